@@ -39,7 +39,7 @@ test: $(VENV)/.ready-to-test
 	@echo "== ruff" && $(BIN)/ruff check
 	@echo "== mypy" && $(BIN)/mypy
 	@echo "== import contracts" && $(BIN)/lint-imports
-	@echo "== pytest" && $(BIN)/pytest -n 2 tests --ignore tests/installed --ignore tests/browser
+	@echo "== pytest" && $(BIN)/pytest -n 2 -m "not slow" tests --ignore tests/installed --ignore tests/browser
 
 test-all: test test-rest
 
@@ -47,6 +47,7 @@ test-rest: $(VENV)/.ready-to-test-all
 	@for extra in $(EXTRAS); do echo "== mypy $$extra" && $(BIN)/mypy $$extra/harvey_* || exit 1; done
 	@echo "== pytest of the extras, of an installation and in a browser" \
 		&& $(BIN)/pytest -n 2 $(wildcard extras/*/tests) tests/installed tests/browser
+	@echo "== pytest of what drives for minutes" && $(BIN)/pytest -n 2 -m slow tests
 
 # Minutes to hours; not in CI. Rooms and equivalent mutants: tests/mutation/rooms.toml.
 mutants: $(VENV)/.ready-to-test

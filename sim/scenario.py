@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from sim.body.actuator import ActuatorParameters
-from sim.body.bumper import Bumper
-from sim.body.elevator import Helper
-from sim.body.range_ring import RangeRing
+from sim.body.building import Helper
+from sim.body.senses import Bumper, RangeRing
 from sim.differences.inexact import TrueInexact
 from sim.differences.table import NO_DIFFERENCES, TrueCamera, TruthTable, read_truth
+from sim.differences.things import MovedThing
 from sim.faults.fault import Fault
 from sim.faults.registry import read_fault
-from sim.moved_things import MovedThing
 from sim.render.light.lighting import Lighting
 from sim.render.optics import check_lens
 from sim.render.rasterizer import sample_offsets

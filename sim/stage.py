@@ -11,16 +11,22 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.body.building import Building
-from sim.body.elevator import Elevators
+from sim.body.building import Building, Elevators
 from sim.body.simulated_body import SimulatedBody
-from sim.differences.changing_faces import ChangingFaces, State
+from sim.differences.changes import ChangingFaces, State
 from sim.differences.table import AS_TOLD
 from sim.render.light.lamps import Room
 from sim.render.light.lights import Lights
 from sim.scenario import Scenario
-from sim.scenario_changes import find_changed_locales, find_changes, load_true_world
-from sim.scenario_checks import check_names, check_room, find_named_locales, move_scenario_things
+from sim.scenario_changes import (
+    check_names,
+    check_room,
+    find_changed_locales,
+    find_changes,
+    find_named_locales,
+    load_true_world,
+    move_scenario_things,
+)
 from sim.truth import Score, Truth, score
 from world_models.building.geometry.outlines import inside_polygon
 from world_models.building.locales import Link

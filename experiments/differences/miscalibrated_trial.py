@@ -12,7 +12,7 @@ import numpy as np
 from blackboard.journal import Decision
 from experiments.generated.missions import CameraCase, write_camera_mission
 from harvey.campaign.campaign import Task, run_task
-from sim.faults.camera_faults import CameraKnocked
+from sim.faults.kinds import CameraKnocked
 from sim.scenario import Scenario, load_scenario
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, subtract_cameras
 from world_models.entries.body import MotionReport

@@ -14,8 +14,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from sim.body.collision import Obstacles
-from sim.body.free_floor import find_free_floor, find_shortest_way
+from sim.body.collision import Obstacles, find_free_floor, find_shortest_way
 from sim.differences.table import NO_DIFFERENCES
 from sim.scenario import Scenario
 from sim.stage import Stage, build_stage

@@ -1,6 +1,6 @@
 """Clutter: solid things on or beside a way that the model lacks, at random, with a way left or with none left.
 
-Whether there is a way is decided by a planner that knows everything solid (:mod:`sim.body.free_floor`). With a way left
+Whether there is a way is decided by a planner that knows everything solid (:mod:`sim.body.collision`). With a way left
 the robot can pass at ``WAY_MARGIN_M`` from everything; with none left it cannot even by touching.
 """
 
@@ -15,10 +15,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from sim.body.collision import ROBOT_RADIUS_M, Obstacles
-from sim.body.free_floor import find_free_floor, has_way, take_from_floor
-from sim.differences.shapes import SHAPES, build_thing, footprint
+from sim.body.collision import ROBOT_RADIUS_M, Obstacles, find_free_floor, has_way, take_from_floor
 from sim.differences.table import ExtraThing
+from sim.differences.things import SHAPES, build_thing, footprint
 from sim.stage import Stage
 from world_models.building.locales import Doorway
 from world_models.commands import parse_command

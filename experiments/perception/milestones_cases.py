@@ -20,8 +20,7 @@ from knowledge_sources.plan.milestone_selector import choose_heading, predict_mi
 from knowledge_sources.settings import DEFAULT
 from sim.body.building import Building
 from sim.differences.inexact import TrueInexact
-from sim.render.occluder import Occluder
-from sim.render.sensor import SensorParameters, compress_jpeg, expose
+from sim.render.sensor import Occluder, SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
 from world_models.building.geometry.outlines import inside_polygon

@@ -16,8 +16,7 @@ from tqdm import tqdm
 
 from experiments.generated.scenes import generate_house
 from experiments.report import Report
-from sim.render.mesh import build_mesh
-from sim.render.projection import Pinhole, project_mesh
+from sim.render.mesh import Pinhole, build_mesh, project_mesh
 from sim.render.rasterizer import find_visible_patches, sample_offsets
 from world_models.building.geometry.outlines import inside_polygon
 from world_models.building.world import World

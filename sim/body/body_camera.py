@@ -8,13 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.body.actuator import ContinuousMotion
 from sim.body.building import Building
-from sim.body.continuous_motion import ContinuousMotion
 from sim.render.light.auto_exposure import AutoExposure, vignette
 from sim.render.light.lighting import Lighting
-from sim.render.occluder import Occluder
 from sim.render.optics import Optics
-from sim.render.sensor import SensorParameters, compress_jpeg, expose, skip_noise_draws
+from sim.render.sensor import Occluder, SensorParameters, compress_jpeg, expose, skip_noise_draws
 from sim.truth import Truth
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import Frame

@@ -8,17 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.body.actuator import STEP_M, ActuatorParameters, Slip, Wheels, arc_displacement, arc_steps
+from sim.body.actuator import STEP_M, ActuatorParameters, ContinuousMotion, Slip, Wheels, arc_displacement, arc_steps
 from sim.body.body_camera import BodyCamera
 from sim.body.building import Building
-from sim.body.bumper import Bumper
-from sim.body.continuous_motion import ContinuousMotion
-from sim.body.range_ring import RangeRing
-from sim.faults.fault import DeviceFault, Fault
-from sim.faults.schedule import FaultSchedule
+from sim.body.senses import Bumper, RangeRing
+from sim.faults.fault import DeviceFault, Fault, FaultSchedule
 from sim.render.light.lighting import Lighting
-from sim.render.occluder import Occluder
-from sim.render.sensor import SensorParameters
+from sim.render.sensor import Occluder, SensorParameters
 from sim.truth import Truth
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Odometry, Ride, RideReport

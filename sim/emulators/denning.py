@@ -10,9 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from sim.body.bumper import Bumper
 from sim.body.collision import ROBOT_RADIUS_M
-from sim.body.range_ring import RangeRing
+from sim.body.senses import Bumper, RangeRing
 from sim.emulators.emulator import EmulatorKind, Ground
 from world_models.entries.body import MotionReport, MotorCommand
 from world_models.entries.touch import Contact, Ranges

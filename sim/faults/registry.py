@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from sim.faults.base_faults import LinkLost, Nonsense, Stall
-from sim.faults.camera_faults import CameraKnocked, CameraUnplugged, DroppedFrames, LateFrames
-from sim.faults.displacement import Bump, Kidnap
 from sim.faults.fault import Fault
-from sim.faults.lights_off import LightsOff
-from sim.faults.occlusion import Occlusion
+from sim.faults.kinds import (
+    Bump,
+    CameraKnocked,
+    CameraUnplugged,
+    DroppedFrames,
+    Kidnap,
+    LateFrames,
+    LightsOff,
+    LinkLost,
+    Nonsense,
+    Occlusion,
+    Stall,
+)
 from world_models.files.toml.settings import read_settings, suggest_keys
 from world_models.files.toml.source import Node, WorldError
 from world_models.plugins import PluginError, list_plugins, load_plugin_classes

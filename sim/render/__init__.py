@@ -1,7 +1,7 @@
 """The simulated camera: renderer, lens and sensor. It shares no code with the robot's own camera model.
 
-In reading order: ``mesh`` (the building as flat patches), ``projection`` (the patches on the image plane),
-``rasterizer`` (which patch is seen at each sample), ``pieces`` (the samples sorted by patch), ``noise_table`` and
-``textures`` (the colour of a patch), ``renderer`` (all of these: a pinhole picture), ``optics`` (the lens),
-``occluder`` (what hides a part of the view), ``sensor`` (blur, noise, JPEG).
+In reading order: ``mesh`` (the building as flat patches, and these on the image plane), ``rasterizer`` (which patch is
+seen at each sample), ``pieces`` (the samples sorted by patch), ``noise_table`` and ``textures`` (its colour),
+``renderer`` (all of these: a pinhole picture), ``optics`` (the lens), ``sensor`` (what hides a part of the view; blur,
+noise, JPEG).
 """

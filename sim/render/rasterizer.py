@@ -17,8 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sim.render.mesh import Mesh
-from sim.render.projection import Pinhole, View
+from sim.render.mesh import Mesh, Pinhole, View
 
 NEAR_M = 0.02
 """Depth of the near clipping plane [m]."""

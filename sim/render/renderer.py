@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.render.mesh import FaceLike, Mesh, build_mesh, join_meshes
+from sim.render.mesh import FaceLike, Mesh, Pinhole, View, build_mesh, join_meshes, project_mesh
 from sim.render.noise_table import build_noise_table
 from sim.render.pieces import split_pieces
-from sim.render.projection import Pinhole, View, project_mesh
 from sim.render.rasterizer import find_visible_patches, sample_offsets
 from sim.render.textures import shade
 from world_models.camera import Camera

@@ -13,6 +13,48 @@ from numpy.typing import NDArray
 
 from world_models.units import Bounds, check_bounds
 
+MIN_SHADE, MAX_SHADE = 0.05, 0.6
+"""Range of its brightness, 0..1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Occluder:
+    """A rectangle of one brightness in the picture.
+
+    Attributes:
+        left, top, width, height: relative to the picture's width and height, 0..1.
+        shade: its brightness, 0..1.
+        until_s: simulated time at which it is gone [s].
+    """
+
+    left: float
+    top: float
+    width: float
+    height: float
+    shade: float
+    until_s: float
+
+    @staticmethod
+    def draw(part: float, until_s: float, rng: np.random.Generator) -> Occluder:
+        """A random rectangle with ``part`` of the picture's area. Always takes four numbers from ``rng``."""
+        shape, left, top, shade = rng.random(4)
+        width = part ** (0.25 + 0.5 * float(shape))
+        height = part / width
+        return Occluder(
+            float(left) * (1.0 - width), float(top) * (1.0 - height), width, height,
+            MIN_SHADE + (MAX_SHADE - MIN_SHADE) * float(shade), until_s,
+        )
+
+    def cover(self, radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+        """A copy of a radiance (h, w, 3), 0..1, with the occluder in it."""
+        rows, columns = radiance.shape[:2]
+        top, bottom = round(self.top * rows), round((self.top + self.height) * rows)
+        left, right = round(self.left * columns), round((self.left + self.width) * columns)
+        seen = radiance.copy()
+        seen[top:bottom, left:right] = self.shade
+        return seen
+
+
 MEAN, INVERSE_SIGMA = np.float32(510.0), np.float32(1.0 / np.sqrt((256.0**2 - 1.0) / 3.0))
 """Mean and reciprocal standard deviation of the sum of four random bytes."""
 MIN_LEVEL, HALF, MAX_LEVEL = np.float32(0.0), np.float32(0.5), np.float32(255.0)

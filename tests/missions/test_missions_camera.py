@@ -11,7 +11,7 @@ import pytest
 
 from blackboard.journal import Decision
 from harvey.simulation.run import run_mission
-from sim.faults.camera_faults import CameraKnocked
+from sim.faults.kinds import CameraKnocked
 from sim.scenario import load_scenario, with_settings
 from sim.stage import build_stage
 from world_models.camera import CAMERA_UNKNOWNS, YAW, subtract_cameras

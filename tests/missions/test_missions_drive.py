@@ -24,9 +24,8 @@ from sim.emulators.camera_server import CameraServer
 from sim.emulators.denning import ConstantSpeedMotion, DenningEmulator
 from sim.emulators.emulator import SimulatedGround
 from sim.emulators.line import FaultyLine, PseudoTerminal
-from sim.faults.base_faults import LinkLost
-from sim.faults.camera_faults import CameraUnplugged
 from sim.faults.fault import Fault
+from sim.faults.kinds import CameraUnplugged, LinkLost
 from sim.scenario import Scenario, load_scenario
 from sim.stage import build_stage
 from world_models.files.toml.camera_file import camera_text

@@ -10,9 +10,8 @@ import pytest
 from blackboard.journal import Decision
 from harvey.runner.result import MissionResult
 from harvey.simulation.run import run_mission
-from sim.faults.base_faults import LinkLost, Stall
-from sim.faults.camera_faults import CameraUnplugged
 from sim.faults.fault import DeviceFault
+from sim.faults.kinds import CameraUnplugged, LinkLost, Stall
 from sim.faults.registry import BUILT_IN
 from sim.stage import Stage
 from world_models.entries.body import BodyFault, MotionReport, MotorCommand, Recovery

@@ -23,7 +23,7 @@ from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources
 from knowledge_sources.settings import Settings
 from sim.body.building import Building as TrueBuilding
 from sim.body.simulated_body import SimulatedBody
-from sim.differences.change import Change as Difference
+from sim.differences.changes import Change as Difference
 from sim.differences.table import Lasting, TrueCamera
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage

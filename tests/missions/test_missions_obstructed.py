@@ -7,7 +7,7 @@ import numpy as np
 from blackboard.journal import Decision
 from experiments.generated.short_missions import HALLWAY, fault
 from harvey.simulation.run import run_mission
-from sim.faults.occlusion import Occlusion
+from sim.faults.kinds import Occlusion
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from world_models.entries.obstruction import Obstruction

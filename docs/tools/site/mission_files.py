@@ -9,10 +9,10 @@ from typing import Any
 
 from docs.tools.site.markdown import describe_fields, summary, table
 from harvey.hardware.mission import FORMAT as ON_HARDWARE
-from sim.body.elevator import Helper
+from sim.body.building import Helper
 from sim.differences.table import ExtraThing, TrueDoor, TrueThing, TrueWall
+from sim.differences.things import MovedThing
 from sim.faults.registry import BUILT_IN
-from sim.moved_things import MovedThing
 from sim.scenario import FORMAT as SIMULATED
 from world_models.files.toml.mission import TABLES, Telling
 from world_models.files.toml.settings import spellings

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from sim.render.light.light_map import LightMap
 from sim.render.light.lit_shading import NO_MIRROR, shade_lit
 from sim.render.light.mirror import before_plane, mirror_camera
+from sim.render.mesh import Pinhole, View, project_mesh
 from sim.render.pieces import Pieces, split_pieces
-from sim.render.projection import Pinhole, View, project_mesh
 from sim.render.rasterizer import find_visible_patches, sample_offsets
 from sim.render.renderer import HAZE_PER_M, Renderer
 from sim.render.textures import background, shade_pieces

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.render.projection import Pinhole
+from sim.render.mesh import Pinhole
 
 Floats = NDArray[np.float64]
 UPSIDE_DOWN = np.diag([1.0, -1.0, 1.0])

@@ -22,8 +22,7 @@ from sim.render.light.irradiance import SKY_COLOUR
 from sim.render.light.lamps import Lamp
 from sim.render.light.lighting import GAMMA, Lighting
 from sim.render.light.lit_renderer import LitRenderer
-from sim.render.mesh import Mesh
-from sim.render.projection import Pinhole
+from sim.render.mesh import Mesh, Pinhole
 from sim.render.renderer import HAZE_PER_M
 from world_models.camera import Camera
 from world_models.frames import Pose

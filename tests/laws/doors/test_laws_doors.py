@@ -24,7 +24,7 @@ from knowledge_sources.methods.doors.leaf import (
 )
 from knowledge_sources.methods.features.picture import read_picture
 from sim.body.building import Building
-from sim.differences.leaf import build_leaf
+from sim.differences.changes import build_leaf
 from sim.differences.table import TrueDoor
 from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings

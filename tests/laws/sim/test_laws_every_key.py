@@ -13,16 +13,12 @@ from typing import Any
 import pytest
 
 from experiments.generated.scenes import box_room
-from sim.body.building import Building
-from sim.body.elevator import Helper
+from sim.body.building import Building, Helper
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.displacement import Bump, Kidnap
-from sim.faults.fault import DeviceFault, Fault
-from sim.faults.lights_off import LightsOff
-from sim.faults.occlusion import Occlusion
+from sim.differences.things import MovedThing
+from sim.faults.fault import DeviceFault, Fault, FaultSchedule
+from sim.faults.kinds import Bump, Kidnap, LightsOff, Occlusion
 from sim.faults.registry import BUILT_IN
-from sim.faults.schedule import FaultSchedule
-from sim.moved_things import MovedThing
 from sim.scenario import FORMAT
 from world_models.camera import Camera, CameraMount
 from world_models.entries.location import Place
@@ -175,7 +171,7 @@ def test_the_dark_and_an_occluder_last_as_long_as_they_say() -> None:
 @pytest.mark.parametrize("what", ["picture", "wheels", "put down", "ranges"])
 def test_noise_depends_on_its_seed_and_on_nothing_else(what: str) -> None:
     """Eight seeds give eight noises of each kind; the same seed gives the same."""
-    from sim.body.range_ring import RangeRing
+    from sim.body.senses import RangeRing
     from world_models.entries.body import MotorCommand
 
     def draw(seed: int) -> object:

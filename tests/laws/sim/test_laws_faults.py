@@ -11,8 +11,8 @@ from experiments.generated.scenes import box_room
 from sim.body.building import Building
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.displacement import Kidnap
 from sim.faults.fault import DeviceFault, Fault
+from sim.faults.kinds import Kidnap
 from sim.faults.registry import BUILT_IN, find_fault_class
 from sim.scenario import ScenarioError, parse_scenario
 from world_models.camera import Camera, CameraMount

@@ -14,7 +14,7 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.methods.floor.seen_floor import SeenFloor
 from sim.body.collision import Obstacles
-from sim.body.range_ring import RangeRing
+from sim.body.senses import RangeRing
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.floor import FreeFloor

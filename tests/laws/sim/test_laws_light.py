@@ -26,8 +26,7 @@ from sim.render.light.mirror import mirror_camera
 from sim.render.light.panes import find_panes
 from sim.render.light.rays import build_ray_tree, first_hits
 from sim.render.light.sun_patches import find_sun_patches
-from sim.render.mesh import build_mesh
-from sim.render.projection import Pinhole
+from sim.render.mesh import Pinhole, build_mesh
 from sim.render.renderer import Renderer
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2

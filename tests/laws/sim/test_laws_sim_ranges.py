@@ -17,7 +17,7 @@ from harvey.runner.ports import BodyPort
 from sim.body.building import Building
 from sim.body.collision import ROBOT_RADIUS_M
 from sim.body.faulty_body import FaultyBody
-from sim.body.range_ring import RangeRing, find_echo
+from sim.body.senses import RangeRing, find_echo
 from sim.body.simulated_body import SimulatedBody
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import Course, Frame, Look, MotorCommand

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from experiments.generated.scenes import Patch, PatchFace, box_faces, box_room
-from sim.render.mesh import Mesh, build_mesh
+from sim.render.mesh import Mesh, Pinhole, build_mesh, project_mesh
 from sim.render.pieces import split_pieces
-from sim.render.projection import Pinhole, project_mesh
 from sim.render.rasterizer import find_visible_patches, sample_offsets
 from sim.render.renderer import Renderer
 from world_models.camera import Camera, CameraMount

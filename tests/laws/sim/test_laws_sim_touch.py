@@ -19,8 +19,8 @@ from experiments.generated.scenes import box_room
 from harvey.runner.ports import BodyPort
 from sim.body.actuator import ActuatorParameters
 from sim.body.building import Building
-from sim.body.bumper import Bumper
 from sim.body.faulty_body import FaultyBody
+from sim.body.senses import Bumper
 from sim.body.simulated_body import SimulatedBody
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.differences.change import Change, find_active
-from sim.differences.shapes import SHAPES
+from sim.differences.changes import Change, find_active
 from sim.differences.table import Lasting
+from sim.differences.things import SHAPES
 from sim.scenario import load_scenario, parse_scenario
 from sim.stage import Stage, build_stage
 from world_models.camera import Camera, CameraMount

@@ -55,6 +55,7 @@ def test_a_flaw_fails_its_claim(
     assert any(told in claim for claim in found.failing)
 
 
+@pytest.mark.slow
 def test_the_small_version_drives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     found = run_here(monkeypatch, tmp_path, doors, run_door_mission, quick=True)
     assert found.holds, found.text()

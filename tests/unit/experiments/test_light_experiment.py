@@ -56,6 +56,7 @@ def test_a_flaw_under_light_fails_its_claim(
     assert any(told in claim for claim in found.failing)
 
 
+@pytest.mark.slow
 def test_the_small_version_drives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     found = report(monkeypatch, tmp_path, run_light_mission, quick=True)
     assert found.holds, found.text()

@@ -58,6 +58,7 @@ def test_a_flaw_fails_its_claim(
     assert found.rows[0][3] == 30
 
 
+@pytest.mark.slow
 def test_the_small_version_drives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     found = run_here(monkeypatch, tmp_path, obstacles, obstacles.run_trial, quick=True)
     assert found.rows[0] == ("missions", None, None, 2, 1, 1, 1)

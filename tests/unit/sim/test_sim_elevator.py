@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harvey.runner.ports import BodyPort
-from sim.body.elevator import Helper
+from sim.body.building import Helper
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
 from sim.scenario import ScenarioError, parse_scenario, scenario_from_tables

@@ -10,11 +10,8 @@ import pytest
 from experiments.generated.scenes import box_room
 from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.base_faults import Stall
-from sim.faults.displacement import Bump, Kidnap
-from sim.faults.fault import Fault
-from sim.faults.lights_off import LightsOff
-from sim.faults.schedule import FaultSchedule
+from sim.faults.fault import Fault, FaultSchedule
+from sim.faults.kinds import Bump, Kidnap, LightsOff, Stall
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotorCommand
 from world_models.frames import Pose2

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from experiments.generated.scenes import box_room
 from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
+from sim.differences.things import MovedThing, move_things
 from sim.faults.fault import Fault
-from sim.faults.occlusion import Occlusion
-from sim.moved_things import MovedThing, move_things
-from sim.render.occluder import Occluder
+from sim.faults.kinds import Occlusion
+from sim.render.sensor import Occluder
 from sim.scenario import SCENARIOS, ScenarioError, load_scenario, parse_scenario
 from sim.stage import build_stage
 from world_models.camera import Camera, CameraMount

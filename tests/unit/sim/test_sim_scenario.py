@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.faults.displacement import Kidnap
-from sim.faults.lights_off import LightsOff
+from sim.faults.kinds import Kidnap, LightsOff
 from sim.render.sensor import SensorParameters, expose
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
 from sim.scenario_names import list_scenarios

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.displacement import Bump, Kidnap
-from sim.render.projection import Pinhole, project_mesh
+from sim.faults.kinds import Bump, Kidnap
+from sim.render.mesh import Pinhole, project_mesh
 from sim.render.rasterizer import find_visible_patches
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
 from sim.scenario_names import list_scenarios

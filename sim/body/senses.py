@@ -1,8 +1,4 @@
-"""A ring of sonars round the simulated robot: each hears the nearest solid thing in its cone, if the sound comes back.
-
-A smooth wall throws sound away like a mirror: at a large angle of incidence an echo may fail. Echoes by way of a second
-wall are left out.
-"""
+"""What the simulated robot feels and hears: a ring of bumper switches, a ring of sonars."""
 
 from __future__ import annotations
 
@@ -13,9 +9,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.body.collision import ROBOT_RADIUS_M
-from world_models.entries.touch import Ranges
+from world_models.entries.touch import Contact, Ranges
 from world_models.frames import Pose2
 from world_models.units import Bounds, check_bounds
+
+
+@dataclass(frozen=True, slots=True)
+class Bumper:
+    """A ring of switches round the robot; the first sector has its middle straight ahead.
+
+    Attributes:
+        sectors: how many; 0 for a robot without a bumper.
+    """
+
+    sectors: int = 12
+
+    def __post_init__(self) -> None:
+        check_bounds(self, {"sectors": Bounds(0, 360)})
+
+    def feel(self, direction_rad: float, when_s: float) -> Contact:
+        """What is felt of a touch in this direction from the robot's heading; the touch may be anywhere in its sector.
+        """
+        if not self.sectors:
+            return Contact.of_stall(when_s)
+        width = math.tau / self.sectors
+        middle = math.remainder(round(direction_rad / width) * width, math.tau)
+        return Contact("bumper", middle, width / math.sqrt(12.0), when_s)
+
 
 Floats = NDArray[np.float64]
 

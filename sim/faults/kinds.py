@@ -1,4 +1,4 @@
-"""The robot is moved by somebody or something else: bumped aside, or carried off (kidnapped)."""
+"""The faults that come with the simulator: lights off, a view hidden, the robot moved, base or camera failing."""
 
 from __future__ import annotations
 
@@ -9,10 +9,48 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.faults.fault import Fault, FaultTarget
+from sim.faults.fault import DURATION, DeviceFault, Fault, FaultTarget
+from sim.render.sensor import Occluder
 from world_models.entries.location import Place
 from world_models.frames import Pose2
 from world_models.units import Bounds
+
+
+@dataclass(frozen=True, slots=True)
+class LightsOff(Fault):
+    """The building's lights go off.
+
+    Attributes:
+        duration_s: for how long [s].
+    """
+
+    kind: ClassVar[str] = "lights_off"
+    bounds: ClassVar[Mapping[str, Bounds]] = {"duration_s": DURATION}
+
+    duration_s: float = 10.0
+
+    def apply(self, body: FaultTarget) -> None:
+        body.turn_lights_off(self.duration_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Occlusion(Fault):
+    """A rectangle of the picture is hidden. Where it is, and how dark, is drawn at random.
+
+    Attributes:
+        duration_s: for how long [s].
+        part: of the picture's area, 0..1.
+    """
+
+    kind: ClassVar[str] = "occluded"
+    bounds: ClassVar[Mapping[str, Bounds]] = {"duration_s": DURATION, "part": Bounds(0.0, 0.99, above=True)}
+
+    duration_s: float = 10.0
+    part: float = 0.2
+
+    def apply(self, body: FaultTarget) -> None:
+        body.add_occluder(Occluder.draw(self.part, body.truth.time_s + self.duration_s, body.fault_rng))
+
 
 MAX_DISPLACEMENT_M = 5.0
 """Largest displacement along each axis; further only to a place that is named."""
@@ -134,3 +172,94 @@ class Kidnap(Displacement):
             Displacement.apply(self, body)
         else:
             body.put_robot(body.world_from_place(self.destination))
+
+
+WATCHDOG_S = 0.5
+"""A base that receives nothing any more stops by itself after this time [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkLost(DeviceFault):
+    """Nothing comes through the line, in either direction. The base's watchdog stops it."""
+
+    kind: ClassVar[str] = "link_lost"
+    part: ClassVar[str] = "base"
+    what: ClassVar[str] = "link lost"
+    detail: ClassVar[str] = "no answer on the line"
+    stops_motion_after_s: ClassVar[float | None] = WATCHDOG_S
+    odometry_arrives: ClassVar[bool] = False
+
+
+@dataclass(frozen=True, slots=True)
+class Nonsense(DeviceFault):
+    """What arrives from the base is noise. The base's watchdog stops it."""
+
+    kind: ClassVar[str] = "nonsense"
+    part: ClassVar[str] = "base"
+    what: ClassVar[str] = "base answers nonsense"
+    detail: ClassVar[str] = "what arrives is not the protocol"
+    stops_motion_after_s: ClassVar[float | None] = WATCHDOG_S
+    odometry_arrives: ClassVar[bool] = False
+
+
+@dataclass(frozen=True, slots=True)
+class Stall(DeviceFault):
+    """The wheels are held. The line works, so the base reports how far it came."""
+
+    kind: ClassVar[str] = "stall"
+    part: ClassVar[str] = "base"
+    what: ClassVar[str] = "stalled"
+    detail: ClassVar[str] = "the wheels do not turn as they were told to"
+    stops_motion_after_s: ClassVar[float | None] = 0.0
+
+
+KNOCK = Bounds(-0.5, 0.5)
+
+
+@dataclass(frozen=True, slots=True)
+class CameraUnplugged(DeviceFault):
+    """The camera is gone."""
+
+    kind: ClassVar[str] = "camera_unplugged"
+    part: ClassVar[str] = "camera"
+    what: ClassVar[str] = "camera unplugged"
+    detail: ClassVar[str] = "no such device"
+
+
+@dataclass(frozen=True, slots=True)
+class LateFrames(DeviceFault):
+    """Only pictures from before the robot stood still arrive."""
+
+    kind: ClassVar[str] = "late_frames"
+    part: ClassVar[str] = "camera"
+    what: ClassVar[str] = "frame late"
+    detail: ClassVar[str] = "the newest picture was taken before the robot stood"
+
+
+@dataclass(frozen=True, slots=True)
+class DroppedFrames(DeviceFault):
+    """Pictures arrive incomplete."""
+
+    kind: ClassVar[str] = "dropped_frames"
+    part: ClassVar[str] = "camera"
+    what: ClassVar[str] = "frame dropped"
+    detail: ClassVar[str] = "no whole picture arrived"
+
+
+@dataclass(frozen=True, slots=True)
+class CameraKnocked(Fault):
+    """Something knocks against the camera: its mounting is turned, and stays so.
+
+    Attributes:
+        tilt_rad: downward; roll_rad: clockwise as the camera looks; yaw_rad: to the left; each by so much.
+    """
+
+    kind: ClassVar[str] = "camera_knocked"
+    bounds: ClassVar[Mapping[str, Bounds]] = {"tilt_rad": KNOCK, "roll_rad": KNOCK, "yaw_rad": KNOCK}
+
+    tilt_rad: float = 0.0
+    roll_rad: float = 0.0
+    yaw_rad: float = 0.0
+
+    def apply(self, body: FaultTarget) -> None:
+        body.turn_camera(self.tilt_rad, self.roll_rad, self.yaw_rad)
