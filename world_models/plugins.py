@@ -6,6 +6,7 @@
 ``harvey.emulators``          a ``sim.emulators.emulator.EmulatorKind``
 ``harvey.faults``             a class under ``sim.faults.fault.Fault``
 ``harvey.loggers``            a class under ``logs.recording.logger.Logger``
+``harvey.pages``              a ``harvey.runner.page_kind.PageKind``, named ``live``
 ``harvey.commands``           a ``harvey.commands.command.Command``; of a verb: ``world.import``
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
 ``harvey.exporters``          a ``harvey_buildings.exporters.export_file.Exporter``
@@ -25,8 +26,12 @@ SOURCES_GROUP = "harvey.knowledge_sources"
 """The group of knowledge sources: named in ``run.json`` and put round the board, so it is said once, here."""
 
 COMMANDS_GROUP = "harvey.commands"
+PAGES_GROUP = "harvey.pages"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
-    COMMANDS_GROUP: {"world.export": "harvey-buildings", "world.import": "harvey-buildings"},
+    COMMANDS_GROUP: {
+        "serve": "harvey-serve", "world.export": "harvey-buildings", "world.import": "harvey-buildings",
+    },
+    PAGES_GROUP: {"live": "harvey-serve"},
     "harvey.bases": {"p2os": "harvey-bases", "create2": "harvey-bases"},
     "harvey.emulators": {"p2os": "harvey-bases", "create2": "harvey-bases"},
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import statistics
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from typing import Any
 
 from experiments.report import Cell, Report
 from experiments.scale import watcher_clients
-from harvey.runner.teller import LiveTeller
+from harvey.runner.page_kind import find_page
 from harvey.simulation.run import build_head, run_mission
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
@@ -26,7 +27,6 @@ WATCHERS, PAIRS, QUICK_PAIRS = 50, 5, 1
 REQUESTS = 10_000
 MOST_COST = 1.10
 COLUMNS = ("what", "required", "ours")
-NEEDS = "pip install 'harvey[serve]'"
 
 
 @dataclass
@@ -104,31 +104,30 @@ class _Bench:
         return self._drive_served(clients, out)
 
     def _drive_served(self, clients: Sequence[tuple[str, int]], out: Path) -> _Drive:
-        from harvey.serve.app import build_app
-        from harvey.serve.gate import Gate
-        from harvey.serve.live_state import LiveState
-        from harvey.serve.page import LivePage
-        from harvey.serve.server import bind, serving
-
         head = build_head(self._stage, self._seed)
-        world, gate = head.load_world(), Gate()
-        page = LivePage(LiveState(world, head.model(world).lens), gate, LiveTeller(), world, self._stage.part)
-        app = build_app(page.live, gate, world, title="a run", token="a-token", ask=page.ask)
-        listening = bind("127.0.0.1", 0)
-        port = listening.getsockname()[1]
-        with serving(app, listening), _clients(clients, port, self._seed) as processes:
+        port = find_free_port()
+        with (find_page("watchers").serve(port, head.load_world(), head.model(head.load_world()).lens, "a run",
+                                          token="a-token", part=self._stage.part) as page,
+              _clients(clients, port, self._seed) as processes):
             began, spent = time.perf_counter(), time.process_time()
             run_mission(self._stage, self._seed, out=out, sinks=(page.live,), head=head, tell=page.teller.tell,
                         around=lambda body, _replayed: page.guard(body))
-            wall_s, processor_s, state = time.perf_counter() - began, time.process_time() - spent, gate.state
+            wall_s, processor_s, state = time.perf_counter() - began, time.process_time() - spent, page.gate.state
             ends = [what == "attack" for what, _ in clients]
             told = [json.loads(one.communicate()[0]) for one, by_itself in zip(processes, ends, strict=True)
                     if by_itself]
             page.live.end("over")
             told += [json.loads(one.communicate()[0]) for one, by_itself in zip(processes, ends, strict=True)
                      if not by_itself]
-            state = gate.state if state == "running" else state
+            state = page.gate.state if state == "running" else state
         return _Drive(wall_s, processor_s, _journal(out), state, [one for client in told for one in client])
+
+
+def find_free_port() -> int:
+    """A port of this machine that nobody uses now."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        port: int = listening.getsockname()[1]
+        return port
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from world_models.plugins import COMMANDS_GROUP, list_absent, list_plugins, load
 MODULES: Mapping[str, str] = {
     "list": "listing",
     **{name: name for name in (
-        "run", "serve", "view", "story", "why", "replay", "diff", "report", "export", "resume", "repair", "world",
+        "run", "view", "story", "why", "replay", "diff", "report", "export", "resume", "repair", "world",
         "settings", "experiment", "campaign", "drive", "calibrate", "emulate", "completion")},
 }
 """The module of each command."""

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harvey.commands.command import Command
-from harvey.commands.serve import PORT, check_installed
 from harvey.errors import BadInput
 from logs.run_directory import RUNS, check_vacant
 
@@ -21,10 +20,13 @@ if TYPE_CHECKING:
     from harvey.agent_settings import Pairs
     from harvey.hardware.mission import HardwareMission
     from harvey.hardware.preflight import Check, Preflight
+    from harvey.runner.page_kind import PageKind
     from harvey.runner.ports import Body
     from harvey.runner.result import MissionResult
     from world_models.robot import RobotModel
 
+PORT = 8750
+"""Of the page."""
 OPTIONS: Mapping[str, tuple[str, str, str]] = {
     "world": ("world", "FILE", "the building: a world file, or the name of one that comes with Harvey"),
     "goal": ("goal", "GOAL", 'from where to where: "Go from the hall to the kitchen", middle to middle; or in feet '
@@ -47,7 +49,8 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/MISSION-drive)")
     parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
     parser.add_argument("--serve", metavar="PORT", type=int, nargs="?", const=PORT,
-                        help=f"show it on a page of 127.0.0.1, which can also send, pause and stop it ({PORT})")
+                        help=f"show it on a page of 127.0.0.1, which can also send, pause and stop it ({PORT}); needs"
+                             " harvey-serve")
 
 
 def _run(args: Namespace) -> int:
@@ -56,10 +59,10 @@ def _run(args: Namespace) -> int:
     from harvey.campaign.campaign import make_room, parse_pairs
     from harvey.hardware.mission import FORMAT
     from harvey.hardware.preflight import Preflight
+    from harvey.runner.page_kind import find_page
     from harvey.what_if import WhatIf
 
-    if args.serve is not None:
-        check_installed()
+    page = None if args.serve is None else find_page("--serve")
     settings, numbers = split_settings(dict(parse_pairs(args.settings)), FORMAT.keys())
     mission = _mission(args, settings)
     out = check_vacant(Path(args.out) if args.out else RUNS / f"{mission.name}-drive")
@@ -74,7 +77,7 @@ def _run(args: Namespace) -> int:
         if args.dry_run:
             print("\neverything is ready; nothing was moved")
             return 0
-        return _drive(mission, dry, clock, make_room(out, mission.name, 0), args, numbers)
+        return _drive(mission, dry, clock, make_room(out, mission.name, 0), args, numbers, page)
 
 
 def run_checks(dry: Preflight) -> bool:
@@ -108,36 +111,34 @@ def _print_check(check: Check) -> None:
 
 
 def _drive(
-    mission: HardwareMission, dry: Preflight, clock: Callable[[], float], out: Path, args: Namespace, numbers: Pairs
+    mission: HardwareMission, dry: Preflight, clock: Callable[[], float], out: Path, args: Namespace, numbers: Pairs,
+    page: PageKind | None,
 ) -> int:
     from harvey.hardware.run import drive
 
     if dry.robot is None or dry.base is None or dry.camera is None:
         raise BadInput("expected a world, a base and a camera, and one of them is lacking")
     start = partial(drive, mission, dry.robot, dry.base, dry.camera, clock, out=out, live=args.live, settings=numbers)
-    if args.serve is None:
+    if page is None:
         tell_how_to_stop()
         result = start(sinks=[follow])
     else:
-        result = _drive_served(start, mission, dry.robot, args.serve)
+        result = _drive_served(start, mission, dry.robot, page, args.serve)
     print(summary(result, out))
     return 0 if result.outcome == "reached" else 1
 
 
-def _drive_served(start: Callable[..., MissionResult], mission: HardwareMission, robot: RobotModel, port: int
-                  ) -> MissionResult:
+def _drive_served(start: Callable[..., MissionResult], mission: HardwareMission, robot: RobotModel, kind: PageKind,
+                  port: int) -> MissionResult:
     """Drive, and show it on a page, which may pause and stop it."""
     from harvey.hardware.body import HardwareBody
-    from harvey.serve.gate import Gate
-    from harvey.serve.page import open_page
-    from harvey.serve.server import bind
     from logs.run_head import load_known_world
 
-    gate, world = Gate(), load_known_world(mission.world)
-    with open_page(bind("127.0.0.1", port), world, robot.lens, mission.name, gate=gate) as page:
+    with kind.serve(port, load_known_world(mission.world), robot.lens, mission.name) as page:
         def guard(body: HardwareBody, tick: Callable[[], None]) -> Body:
-            gate.on_stop = body.stop_for_good
-            return page.guard(body, tick)
+            page.gate.on_stop = body.stop_for_good
+            guarded: Body = page.guard(body, tick)
+            return guarded
 
         tell_how_to_stop()
         result = start(sinks=[follow, page.live], around=guard, tell=page.teller.tell)

@@ -11,14 +11,14 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("uvicorn", reason="the extra 'serve' is not installed")
+pytest.importorskip("harvey_serve", reason="the extra harvey-serve is not installed")
 
 from harvey.campaign.campaign import Task
 from harvey.runner.result import MissionResult
-from harvey.serve.gate import Gate
-from harvey.serve.page import open_page as serve_page
-from harvey.serve.server import bind
 from harvey.simulation.run import build_head, run_mission
+from harvey_serve.gate import Gate
+from harvey_serve.page import open_page as serve_page
+from harvey_serve.server import bind
 
 
 class Served:

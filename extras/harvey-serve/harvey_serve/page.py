@@ -9,12 +9,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from socket import socket
 
+from harvey.runner.page_kind import PageKind
 from harvey.runner.ports import Body
 from harvey.runner.teller import LiveTeller
-from harvey.serve.app import LOCAL_HOSTS, build_app, refuse_goal
-from harvey.serve.gate import Gate, GatedBody, do_nothing
-from harvey.serve.live_state import LiveState
-from harvey.serve.server import serving
+from harvey_serve.app import LOCAL_HOSTS, build_app, refuse_goal
+from harvey_serve.gate import Gate, GatedBody, do_nothing
+from harvey_serve.live_state import LiveState
+from harvey_serve.server import bind, serving
 from world_models.building.world import World
 from world_models.camera import Camera
 from world_models.commands import parse_destination
@@ -57,16 +58,18 @@ class LivePage:
 @contextmanager
 def open_page(
     listening: socket, world: World, camera: Camera, title: str, *, gate: Gate | None = None, part: str = "",
+    token: str = "",
 ) -> Iterator[LivePage]:
     """Serve the page of a run for a while, and print its addresses.
 
     Args:
-        listening: as :func:`harvey.serve.server.bind` gives it.
+        listening: as :func:`harvey_serve.server.bind` gives it.
         gate: of the run; None: the page only shows it.
         part: as of :class:`LivePage`.
+        token: of who may order anything, where there is a gate; "" for a new one.
     """
     page = LivePage(LiveState(world, camera), gate or Gate(), LiveTeller(), world, part)
-    token = "" if gate is None else secrets.token_urlsafe()
+    token = "" if gate is None else token or secrets.token_urlsafe()
     host, port = listening.getsockname()
     app = build_app(page.live, page.gate, world, title=title, token=token, hosts=(*LOCAL_HOSTS, host),
                     ask=refuse_goal if gate is None else page.ask)
@@ -77,3 +80,15 @@ def open_page(
         if host not in LOCAL_HOSTS:
             print(f"whoever reaches {host} may watch; the line is not encrypted", file=sys.stderr, flush=True)
         yield page
+
+
+@contextmanager
+def serve_page(
+    port: int, world: World, camera: Camera, title: str, *, host: str = "127.0.0.1", token: str = "", part: str = "",
+) -> Iterator[LivePage]:
+    """Serve the page of a run that can be paused and stopped; see :class:`harvey.runner.page_kind.PageKind`."""
+    with open_page(bind(host, port), world, camera, title, gate=Gate(), part=part, token=token) as page:
+        yield page
+
+
+KIND = PageKind(serve_page)

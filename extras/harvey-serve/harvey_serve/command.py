@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from argparse import ArgumentParser, Namespace
-from importlib.util import find_spec
 from pathlib import Path
 
 from harvey.campaign.campaign import Task, make_room, parse_pairs, parse_seeds
@@ -32,16 +31,9 @@ def _arguments(parser: ArgumentParser) -> None:
                         help="change a setting, as harvey run does; may be repeated")
 
 
-def check_installed() -> None:
-    """Raises BadInput where what the page needs is not installed."""
-    if any(find_spec(name) is None for name in ("starlette", "uvicorn")):
-        raise BadInput("expected Starlette and uvicorn to be installed: pip install 'harvey[serve]'")
-
-
 def _run(args: Namespace) -> int:
     if not (math.isfinite(args.speed) and args.speed >= 0.0):
         raise BadInput(f"--speed: expected a number that is not below 0, got {args.speed}")
-    check_installed()
     if Path(args.scenario).is_dir():
         return _follow(Path(args.scenario), args)
     seeds = parse_seeds(args.seed)
@@ -55,10 +47,10 @@ def _run(args: Namespace) -> int:
 
 def _serve(task: Task, args: Namespace, wanted: Path) -> int:
     from harvey.campaign.summary import format_result
-    from harvey.serve.gate import Gate
-    from harvey.serve.page import open_page
-    from harvey.serve.server import bind
     from harvey.simulation.run import build_head, run_mission
+    from harvey_serve.gate import Gate
+    from harvey_serve.page import open_page
+    from harvey_serve.server import bind
     from logs.explain.story import first_lines
 
     listening = bind(args.host, args.port)
@@ -78,9 +70,9 @@ def _serve(task: Task, args: Namespace, wanted: Path) -> int:
 
 
 def _follow(path: Path, args: Namespace) -> int:
-    from harvey.serve.follow import Follower, how_it_ended
-    from harvey.serve.page import open_page
-    from harvey.serve.server import bind
+    from harvey_serve.follow import Follower, how_it_ended
+    from harvey_serve.page import open_page
+    from harvey_serve.server import bind
     from logs.run_directory import RunDirectory
     from logs.run_head import RunHead
 
@@ -109,6 +101,5 @@ COMMAND = Command(
     "last decisions with what they rest on. Who has the first address, with the token, can also send the robot\n"
     "elsewhere ('Go to the library'), pause, resume and stop; who has the second can only watch. A stop ends the run\n"
     "as the stop key of a robot does: its files are whole. harvey drive --serve does the same for a robot.\n"
-    "Needs the extra 'serve'.\n"
     "Exit code 0: the goal was reached; 1: it was not, or the run was stopped; 2: the input cannot be used.",
 )

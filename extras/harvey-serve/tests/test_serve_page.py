@@ -18,11 +18,11 @@ from starlette.testclient import TestClient
 from harvey.cli import main
 from harvey.errors import BadInput
 from harvey.runner.teller import LiveTeller
-from harvey.serve.app import MOST_WORDS, build_app
-from harvey.serve.gate import WHY, Gate, GatedBody
-from harvey.serve.live_state import LiveState
-from harvey.serve.page import LivePage
-from harvey.serve.server import bind
+from harvey_serve.app import MOST_WORDS, build_app
+from harvey_serve.gate import WHY, Gate, GatedBody
+from harvey_serve.live_state import LiveState
+from harvey_serve.page import LivePage
+from harvey_serve.server import bind
 from scripted_turns import decisions
 from world_models.camera import Camera
 from world_models.entries.body import STOP_KEY, BodyFault, MotionReport

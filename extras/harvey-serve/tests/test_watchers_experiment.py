@@ -6,17 +6,14 @@ import asyncio
 from pathlib import Path
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-pytest.importorskip("uvicorn", reason="the extra 'serve' is not installed")
-
 from experiments.scale.watcher_clients import attack, make_request
-from harvey.serve.app import build_app
-from harvey.serve.gate import Gate
-from harvey.serve.live_state import LiveState
-from harvey.serve.server import bind, serving
+from harvey_serve.app import build_app
+from harvey_serve.gate import Gate
+from harvey_serve.live_state import LiveState
+from harvey_serve.server import bind, serving
 from world_models.camera import Camera
 from world_models.files.world_files import load_world
 

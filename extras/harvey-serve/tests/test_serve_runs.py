@@ -14,16 +14,14 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("uvicorn", reason="the extra 'serve' is not installed")
-
 from harvey.campaign.campaign import Task
 from harvey.cli import main
-from harvey.serve.app import build_app
-from harvey.serve.follow import Follower
-from harvey.serve.gate import Gate, GatedBody
-from harvey.serve.live_state import LiveState
-from harvey.serve.server import bind, serving
 from harvey.simulation.run import build_head, run_mission
+from harvey_serve.app import build_app
+from harvey_serve.follow import Follower
+from harvey_serve.gate import Gate, GatedBody
+from harvey_serve.live_state import LiveState
+from harvey_serve.server import bind, serving
 from logs.run_directory import RunDirectory
 
 SHORT = (("limits.max_time_s", "6"),)

@@ -10,7 +10,7 @@ from typing import Any
 from blackboard.change import Change, Posted, Retracted, Revised
 from harvey.errors import BadInput
 from harvey.runner.result import UNFINISHED
-from harvey.serve.live_state import LiveState, Shown
+from harvey_serve.live_state import LiveState, Shown
 from logs.records import DecisionRecord, EntryRecord, decision_of, entry_of, kinds_for, refs_of
 from logs.run_directory import RunDirectory
 from world_models import words

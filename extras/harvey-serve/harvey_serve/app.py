@@ -21,10 +21,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from harvey.report.data import draw_blank_plans
 from harvey.report.page import embedded, fill_in
-from harvey.serve.gate import Gate, Order
-from harvey.serve.live_state import LiveState
+from harvey_serve.gate import Gate, Order
+from harvey_serve.live_state import LiveState
 from world_models.building.world import World
 
+PACKAGE = "harvey_serve"
 PERIOD_S = 0.1
 """A watcher is told at most once in this time."""
 LOCAL_HOSTS = ("127.0.0.1", "localhost")
@@ -128,10 +129,10 @@ def build_app(
         return HTMLResponse(page)
 
     async def script(_request: Request) -> Response:
-        return Response(_read("report", "draw.js") + _read("serve", "live.js"), media_type="text/javascript")
+        return Response(_read("harvey.report", "draw.js") + _read(PACKAGE, "live.js"), media_type="text/javascript")
 
     async def style(_request: Request) -> Response:
-        return Response(_read("report", "page.css"), media_type="text/css")
+        return Response(_read("harvey.report", "page.css"), media_type="text/css")
 
     async def events(_request: Request) -> Response:
         return StreamingResponse(boards[-1].messages(), media_type="text/event-stream")
@@ -187,9 +188,9 @@ async def _read_words(request: Request) -> str:
 def _build_page(world: World, title: str) -> str:
     plans = draw_blank_plans(world)
     known: list[dict[str, Any]] = [{key: value for key, value in plan.items() if key != "svg"} for plan in plans]
-    return fill_in(_read("serve", "live.html"), {
+    return fill_in(_read(PACKAGE, "live.html"), {
         "title": escape(title), "plans": "\n".join(plan["svg"] for plan in plans), "data": embedded({"plans": known})})
 
 
 def _read(package: str, name: str) -> str:
-    return (files(f"harvey.{package}") / name).read_text(encoding="utf-8")
+    return (files(package) / name).read_text(encoding="utf-8")
