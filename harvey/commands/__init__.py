@@ -1,6 +1,6 @@
-"""The commands, one a module, in the order in which ``harvey --help`` lists them.
+"""The commands, those that belong together in one module, in the order in which ``harvey --help`` lists them.
 
-Only the one that is asked for is imported, and it imports what it needs when it runs.
+Only the module of the one that is asked for is imported, and it imports what it needs when it runs.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from harvey.errors import BadInput
 from world_models.plugins import COMMANDS_GROUP, list_absent, list_plugins, load_plugins
 
 MODULES: Mapping[str, str] = {
-    "list": "listing",
-    **{name: name for name in (
-        "run", "view", "story", "why", "replay", "diff", "report", "export", "resume", "repair", "world",
-        "settings", "experiment", "campaign", "drive", "calibrate", "emulate", "completion")},
+    "list": "listing", "run": "run", "view": "view", "story": "explain", "why": "explain", "replay": "again",
+    "diff": "explain", "report": "report", "export": "report", "resume": "again", "repair": "again", "world": "world",
+    "settings": "listing", "experiment": "listing", "campaign": "run", "drive": "drive", "calibrate": "calibrate",
+    "emulate": "emulate", "completion": "listing",
 }
-"""The module of each command."""
+"""The module of each command; there it stands under its name in capitals."""
 
 
 def find_commands(name: str | None = None) -> tuple[Command, ...]:
@@ -47,7 +47,7 @@ def _is_of(name: str, prefix: str) -> bool:
 
 
 def _import(name: str) -> Command:
-    command: Command = importlib.import_module(f"{__name__}.{MODULES[name]}").COMMAND
+    command: Command = getattr(importlib.import_module(f"{__name__}.{MODULES[name]}"), name.upper())
     return command
 
 

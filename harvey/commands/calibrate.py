@@ -180,7 +180,7 @@ def _print_status(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-COMMAND = Command(
+CALIBRATE = Command(
     "calibrate", "measure a camera: lens, distortion, mounting",
     (
         ("harvey calibrate photos/ --pattern 9x6 --square-mm 25", "from photographs of a board"),

@@ -179,7 +179,7 @@ def follow(decision: Decision) -> None:
             print(f"cycle {decision.cycle}: {said}", file=sys.stderr, flush=True)
 
 
-COMMAND = Command(
+DRIVE = Command(
     "drive", "drive a mission on hardware",
     (
         ("harvey drive mission.toml --dry-run", "check world, plan, base, camera and disk; nothing moves"),

@@ -161,7 +161,7 @@ class _Trace:
         return False
 
 
-COMMAND = Command(
+EMULATE = Command(
     "emulate", "a robot base on a pseudo-terminal, for trying things out without one",
     (
         ("harvey emulate denning", "the documented line protocol; docs/protocol-denning.md"),

@@ -1,4 +1,4 @@
-"""``harvey report``: a run, or several missions, as one HTML file."""
+"""``harvey report`` and ``export``: a run, or several missions, as one page of HTML; a run as tables."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 from harvey.commands.command import Command
 from harvey.errors import BadInput
-from logs.run_directory import RunDirectory
+from logs.run_directory import RunDirectory, open_run
+from world_models.words import count
 
 if TYPE_CHECKING:
     from harvey.report.several import Mission
 
-
-def _arguments(parser: ArgumentParser) -> None:
+def _add_report_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", nargs="+",
                         help="a run directory, several of them, or the folder of a campaign")
     parser.add_argument("--out", metavar="FILE.html", help="the file (named as the first directory, here)")
@@ -25,7 +25,7 @@ def _arguments(parser: ArgumentParser) -> None:
                              " file; the table's names lead to them")
 
 
-def _run(args: Namespace) -> int:
+def _run_report(args: Namespace) -> int:
     from harvey.report.several import find_runs, read_missions
 
     found = [find_runs(text) for text in dict.fromkeys(args.run)]
@@ -88,7 +88,7 @@ def _write(out: Path, page: str, *, make_folder: bool = False) -> None:
         raise BadInput(f"--out {out}: expected a file to write to, got: {error.strerror}") from None
 
 
-COMMAND = Command(
+REPORT = Command(
     "report", "a run as one HTML file: plan, pictures, decisions, reasons, errors, story; or a campaign",
     (
         ("harvey report runs/hallway-kidnap-0", "hallway-kidnap-0.html, to be opened, kept or sent by mail"),
@@ -97,11 +97,49 @@ COMMAND = Command(
         ("harvey report runs/hallway-kidnap --each", "and the report of each run, to which the table leads"),
         ("harvey report runs/bump-0 runs/bump-1", "runs beside each other"),
     ),
-    _arguments, _run,
+    _add_report_arguments, _run_report,
     "The file asks the network for nothing. It has the believed path and, of a simulated run, the true one; a slider\n"
     "over the cycles with the camera's picture and the lines expected and found in it; each decision, with what it\n"
     "rests on at a click; the errors against how sure the belief was; and the story.\n\n"
     "Of several runs, or of a campaign, it has a table of the missions, to be sorted and filtered by outcome; how\n"
     "often each outcome came, with bounds; and distributions of errors, times, probes (pictures taken to find out\n"
     "where it is) and others.",
+)
+
+
+def _add_export_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("run", metavar="RUN", help="a run directory")
+    parser.add_argument("--csv", metavar="DIR", help="write the tables there as CSV; older ones are overwritten")
+    parser.add_argument("--parquet", metavar="DIR", help="write them there as Parquet")
+
+
+def _run_export(args: Namespace) -> int:
+    wanted = {kind: Path(folder) for kind in ("csv", "parquet") if (folder := getattr(args, kind)) is not None}
+    if not wanted:
+        raise BadInput("expected --csv DIR or --parquet DIR, got neither")
+    from logs.export import read_tables, write_tables
+    from logs.timeline import Timeline
+
+    run = open_run(args.run)
+    history = Timeline(run.journal)
+    if not history.cycles:
+        history.verify()
+        raise BadInput(f"{run.journal}: expected at least one decision, got none")
+    tables = list(read_tables(run, history))
+    for kind, folder in wanted.items():
+        for path, table in zip(write_tables(tables, kind, folder), tables, strict=True):
+            print(f"{path}: {count(len(table.rows), 'row')}")
+    return 0
+
+
+EXPORT = Command(
+    "export", "a run as tables for other programs: decisions, poses, milestones, turning points",
+    (
+        ("harvey export runs/lab-to-allens-office-0 --csv tables", "decisions.csv, poses.csv, milestones.csv, ..."),
+        ("harvey export runs/lab-to-allens-office-0 --parquet tables", "the same for pandas, polars, DuckDB, Arrow"),
+    ),
+    _add_export_arguments, _run_export,
+    "decisions: who acted in each cycle, woken by what; poses: each believed pose with its covariance, in its room's\n"
+    "frame and in the world's; milestones: each verdict; turning_points; of a simulated run also truth: where the\n"
+    "robot truly was, from the recording. Units stand at the end of each column's name: _m, _rad, _s.",
 )

@@ -143,7 +143,7 @@ def find_viewer() -> str:
     return viewer
 
 
-COMMAND = Command(
+VIEW = Command(
     "view", "open the recording of a run, or an overview of several, in the rerun viewer",
     (
         ("harvey view runs/lab-to-allens-office-0", "building, camera, plan, knowledge sources and why"),

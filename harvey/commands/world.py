@@ -262,7 +262,7 @@ VERBS = (
         _compile_arguments, lambda args: _compile(args.file, args.details, args.out),
     ),
 )
-COMMAND = Command(
+WORLD = Command(
     "world", "begin, edit, check, show, compile, import or export a world file",
     tuple(verb.examples[0] for verb in VERBS), _arguments, _run,
     "harvey world VERB --help tells more of each and gives examples.",

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import groupby
 
 from docs.tools.site.markdown import escape, table
-from harvey.commands.settings import describe_room, format_value, select_rows
+from harvey.commands.listing import describe_room, format_value, select_rows
 from knowledge_sources.settings import Row
 
 

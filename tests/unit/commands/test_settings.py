@@ -12,7 +12,7 @@ import pytest
 
 from harvey.agent_settings import build_settings, names
 from harvey.cli import main
-from harvey.commands.settings import format_value
+from harvey.commands.listing import format_value
 from harvey.errors import BadInput
 from harvey.robot_settings import list_robot_rows
 from knowledge_sources.settings import DEFAULT, Row, Settings, list_rows, replace_value

@@ -13,7 +13,7 @@ import harvey
 from docs.tools.site import journal, mission_files, setting_tables, world_files
 from docs.tools.site.command_line import describe_commands
 from harvey.cli import parser
-from harvey.commands.settings import select_rows
+from harvey.commands.listing import select_rows
 from harvey.wiring import load_kinds
 from sim.scenario import FORMAT
 

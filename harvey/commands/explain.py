@@ -1,4 +1,4 @@
-"""``harvey why``: what a decision rests on, down to goal, model and pixels; and why not something else."""
+"""``harvey why``, ``story`` and ``diff``: what a decision rests on, a run told in a page, where two runs part."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import json
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
+from itertools import islice
 from typing import Any
 
 from harvey.commands.command import Command, whole
 from harvey.errors import BadInput
 from logs.disk import is_being_written
+from logs.explain.diff import agreement, apart, because, describe, first_difference, settings
 from logs.explain.model import WorldFile
 from logs.explain.questions import answers, is_question
 from logs.explain.story import opening
@@ -21,7 +23,7 @@ from logs.run_directory import RunDirectory, open_run
 from logs.timeline import Timeline
 
 
-def _arguments(parser: ArgumentParser) -> None:
+def _add_why_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", help="a run directory")
     parser.add_argument("entry", metavar="NAME", nargs="?",
                         help="as MotorCommand-12 (its last revision) or Leg-3.2, or a landmark, door or room as"
@@ -38,7 +40,7 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="for machines")
 
 
-def _run(args: Namespace) -> int:
+def _run_why(args: Namespace) -> int:
     asked = [name for name in ("entry", "milestone", "not_") if getattr(args, name) is not None]
     asked += ["--check"] * args.check
     with_at = args.not_ or (args.entry is not None and is_question(args.entry))
@@ -133,7 +135,7 @@ def _print_not(run: RunDirectory, history: Timeline, args: Namespace) -> None:
     print(json.dumps({"not": args.not_, "at": args.at, "because": lines}, indent=2) if args.json else "\n".join(lines))
 
 
-COMMAND = Command(
+WHY = Command(
     "why", "why Harvey did what it did, in sentences; and why not something else",
     (
         ("harvey why runs/lab-to-allens-office-0", "what happened on the way, how the mission ended, and why"),
@@ -153,7 +155,97 @@ COMMAND = Command(
         ("harvey why runs/lab-to-allens-office-0 --check", "whether every decision rests on something"),
         ("harvey why runs/lab-to-allens-office-0 --depth 12", "the whole web of reasons, twelve steps down"),
     ),
-    _arguments, _run,
+    _add_why_arguments, _run_why,
     "Follows the main reasons from an entry down to goal, model and pixels. With --check, exit code 1 where a\n"
     "decision rests on nothing.",
+)
+
+
+def _add_story_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("run", metavar="RUN", help="a run directory")
+    parser.add_argument("--json", action="store_true", help="for machines")
+
+
+def _run_story(args: Namespace) -> int:
+    from logs.explain.story import story_lines, tell_run
+    from logs.records import read_records
+    from logs.timeline import Timeline
+
+    run = open_run(args.run)
+    for _ in read_records(run.journal):
+        pass  # a line that is no decision is said first, also where the story has no need of it
+    history = Timeline(run.journal)
+    story = tell_run(run, history)
+    print(json.dumps(story.record(), indent=2) if args.json else "\n".join(story_lines(story)))
+    if history.cut_off is not None and not is_being_written(run.journal):
+        raise BadInput(
+            f"{run.path}: the run was cut off in cycle {history.cut_off}, before it had an outcome; harvey"
+            f" resume {run.path} goes on with it"
+        )
+    return 0
+
+
+STORY = Command(
+    "story",
+    "a run told in a page of text: plans, lost and found, contacts, milestones, how it ended",
+    (
+        ("harvey story runs/hallway-kidnap-0", "what happened, in the order of subjects, with cycles and times"),
+        ("harvey story runs/hallway-kidnap-0 | head -20", "its first lines: how it ended, and what went wrong"),
+        ("harvey story runs/hallway-kidnap-0 --json", "the same for machines, each sentence with cycle and entries"),
+    ),
+    _add_story_arguments,
+    _run_story,
+    "From the journal, as the robot knew it; what only the simulator knows is from result.json, and is called that.\n"
+    "Exit code 2 where the run was cut off before it had an outcome: what there is of it is told all the same.",
+)
+
+
+def _add_diff_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("first", metavar="RUN", help="a run directory")
+    parser.add_argument("second", metavar="RUN", help="another")
+    parser.add_argument("--fields", action="store_true", help="list the first decision that differs field by field")
+
+
+def _run_diff(args: Namespace) -> int:
+    from logs.run_head import RunHead
+
+    first, second = open_run(args.first), open_run(args.second)
+    heads = RunHead.read(first.path), RunHead.read(second.path)
+    ours, theirs = Timeline(first.journal), Timeline(second.journal)
+    print(f"first:  {_title(first)}\nsecond: {_title(second)}")
+    for name, head in zip(("first", "second"), heads, strict=True):
+        if elsewhere := head.decided_elsewhere():
+            print(f"note: the {name} run {elsewhere}")
+    set_differently = tuple(settings(*heads))
+    if set_differently:
+        print(f"set differently: {'; '.join(set_differently)}")
+    alike = ours.lines_alike(theirs)
+    more, one, other = first_difference(*(islice(h.decisions(), alike, None) for h in (ours, theirs)))
+    agreed = alike + more
+    if one is None or other is None or args.fields:
+        print("\n".join(describe(agreed, one, other)))
+    else:
+        print("\n".join([agreement(agreed), "", *because(ours, theirs, agreed, set_differently)]))
+    if one is None and other is None:
+        return 0
+    print(f"\nHow they went:\n{apart(first, second, ours, theirs)}")
+    return 1
+
+
+def _title(run: RunDirectory) -> str:
+    result = run.read_result()
+    named = [f"{key} {result[key]}" for key in ("scenario", "seed", "outcome") if key in result]
+    return ", ".join([str(run.path), *named])
+
+
+DIFF = Command(
+    "diff", "the first decision in which two runs differ, and why",
+    (
+        ("harvey diff runs/lab-to-allens-office-0 runs/lab-to-allens-office-1", "two seeds of one scenario"),
+        ("harvey diff runs/bump-0 runs/without-door", "a run and what would have been (harvey replay --without)"),
+        ("harvey diff runs/bump-0 runs/bump-1 --fields", "the first difference field by field"),
+    ),
+    _add_diff_arguments, _run_diff,
+    "Goes down from the first decision that differs to the observation or the setting that it comes from.\n"
+    "Exit code 0 where all decisions agree, 1 where they do not, 2 where an input cannot be used.",
 )
