@@ -7,20 +7,16 @@ import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from harvey.commands.command import Command, whole
 from harvey.errors import BadInput
 from logs.disk import is_being_written
-from logs.explain.diff import agreement, apart, because, describe, first_difference, settings
-from logs.explain.model import WorldFile
-from logs.explain.questions import answers, is_question
-from logs.explain.story import opening
-from logs.explain.subjects import stories_of
-from logs.explain.web import cycle_lines, explain
-from logs.explain.why import LEGEND, Story, lines_of
 from logs.run_directory import RunDirectory, open_run
-from logs.timeline import Timeline
+
+if TYPE_CHECKING:
+    from logs.explain.why import Story
+    from logs.timeline import Timeline
 
 
 def _add_why_arguments(parser: ArgumentParser) -> None:
@@ -41,6 +37,10 @@ def _add_why_arguments(parser: ArgumentParser) -> None:
 
 
 def _run_why(args: Namespace) -> int:
+    from logs.explain.questions import is_question
+    from logs.explain.story import opening
+    from logs.timeline import Timeline
+
     asked = [name for name in ("entry", "milestone", "not_") if getattr(args, name) is not None]
     asked += ["--check"] * args.check
     with_at = args.not_ or (args.entry is not None and is_question(args.entry))
@@ -76,22 +76,25 @@ def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
 
 
 def _stories(run: RunDirectory, history: Timeline, args: Namespace) -> Iterator[Story]:
+    from logs.explain.model import WorldFile
+    from logs.explain.questions import answers, answers_of_the_run, is_question
+    from logs.explain.subjects import milestone_story, milestones, stories_of
+
     world = WorldFile(run)
     if args.entry is not None and is_question(args.entry):
-        from logs.explain.questions import answers_of_the_run as answers_of_the_run
-
         of_the_run = answers_of_the_run(run, history, args.entry, args.at)
         yield from answers(history, args.entry, args.at) if of_the_run is None else of_the_run
         return
     if args.milestone is None:
         yield from stories_of(history, args.entry if args.at is None else args.at, world)
         return
-    from logs.explain.subjects import milestone_story, milestones
-
     yield from (milestone_story(history, id, world) for id in milestones(history, args.milestone))
 
 
 def _paragraphs(history: Timeline, args: Namespace, stories: list[Story]) -> Iterator[str]:
+    from logs.explain.web import cycle_lines, explain
+    from logs.explain.why import LEGEND, lines_of
+
     if args.at is not None and args.entry is None:
         yield from cycle_lines(history.decision(args.at), history.candidates(args.at))
         yield ""
@@ -207,7 +210,9 @@ def _add_diff_arguments(parser: ArgumentParser) -> None:
 
 
 def _run_diff(args: Namespace) -> int:
+    from logs.explain.diff import agreement, apart, because, describe, first_difference, settings
     from logs.run_head import RunHead
+    from logs.timeline import Timeline
 
     first, second = open_run(args.first), open_run(args.second)
     heads = RunHead.read(first.path), RunHead.read(second.path)
