@@ -25,10 +25,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from harvey.packages import check_packages
-from logs.decided_by import settle
 
-settle()
 check_packages()
+importlib.import_module("logs.decided_by").settle()
 
 if TYPE_CHECKING:
     from blackboard.board import View

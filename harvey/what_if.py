@@ -15,8 +15,8 @@ from blackboard.board import View
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from blackboard.scheduler import Scheduler
+from harvey.agent_settings import build_believed
 from harvey.errors import BadInput
-from harvey.robot_settings import build_believed
 from logs.records import WHAT_IF
 from world_models.building.changes import element_names
 from world_models.building.locale_frame import FrameChange, FrameRequest, LocaleFrame

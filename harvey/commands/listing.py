@@ -73,7 +73,7 @@ def _run_settings(args: Namespace) -> int:
 
 def select_rows(name: str | None) -> tuple[Row, ...]:
     """All settings, those of a room, or one. Raises BadInput where there is no such room or setting."""
-    from harvey.robot_settings import find_key, list_robot_rows
+    from harvey.agent_settings import find_key, list_robot_rows
     from knowledge_sources.settings import list_rows
     from world_models.files.toml.settings import suggest_keys
 
@@ -101,7 +101,7 @@ def format_rows(rows: Sequence[Row], width: int) -> Iterator[str]:
 
 def describe_room(room: str) -> str:
     """What a room's numbers are for, as its dataclass says."""
-    from harvey.robot_settings import ROOMS
+    from harvey.agent_settings import ROOMS
     from knowledge_sources.settings import DEFAULT
 
     if room in ROOMS:

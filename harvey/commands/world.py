@@ -104,7 +104,7 @@ def _compile(file: str, details: list[str], out: str | None) -> int:
 
 def _edit(args: Namespace) -> int:
     from harvey.commands.view import find_viewer, has_screen
-    from harvey.world_editor import BuildingViewer, WorldEditor
+    from harvey.commands.world_editor import BuildingViewer, WorldEditor
 
     path = Path(args.file)
     if path.suffix != ".toml" or not path.is_file():
@@ -210,7 +210,7 @@ def _svg(world: World, out: Path) -> None:
 
 
 def _png(world: World, out: Path) -> None:
-    from harvey.plan_picture import draw_plan
+    from harvey.commands.plan_picture import draw_plan
 
     draw_plan(world, out)
 

@@ -9,10 +9,17 @@ from typing import Any
 
 import pytest
 
-from harvey.agent_settings import build_settings, split_settings
+from harvey.agent_settings import (
+    KEYS,
+    VALUES,
+    RobotValue,
+    build_believed,
+    build_settings,
+    list_robot_rows,
+    split_settings,
+)
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey.robot_settings import KEYS, VALUES, RobotValue, build_believed, list_robot_rows
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import BOUNDS, ActuatorModel
 from world_models.camera import Camera, CameraMount

@@ -10,11 +10,10 @@ from typing import Any
 
 import pytest
 
-from harvey.agent_settings import build_settings, names
+from harvey.agent_settings import build_settings, list_robot_rows, names
 from harvey.cli import main
 from harvey.commands.listing import format_value
 from harvey.errors import BadInput
-from harvey.robot_settings import list_robot_rows
 from knowledge_sources.settings import DEFAULT, Row, Settings, list_rows, replace_value
 from world_models.entries.body import LAST_REQUESTS
 from world_models.entries.percepts import LAST_SEGMENTS

@@ -17,7 +17,7 @@ LINES = {
     "harvey": 11_100, "experiments": 13_950, "tests": 33_900, "extras": 12_800,
 }
 """Of Python files, at most."""
-BYTES = {"ARCHITECTURE.md": 12_700}
+BYTES = {"ARCHITECTURE.md": 12_000}
 
 
 def list_tracked(room: str) -> list[Path]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harvey.plan_picture import draw_plan
+from harvey.commands.plan_picture import draw_plan
 from world_models.building.checks import check_world
 from world_models.building.plan_view import build_drawing, plan_svg
 from world_models.building.world import World

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from harvey.cli import main
-from harvey.world_editor import BuildingViewer, WorldEditor
+from harvey.commands.world_editor import BuildingViewer, WorldEditor
 from world_models.building.plan_view import plan_svg
 from world_models.building.world import World
 from world_models.files.first_world import first_world_text
