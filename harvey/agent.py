@@ -1,7 +1,8 @@
 """The agent of a run: its knowledge sources, model, settings and servo levels, as its run head says.
 
-``without`` takes away a knowledge source, a landmark or a face (:mod:`harvey.what_if`), or one segment of one picture;
-``constants`` replaces servo levels, settings, and what the robot believes of itself (``harvey settings``).
+``without`` takes away a knowledge source, a landmark or a face, or one segment of one picture
+(:mod:`harvey.replay.what_if`); ``constants`` replaces servo levels, settings, and what the robot believes of itself
+(``harvey settings``).
 """
 
 from __future__ import annotations
@@ -16,8 +17,7 @@ from blackboard.scheduler import Scheduler, registry_of
 from blackboard.servoing import Servoing
 from harvey.agent_settings import build_settings
 from harvey.errors import BadInput
-from harvey.hidden_segments import SegmentHider, is_segment, parse_segments
-from harvey.what_if import WhatIf, check_removals
+from harvey.replay.what_if import SegmentHider, WhatIf, check_removals, is_segment, parse_segments
 from harvey.wiring import build, foreign_sources, knowledge_sources, servoing
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import Settings

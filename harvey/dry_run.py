@@ -116,7 +116,7 @@ def dry_run(
 ) -> tuple[tuple[MilestonePreview, ...], Outcome]:
     """The milestones in the order in which they will come, and how the dry run of the mission ends.
 
-    ``what_if`` revises what the robot believes of itself (:class:`harvey.what_if.WhatIf`).
+    ``what_if`` revises what the robot believes of itself (:class:`harvey.replay.what_if.WhatIf`).
     """
     scheduler = build_dry_run(world, robot, settings)
     what_if(scheduler)

@@ -22,8 +22,8 @@ from blackboard.journal import decision_record, plain
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler
 from harvey.agent import Agent, build_agent
+from harvey.replay.why_not import why_absent
 from harvey.runner.replay import open_originals, replay
-from harvey.why_not import why_absent
 from logs.explain.phrases import describe_decision
 from logs.explain.why_not import Fate, in_cycle
 from logs.records import WHAT_IF, DecisionRecord, EntryRecord, decision_of
@@ -34,7 +34,7 @@ from logs.timeline import Timeline
 KINDS = ("what next", "why", "why not", "what if", "since when", "rested on", "did not rest on")
 WOKEN = re.compile(r"woken by ([\w-]+\.\d+)")
 COULD = "could have acted"
-"""How :mod:`harvey.why_not` says that a knowledge source would have acted."""
+"""How :mod:`harvey.replay.why_not` says that a knowledge source would have acted."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,8 +48,7 @@ def _run_replay(args: Namespace) -> int:
 
 def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, str], ...]) -> int:
     """Decide it again with a changed agent."""
-    from harvey.counterfactual import what_if
-    from harvey.counterfactual_words import describe_answer
+    from harvey.replay.counterfactual import describe_answer, what_if
     from logs.run_head import RunHead
 
     out = RunDirectory(check_vacant(Path(args.out))) if args.out else None
@@ -185,7 +184,7 @@ def _on_hardware(
     from harvey.hardware.mission import rebuild_mission
     from harvey.hardware.preflight import Preflight
     from harvey.hardware.run import resume, time_of_last_observation
-    from harvey.what_if import WhatIf
+    from harvey.replay.what_if import WhatIf
 
     mission, began_s = rebuild_mission(head, moved), time.monotonic() - time_of_last_observation(run)
 
@@ -234,7 +233,7 @@ def _add_repair_arguments(parser: ArgumentParser) -> None:
 def _run_repair(args: Namespace) -> int:
     from tqdm import tqdm
 
-    from harvey.repair import redraw
+    from harvey.simulation.run import redraw
 
     run = open_run(args.run)
     with tqdm(unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:

@@ -59,8 +59,8 @@ def _run(args: Namespace) -> int:
     from harvey.campaign.campaign import make_room, parse_pairs
     from harvey.hardware.mission import FORMAT
     from harvey.hardware.preflight import Preflight
+    from harvey.replay.what_if import WhatIf
     from harvey.runner.page_kind import find_page
-    from harvey.what_if import WhatIf
 
     page = None if args.serve is None else find_page("--serve")
     settings, numbers = split_settings(dict(parse_pairs(args.settings)), FORMAT.keys())

@@ -132,7 +132,7 @@ def _print_check(history: Timeline, as_json: bool) -> int:
 
 
 def _print_not(run: RunDirectory, history: Timeline, args: Namespace) -> None:
-    from harvey.why_not import answers
+    from harvey.replay.why_not import answers
 
     lines = list(answers(run, history, args.not_, args.at))
     print(json.dumps({"not": args.not_, "at": args.at, "because": lines}, indent=2) if args.json else "\n".join(lines))

@@ -80,8 +80,8 @@ def _check(task: Task) -> int:
     from harvey.agent_settings import build_settings
     from harvey.campaign.summary import format_previews, summarize_dry_run
     from harvey.dry_run import dry_run
+    from harvey.replay.what_if import WhatIf
     from harvey.simulation.run import build_robot_model
-    from harvey.what_if import WhatIf
     from world_models.files.world_files import load_world
 
     scenario = stage.scenario

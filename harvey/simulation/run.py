@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -11,8 +12,9 @@ from harvey.agent import Agent, Sources, build_agent
 from harvey.agent_settings import Pairs
 from harvey.errors import BadInput
 from harvey.runner.ports import Body
+from harvey.runner.replay import check_same, open_originals, replay
 from harvey.runner.result import MissionResult
-from harvey.runner.resume import Remains, continue_run
+from harvey.runner.resume import Remains, continue_run, find_remains, replay_run
 from harvey.runner.run import Run
 from harvey.runner.teller import Tell, tell_nothing
 from harvey.simulation.body_replay import BodyReplay
@@ -94,6 +96,32 @@ def resume_mission(
     recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, whole=remains.extent)
     with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
         return run.drive(files, lambda: continue_run(files, run, run.body_replay))
+
+
+def redraw(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
+    """Draw a run's recording anew; the old one stays until the new one is whole. Returns how many decisions it shows.
+
+    Raises:
+        BadInput: the run cannot be replayed as it was.
+        RecordingError: the recording cannot be written.
+    """
+    decisions = find_remains(run).decisions
+    head, part = RunHead.read(run.path), run.recording.with_name("recording.rrd.part")
+    agent = build_agent(head)
+    recorder = RunRecorder(None, head, agent.world, agent.robot, drawing=part)
+    try:
+        if head.kind == SIMULATOR:
+            with SimulatedRun(rebuild_stage(head), head, agent, recorder, sinks) as simulated:
+                replay_run(run, simulated, simulated.body_replay)
+        else:
+            scheduler = agent.scheduler(sinks=(*recorder.sinks, *sinks))
+            for decision in replay(run, open_originals(run, agent.store), scheduler):
+                check_same(run, decision)
+        recorder.close()
+        os.replace(part, run.recording)
+    finally:
+        part.unlink(missing_ok=True)
+    return decisions
 
 
 def build_head(stage: Stage, seed: int, body: str = IN_PROCESS, settings: Pairs = ()) -> RunHead:

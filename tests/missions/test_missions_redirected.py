@@ -12,7 +12,7 @@ from blackboard.change import Retracted
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from harvey.cli import main
-from harvey.counterfactual import what_if
+from harvey.replay.counterfactual import what_if
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
 from harvey.runner.teller import PAGE, LiveTeller

@@ -14,9 +14,9 @@ from blackboard.board import View
 from blackboard.effect import Post
 from blackboard.scheduler import RAISED, Scheduler
 from harvey.agent import build_agent
+from harvey.replay.what_if import WhatIf
 from harvey.runner.world_port import tell_robot
 from harvey.simulation.run import SimulatedRun, build_head
-from harvey.what_if import WhatIf
 from logs.run_recorder import RunRecorder
 from sim.stage import Stage
 from two_doors import two_doors

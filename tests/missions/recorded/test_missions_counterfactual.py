@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from harvey.cli import main
-from harvey.counterfactual import what_if
 from harvey.errors import BadInput
+from harvey.replay.counterfactual import what_if
 from harvey.simulation.run import build_head, run_mission
 from knowledge_sources.settings import list_rows
 from logs.records import DecisionRecord, read_records

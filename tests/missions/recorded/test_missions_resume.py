@@ -15,11 +15,10 @@ import pytest
 from experiments.robustness import crash
 from harvey.agent import build_agent
 from harvey.cli import main
-from harvey.repair import redraw
 from harvey.runner.replay import open_originals, replay
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
-from harvey.simulation.run import resume_mission, run_mission
+from harvey.simulation.run import redraw, resume_mission, run_mission
 from logs import disk
 from logs.pictures import open_pictures
 from logs.reader import damage_of, read_decisions, read_frames

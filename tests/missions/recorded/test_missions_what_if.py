@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from harvey.cli import main
-from harvey.counterfactual import Answer, what_if
+from harvey.replay.counterfactual import Answer, what_if
 from harvey.runner.resume import find_remains
 from harvey.simulation.run import build_head, resume_mission, run_mission
 from logs.records import EntryRecord, read_records

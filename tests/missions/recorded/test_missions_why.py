@@ -19,7 +19,7 @@ from experiments.scale.long_journal import write_hour
 from harvey.agent import Agent, build_agent
 from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
-from harvey.why_not import AskedView, board_at, changes, why_absent
+from harvey.replay.why_not import AskedView, board_at, changes, why_absent
 from logs.explain.diff import grounds, parting, same
 from logs.explain.phrases import describe_decision
 from logs.explain.subjects import milestone_story, milestones

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from harvey.errors import BadInput
-from harvey.what_if import check_removals
+from harvey.replay.what_if import check_removals
 from logs.run_head import load_known_world
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.files.toml.source import WORLDS
