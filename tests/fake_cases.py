@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 from collections.abc import Mapping, Sequence
@@ -11,6 +12,7 @@ from typing import Any
 
 from harvey.campaign.case_work import Killed
 from harvey.campaign.engine import Campaign, run_campaign
+from harvey.campaign.origin import origin
 from harvey.campaign.workers import Workers
 
 
@@ -44,11 +46,15 @@ def of_record(record: Mapping[str, Any]) -> FakeResult:
     return FakeResult(**record)
 
 
+def fake_cases(folder: Path, kills: Sequence[int]) -> list[FakeCase]:
+    """One for each, numbered."""
+    (folder / "tries").mkdir(parents=True, exist_ok=True)
+    return [FakeCase(number, kill, folder / "tries") for number, kill in enumerate(kills)]
+
+
 def fake_campaign(folder: Path, kills: Sequence[int]) -> Campaign[FakeCase, FakeResult]:
     """One case for each; results in ``folder/results``."""
-    (folder / "tries").mkdir(parents=True, exist_ok=True)
-    cases = {number: FakeCase(number, kill, folder / "tries") for number, kill in enumerate(kills)}
-    return Campaign(work_on, cases, folder / "results", asdict, of_record)
+    return Campaign(work_on, dict(enumerate(fake_cases(folder, kills))), folder / "results", asdict, of_record)
 
 
 def be_client(folder: Path, kills: Sequence[int], workers: Workers, end_after: int | None) -> None:
@@ -62,3 +68,12 @@ def run_here(folder: Path, kills: Sequence[int], workers: Workers) -> dict[int, 
     """Run it in this process: the square of each case, or the kills after which it was given up."""
     return {case: result.kills if isinstance(result, Killed) else result.square
             for case, result in run_campaign(fake_campaign(folder, kills), workers)}
+
+
+def serial(kills: Sequence[int]) -> bytes:
+    """The file of results as one process would write it that is never killed; 3 kills end a case."""
+    lines = [origin()]
+    for case, kill in enumerate(kills):
+        result = {"square": case * case / 3.0, "worker": "any", "seconds": None}
+        lines.append({"case": case, "killed": 3} if kill >= 3 else {"case": case, "result": result})
+    return "".join(json.dumps(line) + "\n" for line in lines).encode()

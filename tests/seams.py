@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import shlex
 from argparse import ArgumentParser
+from pathlib import Path
 
+import pytest
+
+from fake_cases import fake_cases, work_on
+from harvey.campaign.case_work import Answer, Killed
+from harvey.campaign.workers import ClusterWorkers
 from harvey.commands.command import Command, add_parser
+from harvey.errors import BadInput
 
 
 def check_command(command: Command, of: str = "") -> None:
@@ -20,3 +27,23 @@ def check_command(command: Command, of: str = "") -> None:
     for given in own:
         _, unknown = parser.parse_known_args(given[len(words) - 1:])
         assert command.open_ended or not unknown, given
+
+
+def check_cluster(workers: ClusterWorkers, cluster: str, folder: Path) -> None:
+    """Workers of a cluster: each case is answered once, whoever is killed; only what kills its workers is given up."""
+    cases, told = fake_cases(folder, [0, 9, 1, 0]), list[str]()
+    found = list(workers.map_on_cluster(work_on, cases, cluster, told.append))
+    answers = {place: answer.value.square for place, answer in found if isinstance(answer, Answer)}
+    assert answers == {place: place * place / 3.0 for place in (0, 2, 3)}
+    assert [place for place, answer in found if isinstance(answer, Killed)] == [1] and len(found) == len(cases)
+    assert len(told) == 1
+    with pytest.raises(ZeroDivisionError):
+        list(workers.map_on_cluster(divide, [1.0, 0.0], cluster))
+    with pytest.raises(BadInput, match="--cluster"):
+        list(workers.map_on_cluster(divide, [1.0], "nowhere"))
+    command = workers.worker_command("tcp://host:8786", 3)
+    assert command[0] == "-m" and {"tcp://host:8786", "3"} <= set(command)
+
+
+def divide(case: float) -> float:
+    return 1.0 / case

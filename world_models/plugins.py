@@ -7,6 +7,7 @@
 ``harvey.faults``             a class under ``sim.faults.fault.Fault``
 ``harvey.loggers``            a class under ``logs.recording.logger.Logger``
 ``harvey.pages``              a ``harvey.runner.page_kind.PageKind``, named ``live``
+``harvey.workers``            a ``harvey.campaign.workers.ClusterWorkers``, named ``dask``
 ``harvey.commands``           a ``harvey.commands.command.Command``; of a verb: ``world.import``
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
 ``harvey.exporters``          a ``harvey_buildings.exporters.export_file.Exporter``
@@ -27,11 +28,13 @@ SOURCES_GROUP = "harvey.knowledge_sources"
 
 COMMANDS_GROUP = "harvey.commands"
 PAGES_GROUP = "harvey.pages"
+WORKERS_GROUP = "harvey.workers"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
     COMMANDS_GROUP: {
         "serve": "harvey-serve", "world.export": "harvey-buildings", "world.import": "harvey-buildings",
     },
     PAGES_GROUP: {"live": "harvey-serve"},
+    WORKERS_GROUP: {"dask": "harvey-cluster"},
     "harvey.bases": {"p2os": "harvey-bases", "create2": "harvey-bases"},
     "harvey.emulators": {"p2os": "harvey-bases", "create2": "harvey-bases"},
 }

@@ -19,7 +19,7 @@ from harvey.campaign.case_work import Answer, Killed, check_origin
 from harvey.campaign.local_workers import map_locally
 from harvey.campaign.origin import origin
 from harvey.campaign.results_file import open_results, read_times
-from harvey.campaign.workers import Workers, chosen_workers
+from harvey.campaign.workers import Workers, chosen_workers, find_cluster
 from harvey.errors import BadInput
 
 T = TypeVar("T")
@@ -67,9 +67,7 @@ def map_cases(
     """
     workers = workers or chosen_workers()
     if workers.cluster is not None:
-        from harvey.campaign.dask_workers import map_on_cluster
-
-        done = map_on_cluster(work, cases, workers.cluster, tell)
+        done = find_cluster("--cluster").map_on_cluster(work, cases, workers.cluster, tell)
     else:
         done = map_locally(work, cases, workers.number)
     for place, answer in done:

@@ -180,7 +180,7 @@ def _add_campaign_arguments(parser: ArgumentParser) -> None:
     compare.add_argument("--success", metavar="TEST", default="outcome=reached",
                          help="what counts as success: FIELD=VALUE, FIELD<NUMBER or FIELD>NUMBER (outcome=reached)")
     compare.set_defaults(verb=_compare)
-    worker = add("worker", "work for the campaigns of a Dask scheduler",
+    worker = add("worker", "work for the campaigns of a Dask scheduler (needs harvey-cluster)",
                  "examples:\n  dask scheduler --port 8786\n  harvey campaign worker tcp://host:8786 --workers 8\n"
                  "  harvey run lab-to-allens-office --seed 0..999 --cluster tcp://host:8786\n"
                  "Every worker needs the same program; one with other code or arithmetic is refused.")
@@ -220,13 +220,12 @@ def _compare(args: Namespace) -> int:
 
 def _worker(args: Namespace) -> int:
     """Becomes Dask's own worker, in an environment in which the libraries calculate as ours do."""
-    from harvey.campaign.dask_workers import worker_command
-    from harvey.campaign.workers import count_processors, parse_workers
+    from harvey.campaign.workers import count_processors, find_cluster, parse_workers
 
     workers = replace(parse_workers(args), cluster=None)
     if "://" not in args.scheduler and not os.path.isfile(args.scheduler):
         raise BadInput(f"expected tcp://host:port or the file of a scheduler, got {args.scheduler!r}")
-    command = worker_command(args.scheduler, workers.number or count_processors())
+    command = find_cluster("campaign worker").worker_command(args.scheduler, workers.number or count_processors())
     os.execv(sys.executable, [sys.executable, *command])
 
 

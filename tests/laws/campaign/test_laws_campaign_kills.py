@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import signal
 import tempfile
@@ -13,8 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fake_cases import be_client, run_here
-from harvey.campaign.origin import origin
+from fake_cases import be_client, run_here, serial
 from harvey.campaign.results_file import RESULTS, open_results, read_times
 from harvey.campaign.workers import Workers
 from harvey.errors import BadInput
@@ -22,15 +20,6 @@ from harvey.errors import BadInput
 SPAWN = multiprocessing.get_context("spawn")
 QUICK = settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 KILLS = st.lists(st.sampled_from([0, 0, 0, 1, 2, 9]), min_size=1, max_size=6)
-
-
-def serial(kills: list[int]) -> bytes:
-    """The file of results as one process would write it that is never killed; 3 kills end a case."""
-    lines = [origin()]
-    for case, kill in enumerate(kills):
-        result = {"square": case * case / 3.0, "worker": "any", "seconds": None}
-        lines.append({"case": case, "killed": 3} if kill >= 3 else {"case": case, "result": result})
-    return "".join(json.dumps(line) + "\n" for line in lines).encode()
 
 
 @QUICK
@@ -109,10 +98,3 @@ def _runs(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
-
-
-def test_a_dask_cluster_gives_the_file_of_the_serial_run(tmp_path: Path) -> None:
-    pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
-    kills = [0, 1, 0, 9, 0, 2]
-    run_here(tmp_path, kills, Workers(cluster="local:2"))
-    assert (tmp_path / "results" / RESULTS).read_bytes() == serial(kills)

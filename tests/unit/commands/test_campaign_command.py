@@ -18,6 +18,7 @@ from harvey.campaign.workers import Workers, choose_workers, chosen_workers
 from harvey.cli import main
 from harvey.errors import BadInput
 from logs.decided_by import arithmetic
+from world_models import plugins
 
 
 def campaign(folder: Path, outcomes: list[str], total: int = 40, killed: tuple[int, ...] = ()) -> str:
@@ -65,8 +66,6 @@ def test_a_worse_campaign_is_found(tmp_path: Path, capsys: pytest.CaptureFixture
     (["run", "bump", "--workers", "2"], "--workers: expected several seeds"),
     (["run", "bump", "--keep", "none"], "--keep: expected several seeds"),
     (["experiment", "levels", "--workers", "many"], "--workers: expected"),
-    (["run", "bump", "--seed", "0..3", "--cluster", "nowhere"], "--cluster: expected"),
-    (["run", "bump", "--seed", "0..3", "--cluster", "local:none"], "--cluster: expected"),
     (["campaign", "worker", "nowhere"], "expected tcp://host:port"),
 ])
 def test_what_cannot_be_used_is_refused(
@@ -74,6 +73,19 @@ def test_what_cannot_be_used_is_refused(
 ) -> None:
     assert main(argv) == 2
     assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("argv", "asked_by"), [
+    (["run", "bump", "--seed", "0..3", "--cluster", "local:2"], "--cluster"),
+    (["experiment", "levels", "--cluster", "local:2"], "--cluster"),
+    (["campaign", "worker", "tcp://host:8786"], "campaign worker")])
+def test_without_the_extra_a_cluster_says_what_to_install(
+    argv: list[str], asked_by: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(plugins, "entry_points", lambda group: ())
+    assert main(argv) == 2
+    needs = "harvey-cluster: pip install ./extras/harvey-cluster"
+    assert capsys.readouterr().err == f"harvey: {asked_by} needs {needs}\n"
 
 
 def test_who_works_is_chosen_for_a_while() -> None:

@@ -15,12 +15,14 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from harvey.campaign.case_work import MOST_KILLS, Answer, Killed, answer_case
 from harvey.errors import BadInput
+
+dask: Any = import_module("dask")  # annotated only in part
+distributed: Any = import_module("distributed")
 
 AHEAD = 2
 """Cases that each worker has before it, so that it never waits."""
@@ -34,38 +36,40 @@ CONFIG: Mapping[str, object] = {
 }
 
 
-def map_on_cluster(
-    work: Callable[[Any], Any], cases: Sequence[Any], cluster: str, tell: Callable[[str], None] | None = None
-) -> Iterator[tuple[int, Answer | Killed]]:
-    """(place in ``cases``, answer) as they are done, in whatever order.
+class DaskWorkers:
+    """A :class:`~harvey.campaign.workers.ClusterWorkers`."""
 
-    Args:
-        work: a function of a module that the workers can import too.
-        cluster: as ``--cluster`` takes it.
-        tell: is told where the dashboard is.
+    def map_on_cluster(
+        self, work: Callable[[Any], Any], cases: Sequence[Any], cluster: str,
+        tell: Callable[[str], None] | None = None,
+    ) -> Iterator[tuple[int, Answer | Killed]]:
+        """``cluster`` is ``local:N``, the address of a scheduler, or its file. Raises BadInput."""
+        with _connect(cluster) as client:
+            if tell is not None:
+                tell(str(client.dashboard_link))
+            suspects: list[int] = []
+            try:
+                for place, answer in _map(client, work, cases, range(len(cases)), alone=False):
+                    if isinstance(answer, Killed):
+                        suspects.append(place)
+                    else:
+                        yield place, answer
+                yield from _map(client, work, cases, suspects, alone=True)
+            except (distributed.client.FutureCancelledError, OSError) as error:
+                raise BadInput(
+                    f"--cluster {cluster}: the scheduler was lost ({error}); what was done is kept") from None
 
-    Raises:
-        BadInput: the extra is missing, or there is no such cluster. What ``work`` raises comes through.
-    """
-    distributed = import_dask()
-    with _connect(distributed, cluster) as client:
-        if tell is not None:
-            tell(str(client.dashboard_link))
-        suspects: list[int] = []
-        try:
-            for place, answer in _map(distributed, client, work, cases, range(len(cases)), alone=False):
-                if isinstance(answer, Killed):
-                    suspects.append(place)
-                else:
-                    yield place, answer
-            yield from _map(distributed, client, work, cases, suspects, alone=True)
-        except (distributed.client.FutureCancelledError, OSError) as error:
-            raise BadInput(f"--cluster {cluster}: the scheduler was lost ({error}); what was done is kept") from None
+    def worker_command(self, address: str, number: int) -> list[str]:
+        """One case at a time each."""
+        where = [address] if "://" in address else ["--scheduler-file", os.fspath(Path(address).resolve())]
+        return ["-m", "distributed.cli.dask_worker", *where, "--nworkers", str(number), "--nthreads", "1"]
+
+
+DASK = DaskWorkers()
 
 
 def _map(
-    distributed: Any, client: Any, work: Callable[[Any], Any], cases: Sequence[Any], places: Sequence[int], *,
-    alone: bool,
+    client: Any, work: Callable[[Any], Any], cases: Sequence[Any], places: Sequence[int], *, alone: bool
 ) -> Iterator[tuple[int, Answer | Killed]]:
     """Keep as many cases under way as the workers can take, or one at a time."""
     todo = deque(places)
@@ -89,18 +93,10 @@ def _map(
         future.release()
 
 
-def import_dask() -> Any:
-    """The package ``distributed``. Raises BadInput where the extra is not installed."""
-    if find_spec("distributed") is None:
-        raise BadInput("--cluster: expected Dask to be installed: pip install 'harvey[cluster]'")
-    return import_module("distributed")
-
-
 @contextmanager
-def _connect(distributed: Any, cluster: str) -> Iterator[Any]:
+def _connect(cluster: str) -> Iterator[Any]:
     """A client of the cluster. Raises BadInput."""
-    config = import_module("dask").config
-    with config.set(dict(CONFIG)):
+    with dask.config.set(dict(CONFIG)):
         if cluster.startswith("local:"):
             number = cluster.removeprefix("local:")
             if not (number.isascii() and number.isdecimal() and 0 < int(number) <= 4096):
@@ -114,11 +110,11 @@ def _connect(distributed: Any, cluster: str) -> Iterator[Any]:
                 with suppress(Exception):  # one that is just being replaced cannot be closed; all is known by now
                     local.close()
         else:
-            with _find_scheduler(distributed, cluster) as client:
+            with _find_scheduler(cluster) as client:
                 yield client
 
 
-def _find_scheduler(distributed: Any, cluster: str) -> Any:
+def _find_scheduler(cluster: str) -> Any:
     try:
         if "://" in cluster:
             return distributed.Client(cluster, timeout=CONNECT_S)
@@ -130,10 +126,3 @@ def _find_scheduler(distributed: Any, cluster: str) -> Any:
         if isinstance(error, BadInput):
             raise
         raise BadInput(f"--cluster {cluster}: expected a Dask scheduler that answers, got: {error}") from None
-
-
-def worker_command(address: str, number: int) -> list[str]:
-    """The command line of so many workers of a scheduler, one case at a time each."""
-    import_dask()
-    where = [address] if "://" in address else ["--scheduler-file", os.fspath(Path(address).resolve())]
-    return ["-m", "distributed.cli.dask_worker", *where, "--nworkers", str(number), "--nthreads", "1"]

@@ -1,0 +1,1 @@
+"""Campaigns on a Dask cluster; ``README.md`` of this extra tells how."""
