@@ -10,7 +10,7 @@ from blackboard.effect import Effect
 from blackboard.knowledge_source import KnowledgeSource
 from harvey.runner.ports import Body
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
-from world_models.entries.touch import Contact, Ranges
+from world_models.entries.obstacle import Contact, Ranges
 
 
 class WrappedBody:

@@ -14,11 +14,10 @@ from knowledge_sources.settings import ActionSettings
 from world_models.building.locale_frame import CHANGED, FRAME_OF, LocaleFrame
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis
-from world_models.entries.obstruction import Obstruction
+from world_models.entries.obstacle import Contact, Obstruction
 from world_models.entries.percepts import Tracks
 from world_models.entries.robot import CameraState, Footprint, Wheels
 from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch
-from world_models.entries.touch import Contact
 from world_models.frame_building import FrameBuilding
 from world_models.robot import RobotModel
 

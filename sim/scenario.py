@@ -22,10 +22,9 @@ from sim.render.rasterizer import sample_offsets
 from sim.render.sensor import SensorParameters
 from sim.scenario_names import SCENARIOS, list_scenarios
 from world_models.camera import Camera, CameraMount
-from world_models.files.toml.line_numbers import Key
 from world_models.files.toml.mission import ROOT, TABLES, Limits, Mission, MissionFormat, named_file
 from world_models.files.toml.settings import MAX_NUMBER, read_settings, suggest_keys
-from world_models.files.toml.source import Source, WorldError
+from world_models.files.toml.source import Key, Source, WorldError
 from world_models.units import Bounds, check_bounds
 
 MAX_DISTORTION = 1e4

@@ -26,7 +26,7 @@ from sim.emulators.emulator import IdealGround
 from sim.emulators.line import PseudoTerminalLink
 from sim.emulators.registry import emulator_kinds
 from world_models.entries.body import MotorCommand
-from world_models.entries.touch import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD
+from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD
 
 NEAR_M, NEAR_RAD = 0.011, math.radians(1.0)
 MUDDLED_M, MUDDLED_RAD = 0.015, math.radians(1.2)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.entries.obstruction import Obstruction
+from world_models.entries.obstacle import Obstruction
 from world_models.frames import Pose, frozen
 
 NEAR_PLANE_M = 0.05

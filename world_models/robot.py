@@ -8,7 +8,7 @@ from typing import Any
 from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
 from world_models.camera import NOT_STATED, Camera, CameraDeviation, CameraMount
-from world_models.entries.obstruction import Obstruction
+from world_models.entries.obstacle import Obstruction
 from world_models.entries.robot import CameraState, Footprint, Wheels
 from world_models.frames import Pose, Pose2
 

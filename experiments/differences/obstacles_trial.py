@@ -18,8 +18,7 @@ from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
 from world_models.entries.body import Look, MotorCommand
 from world_models.entries.location import Hypothesis
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.touch import Contact
+from world_models.entries.obstacle import Contact, Obstacle
 
 MAX_DRAWS, NEXT_DRAW = 20, 50_000_000
 """Where a seed's floor has no room for what is wanted, another's is taken, this far away."""

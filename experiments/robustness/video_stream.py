@@ -23,9 +23,9 @@ from harvey.simulation.run import run_mission
 from sim.scenario import load_scenario, with_settings
 from sim.stage import Stage, build_stage
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
+from world_models.entries.obstacle import Contact, Ranges
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate, Outcome
-from world_models.entries.touch import Contact, Ranges
 from world_models.frames import Pose2, wrap_angle
 
 SCENARIO = "lab-to-allens-office"

@@ -15,7 +15,8 @@ from pathlib import Path
 from world_models.building.checks import check_world
 from world_models.building.plan_view import plan_svg
 from world_models.building.world import World
-from world_models.files.toml.source import WorldError, compute_digest
+from world_models.files.toml.other_files import compute_digest
+from world_models.files.toml.source import WorldError
 from world_models.files.world_files import load_world
 from world_models.words import count
 

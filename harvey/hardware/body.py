@@ -22,7 +22,7 @@ from world_models.entries.body import (
     Ride,
     RideReport,
 )
-from world_models.entries.touch import Contact, Ranges
+from world_models.entries.obstacle import Contact, Ranges
 
 BASE_WORDS: Mapping[str, str] = {
     "silent": "link lost",

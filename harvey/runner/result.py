@@ -11,10 +11,9 @@ from blackboard.change import Posted
 from blackboard.journal import Decision
 from logs.explain.turning_points import Collision, TurningPoint, TurningPointFinder
 from world_models.building.locale_frame import FrameRequest
-from world_models.camera_lessons import CameraLesson, find_camera_lessons
 from world_models.entries.body import Frame, Look, MotionReport
 from world_models.entries.location import Hypothesis
-from world_models.entries.robot import CameraState
+from world_models.entries.robot import CameraLesson, CameraState, find_camera_lessons
 from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch
 
 PARTS = ("contacts", "turning_points", "camera")

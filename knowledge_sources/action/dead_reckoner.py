@@ -19,9 +19,8 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.camera import YAW
 from world_models.entries.body import BodyFault, Course, Look, MotionReport, MotorCommand
-from world_models.entries.location import Hypothesis
+from world_models.entries.location import Hypothesis, Travel, begin_travel
 from world_models.entries.robot import Drift
-from world_models.entries.travel import Travel, begin_travel
 from world_models.frames import Pose2
 
 MIN_CLAIMED_PART = 0.7  # if the wheels claim less than this part of a move, something stopped the robot

@@ -53,9 +53,8 @@ from world_models.building.locales import EXTRA_KIND, Doorway
 from world_models.entries.body import MotorCommand
 from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.location import Hypothesis, Place
-from world_models.entries.obstacle import Obstacle, ObstacleStatus
+from world_models.entries.obstacle import Contact, Obstacle, ObstacleStatus
 from world_models.entries.task import Certificate, Leg
-from world_models.entries.touch import Contact
 
 VAGUE_SIGMA_M = 0.05  # sights of an obstacle whose standard deviations differ by this and twofold are not joined
 MIN_COMMON_DIRECTIONS = 0.6

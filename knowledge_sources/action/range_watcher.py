@@ -14,7 +14,7 @@ from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.questions import find_belief, find_robot, is_in_doubt, is_up_to_date
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.floor import FreeFloor
-from world_models.entries.touch import Ranges
+from world_models.entries.obstacle import Ranges
 
 MAX_BELIEF_SIGMA_M = 0.15  # a less certain place tells of no free floor
 MAX_RANGE_AGE_S = 5.0  # a reading is compared with those that are no older

@@ -19,10 +19,9 @@ from knowledge_sources.camera_knowledge import compute_camera_covariance, find_c
 from knowledge_sources.questions import find_belief, find_building, is_standing
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.camera import CAMERA_UNKNOWNS, YAW
-from world_models.entries.location import Hypothesis
+from world_models.entries.location import Hypothesis, Travel, begin_travel, turn_about_camera
 from world_models.entries.robot import CameraState, Drift
 from world_models.entries.task import Milestone
-from world_models.entries.travel import Travel, begin_travel, turn_about_camera
 from world_models.frames import Pose2, wrap_angle
 
 

@@ -42,7 +42,7 @@ from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
 from world_models.entries.body import Look, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis, HypothesisStatus, Place, PlaceOdds, TwinOdds, covariance_tuple
-from world_models.entries.obstruction import Obstruction
+from world_models.entries.obstacle import Obstruction
 from world_models.entries.percepts import Glimpse, Panorama, Segments
 from world_models.entries.robot import CameraState
 from world_models.entries.task import Certificate, Goal, PlanSketch

@@ -13,10 +13,10 @@ from blackboard.level import Level
 from knowledge_sources.camera_knowledge import compute_camera_covariance, learn
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.camera import YAW
+from world_models.entries.location import Travel, begin_travel
 from world_models.entries.percepts import PoseFix
 from world_models.entries.robot import CameraState
 from world_models.entries.task import Certificate
-from world_models.entries.travel import Travel, begin_travel
 
 
 class CameraCalibrator(RobotKnowledgeSource):

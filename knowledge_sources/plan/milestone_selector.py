@@ -43,7 +43,7 @@ from world_models.building.building import Building
 from world_models.building.model_errors import pack_errors
 from world_models.entries.body import Look
 from world_models.entries.location import Hypothesis
-from world_models.entries.obstruction import Obstruction
+from world_models.entries.obstacle import Obstruction
 from world_models.entries.task import Certificate, Milestone, PlanSketch, Subgoal
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel

@@ -17,7 +17,7 @@ from knowledge_sources.questions import active_goal, find_robot, unmeasured_doub
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import Settings
 from world_models.camera import Camera
-from world_models.entries.obstruction import Obstruction
+from world_models.entries.obstacle import Obstruction
 from world_models.entries.percepts import Segments
 from world_models.frames import Pose2
 

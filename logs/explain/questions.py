@@ -26,10 +26,9 @@ from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.body import Frame, MotorCommand
 from world_models.entries.door_state import DoorState
 from world_models.entries.location import Hypothesis
-from world_models.entries.obstacle import Obstacle
+from world_models.entries.obstacle import Contact, Obstacle, Ranges
 from world_models.entries.task import Leg, Outcome, PlanSketch
 from world_models.entries.told import Redirection, Told
-from world_models.entries.touch import Contact, Ranges
 from world_models.frames import Pose2, wrap_angle
 from world_models.words import count, degrees, metres
 

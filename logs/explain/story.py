@@ -21,15 +21,13 @@ from logs.run_directory import RunDirectory
 from logs.tables import table
 from logs.timeline import Timeline
 from world_models.building.locale_frame import LocaleFrame
-from world_models.camera_lessons import find_camera_lessons
 from world_models.entries.body import Look
 from world_models.entries.door_state import DoorState
 from world_models.entries.location import Hypothesis
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.robot import CameraState
+from world_models.entries.obstacle import Contact, Obstacle
+from world_models.entries.robot import CameraState, find_camera_lessons
 from world_models.entries.task import Certificate, Command, Goal, Milestone, Outcome, PlanSketch
 from world_models.entries.told import Redirection, Told
-from world_models.entries.touch import Contact
 from world_models.words import count, listed, metres
 
 

@@ -25,10 +25,9 @@ from world_models import words
 from world_models.entries.body import BodyFault, Recovery
 from world_models.entries.door_state import DoorState
 from world_models.entries.location import Hypothesis, Place
-from world_models.entries.obstacle import Obstacle
+from world_models.entries.obstacle import Contact, Obstacle
 from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch, Resumed
 from world_models.entries.told import Redirection, Told
-from world_models.entries.touch import Contact
 from world_models.words import count
 
 TOLD = ("refuted", "not testable", "lost", "found", "fault", "contact", "door", "thing", "resumed", "told")

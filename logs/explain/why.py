@@ -35,15 +35,12 @@ from world_models.entries.body import (
 )
 from world_models.entries.door_state import DoorState
 from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor
-from world_models.entries.location import Hypothesis
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.obstruction import Obstruction
+from world_models.entries.location import Hypothesis, Travel
+from world_models.entries.obstacle import Contact, Obstacle, Obstruction, Ranges
 from world_models.entries.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
 from world_models.entries.robot import CameraState, Drift, Footprint, Wheels
 from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, Outcome, PlanSketch, Resumed
 from world_models.entries.told import Redirection, Told
-from world_models.entries.touch import Contact, Ranges
-from world_models.entries.travel import Travel
 
 MOST = 24
 """So many things are told at the most."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 from sim.body.simulated_body import SimulatedBody
 from sim.faults.fault import DeviceFault
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
-from world_models.entries.touch import Contact, Ranges
+from world_models.entries.obstacle import Contact, Ranges
 
 
 class FaultyBody:

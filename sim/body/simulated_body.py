@@ -19,7 +19,7 @@ from sim.truth import Truth
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Odometry, Ride, RideReport
 from world_models.entries.location import Place
-from world_models.entries.touch import Contact, Ranges
+from world_models.entries.obstacle import Contact, Ranges
 from world_models.frames import Pose2
 
 FRAME_S = 0.1

@@ -10,7 +10,7 @@ from harvey.simulation.run import run_mission
 from sim.faults.kinds import Occlusion
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
-from world_models.entries.obstruction import Obstruction
+from world_models.entries.obstacle import Obstruction
 from world_models.entries.task import Milestone
 
 HIDDEN = fault("occluded", "hallway", 3.0, part=0.2, duration_s=1000.0)

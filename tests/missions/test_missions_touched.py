@@ -26,8 +26,7 @@ from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
 from world_models.entries.body import MotorCommand
 from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.touch import Contact
+from world_models.entries.obstacle import Contact, Obstacle
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2

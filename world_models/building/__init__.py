@@ -7,7 +7,6 @@ In reading order:
 * :mod:`.changes`: what is believed otherwise than the world file says: a door found shut, a thing gone.
 * :mod:`.passages`: passage graphs at every level of the hierarchy, and routes.
 * :mod:`.locale_frame`: all that is known of one locale: the unit in which a building is asked, told and changed.
-* :mod:`.build_frames`: the frames of what a world file describes.
 * :mod:`.building`: the queries, one locale at a time; :mod:`.world`: the whole, as files and the simulator have it.
 * :mod:`.model_errors`: how well the model knows where things are, and which errors are shared.
 * :mod:`.checks`: faults of a world.

@@ -2,20 +2,6 @@
 
 from blackboard.kinds import kinds_in
 from world_models.building import locale_frame
-from world_models.entries import (
-    body,
-    door_state,
-    floor,
-    location,
-    obstacle,
-    obstruction,
-    percepts,
-    robot,
-    task,
-    told,
-    touch,
-    travel,
-)
+from world_models.entries import body, door_state, floor, location, obstacle, percepts, robot, task, told
 
-KINDS = kinds_in(locale_frame, told, robot, body, touch, task, percepts, location, obstacle, obstruction, floor,
-                 door_state, travel)
+KINDS = kinds_in(locale_frame, told, robot, body, task, percepts, location, obstacle, floor, door_state)

@@ -1,13 +1,104 @@
-"""Obstacles: what stands in the way and is not in the model of the building."""
+"""What is not in the model of the building: touch and range, by bumper, wheels or a ring of range sensors; obstacles in
+the way; and what stands before the camera (a coat, a cable, dirt on the glass), where nothing is to be expected."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from blackboard.kinds import inference
+import numpy as np
+from numpy.typing import NDArray
+
+from blackboard.kinds import inference, observation
 from world_models import words
+
+Sense = Literal["bumper", "stall"]
+LAST_CONTACTS = 8
+"""The newest contacts that stay on the board."""
+AHEAD_SIGMA_RAD = math.pi / math.sqrt(12.0)
+"""Of wheels that are held in a move: what stops it is anywhere on the half that faces ahead."""
+AROUND_SIGMA_RAD = 2.0 * AHEAD_SIGMA_RAD
+"""Of wheels that are held in a turn: anywhere round the robot."""
+
+
+@observation(keep=LAST_CONTACTS)
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Something was touched, and ended the motion; it rests on the request of that motion.
+
+    Attributes:
+        by: bumper, or stall: the wheels are held, which knows no direction but that of the motion.
+        direction_rad: from the robot's heading, counter-clockwise, -pi..pi.
+        sigma_rad: standard deviation of the direction.
+        when_s: by the body's clock.
+    """
+
+    by: Sense
+    direction_rad: float
+    sigma_rad: float
+    when_s: float
+
+    def __post_init__(self) -> None:
+        if not (abs(self.direction_rad) <= math.pi and self.sigma_rad > 0.0):
+            raise ValueError("expected a direction of -pi to pi and a sigma above 0 rad, got "
+                             f"{self.direction_rad:g} and {self.sigma_rad:g}")
+
+    @staticmethod
+    def of_stall(when_s: float, *, turning: bool = False) -> Contact:
+        """What held wheels tell: something ahead in a move, something anywhere in a turn."""
+        return Contact("stall", 0.0, AROUND_SIGMA_RAD if turning else AHEAD_SIGMA_RAD, when_s)
+
+    def sentence(self) -> str:
+        sure = f"+-{words.degrees(self.sigma_rad)}"
+        felt = "the bumper touched something" if self.by == "bumper" else "the wheels were held by something"
+        if self.sigma_rad >= AROUND_SIGMA_RAD:
+            return f"{felt} in an unknown direction; at {self.when_s:.1f} s"
+        return f"{felt} {words.bearing(self.direction_rad)} ({sure}); at {self.when_s:.1f} s"
+
+
+@observation(keep=2)
+@dataclass(frozen=True, slots=True)
+class Ranges:
+    """One reading of a ring of range sensors; it is taken with a picture, and rests on the same request.
+
+    Attributes:
+        directions_rad: (n,) of each echo or, without one, of the sensor's axis; from the robot's heading,
+            counter-clockwise.
+        distances_m: (n,) from the robot's axis to the nearest thing that sends back an echo; None without an echo:
+            nothing is there, or it throws the sound elsewhere.
+        sigma_m: standard deviation of a distance.
+        half_beam_rad: the echo comes from anywhere within this of its direction.
+        max_range_m: what is further from the robot's axis sends back no echo.
+        when_s: by the body's clock.
+    """
+
+    directions_rad: tuple[float, ...]
+    distances_m: tuple[float | None, ...]
+    sigma_m: float
+    half_beam_rad: float
+    max_range_m: float
+    when_s: float
+
+    def __post_init__(self) -> None:
+        if len(self.directions_rad) != len(self.distances_m):
+            raise ValueError(f"expected a distance for each of {len(self.directions_rad)} directions, got "
+                             f"{len(self.distances_m)}")
+
+    @property
+    def echoes(self) -> tuple[tuple[float, float], ...]:
+        """(direction [rad], distance [m]) of each sensor that has an echo."""
+        both = zip(self.directions_rad, self.distances_m, strict=True)
+        return tuple((direction, distance) for direction, distance in both if distance is not None)
+
+    def sentence(self) -> str:
+        echoes = self.echoes
+        heard = f"{len(echoes)} of {words.count(len(self.distances_m), 'range sensor')} have an echo"
+        if not echoes:
+            return f"{heard}; at {self.when_s:.1f} s"
+        direction, distance = min(echoes, key=lambda echo: echo[1])
+        return f"{heard}, the nearest {words.metres(distance)} away, {words.bearing(direction)}; at {self.when_s:.1f} s"
+
 
 ObstacleStatus = Literal["suspected", "there", "gone"]
 ObstacleSense = Literal["touch", "camera", "ranges"]
@@ -76,3 +167,52 @@ class Obstacle:
         last = {"touch": "touched", "camera": "seen", "ranges": "ranged"}[self.by]
         evidence = f"; {self.evidence}" if self.evidence else ""
         return f"{self.words()} {state} ({self.name}); first {last}, {sure}; last at {self.seen_s:.1f} s{evidence}"
+
+
+Floats = NDArray[np.float64]
+SAMPLES = (np.arange(16) + 0.5) / 16.0
+"""Where on a line it is asked whether it is hidden: parts of its length."""
+MOST_HIDDEN = 0.3
+"""A line of which a larger part is hidden is not to be seen."""
+ROUND_PX = 2.5
+"""What lies no further outside belongs to the outline."""
+
+
+@inference()
+@dataclass(frozen=True, slots=True)
+class Obstruction:
+    """A convex part of the picture that something hides which moves with the camera.
+
+    Attributes:
+        outline_px: (k, 2) its corners, in the order of a walk round it, either way.
+    """
+
+    outline_px: tuple[tuple[float, float], ...]
+
+    def covers(self, points_px: Any, round_px: float = 0.0) -> NDArray[np.bool_]:
+        """(...) which points (..., 2) lie within the outline, or no further than ``round_px`` outside its sides."""
+        points, corners = np.asarray(points_px, float), np.asarray(self.outline_px, float)
+        sides = np.roll(corners, -1, axis=0) - corners
+        normals = np.stack([-sides[:, 1], sides[:, 0]], axis=1)
+        normals /= np.maximum(np.linalg.norm(sides, axis=1), 1e-9)[:, None]
+        inwards = np.sign(np.sum(normals * (corners.mean(axis=0) - corners)))  # by which way round the corners are told
+        depth = (np.einsum("...j,kj->...k", points, normals) - np.sum(normals * corners, axis=1)) * inwards
+        return np.asarray(np.all(depth >= -round_px, axis=-1))
+
+    def hidden_part(self, segments_px: Any, round_px: float = 0.0) -> Floats:
+        """(n,) which part of each segment (n, 2, 2) lies within, 0..1."""
+        ends = np.asarray(segments_px, float).reshape(-1, 2, 2)
+        points = ends[:, :1] + SAMPLES[:, None] * (ends[:, 1:] - ends[:, :1])
+        return np.asarray(np.mean(self.covers(points, round_px), axis=1))
+
+    def shows(self, segments_px: Any) -> NDArray[np.bool_]:
+        """(n,) which lines (n, 2, 2) can be seen past it."""
+        return self.hidden_part(segments_px) <= MOST_HIDDEN
+
+    def without_its_own(self, segments_px: Floats) -> Floats:
+        """Of segments (n, 2, 2) those that are not its outline, nor lie within it."""
+        return np.asarray(segments_px[self.hidden_part(segments_px, ROUND_PX) < 1.0])
+
+    def sentence(self) -> str:
+        corners = ", ".join(f"({u:.0f}, {v:.0f})" for u, v in self.outline_px)
+        return f"something before the camera hides a part of every picture; within {corners} px"

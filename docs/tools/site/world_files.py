@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 
 from docs.tools.site.markdown import table
 from world_models.files.toml.locale_reader import DEFAULT_KEYS, LOCALE_KEYS
+from world_models.files.toml.other_files import COPY_KEYS
 from world_models.files.toml.placements import ROW_KEYS, THING_KEYS
-from world_models.files.toml.subtrees import COPY_KEYS
 from world_models.files.toml.world_reader import DOOR_KEYS, SHARED_KEYS
 
 TOP: Mapping[str, str] = {

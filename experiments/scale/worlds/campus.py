@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from world_models.building.build_frames import iterate_frames
 from world_models.building.geometry.faces import Face, Finish, build_barrier, expected_brightness
 from world_models.building.geometry.landmarks import Edges, Landmark
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.building.locale_frame import LocaleFrame
 from world_models.building.locales import Doorway, Link, Locale
-from world_models.building.world import World
+from world_models.building.world import World, iterate_frames
 from world_models.files.packed import write_frames
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from harvey.hardware.drivers.base import LOOK_S, BaseKind, Driver, Link
 from harvey_bases.counters import step
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
-from world_models.entries.touch import Contact, Ranges
+from world_models.entries.obstacle import Contact, Ranges
 from world_models.frames import Pose2, wrap_angle
 
 HEADER = b"\xfa\xfb"

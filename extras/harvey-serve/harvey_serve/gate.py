@@ -18,7 +18,7 @@ from world_models.entries.body import (
     Ride,
     RideReport,
 )
-from world_models.entries.touch import Contact, Ranges
+from world_models.entries.obstacle import Contact, Ranges
 
 Order = Literal["pause", "resume", "stop"]
 WHY = "stopped from the page"

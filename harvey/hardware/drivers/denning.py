@@ -20,7 +20,7 @@ from typing import get_args
 
 from harvey.hardware.drivers.base import LOOK_S, BaseFault, BaseKind, Driver, Link
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
-from world_models.entries.touch import Contact, Ranges, Sense
+from world_models.entries.obstacle import Contact, Ranges, Sense
 
 LONGEST = 200
 """Bytes of a line; more without an end is noise."""

@@ -21,7 +21,7 @@ from logs.recording.paths import SEGMENTS as SEGMENTS_PATH
 from logs.recording.stream import RecordingStream
 from world_models.camera import clip_segments
 from world_models.entries.body import Frame
-from world_models.entries.obstruction import Obstruction
+from world_models.entries.obstacle import Obstruction
 from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
 from world_models.entries.task import Milestone
 from world_models.frames import frozen

@@ -28,9 +28,8 @@ from world_models.building.world import World
 from world_models.entries.body import MotorCommand
 from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.location import Hypothesis, Place, diagonal
-from world_models.entries.obstacle import Obstacle
+from world_models.entries.obstacle import Contact, Obstacle
 from world_models.entries.task import Certificate, Goal, MilestoneVerdict
-from world_models.entries.touch import Contact
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_building import FrameBuilding
 from world_models.frame_store import FrameStore

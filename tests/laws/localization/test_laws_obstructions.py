@@ -21,7 +21,7 @@ from knowledge_sources.methods.verification.line_check import predict_lines
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.entries.obstruction import MOST_HIDDEN, Obstruction
+from world_models.entries.obstacle import MOST_HIDDEN, Obstruction
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

@@ -21,7 +21,7 @@ from sim.body.senses import RangeRing, find_echo
 from sim.body.simulated_body import SimulatedBody
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import Course, Frame, Look, MotorCommand
-from world_models.entries.touch import Ranges
+from world_models.entries.obstacle import Ranges
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)

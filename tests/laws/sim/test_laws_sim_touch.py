@@ -24,7 +24,7 @@ from sim.body.senses import Bumper
 from sim.body.simulated_body import SimulatedBody
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
-from world_models.entries.touch import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD, Contact
+from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD, Contact
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)

@@ -9,10 +9,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from world_models.building.build_frames import build_frames
 from world_models.building.locale_frame import LocaleFrame
 from world_models.building.locales import Doorway, Link, Locale
 from world_models.building.passages import Route, find_route
+from world_models.building.world import build_frames
 from world_models.frames import Pose
 
 SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from world_models.building.checks import check_world
 from world_models.building.world import World
-from world_models.files.toml.line_numbers import find_line_numbers
-from world_models.files.toml.source import Source, WorldError
+from world_models.files.toml.source import Source, WorldError, find_line_numbers
 from world_models.files.world_files import WORLDS, read_world
 
 SMALL = """\

@@ -30,8 +30,8 @@ from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
 from logs.timeline import Timeline
 from memory_timeline import MemoryTimeline
+from world_models.entries.obstacle import Contact
 from world_models.entries.task import Certificate
-from world_models.entries.touch import Contact
 
 TOLD_SHUT = """
 description = "To Allen's office; that its door is shut is told at once."

@@ -34,9 +34,8 @@ from sim.body.simulated_body import SimulatedBody
 from sim.truth import Truth
 from world_models.entries.body import BodyFault, Recovery
 from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.obstacle import Obstacle
+from world_models.entries.obstacle import Contact, Obstacle
 from world_models.entries.task import Outcome
-from world_models.entries.touch import Contact
 from world_models.frames import Pose2
 
 

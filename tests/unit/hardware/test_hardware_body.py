@@ -15,7 +15,7 @@ from harvey.hardware.drivers.capture import CameraFault, CameraFaultKind
 from harvey.hardware.mission import load_mission
 from harvey.hardware.stopping import Heartbeat
 from world_models.entries.body import STOP_KEY, BodyFault, Frame, MotionReport, MotorCommand, Odometry
-from world_models.entries.touch import Ranges
+from world_models.entries.obstacle import Ranges
 from world_models.files.toml.mission import ROOT
 
 

@@ -5,9 +5,8 @@ from typing import Any
 
 import pytest
 
-from world_models.building.build_frames import build_frames
 from world_models.building.checks import check_world
-from world_models.building.world import World
+from world_models.building.world import World, build_frames
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world
 

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.build_frames import build_frames
 from world_models.building.geometry.faces import Face
 from world_models.building.geometry.landmarks import Landmark
 from world_models.building.geometry.solids import Solid
 from world_models.building.locales import ROBOT_TOP_M, Doorway, Finding, Link, Locale, Thing
-from world_models.building.world import World
+from world_models.building.world import World, build_frames
 from world_models.files.construction.doors import LEAF_DEPTH_M, DoorSide, build_closed_door, build_open_door
 from world_models.files.construction.rooms import Opening, RoomShell, Wall, build_walls, coordinate_along_wall
 from world_models.files.construction.specs import DoorSpec, LinkSpec, LocaleSpec, ThingSpec, WorldSpec

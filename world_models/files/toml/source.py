@@ -2,15 +2,125 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 import tomllib
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from world_models.files.toml.line_numbers import Key, find_line_numbers
+Key = tuple[str | int, ...]
+"""The path to a value: table names, keys and positions in arrays, from the top of the file."""
+
+
+def find_line_numbers(text: str) -> dict[Key, int]:
+    """The line (from 1) on which each value of a valid TOML text starts."""
+    return _Scanner(text).scan()
+
+
+@dataclass
+class _Scanner:
+    """Scans TOML that ``tomllib`` has accepted, and notes where values start."""
+
+    text: str
+    at: int = 0
+    lines: dict[Key, int] = field(default_factory=dict)
+    counts: dict[Key, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._newlines = [match.start() for match in re.finditer("\n", self.text)]
+
+    def scan(self) -> dict[Key, int]:
+        table: Key = ()
+        while self._skip(r"(?:\s|#[^\n]*)*"):
+            if self.text.startswith("[", self.at):
+                table = self._header()
+            else:
+                self._pair(table)
+        return self.lines
+
+    def _skip(self, pattern: str) -> bool:
+        """Move past the pattern; says whether text is left."""
+        match = re.compile(pattern).match(self.text, self.at)
+        self.at = match.end() if match else self.at
+        return self.at < len(self.text)
+
+    def _note(self, key: Key) -> None:
+        """The value of this key starts here, and those that hold it no later."""
+        line = bisect_right(self._newlines, self.at - 1) + 1
+        for length in range(len(key), 0, -1):
+            self.lines.setdefault(key[:length], line)
+
+    def _header(self) -> Key:
+        double = self.text.startswith("[[", self.at)
+        start, self.at = self.at, self.at + (2 if double else 1)
+        path: Key = ()
+        names = self._dotted()
+        for depth, name in enumerate(names):
+            path = (*path, name)
+            if double and depth == len(names) - 1:
+                self.counts[path] = self.counts.get(path, -1) + 1
+            if path in self.counts:
+                path = (*path, self.counts[path])
+        end, self.at = self.at, start
+        self._note(path)
+        self.at = end
+        self._skip(r"\s*\]\]?")
+        return path
+
+    def _dotted(self) -> list[str]:
+        names = []
+        while True:
+            self._skip(r"[ \t]*")
+            start = self.at
+            self._skip(_STRING + r"|[A-Za-z0-9_-]+")
+            raw = self.text[start : self.at]
+            names.append(next(iter(tomllib.loads(raw + "=0"))))
+            self._skip(r"[ \t]*")
+            if not self.text.startswith(".", self.at):
+                return names
+            self.at += 1
+
+    def _pair(self, table: Key) -> None:
+        key: Key = (*table, *self._dotted())
+        self._skip(r"[ \t]*=[ \t]*")
+        self._value(key)
+
+    def _value(self, key: Key) -> None:
+        self._note(key)
+        opening = self.text[self.at]
+        if opening == "[":
+            self._array(key)
+        elif opening == "{":
+            self._inline_table(key)
+        elif opening in "\"'":
+            self._skip(_STRING)
+        else:
+            self._skip(r"[^,\]}\n#]*")
+
+    def _array(self, key: Key) -> None:
+        self.at += 1
+        index = 0
+        while self._skip(r"(?:[\s,]|#[^\n]*)*") and self.text[self.at] != "]":
+            self._value((*key, index))
+            index += 1
+        self.at += 1
+
+    def _inline_table(self, key: Key) -> None:
+        self.at += 1
+        while self._skip(r"(?:[\s,]|#[^\n]*)*") and self.text[self.at] != "}":
+            self._pair(key)
+        self.at += 1
+
+
+_STRING = (
+    r'"""(?:[^\\]|\\[\s\S])*?"{3,5}'
+    r"|'''[\s\S]*?'{3,5}"
+    r'|"(?:[^"\\\n]|\\.)*"'
+    r"|'[^'\n]*'"
+)
+
 
 MAX_SHOWN = 10**80
 
@@ -202,61 +312,3 @@ def _shorten(text: str) -> str:
 
 WORLDS = Path(__file__).parents[2] / "worlds"
 """Folder of the worlds that come with the project; ``parts`` in it holds what they share."""
-MAX_DEPTH = 8
-"""Longest chain of files that name each other."""
-
-
-def read_included(root: Node) -> Iterator[Source]:
-    """The files that ``include`` lists. Raises WorldError."""
-    if "include" not in root:
-        return
-    for item in root["include"].items():
-        source = find_named_file(item, WORLDS / "parts")
-        if source.depth > MAX_DEPTH:
-            raise item.fail("a file that does not include itself")
-        yield source
-
-
-def find_named_file(node: Node, shipped: Path = WORLDS) -> Source:
-    """A file that comes with the project, by its bare name, or a .toml file relative to the file that names it.
-
-    Raises:
-        WorldError: there is no such file.
-    """
-    name = node.text()
-    path = node.source.folder / name if name.endswith(".toml") else shipped / f"{name}.toml"
-    bare = name.endswith(".toml") or name in [known.stem for known in shipped.glob("*.toml")]
-    try:
-        if bare and "\0" not in name and path.is_file():
-            return Source.read(path, depth=node.source.depth + 1)
-    except OSError:
-        pass
-    names = ", ".join(sorted(known.stem for known in shipped.glob("*.toml")))
-    raise node.fail(f"a .toml file that is there, or one of {names}")
-
-
-def find_all_files(source: Source) -> Iterator[Source]:
-    """A world file and all that it includes or copies from, once for each time that it is named."""
-    yield source
-    root = source.root
-    if not isinstance(root.value, dict) or source.depth > MAX_DEPTH:
-        return
-    if isinstance(root.value.get("include"), list):
-        for other in read_included(root):
-            yield from find_all_files(other)
-    if isinstance(root.value.get("locales"), dict):
-        for _, node in root["locales"].entries():
-            if isinstance(node.value, dict) and "from" in node:
-                yield from find_all_files(find_named_file(node["from"]))
-
-
-def compute_digest(path: Path) -> str:
-    """SHA-256 of a world file with all that it includes or copies from. Raises OSError or WorldError."""
-    own = path.read_bytes()
-    try:
-        others = list(find_all_files(Source.read(path)))[1:]
-    except WorldError:
-        others = []
-    if not others:
-        return hashlib.sha256(own).hexdigest()
-    return hashlib.sha256(b"".join([own, *(other.text.encode() for other in others)])).hexdigest()

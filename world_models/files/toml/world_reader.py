@@ -11,9 +11,15 @@ from world_models.building.geometry.faces import Finish
 from world_models.building.model_errors import SIGMA, SIGMAS
 from world_models.files.construction.specs import DoorSpec, LinkSpec, LocaleSpec, ThingSpec, WorldSpec
 from world_models.files.toml.locale_reader import LOCALE_KEYS, LocaleReader, pose_at, read_properties, read_sigma
+from world_models.files.toml.other_files import (
+    COPY_KEYS,
+    extract_subtree,
+    find_named_file,
+    read_included,
+    rename_locales,
+)
 from world_models.files.toml.placements import Placement, read_coordinates, read_placements
-from world_models.files.toml.source import Node, Source, find_named_file, read_included
-from world_models.files.toml.subtrees import COPY_KEYS, extract_subtree, rename_locales
+from world_models.files.toml.source import Node, Source
 
 SHARED_KEYS = ("include", "finishes", "parts", "defaults")
 DOOR_KEYS = ("width", "height", "open", "frame", "leaf", "threshold", "panel", "sigma_cm")

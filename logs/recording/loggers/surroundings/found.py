@@ -17,9 +17,8 @@ from logs.recording.stream import RecordingStream
 from world_models import words
 from world_models.entries.door_state import DoorCondition, DoorState
 from world_models.entries.floor import FreeFloor
-from world_models.entries.obstacle import Obstacle
+from world_models.entries.obstacle import Contact, Obstacle, Ranges
 from world_models.entries.robot import Footprint
-from world_models.entries.touch import Contact, Ranges
 from world_models.frames import Pose2
 
 BUMPER_M = 0.3
