@@ -10,7 +10,7 @@
 ``harvey.workers``            a ``harvey.campaign.workers.ClusterWorkers``, named ``dask``
 ``harvey.commands``           a ``harvey.commands.command.Command``; of a verb: ``world.import``
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
-``harvey.exporters``          a ``harvey_buildings.exporters.export_file.Exporter``
+``harvey.exporters``          a ``harvey_buildings.exporters.Exporter``
 ============================  ==========================================================================
 
 The name of an entry point is the name under which Harvey knows what it points to. What the folder ``extras`` has is

@@ -4,16 +4,20 @@ In reading order:
 
 * :mod:`.commands`: ``harvey world import`` and ``harvey world export``.
 * :mod:`.building_plan`: what a building file contains: spaces, openings, furnishings, and a report of what was used.
-* :mod:`.indoor_gml`, :mod:`.ifc`, :mod:`.geojson`, :mod:`.ros_map`: the readers, each into a building plan.
-* :mod:`.polygons`, :mod:`.curved_walls`: outlines cleaned, kept apart by walls, and straightened at doors.
-* :mod:`.openings`: positions of doors, wide openings and windows in walls.
-* :mod:`.furnishings`: furniture and stairs fitted into rooms.
+* :mod:`.geojson`: GeoJSON read and written.
+* :mod:`.indoor_gml`: IndoorGML (OGC 14-005, and 2.0's core) read; :mod:`.indoor_gml_file` has its elements.
+* :mod:`.ifc`: IFC (ISO 16739) read, in a process of its own; :mod:`.ifc_file` has the opened file, :mod:`.ifc_elements`
+  what its elements are on the plan.
+* :mod:`.ros_map`: a ROS map read; :mod:`.ros_map_file` has its files, which are written too, :mod:`.ros_map_rooms` its
+  floor parted into rooms.
+* :mod:`.polygons`: outlines cleaned, kept apart by walls, and straightened at doors.
+* :mod:`.placement`: doors, wide openings and windows placed in walls, furniture and stairs fitted into rooms.
 * :mod:`.layout`: rooms with walls, openings and furniture in place.
 * :mod:`.world_text`: the world file.
 * :mod:`.exporters`: a world for other programs: ROS map, SVG, GeoJSON, glTF.
 
 Other packages add formats by entry points: ``harvey.importers``, an :class:`Importer` under the ending of its files,
-and ``harvey.exporters``, an ``Exporter`` (:mod:`.exporters.export_file`) under the ending or the name of its format.
+and ``harvey.exporters``, an ``Exporter`` (:mod:`.exporters`) under the ending or the name of its format.
 """
 
 from __future__ import annotations
@@ -23,10 +27,9 @@ from inspect import signature
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from harvey_buildings.building_plan import BuildingError, BuildingPlan, ImportReport
-from harvey_buildings.indoor_gml.navigation_graph import NavigationGraph
+from harvey_buildings.building_plan import BuildingError, BuildingPlan, ImportReport, NavigationGraph
 from harvey_buildings.layout import Layout, lay_out
-from harvey_buildings.ros_map.occupancy import PICTURES, explain_bare_picture
+from harvey_buildings.ros_map_file import PICTURES, explain_bare_picture
 from harvey_buildings.world_text import world_text
 from world_models.plugins import list_plugins, load_plugins
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from itertools import combinations, pairwise
 
+import networkx as nx
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from world_models.files.toml.source import WorldError
-
-if TYPE_CHECKING:
-    from harvey_buildings.indoor_gml.navigation_graph import NavigationGraph
 
 Floats = NDArray[np.float64]
 Steps = tuple[tuple[float, float, float, float, float, float], ...]
@@ -119,6 +118,58 @@ class ImportReport:
         parts = (("used", self.used), ("guessed", self.guessed), ("left out", self.left_out))
         return "\n".join(f"{title}\n" + "\n".join(f"  {line}" for line in lines or ["nothing"])
                          for title, lines in parts)
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationGraph:
+    """A graph to plan on, in metres: edges carry ``length_m`` and ``kind`` (floor, stairs, elevator).
+
+    Attributes:
+        layer: name of the layer that it is made from.
+        graph: nodes carry ``floor`` and ``room``, the room that the place is in or next to (None: too far from any).
+        rooms: the node of each room; absent where none is near.
+    """
+
+    layer: str
+    graph: nx.Graph
+    rooms: dict[str, str]
+
+    def find_route(self, origin: str, destination: str) -> list[str] | None:
+        """The nodes of the shortest path from room to room; None where there is none or a room has no node."""
+        if origin not in self.rooms or destination not in self.rooms:
+            return None
+        try:
+            path: list[str] = nx.shortest_path(self.graph, self.rooms[origin], self.rooms[destination], "length_m")
+        except nx.NetworkXNoPath:
+            return None
+        return path
+
+    def describe(self, way: Iterable[str]) -> str:
+        """A path in words: rooms with their floors, in order, and its length."""
+        names: list[str] = []
+        nodes = list(way)
+        for node in nodes:
+            data = self.graph.nodes[node]
+            here = f"{data['room'] or node} ({data['floor']})"
+            if not names or names[-1] != here:
+                names.append(here)
+        length = float(np.sum([self.graph.edges[a, b]["length_m"] for a, b in pairwise(nodes)]))
+        return f"{' - '.join(names)}: {length:.0f} m"
+
+    def count_routes_across_floors(
+        self, floor_of: dict[str, str]
+    ) -> tuple[int, int, tuple[str, str, list[str]] | None]:
+        """Pairs of rooms on different floors: how many have a path, of how many; and the path with the most nodes."""
+        total, found, longest = 0, 0, None
+        for a, b in combinations(floor_of, 2):
+            if floor_of[a] == floor_of[b]:
+                continue
+            total += 1
+            way = self.find_route(a, b)
+            found += way is not None
+            if way is not None and (longest is None or len(way) > len(longest[2])):
+                longest = a, b, way
+        return found, total, longest
 
 
 @dataclass

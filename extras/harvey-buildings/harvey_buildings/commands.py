@@ -47,7 +47,7 @@ def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
 
 
 def _export(args: Namespace) -> int:
-    from harvey_buildings.exporters.export_file import ExportError, export_world, list_formats
+    from harvey_buildings.exporters import ExportError, export_world, list_formats
 
     out = Path(args.to)
     if args.format is not None and args.format not in list_formats():

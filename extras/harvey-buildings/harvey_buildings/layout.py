@@ -17,14 +17,17 @@ from harvey_buildings.building_plan import (
     WallOpening,
     Window,
 )
-from harvey_buildings.curved_walls import straighten_wall
-from harvey_buildings.furnishings import ROBOT_TOP_M, bottom_m, fit_into_room, footprint, is_obstacle
-from harvey_buildings.openings import (
+from harvey_buildings.placement import (
+    ROBOT_TOP_M,
     PlacedOpening,
     PlacedWindow,
     all_pairs,
+    bottom_m,
     doorway,
     find_panes,
+    fit_into_room,
+    footprint,
+    is_obstacle,
     overlap,
     place_door,
     place_outer_door,
@@ -36,6 +39,7 @@ from harvey_buildings.polygons import (
     Floats,
     find_facing_stretches,
     separate_outlines,
+    straighten_wall,
 )
 
 STOREY_GAP_M = 10.0

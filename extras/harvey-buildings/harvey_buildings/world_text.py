@@ -10,7 +10,7 @@ import numpy as np
 
 from harvey_buildings.building_plan import Furnishing, Space, Storey, Window
 from harvey_buildings.layout import Layout
-from harvey_buildings.openings import PlacedOpening, PlacedWindow
+from harvey_buildings.placement import PlacedOpening, PlacedWindow
 from harvey_buildings.polygons import Floats, find_center
 
 HEAD = """\

@@ -13,9 +13,8 @@ import shapely
 from harvey.cli import main
 from harvey_buildings import BuildingError, import_building
 from harvey_buildings.building_plan import Space
-from harvey_buildings.curved_walls import straighten_wall
-from harvey_buildings.ifc.boxes import find_climbed_spaces
-from harvey_buildings.polygons import Floats, extract_outline, separate_outlines
+from harvey_buildings.ifc_file import find_climbed_spaces
+from harvey_buildings.polygons import Floats, extract_outline, separate_outlines, straighten_wall
 from ifc_house import House, box, flat
 from world_models.building.checks import check_world
 from world_models.building.world import World

@@ -15,16 +15,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from harvey_buildings.building_plan import Furnishing, Space, WallOpening, Window
-from harvey_buildings.furnishings import (
+from harvey_buildings.placement import (
+    PlacedOpening,
     build_bounding_boxes,
+    doorway,
+    find_panes,
     fit_into_room,
     footprint,
     is_obstacle,
-)
-from harvey_buildings.openings import (
-    PlacedOpening,
-    doorway,
-    find_panes,
     overlap,
     place_door,
     place_outer_door,

@@ -14,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from harvey_buildings.curved_walls import straighten_wall
 from harvey_buildings.polygons import (
     clean_outline,
     cut_holes_open,
@@ -25,6 +24,7 @@ from harvey_buildings.polygons import (
     separate_outlines,
     side_of,
     square_outline,
+    straighten_wall,
 )
 
 Floats = NDArray[np.float64]

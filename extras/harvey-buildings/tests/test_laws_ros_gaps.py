@@ -17,12 +17,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from harvey_buildings.ros_map.gaps import Gap, _close_slanting, _line, close_gaps
-from harvey_buildings.ros_map.grid import Grid, find_wall_turn, make_grid
-from harvey_buildings.ros_map.map_yaml import MapFile
-from harvey_buildings.ros_map.occupancy import FREE, OCCUPIED, UNKNOWN
-from harvey_buildings.ros_map.outlines import gap_on_map
-from harvey_buildings.ros_map.rooms import clean_floor, part_rooms, rooms_beside
+from harvey_buildings.ros_map import Grid, find_wall_turn, gap_on_map, make_grid
+from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN, MapFile
+from harvey_buildings.ros_map_rooms import (
+    Gap,
+    _close_slanting,
+    _line,
+    clean_floor,
+    close_gaps,
+    part_rooms,
+    rooms_beside,
+)
 
 Mask = NDArray[np.bool_]
 

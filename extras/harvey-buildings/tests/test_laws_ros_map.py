@@ -13,9 +13,8 @@ from hypothesis.extra.numpy import arrays
 
 from experiments.generated.floors import ScanNoise, write_floor_map
 from harvey_buildings import BuildingError, import_building
-from harvey_buildings.ros_map.grid import find_wall_turn, make_grid
-from harvey_buildings.ros_map.map_yaml import MapFile, read_map_yaml
-from harvey_buildings.ros_map.occupancy import FREE, OCCUPIED, UNKNOWN, read_cells
+from harvey_buildings.ros_map import find_wall_turn, make_grid
+from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN, MapFile, read_cells, read_map_yaml
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.files.toml.source import Source

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from harvey.cli import main
 from harvey_buildings import BuildingError, import_building, read_plan
-from harvey_buildings.exporters.export_file import export_world
+from harvey_buildings.exporters import export_world
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.files.first_world import first_world_text

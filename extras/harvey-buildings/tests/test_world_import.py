@@ -13,8 +13,7 @@ from experiments.robustness.imported_floors import plan_pairs
 from harvey.cli import main
 from harvey_buildings import BuildingError, ImportedBuilding, import_building
 from harvey_buildings.building_plan import Furnishing, Names, Space, WallOpening, slug
-from harvey_buildings.furnishings import build_bounding_boxes, fit_into_room
-from harvey_buildings.openings import place_door, place_wide_opening
+from harvey_buildings.placement import build_bounding_boxes, fit_into_room, place_door, place_wide_opening
 from harvey_buildings.polygons import (
     clean_outline,
     find_facing_stretches,

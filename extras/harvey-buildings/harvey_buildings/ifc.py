@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from harvey_buildings.building_plan import BuildingError, BuildingPlan
-from harvey_buildings.ifc.opened_file import READ_ERRORS, IfcFile, Progress, first_line
-from harvey_buildings.ifc.plan_reader import read_plan
-from harvey_buildings.ifc.shapes import Body
+from harvey_buildings.ifc_elements import FURNITURE, Contents, Passages, Spaces
+from harvey_buildings.ifc_file import ELEMENT_S, READ_ERRORS, Body, IfcFile, Progress, first_line
 
 TAIL_BYTES = 65536
 """How much of a file's start and end is searched for its first and last line."""
@@ -164,3 +163,36 @@ def _read_unit_m(model: Any) -> float:
         return float(ifcopenshell.util.unit.calculate_unit_scale(model))
     except READ_ERRORS:
         return 1.0
+
+
+def read_plan(file: IfcFile) -> BuildingPlan:
+    """Everything that is used of the file. Raises BuildingError where it has no usable space."""
+    file.send(Progress("reading its storeys", ELEMENT_S))
+    spaces, contents = Spaces(file), Contents(file)
+    spaces.read()
+    Passages(file, spaces).read()
+    contents.read()
+    _write_report(file, contents)
+    return file.plan
+
+
+def _write_report(file: IfcFile, contents: Contents) -> None:
+    """Say what was used, guessed and left out."""
+    plan, report = file.plan, file.plan.report
+
+    def count(*kinds: str) -> int:
+        return len(file.all(*kinds))
+
+    doors = len([gap for gap in plan.openings if gap.has_leaf])
+    passages = f"{len(plan.openings) - doors} openings without a door, " if len(plan.openings) > doors else ""
+    report.used.append(f"{file.model.schema}: {len(plan.storeys)} storeys, {len(plan.spaces)} of "
+                        f"{count('IfcSpace')} spaces, {doors} of {count('IfcDoor')} doors, {passages}"
+                        f"{len(plan.windows)} of {count('IfcWindow')} windows, {contents.flights} of "
+                        f"{contents.stairs} stairs, {contents.pieces} of {count(*FURNITURE)} pieces of furniture")
+    if lifts := count("IfcTransportElement"):
+        report.used.append(f"{lifts} lifts: {len(contents.lifts)} rides from a storey to the next")
+    report.used.append(f"its unit of length: {file.unit_m:g} m")
+    report.used.append("which spaces a door joins: from space boundaries, and from what lies on both its sides")
+    report.guessed.append("all doors between spaces stand open; furniture is its bounding box; colours are ours")
+    report.left_out.append(f"the shapes of {count('IfcWall')} walls (rooms are bounded by their spaces), "
+                            "slabs, coverings, roofs, railings, materials")

@@ -19,25 +19,27 @@ from harvey_buildings.building_plan import (
     BuildingError,
     BuildingPlan,
     Names,
+    NavigationGraph,
     RoomLink,
     Space,
     Storey,
     WallOpening,
     slug,
 )
-from harvey_buildings.indoor_gml.cells import (
+from harvey_buildings.indoor_gml_file import (
     CELLS,
     Boundary,
     Cell,
+    Layer,
+    elements,
     find_origin,
     find_outline,
     read_boundaries,
     read_cells,
+    read_layers,
+    read_xml,
 )
-from harvey_buildings.indoor_gml.gml import elements
-from harvey_buildings.indoor_gml.navigation_graph import Layer, NavigationGraph, read_layers
-from harvey_buildings.indoor_gml.xml_reader import read_xml
-from harvey_buildings.openings import MIN_DOOR_M
+from harvey_buildings.placement import MIN_DOOR_M
 from harvey_buildings.polygons import (
     Floats,
     find_facing_stretches,
