@@ -15,8 +15,7 @@ from typing import Any, TypeVar
 from tqdm import tqdm
 
 from harvey.campaign.case_work import Killed
-from harvey.campaign.engine import Campaign, run_campaign
-from harvey.campaign.results_file import RESULTS
+from harvey.campaign.engine import RESULTS, Campaign, run_campaign
 from harvey.errors import BadInput
 from logs.run_directory import RUNS
 

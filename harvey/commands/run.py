@@ -7,16 +7,13 @@ import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from harvey.campaign.campaign import Task, parse_pairs, parse_seeds, run_task
+from harvey.campaign.campaign import Keep, Task, drive_missions, parse_pairs, parse_seeds, run_task
 from harvey.campaign.workers import add_worker_arguments, choose_workers, parse_workers
 from harvey.commands.command import Command
 from harvey.errors import BadInput, Terminated
 from logs.run_directory import RUNS, check_vacant
 
-if TYPE_CHECKING:
-    from harvey.campaign.missions import Keep
 
 def _add_run_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("scenario", metavar="SCENARIO", help="a name from harvey list, or a TOML file")
@@ -111,7 +108,6 @@ def _one(task: Task, args: Namespace) -> int:
 
 
 def _several(tasks: tuple[Task, ...], keep: Keep) -> int:
-    from harvey.campaign.missions import drive_missions
     from harvey.campaign.progress import count_missions
     from harvey.campaign.summary import format_results
     from harvey.runner.result import MissionResult
@@ -205,8 +201,7 @@ def _show(args: Namespace) -> int:
 
 
 def _compare(args: Namespace) -> int:
-    from harvey.campaign.compare import compare, format_comparison, parse_success
-    from harvey.campaign.show import find_campaign, read_progress
+    from harvey.campaign.show import compare, find_campaign, format_comparison, parse_success, read_progress
 
     succeeds = parse_success(args.success)
     first, second = (read_progress(find_campaign(text)) for text in (args.first, args.second))

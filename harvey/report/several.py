@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from harvey.campaign.compare import rate_interval
-from harvey.campaign.results_file import RESULTS
-from harvey.campaign.show import find_campaign, read_progress
+from harvey.campaign.engine import RESULTS
+from harvey.campaign.show import find_campaign, rate_interval, read_progress
 from harvey.errors import BadInput
 from harvey.report.drawing import Field, count_outcomes, draw_distributions, read_fields
 from harvey.report.page import fill_in, read_part

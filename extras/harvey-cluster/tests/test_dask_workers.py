@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fake_cases import run_here, serial
-from harvey.campaign.results_file import RESULTS
+from harvey.campaign.engine import RESULTS
 from harvey.campaign.workers import Workers, find_cluster
 from harvey.cli import main
 from harvey_cluster.dask_workers import DASK

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harvey.campaign.compare import CONFIDENCE, Comparison, compare, parse_success, rate_interval
+from harvey.campaign.show import CONFIDENCE, Comparison, compare, parse_success, rate_interval
 from harvey.errors import BadInput
 
 PAIRS = st.dictionaries(st.integers(0, 99), st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=40)

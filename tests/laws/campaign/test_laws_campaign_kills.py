@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fake_cases import be_client, run_here, serial
-from harvey.campaign.results_file import RESULTS, open_results, read_times
+from harvey.campaign.engine import RESULTS, open_results, read_times
 from harvey.campaign.workers import Workers
 from harvey.errors import BadInput
 

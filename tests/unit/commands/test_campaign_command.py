@@ -8,11 +8,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from harvey.campaign import missions
+from harvey.campaign import campaign as missions
 from harvey.campaign.campaign import Task
-from harvey.campaign.case_work import Answer, check_origin
-from harvey.campaign.origin import code_digest
-from harvey.campaign.results_file import open_results
+from harvey.campaign.case_work import Answer, check_origin, code_digest
+from harvey.campaign.engine import open_results
 from harvey.campaign.show import read_progress
 from harvey.campaign.workers import Workers, choose_workers, chosen_workers
 from harvey.cli import main

@@ -15,9 +15,8 @@ from blackboard.board import Blackboard
 from blackboard.effect import Effect, Post, Revise
 from blackboard.journal import Decision, decision_line
 from blackboard.level import Level
-from harvey.campaign.progress import Lines
+from harvey.campaign.progress import Lines, Tally
 from harvey.campaign.summary import format_result
-from harvey.campaign.tally import Tally
 from harvey.errors import BadInput
 from harvey.runner.result import MissionResult
 from harvey.simulation.contacts import ContactWatch
