@@ -216,7 +216,7 @@ def _png(world: World, out: Path) -> None:
 
 
 def _recording(world: World, out: Path) -> None:
-    from logs.recording.building_recording import record_building
+    from logs.recording.loggers.surroundings.building import record_building
 
     record_building(world, out)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -29,10 +30,23 @@ from world_models.words import count, degrees, landmark, listed, metres, point, 
 STRANGE = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
 """What reading a value raises that has other fields than this version writes."""
 MAX_LISTED = 4
+WIDTH = 120
+"""Of a line of text [characters]."""
 SLIGHT_RAD = math.radians(0.05)
 CORRECTED_BY: Mapping[Level, str] = {
     Level.ACTION: "on the move", Level.PLAN: "at a milestone", Level.GOAL: "by finding out anew where it is",
 }
+
+
+def capital(text: str) -> str:
+    """A clause as a sentence begins."""
+    return text[:1].upper() + text[1:]
+
+
+def wrap(text: str, first: str = "", rest: str | None = None) -> str:
+    """A paragraph; ``first`` stands before it, and ``rest`` before its other lines: as many blanks where None."""
+    rest = " " * len(first) if rest is None else rest
+    return fill(text, WIDTH, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False)
 
 
 def sentence(record: EntryRecord[Any]) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 
 from logs.errors import BadInput
 from logs.explain.model import reference_of
-from logs.explain.phrases import describe_decision, sentence
+from logs.explain.phrases import capital, describe_decision, sentence
 from logs.explain.story import Section, tell_contacts, tell_lost
 from logs.explain.turning_points import read_turning_points
 from logs.explain.why import LABELS, Step, Story, headline
@@ -222,8 +222,7 @@ def _tell_doors(history: Timeline, question: str, at: int | None) -> Iterator[St
 
 
 def _said(record: EntryRecord[Any]) -> str:
-    text = sentence(record)
-    return f"{text[:1].upper()}{text[1:]}."
+    return f"{capital(sentence(record))}."
 
 
 def _nothing(text: str, at: int | None) -> Story:

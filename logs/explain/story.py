@@ -7,14 +7,13 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from textwrap import fill
 from typing import Any
 
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from logs.errors import BadInput
 from logs.explain import phrases
-from logs.explain.phrases import STRANGE, sentence
+from logs.explain.phrases import STRANGE, capital, sentence, wrap
 from logs.explain.turning_points import TurningPoint, read_collisions, read_turning_points, turn_lines
 from logs.records import EntryRecord
 from logs.run_directory import RunDirectory
@@ -83,14 +82,8 @@ def levels_off(run: RunDirectory) -> Iterator[str]:
     """Which servo levels were switched off, as run.json says; nothing where it does not."""
     head = _head(run)
     try:
-        servo = {
-            **head["servo"],
-            **{
-                key.removeprefix("servo."): value == "on"
-                for key, value in head["constants"]
-                if key.startswith("servo.")
-            },
-        }
+        set_since = {key: value == "on" for key, value in head["constants"] if key.startswith("servo.")}
+        servo = {**head["servo"], **{key.removeprefix("servo."): is_on for key, is_on in set_since.items()}}
     except (AttributeError, ValueError, KeyError, TypeError):
         return
     for level, is_on in servo.items():
@@ -112,14 +105,9 @@ WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, Told, Redir
 
 def tell_errand(history: Timeline) -> Section:
     """What was asked for, and what it was told on the way."""
-    return Section(
-        "What it was to do",
-        tuple(
-            sentence_of(history, f"{_capital(sentence(record))}.", record)
-            for record in history.of_kind(Command, Told, Redirection)
-            if record.observed
-        ),
-    )
+    told = (record for record in history.of_kind(Command, Told, Redirection) if record.observed)
+    return Section("What it was to do", tuple(
+        sentence_of(history, f"{capital(sentence(record))}.", record) for record in told))
 
 
 def tell_plans(history: Timeline) -> Section:
@@ -132,7 +120,7 @@ def tell_plans(history: Timeline) -> Section:
 
 
 def _goal(record: EntryRecord[Any]) -> str:
-    return f"{_capital(sentence(record))}." if record.is_new or record.fields["status"] != "active" else ""
+    return f"{capital(sentence(record))}." if record.is_new or record.fields["status"] != "active" else ""
 
 
 def _sketch(history: Timeline, record: EntryRecord[Any]) -> str:
@@ -164,10 +152,6 @@ def _cause(history: Timeline, ref: str) -> str:
     if record.kind is LocaleFrame:  # the changes of a frame are many; what made the last of them is told
         record = history.nearest(record, *WHAT_CHANGES) or record
     return sentence(record).partition(";")[0]
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 MOST_PLACES = 4
@@ -210,11 +194,8 @@ def _tell_loss(history: Timeline, lost: EntryRecord[Any], found: EntryRecord[Any
         return
     now = found.value
     how = f": {now.evidence}" if now.evidence else ""
-    yield sentence_of(
-        history,
-        f"It found out where it was, {_after(history, lost, found)}: at {phrases.pose(now)}{_apart(below, now)}{how}.",
-        found,
-    )
+    at = f"at {phrases.pose(now)}{_apart(below, now)}{how}"
+    yield sentence_of(history, f"It found out where it was, {_after(history, lost, found)}: {at}.", found)
 
 
 def _tell_reasons(history: Timeline, lost: EntryRecord[Any]) -> Iterator[Sentence]:
@@ -241,27 +222,18 @@ def _first(history: Timeline, record: EntryRecord[Any]) -> EntryRecord[Any]:
 def _tell_search(history: Timeline, lost: EntryRecord[Any], found: EntryRecord[Any] | None) -> Iterator[Sentence]:
     """How many pictures it took to find itself, and which places came into question."""
     last = found.cycle if found is not None else history.cycles[-1]
-    looks = [
-        record
-        for record in history.of_kind(Look, until=last)
-        if record.cycle >= lost.cycle and record.value.purpose == "probe"
-    ]
-    candidates = {
-        record.id: record
-        for record in history.of_kind(Hypothesis, until=last)
-        if record.cycle >= lost.cycle and record.is_new and record.fields["status"] == "candidate"
-    }
+    looks = [record for record in history.of_kind(Look, until=last)
+             if record.cycle >= lost.cycle and record.value.purpose == "probe"]
+    candidates = [record for record in history.of_kind(Hypothesis, until=last)
+                  if record.cycle >= lost.cycle and record.is_new and record.fields["status"] == "candidate"]
     if not looks and not candidates:
         return
     text = f"To find out where it was it took {count(len(looks), 'picture')}"
     if candidates:
-        places = [
-            f"{record.value.place()} ({record.value.weight:.0%})"
-            for record in candidates.values()
-        ]
+        places = [f"{record.value.place()} ({record.value.weight:.0%})" for record in candidates]
         text += f"; it may have stood at {listed(places, MOST_PLACES)}"
-    first = min((*looks, *candidates.values()), key=lambda record: record.cycle)
-    yield sentence_of(history, f"{text}.", first, *candidates.values())
+    first = min((*looks, *candidates), key=lambda record: record.cycle)
+    yield sentence_of(history, f"{text}.", first, *candidates)
 
 
 def _after(history: Timeline, lost: EntryRecord[Any], found: EntryRecord[Any]) -> str:
@@ -282,30 +254,23 @@ def _apart(believed: EntryRecord[Any] | None, now: Hypothesis) -> str:
 
 def tell_contacts(history: Timeline, turns: tuple[TurningPoint, ...], result: Mapping[str, Any]) -> Section:
     """What it felt; and, where the simulator says so, what it truly touched."""
-    felt = tuple(_sentences(turns, "contact"))
-    truly = tuple(
-        Sentence(f"It truly touched something at {point.text}.", point.cycle, point.time_s)
-        for point in read_collisions(history, result)
-    )
-    nothing = (Sentence("It felt no contact."),)
-    unknown = (
-        ""
-        if "collisions" in result and result["collisions"] is not None
-        else ("What it touched without feeling it nobody recorded: there is no result of the simulator.")
-    )
-    missing = (result.get("collisions") or 0) - len(truly)
-    more = f"The simulator counts {missing} more, and does not say where." if missing > 0 else unknown
-    return Section("What it touched", (*(felt or nothing), *truly, *((Sentence(more),) if more else ())))
+    told = _sentences(turns, "contact") or [Sentence("It felt no contact.")]
+    truly = [Sentence(f"It truly touched something at {point.text}.", point.cycle, point.time_s)
+             for point in read_collisions(history, result)]
+    told += truly
+    if result.get("collisions") is None:
+        nobody = "What it touched without feeling it nobody recorded: there is no result of the simulator."
+        told.append(Sentence(nobody))
+    elif (missing := result["collisions"] - len(truly)) > 0:
+        told.append(Sentence(f"The simulator counts {missing} more, and does not say where."))
+    return Section("What it touched", tuple(told))
 
 
 def tell_things(turns: tuple[TurningPoint, ...]) -> Section:
     """Doors found shut, things in the way, and what became of them; faults of its body."""
-    found = tuple(point for point in turns if point.kind in ("door", "thing", "fault", "resumed"))
-    told = tuple(Sentence(f"{point.text[:1].upper()}{point.text[1:]}.", point.cycle, point.time_s) for point in found)
-    return Section(
-        "Doors, things in the way and faults",
-        told or (Sentence("No door was found otherwise than known, nothing stood in the way, and nothing failed."),),
-    )
+    nothing = Sentence("No door was found otherwise than known, nothing stood in the way, and nothing failed.")
+    told = _sentences(turns, "door", "thing", "fault", "resumed") or [nothing]
+    return Section("Doors, things in the way and faults", tuple(told))
 
 
 def tell_camera(history: Timeline) -> Section:
@@ -322,10 +287,9 @@ def tell_camera(history: Timeline) -> Section:
     return Section("The camera", tuple(told) or (Sentence("The camera was found to be as told."),))
 
 
-def _sentences(turns: tuple[TurningPoint, ...], kind: str) -> Iterator[Sentence]:
-    for point in turns:
-        if point.kind == kind:
-            yield Sentence(f"{point.text[:1].upper()}{point.text[1:]}.", point.cycle, point.time_s)
+def _sentences(turns: tuple[TurningPoint, ...], *kinds: str) -> list[Sentence]:
+    """The turning points of some kinds."""
+    return [Sentence(f"{capital(point.text)}.", point.cycle, point.time_s) for point in turns if point.kind in kinds]
 
 
 COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong")
@@ -376,17 +340,8 @@ def _judged(history: Timeline) -> Iterator[MilestoneRow]:
         name = certificate.milestone if below is None else _name(below)
         refs = (record.ref, below.ref if below is not None else f"{certificate.milestone}.0")
         yield MilestoneRow(
-            record.cycle,
-            history.time_at(record.cycle),
-            name,
-            certificate.verdict,
-            certificate.expected,
-            certificate.matched,
-            certificate.deviation_m,
-            certificate.deviation_rad,
-            certificate.p_false,
-            refs,
-        )
+            record.cycle, history.time_at(record.cycle), name, certificate.verdict, certificate.expected,
+            certificate.matched, certificate.deviation_m, certificate.deviation_rad, certificate.p_false, refs)
 
 
 def _not_judged(history: Timeline, judged: set[str]) -> Iterator[MilestoneRow]:
@@ -408,13 +363,10 @@ def milestone_lines(rows: Sequence[MilestoneRow]) -> Iterator[str]:
     if not rows:
         yield "There was none."
         return
-    shown = (
-        rows
-        if len(rows) <= MOST_ROWS
-        else sorted(
-            {*(row for row in rows if row.verdict != "verified"), *rows[-MOST_ROWS // 2 :]}, key=lambda row: row.cycle
-        )
-    )
+    shown = rows
+    if len(rows) > MOST_ROWS:
+        failed = (row for row in rows if row.verdict != "verified")
+        shown = sorted({*failed, *rows[-MOST_ROWS // 2 :]}, key=lambda row: row.cycle)
     if len(shown) < len(rows):
         yield f"Of {len(rows)} these {len(shown)}; --json has them all."
     yield from table(COLUMNS, [_cells(row) for row in shown]).splitlines()
@@ -452,17 +404,11 @@ def tell_end(history: Timeline, result: Mapping[str, Any]) -> Section:
     """The outcome, the last belief, and the errors that only the simulator knows."""
     outcome, told = outcome_of(history), list[Sentence]()
     if outcome is not None:
-        said = sentence(outcome)
-        told.append(sentence_of(history, f"{said[:1].upper()}{said[1:]}.", outcome))
+        told.append(sentence_of(history, f"{capital(sentence(outcome))}.", outcome))
     told += _tell_belief(history)
     text = ", ".join(_truth(result))
-    told.append(
-        Sentence(
-            f"In truth, by the simulator's result.json: {text}."
-            if text
-            else "Where it truly was nobody recorded: there is no result of the simulator."
-        )
-    )
+    told.append(Sentence(f"In truth, by the simulator's result.json: {text}." if text else
+                         "Where it truly was nobody recorded: there is no result of the simulator."))
     return Section("How it ended", tuple(told))
 
 
@@ -490,7 +436,6 @@ def _truth(result: Mapping[str, Any]) -> Iterator[str]:
         yield f"and accepted {count(wrong, 'milestone')} wrongly" if wrong else "and accepted no milestone wrongly"
 
 
-WIDTH = 120
 MILESTONES = "Milestones"
 LEGEND = """\
 Places are in metres in each room's own frame. Times are by the body's clock. All of it is from the journal, as the
@@ -556,14 +501,8 @@ def tell_run(run: RunDirectory, history: Timeline) -> RunStory:
 def _sections(first: tuple[str, ...], history: Timeline, result: Mapping[str, Any]) -> RunStory:
     turns = tuple(read_turning_points(history))
     sections = (
-        tell_errand(history),
-        tell_plans(history),
-        tell_lost(history),
-        tell_contacts(history, turns, result),
-        tell_things(turns),
-        tell_camera(history),
-        tell_end(history, result),
-    )
+        tell_errand(history), tell_plans(history), tell_lost(history), tell_contacts(history, turns, result),
+        tell_things(turns), tell_camera(history), tell_end(history, result))
     return RunStory(first, turns, sections, read_milestones(history))
 
 
@@ -587,14 +526,7 @@ def _section_lines(section: Section) -> Iterator[str]:
     width = max(map(len, heads), default=0)
     for head, one in zip(heads, section.sentences, strict=True):
         refs = f"  [{', '.join(one.refs)}]" if one.refs else ""
-        first = f"  {head:<{width}}" + "  " * (width > 0)
-        yield fill(
-            one.text + refs,
-            WIDTH,
-            initial_indent=first,
-            subsequent_indent=" " * len(first),
-            break_on_hyphens=False,
-        )
+        yield wrap(one.text + refs, f"  {head:<{width}}" + "  " * (width > 0))
 
 
 def _when(one: Sentence) -> str:

@@ -9,7 +9,6 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from textwrap import fill
 from typing import Any
 
 from blackboard.change import Change, Posted, Retracted, Revised
@@ -18,7 +17,8 @@ from blackboard.journal import Decision
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from logs.errors import BadInput
-from logs.recording.board_mirror import Mirror
+from logs.explain.phrases import wrap
+from logs.recording.board_mirror import Mirror, is_held
 from logs.records import EntryRecord, Opaque
 from logs.timeline import Timeline
 from world_models import words
@@ -92,13 +92,13 @@ class TurningPointFinder:
     def find(self, decision: Decision) -> list[TurningPoint]:
         """The turning points of the next decision."""
         points: list[TurningPoint] = []
-        before = self._mirror.latest(Hypothesis, _is_held)
+        before = self._mirror.latest(Hypothesis, is_held)
         changes = (*decision.observed, *decision.made)
         for change in changes:
             self._mirror.take(change)
         times = [when for change in decision.observed if (when := time_of(change.entry.value)) is not None]
         self._time_s = max(times, default=self._time_s)
-        now = self._mirror.latest(Hypothesis, _is_held)
+        now = self._mirror.latest(Hypothesis, is_held)
         for change in changes:
             was = self._states.get(change.entry.id, "")
             if state := state_of(change.entry.value):
@@ -182,16 +182,11 @@ def _verdict(certificate: Certificate, get: Get) -> str:
     return f"{what}: {certificate.reason}"
 
 
-def _is_held(value: Hypothesis) -> bool:
-    return value.is_held
-
-
 MARKS = ("escalated", "relocalization")
 """A turning point has one of these words in its line of the journal, or is of one of these kinds."""
 TOLD_KINDS: tuple[type[Any], ...] = (BodyFault, Contact, DoorState, Obstacle, Resumed, Told, Redirection)
 KINDS: tuple[type[Any], ...] = (*TOLD_KINDS, Goal, PlanSketch, Certificate, Outcome)
 NOT_VERIFIED = ("refuted", "not testable")
-WIDTH = 120
 NOTHING = "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
 
 
@@ -261,8 +256,7 @@ def turn_lines(history: Timeline, result: Mapping[str, Any]) -> Iterator[str]:
     heads = [f"  cycle {p.cycle}" + ("" if p.time_s is None else f"  {p.time_s:7.1f} s") for p in points]
     width, kind = max(map(len, heads), default=0), max((len(point.kind) for point in points), default=0)
     for head, point in zip(heads, points, strict=True):
-        first = f"{head:<{width}}  {point.kind:<{kind}}  "
-        yield fill(point.text, WIDTH, initial_indent=first, subsequent_indent=" " * len(first), break_on_hyphens=False)
+        yield wrap(point.text, f"{head:<{width}}  {point.kind:<{kind}}  ")
     if unplaced > 0:
         yield f"  {count(unplaced, 'collision')}; this run does not say where"
 

@@ -6,14 +6,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from textwrap import fill
 from typing import Any, TextIO
 
 from blackboard.journal import Decision, Sink, decision_record
 from logs.explain.diff import differing_leaves
-from logs.explain.phrases import describe_decision, sentence
+from logs.explain.phrases import describe_decision, sentence, wrap
 from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of
-from logs.timeline import Timeline
+from logs.timeline import Timeline, ranked
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.body import Frame, Look, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis
@@ -65,12 +64,6 @@ def cycle_lines(decision: DecisionRecord, candidates: Iterable[Candidate]) -> It
         yield f"  refused   {decision.refused.rstrip().splitlines()[-1]}"
 
 
-def ranked(candidates: Iterable[Candidate], chosen: Candidate | None) -> list[Candidate]:
-    """The chosen one first, then the best rated, then the oldest."""
-    first = chosen.number if chosen else None
-    return sorted(candidates, key=lambda c: (c.number != first, -c.rating, c.number))
-
-
 def _candidate_line(c: Candidate, decision: DecisionRecord) -> str:
     chosen = decision.chosen is not None and c.number == decision.chosen.number
     second = decision.runner_up is not None and c.number == decision.runner_up.number
@@ -85,7 +78,6 @@ def _change_line(word: str, change: EntryRecord[Any]) -> str:
     return f"  {word:<9} {change.ref} by {change.author}: {sentence(change)}"
 
 
-WIDTH = 120
 DEEPEST_INDENT = 20
 FEW = 2
 DEPTH = 5
@@ -168,7 +160,7 @@ def explain(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Itera
 
 def _wrap(depth: int, text: str) -> str:
     indent = "  " * min(depth, DEEPEST_INDENT)
-    return fill(text, WIDTH, initial_indent=indent, subsequent_indent=indent + "    ", break_on_hyphens=False)
+    return wrap(text, indent, indent + "    ")
 
 
 def _describe(reason: Reason) -> str:
@@ -190,7 +182,7 @@ def _describe_record(record: EntryRecord[Any], after: EntryRecord[Any] | None) -
 
 
 def _who(record: EntryRecord[Any], history: Timeline) -> str:
-    return fill(f"{record.ref}: {describe_decision(history, record)}", WIDTH, break_on_hyphens=False)
+    return wrap(f"{record.ref}: {describe_decision(history, record)}")
 
 
 PRINCIPAL = (

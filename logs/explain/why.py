@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from textwrap import fill
 from typing import Any
 
 from blackboard.change import Quiescence
@@ -17,7 +16,7 @@ from blackboard.servoing import Discrepancy
 from logs.errors import BadInput
 from logs.explain import model, phrases
 from logs.explain.model import WorldFile, tell_source
-from logs.explain.phrases import STRANGE, describe_decision, sentence, tell_answer
+from logs.explain.phrases import STRANGE, capital, describe_decision, sentence, tell_answer, wrap
 from logs.records import EntryRecord
 from logs.timeline import Timeline
 from world_models import words
@@ -45,7 +44,6 @@ from world_models.entries.told import Redirection, Told
 MOST = 24
 """So many things are told at the most."""
 MOST_PLAIN, MOST_MET = 12, 200
-WIDTH = 120
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +126,7 @@ def headline(record: EntryRecord[Any]) -> str:
         return f"A picture was taken {words.purpose(record.value.purpose)}."
     if record.kind is Hypothesis and record.value.is_held:
         return _describe_belief(record.value)
-    return f"{said[0].upper()}{said[1:]}." if said else record.ref
+    return f"{capital(said)}." if said else record.ref
 
 
 def _describe_telling(record: EntryRecord[Any]) -> str:
@@ -289,8 +287,8 @@ class _Teller:
         history = self.history
         fix, milestone = history.reason(record, PoseFix), history.reason(record, Milestone)
         judged = None if milestone is None else milestone.value
-        said = when + phrases.verdict(record.value, judged)
-        yield from self._one(record.id, "checked", said[0].upper() + said[1:], record, milestone)
+        said = capital(when + phrases.verdict(record.value, judged))
+        yield from self._one(record.id, "checked", said, record, milestone)
         if fix is not None:
             yield from self._tell_match(fix)
 
@@ -306,8 +304,7 @@ class _Teller:
 
 
 def _plainly(_history: Timeline, record: EntryRecord[Any]) -> str:
-    said = sentence(record)
-    return f"{said[0].upper()}{said[1:]}."
+    return f"{capital(sentence(record))}."
 
 
 def _line(history: Timeline, record: EntryRecord[Any]) -> str:
@@ -373,14 +370,10 @@ FOLLOW: Mapping[type[Any], tuple[type[Any], ...]] = {
 
 def lines_of(told: Story) -> Iterator[str]:
     """A story as paragraphs: label, sentences and the entries that say so."""
-    yield _wrap(f"{told.headline}  [{told.ref}]" if told.ref else told.headline)
+    yield wrap(f"{told.headline}  [{told.ref}]" if told.ref else told.headline)
     if told.decided:
-        yield _wrap(told.decided)
+        yield wrap(told.decided)
     width = max((len(step.label) for step in told.steps), default=0)
     for step in told.steps:
         named = f"  [{', '.join(step.refs)}]" if step.refs else ""
-        yield _wrap(step.text + named, f"  {step.label.ljust(width)}  ")
-
-
-def _wrap(text: str, head: str = "") -> str:
-    return fill(text, WIDTH, initial_indent=head, subsequent_indent=" " * len(head), break_on_hyphens=False)
+        yield wrap(step.text + named, f"  {step.label.ljust(width)}  ")

@@ -150,7 +150,7 @@ class Belief:
 
 def find_belief(mirror: Mirror) -> Hypothesis | None:
     """The hypothesis that is acted on."""
-    entry = mirror.latest(Hypothesis, _is_held)
+    entry = mirror.latest(Hypothesis, is_held)
     return entry.value if entry else None
 
 
@@ -160,5 +160,6 @@ def sigma_m(value: Hypothesis) -> float:
     return math.sqrt(max(0.0, (a + d) / 2 + math.hypot((a - d) / 2, b)))
 
 
-def _is_held(value: Hypothesis) -> bool:
+def is_held(value: Hypothesis) -> bool:
+    """Whether a hypothesis is the one that is acted on."""
     return value.is_held

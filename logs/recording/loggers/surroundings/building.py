@@ -4,6 +4,7 @@ gone."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -68,6 +69,19 @@ def log_building(stream: RecordingStream, world: World) -> None:
         stream.fix(path, mesh)
     stream.fix(NAMES, _names(world))
     stream.fix(DOORWAYS, _doorways(world))
+
+
+def record_building(world: World, out: Path, title: str | None = None) -> None:
+    """Write a recording of nothing but the building: surfaces by storey, doorways, room names. Raises RecordingError.
+
+    ``title``: of the recording, the world's name by default; a viewer keeps recordings with different titles apart.
+    """
+    look = rrb.Blueprint(building_view(world, world.name), rrb.TimePanel(state="hidden"), auto_views=False)
+    stream = RecordingStream(out, f"building of {title or world.name}", title or world.name, look)
+    try:
+        log_building(stream, world)
+    finally:
+        stream.close()
 
 
 def building_view(world: World, name: str) -> Any:
