@@ -1,8 +1,4 @@
-"""Run many trials on all cores and keep each result, so that an interrupted campaign continues where it was.
-
-A result depends on its trial alone, so neither the number of workers nor an interruption changes what a campaign
-finds. Results of other code than today's, or of another kind of processor, are computed again.
-"""
+"""Run many trials on all cores and keep each result, so that an interrupted campaign continues; bounds of rates."""
 
 from __future__ import annotations
 
@@ -12,6 +8,7 @@ from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from scipy.stats import beta
 from tqdm import tqdm
 
 from harvey.campaign.case_work import Killed
@@ -62,3 +59,22 @@ def run_trials(work: Callable[[T], R], trials: Sequence[T], kind: type[R], folde
         raise BadInput(f"{len(killed)} of {len(trials)} trials are missing, the rest is kept in {folder / RESULTS};"
                        f" trial {number} was {first.text}")
     return [done[number] for number in range(len(trials))]
+
+
+CONFIDENCE = 0.95
+
+
+def at_most(found: int, of: int) -> float:
+    """The upper bound of a rate: 0 of 1,000 proves 0.3 %; nothing is proved by none."""
+    _check(found, of)
+    return 1.0 if found == of else float(beta.ppf(CONFIDENCE, found + 1, of - found))
+
+
+def at_least(found: int, of: int) -> float:
+    """The lower bound of a rate."""
+    return 1.0 - at_most(of - found, of)
+
+
+def _check(found: int, of: int) -> None:
+    if not 0 <= found <= of:
+        raise ValueError(f"expected 0 to {of} of {of}, got {found}")

@@ -10,7 +10,7 @@ SEED = 3
 PROGRAM = f"""
 import sys
 from pathlib import Path
-from experiments.generated.short_missions import OFFICE
+from experiments.generated.missions import OFFICE
 from harvey.simulation.run import run_mission
 from sim.stage import build_stage
 from sim.scenario import parse_scenario

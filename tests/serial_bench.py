@@ -15,11 +15,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.robustness.serial.findings import Findings
-from experiments.robustness.serial.line_noise import Noise
-from experiments.robustness.serial.noisy_line import Killed, NoisyLine
-from experiments.robustness.serial.trial import Trial
-from experiments.robustness.serial_chaos import NOISES
+from experiments.robustness.serial_chaos import NOISES, Trial
+from experiments.robustness.serial_line import Findings, Killed, Noise, NoisyLine
 from harvey.hardware.base import base_kinds
 from harvey.hardware.drivers.base import Base, BaseFault
 from sim.emulators.emulator import IdealGround

@@ -8,13 +8,115 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from experiments.bounds import at_least, at_most
-from experiments.differences.light_picture import draw_sheet
-from experiments.differences.light_trial import LightResult, LightTrial, run_light_mission
-from experiments.generated.light import LIGHT_KINDS, LightKind
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.generated.door_missions import write_door_mission
+from experiments.generated.light import LIGHT_KINDS, LightKind, draw_light, format_light
 from experiments.report import Cell, Report
-from experiments.trials import RESULTS, campaign_folder, run_trials
+from experiments.trials import RESULTS, at_least, at_most, campaign_folder, run_trials
+from harvey.campaign.campaign import Task, run_task
+from knowledge_sources.methods.features.picture import read_picture
+from sim.scenario import load_scenario, with_settings
+from sim.stage import build_stage
+from world_models.frames import Pose2
+
+
+@dataclass(frozen=True, slots=True)
+class LightTrial:
+    """A mission.
+
+    Attributes:
+        kind: of light.
+        floor: seed of the generated floor and mission, of the light, and of all chance.
+    """
+
+    kind: LightKind
+    floor: int
+
+
+@dataclass(frozen=True, slots=True)
+class LightResult:
+    """How a mission ended, in plain types.
+
+    Attributes:
+        verified, refuted, not_testable: how many milestones were.
+        robot_s: time of the robot.
+    """
+
+    kind: str
+    floor: int
+    outcome: str
+    reason: str
+    error_m: float
+    verified: int
+    refuted: int
+    not_testable: int
+    false_accepts: int
+    collisions: int
+    relocations: int
+    robot_s: float
+    wall_s: float
+
+
+def run_light_mission(trial: LightTrial) -> LightResult:
+    """Run the mission of a trial."""
+    with TemporaryDirectory() as folder:
+        path = write_light_mission(Path(folder), trial)
+        r = run_task(Task(str(path), (), trial.floor))
+    count = {key: value or 0 for key, value in r.milestones.items()}
+    return LightResult(
+        trial.kind, trial.floor, r.outcome, r.reason, r.error_m, count["verified"], count["refuted"],
+        count["not_testable"], r.false_accepts, r.collisions or 0, r.relocalizations, r.sim_time_s, r.wall_time_s)
+
+
+def write_light_mission(folder: Path, trial: LightTrial) -> Path:
+    """Write the trial's scenario with the files of its floor; the same mission for every kind of light."""
+    mission = write_door_mission(folder, trial.floor, "as filed")
+    text = mission.path.read_text("utf-8") + format_light(draw_light(trial.kind, trial.floor))
+    path = folder / f"light-{trial.kind.replace(' ', '-')}-{trial.floor}.toml"
+    path.write_text(text, "utf-8")
+    return path
+
+
+SCENARIO = "lab-to-allens-office"
+VIEWS = (Pose2(16.6, -4.0, 2.5), Pose2(9.0, 1.0, 0.0))
+"""In an office, and along the hallway."""
+SEED = 192
+"""Of the light; a development seed with sun on the office's windows."""
+ACROSS = 5
+
+
+def draw_sheet(path: Path, seed: int = SEED) -> None:
+    """Write the sheet (PNG): five lights in a row, with both views of each below one another."""
+    from matplotlib.figure import Figure
+
+    rows = -(-len(LIGHT_KINDS) // ACROSS)
+    figure = Figure(figsize=(3.0 * ACROSS, 6.2 * rows), dpi=100, layout="constrained")
+    for axes, kind in zip(np.ravel(figure.subplots(rows, ACROSS)), LIGHT_KINDS, strict=False):
+        axes.imshow(_tile(kind, seed))
+        axes.set_title(kind, fontsize=11)
+    for axes in figure.axes:
+        axes.set_axis_off()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, format="png")
+
+
+def _tile(kind: LightKind, seed: int) -> NDArray[np.uint8]:
+    """(height, width, 3) both views, the second below the first."""
+    values = draw_light(kind, seed) or {}
+    scenario = with_settings(load_scenario(SCENARIO), {f"light.{key}": value for key, value in values.items()})
+    body = build_stage(scenario).body(seed)
+    pictures = []
+    for view in VIEWS:
+        body.put_robot(view)
+        pictures.append(read_picture(body.look().jpeg).color)
+    return np.asarray(np.vstack(pictures), np.uint8)
+
 
 MISSIONS = 1_000
 QUICK_KINDS: tuple[LightKind, ...] = ("flat", "lamps", "sun")

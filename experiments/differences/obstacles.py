@@ -13,11 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.bounds import at_least, at_most
-from experiments.chart import OURS, PAPER, PEER, chart
 from experiments.differences.obstacles_trial import RING, Pairs, Trial, TrialEnd, make_trials, run_trial
-from experiments.report import Cell, Report
-from experiments.trials import RESULTS, campaign_folder, run_trials
+from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
+from experiments.trials import RESULTS, at_least, at_most, campaign_folder, run_trials
 
 MISSIONS, QUICK_MISSIONS = 1_000, 2
 FIRST_SEED, SEEDS_APART = 1_000_000, 10_000

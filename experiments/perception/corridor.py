@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.paper.pose_peer import NOT_INSTALLED, Peer
-from experiments.perception.photographs.data import Corridor, load_corridor
-from experiments.perception.photographs.pictures import draw_attempt
-from experiments.perception.photographs.trials import (
+from experiments.perception.photographs import (
     MAX_ERROR_RAD,
     MAX_ERROR_STEPS,
     Attempt,
+    Corridor,
     Perturbation,
     Trial,
+    draw_attempt,
+    load_corridor,
     run_attempt,
     select_visible,
 )

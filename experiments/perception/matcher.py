@@ -12,22 +12,25 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from experiments.chart import OURS, PAPER, PEER, chart
-from experiments.perception.matcher_large import DATA, MAX_S, MODEL, measure_large
-from experiments.perception.matcher_peer import fit_true_pairs, ransac_icp
 from experiments.perception.matcher_scenes import (
     BESIDE_PX,
+    DATA,
     DISTRACTED,
     FRAGMENTS,
+    MAX_S,
+    MODEL,
     OFFSET_PX,
     OMITTED,
     SHIFT_PX,
     SKEW_RAD,
     TURN_RAD,
     MatchScene,
+    fit_true_pairs,
     generate_match_scene,
+    measure_large,
+    ransac_icp,
 )
-from experiments.report import Cell, Report
+from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
 from experiments.trials import campaign_folder
 from knowledge_sources.methods.matching import Similarity2, match_lines
 from knowledge_sources.settings import PAPER_MATCHING

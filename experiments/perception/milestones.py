@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.chart import OURS, PAPER, PEER, chart
 from experiments.perception.milestones_cases import (
     KINDS,
     MAX_HIDDEN_SHARE,
@@ -19,9 +18,16 @@ from experiments.perception.milestones_cases import (
     generate_cases,
     get_site,
 )
-from experiments.perception.milestones_picture import draw_case
-from experiments.perception.milestones_trials import BLOCK, MARGIN_M, JudgedCase, Trial, TrialResult, judge_trial
-from experiments.report import Cell, Report
+from experiments.perception.milestones_trials import (
+    BLOCK,
+    MARGIN_M,
+    JudgedCase,
+    Trial,
+    TrialResult,
+    draw_case,
+    judge_trial,
+)
+from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
 from experiments.trials import campaign_folder, run_trials
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.generated.short_missions import HALLWAY, OFFICE, fault
+from experiments.generated.missions import HALLWAY, OFFICE, fault
 from experiments.report import Cell, Report
 from experiments.trials import campaign_folder, run_trials
 from harvey.simulation.body_replay import find_interrupted

@@ -9,15 +9,240 @@ place is ambiguous.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+import shapely
 
-from experiments.chart import OURS, PAPER, PEER, chart
-from experiments.report import Cell, Report
-from experiments.robustness.kidnap_trial import Kidnap, KidnapResult, format_scenario, get_floor, run_kidnap
+from blackboard.board import Blackboard
+from blackboard.effect import Post
+from blackboard.level import Level
+from blackboard.scheduler import Scheduler
+from blackboard.servoing import Discrepancy, Servoing
+from experiments.generated.floors import Floor, generated_floor
+from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
 from experiments.trials import RESULTS, campaign_folder, run_trials
+from harvey.runner.ports import BodyPort
+from harvey.runner.run import run_to_outcome
+from harvey.runner.world_port import build_scheduler
+from knowledge_sources.action.dead_reckoner import DeadReckoner
+from knowledge_sources.goal.mission_monitor import MissionMonitor
+from knowledge_sources.goal.relocalizer import Relocalizer
+from knowledge_sources.methods.localization.visibility_map import get_visibility_map
+from knowledge_sources.methods.motion.routes import compute_free_space
+from knowledge_sources.plan.line_finder import LineFinder
+from knowledge_sources.settings import DEFAULT
+from sim.body.building import Building
+from sim.body.faulty_body import FaultyBody
+from sim.body.simulated_body import SimulatedBody
+from world_models.actuator import ActuatorModel
+from world_models.building.world import World
+from world_models.camera import Camera, CameraMount
+from world_models.entries.body import BodyFault, Frame
+from world_models.entries.kinds import KINDS
+from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries.percepts import Panorama
+from world_models.frame_building import FrameBuilding
+from world_models.frame_store import FrameStore
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+from world_models.units import FOOT_M
+
+MIN_CLEARANCE_M = 0.45
+"""Smallest distance of the robot's centre from walls and furniture."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kidnap:
+    """A kidnap.
+
+    Attributes:
+        floor: seed of the floor; rooms: number of its rooms.
+        symmetric: its corridors look the same from both ends, and the robot is put into one of them.
+        number: of the kidnap on that floor; with the floor's seed it determines all random numbers.
+    """
+
+    floor: int
+    rooms: int
+    symmetric: bool
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class KidnapResult:
+    """Result of a kidnap.
+
+    Attributes:
+        room, x_m, y_m, heading_rad: true pose [world].
+        verdict: found, ambiguous or lost.
+        believed: reported locale; error_m: distance from the reported pose; infinite if there is none.
+        probes: number of looks; places: number of pose candidates at the end.
+        cpu_s: processor time, without rendering and what is computed once per floor.
+    """
+
+    floor: int
+    rooms: int
+    number: int
+    room: str
+    x_m: float
+    y_m: float
+    heading_rad: float
+    verdict: str
+    believed: str
+    error_m: float
+    probes: int
+    places: int
+    cpu_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A floor with its building, and a robot that has its model."""
+
+    floor: Floor
+    robot: RobotModel
+    building: Building
+
+
+@lru_cache(maxsize=2)
+def _floor(seed: int, rooms: int, symmetric: bool) -> Floor:
+    return generated_floor(seed, rooms, symmetric=symmetric)
+
+
+def get_floor(trial: Kidnap) -> Floor:
+    """Get the floor of a kidnap."""
+    return _floor(trial.floor, trial.rooms, trial.symmetric)
+
+
+@lru_cache(maxsize=2)
+def _scene(floor: Floor) -> Scene:
+    camera = Camera.from_field_of_view(math.radians(65.0), 512, 512)
+    robot = RobotModel(floor.world, camera, CameraMount(1.0, 0.1, 0.0), ActuatorModel())
+    real = floor.building
+    building = Building.of_faces(real.faces, lambda pose: real.locale_at(pose.position) or "", 8)
+    frames = _frames_of(floor.world)
+    for room in floor.world.rooms:
+        get_visibility_map(frames, room, robot.mount.height_m)
+    return Scene(floor, robot, building)
+
+
+def _frames_of(world: World) -> FrameBuilding:
+    """Put all frames of a world on a board; what is computed from them is kept with them."""
+    board, store = Blackboard(), FrameStore(world)
+    board.apply([Post(store.frame(name)) for name in world.locales], author="world", cycle=0)
+    return FrameBuilding(board.view)
+
+
+def run_kidnap(trial: Kidnap) -> KidnapResult:
+    """Kidnap the robot, and let it relocalize."""
+    scene = _scene(get_floor(trial))
+    room, there, belief = _draw_poses(trial, scene.floor)
+    body = SimulatedBody(scene.building, there, scene.robot.camera, scene.robot.mount, seed=trial.number)
+    timed = _TimedBody(body)
+    scheduler = _build_lost_agent(scene, timed, belief)
+    began = time.process_time()
+    run_to_outcome(scheduler, over=lambda s: "found" if _is_found(s) else None)
+    cpu_s = time.process_time() - began - timed.cpu_s
+    view = scheduler.view
+    held = view.latest(Hypothesis, lambda h: h.is_held)
+    candidates = view.where(Hypothesis, lambda h: h.status == "candidate")
+    panorama = view.latest(Panorama)
+    is_found = _is_found(scheduler)
+    pose = body.truth.world_from_robot
+    error_m = held.value.world_from_robot(scene.robot.world).distance_to(pose) if held and is_found else math.inf
+    verdict = "found" if is_found else "ambiguous" if len(candidates) > 1 else "lost"
+    return KidnapResult(
+        trial.floor, trial.rooms, trial.number, room, there.x_m, there.y_m, there.heading_rad, verdict,
+        held.value.locale if held and is_found else "", error_m, len(panorama.value.glimpses) if panorama else 0,
+        len(candidates), cpu_s,
+    )
+
+
+class _TimedBody(FaultyBody):
+    """The body, with the time of its rendering."""
+
+    def __init__(self, body: SimulatedBody) -> None:
+        super().__init__(body)
+        self.cpu_s = 0.0
+
+    def look(self, purpose: str) -> Frame | BodyFault:
+        began = time.process_time()
+        try:
+            return super().look(purpose)
+        finally:
+            self.cpu_s += time.process_time() - began
+
+
+def _build_lost_agent(scene: Scene, body: FaultyBody, belief: Place) -> Scheduler:
+    """Build a scheduler whose goal level is in doubt."""
+    sources = (LineFinder(DEFAULT), DeadReckoner(DEFAULT), Relocalizer(DEFAULT), MissionMonitor(DEFAULT))
+    scheduler = build_scheduler(sources, scene.floor.world, scene.robot, ports=(BodyPort(body),), servoing=Servoing(),
+                                kinds=KINDS)
+    held = Hypothesis(belief.locale, Pose2(belief.x_m, belief.y_m, belief.heading_rad or 0.0), diagonal(0.05, 0.02),
+                      "milestone")
+    bound_px = DEFAULT.plan.max_deviation_px
+    doubt = Discrepancy(Level.GOAL, "the robot was kidnapped", None, (bound_px, bound_px), "px")
+    scheduler.tell([Post(held), Post(doubt)], "user")
+    return scheduler
+
+
+def _is_found(scheduler: Scheduler) -> bool:
+    held = scheduler.view.latest(Hypothesis, lambda h: h.is_held)
+    return held is not None and held.value.basis == "relocalization"
+
+
+def _draw_poses(trial: Kidnap, floor: Floor) -> tuple[str, Pose2, Place]:
+    """Draw the true room and pose [world], and the believed place."""
+    rng = np.random.default_rng([trial.floor, trial.number])
+    rooms = floor.corridors if trial.symmetric else (*floor.corridors, *floor.rooms)
+    room, there = _draw_pose(floor.building, rooms, rng)
+    believed, pose = _draw_pose(floor.world, (*floor.corridors, *floor.rooms), rng)
+    return room, there, Place.of_world(floor.world, believed, pose.x_m, pose.y_m, pose.heading_rad)
+
+
+def _draw_pose(world: World, rooms: tuple[str, ...], rng: np.random.Generator) -> tuple[str, Pose2]:
+    """Draw a free pose, uniformly over the area and the headings."""
+    free = [compute_free_space(world.outline(name), world.obstacles(name), MIN_CLEARANCE_M) for name in rooms]
+    areas = np.array([space.area for space in free])
+    number = int(rng.choice(len(rooms), p=areas / areas.sum()))
+    x0, y0, x1, y1 = (float(v) for v in free[number].bounds)
+    while True:
+        x, y, heading = rng.uniform(x0, x1), rng.uniform(y0, y1), rng.uniform(-math.pi, math.pi)
+        if shapely.intersects_xy(free[number], x, y):
+            return rooms[number], Pose2(float(x), float(y), float(heading))
+
+
+def format_scenario(trial: Kidnap) -> str:
+    """Format a scenario in which it happens: the robot starts at the believed place and is kidnapped at once."""
+    floor = get_floor(trial)
+    room, there, belief = _draw_poses(trial, floor)
+    place = Place.of_world(floor.world, room, there.x_m, there.y_m, there.heading_rad)
+    goal, spot = _draw_pose(floor.world, (belief.locale,), np.random.default_rng([trial.floor, trial.number, 1]))
+    end = Place.of_world(floor.world, goal, spot.x_m, spot.y_m)
+    return f'''description = "Carried off to {room} at once. Written by harvey experiment kidnap."
+world = "floor-{floor.seed}.toml"
+details = ["floor-{floor.seed}-details.toml"]
+goal = "(ptrans ({belief.locale} ({_ft(belief.x_m)},{_ft(belief.y_m)},0)) ({goal} ({_ft(end.x_m)},{_ft(end.y_m)},0)))"
+
+[start]
+heading_deg = {math.degrees(belief.heading_rad or 0.0):.3f}
+
+[[faults]]
+kind = "kidnap"
+to_locale = "{room}"
+to_x_m = {place.x_m:.4f}
+to_y_m = {place.y_m:.4f}
+to_heading_deg = {math.degrees(place.heading_rad or 0.0):.3f}
+'''
+
+
+def _ft(metres: float) -> str:
+    return f"{metres / FOOT_M:.4f}"
+
 
 ROOMS, FLOORS, EACH = 40, 25, 40
 SYMMETRIC_ROOMS, SYMMETRIC_FLOORS, SYMMETRIC_EACH = 12, 10, 20

@@ -26,8 +26,7 @@ import numpy as np
 from tqdm import tqdm
 
 from experiments.report import Report
-from experiments.robustness.malformed_buildings_text import GML, IFC
-from experiments.robustness.malformed_worlds_text import SMALL
+from experiments.robustness.malformed_texts import GML, IFC, SMALL
 from harvey.campaign.engine import map_values
 from world_models.building.checks import check_world
 from world_models.files.toml.source import Source, WorldError

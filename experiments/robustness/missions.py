@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.chart import OURS, PAPER, PEER, chart
-from experiments.report import Cell, Report, count_kinds
+from experiments.report import OURS, PAPER, PEER, Cell, Report, chart, count_kinds
 from experiments.trials import RESULTS, campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
 from world_models.units import INCH_M

@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.bounds import at_least
 from experiments.generated.floors import ScanNoise, generated_floor, write_floor_map
 from experiments.report import Cell, Report, count_kinds
 from experiments.robustness.imported_building import Trip, draw_trips
 from experiments.robustness.rosmaps_scores import MapTruth, correlate_rooms, count_found, draw_rooms, read_truth
 from experiments.shared_data import MAP_PLANS, data_path, describe_absence
-from experiments.trials import campaign_folder, run_trials
+from experiments.trials import at_least, campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
 from harvey_buildings import import_building
 from world_models.building.checks import check_world

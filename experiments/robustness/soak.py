@@ -14,11 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from experiments.bounds import at_most
 from experiments.generated.light import LIGHT_KINDS, MOST_SAG_DEG, SAG_DEG_PER_DAY, write_soak_mission
 from experiments.report import Cell, Report
 from experiments.scale.agenda_memory import resident_bytes
-from experiments.trials import RESULTS, campaign_folder, run_trials
+from experiments.trials import RESULTS, at_most, campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
 
 MISSIONS, QUICK_MISSIONS, A_DAY = 20_000, 2, 10

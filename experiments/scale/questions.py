@@ -13,11 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bounds import at_least
-from experiments.generated.short_missions import HALLWAY, OFFICE, fault
+from experiments.generated.missions import HALLWAY, OFFICE, fault
 from experiments.report import Report
 from experiments.scale.questions_asked import KINDS, Question, ask
-from experiments.trials import campaign_folder, run_trials
+from experiments.trials import at_least, campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
 from logs.run_directory import RunDirectory
 

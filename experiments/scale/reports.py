@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from experiments.generated.short_missions import OFFICE, fault
+from experiments.generated.missions import OFFICE, fault
 from experiments.report import Cell, Report
 from harvey.cli import main
 

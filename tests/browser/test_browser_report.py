@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from browser_pages import TELEPHONE
-from experiments.generated.short_missions import OFFICE, fault
+from experiments.generated.missions import OFFICE, fault
 from harvey.campaign.campaign import Task, run_task
 from harvey.report.page import build_page
 from logs.run_directory import RunDirectory

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.generated.short_missions import OFFICE
+from experiments.generated.missions import OFFICE
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 

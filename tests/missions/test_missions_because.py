@@ -25,7 +25,7 @@ from blackboard.entry_store import Index
 from blackboard.journal import plain
 from blackboard.kinds import kind_of
 from blackboard.knowledge_source import KnowledgeSource
-from experiments.generated.short_missions import OFFICE, fault
+from experiments.generated.missions import OFFICE, fault
 from harvey.simulation.run import run_mission
 from harvey.wiring import knowledge_sources, load_kinds
 from knowledge_sources.settings import Settings

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from blackboard.effect import Revise
-from experiments.robustness.kidnap_trial import Kidnap, _build_lost_agent, _draw_poses, _is_found, _scene, get_floor
+from experiments.robustness.kidnap import Kidnap, _build_lost_agent, _draw_poses, _is_found, _scene, get_floor
 from harvey.runner.run import run_to_outcome
 from knowledge_sources.settings import DEFAULT
 from sim.body.faulty_body import FaultyBody

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.generated.short_missions import OFFICE, fault
+from experiments.generated.missions import OFFICE, fault
 from harvey.simulation.run import run_mission
 from sim.faults.registry import list_fault_kinds
 from sim.scenario import Scenario, ScenarioError, parse_scenario, scenario_from_tables

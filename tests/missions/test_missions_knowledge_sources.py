@@ -17,7 +17,7 @@ from blackboard.journal import Decision, plain
 from blackboard.kinds import inference
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from experiments.generated.short_missions import OFFICE
+from experiments.generated.missions import OFFICE
 from harvey.simulation.run import run_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources
 from knowledge_sources.settings import Settings

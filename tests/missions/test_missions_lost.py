@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from experiments.robustness.kidnap import is_right, is_wrong
-from experiments.robustness.kidnap_trial import Kidnap, format_scenario, get_floor, run_kidnap
+from experiments.robustness.kidnap import Kidnap, format_scenario, get_floor, is_right, is_wrong, run_kidnap
 from sim.scenario import load_scenario
 
 

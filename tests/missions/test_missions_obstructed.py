@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from blackboard.journal import Decision
-from experiments.generated.short_missions import HALLWAY, fault
+from experiments.generated.missions import HALLWAY, fault
 from harvey.simulation.run import run_mission
 from sim.faults.kinds import Occlusion
 from sim.scenario import parse_scenario

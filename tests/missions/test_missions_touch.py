@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from experiments.generated.short_missions import OFFICE
+from experiments.generated.missions import OFFICE
 from harvey.cli import main
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rerun.chunk import RrdReader
 
-from experiments.generated.short_missions import OFFICE
+from experiments.generated.missions import OFFICE
 from harvey.simulation.run import run_mission
 from sim.scenario import parse_scenario
 from sim.stage import build_stage

@@ -12,7 +12,7 @@ import pytest
 from experiments import trials
 from experiments.paper import figure12
 from experiments.perception import corridor, matcher
-from experiments.perception.photographs.data import load_corridor
+from experiments.perception.photographs import load_corridor
 from experiments.shared_data import CORRIDOR, data_path
 
 PNG = b"\x89PNG"

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from blackboard.journal import Decision
-from experiments.generated.short_missions import OFFICE
+from experiments.generated.missions import OFFICE
 from harvey.runner.result import MissionResult
 from harvey.simulation.run import run_mission
 from sim.body.simulated_body import SimulatedBody

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.robustness.malformed_buildings_text import GML
+from experiments.robustness.malformed_texts import GML
 from experiments.robustness.malformed_worlds import CORRUPTIONS, judge_file
 
 

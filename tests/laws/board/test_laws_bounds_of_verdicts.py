@@ -22,7 +22,7 @@ from blackboard.entry import Entry
 from blackboard.entry_store import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
-from experiments.generated.short_missions import OFFICE
+from experiments.generated.missions import OFFICE
 from harvey.simulation.run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.generated.short_missions import OFFICE, fault
+from experiments.generated.missions import OFFICE, fault
 from harvey.simulation.run import run_mission
 from logs.run_directory import RunDirectory
 from sim.scenario import parse_scenario

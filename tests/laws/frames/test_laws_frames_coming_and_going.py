@@ -19,7 +19,7 @@ from blackboard.journal import Decision, decision_record
 from blackboard.kinds import Kind, Registry
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
-from experiments.generated.short_missions import HALLWAY
+from experiments.generated.missions import HALLWAY
 from harvey.agent import build_agent
 from harvey.runner.replay import open_originals
 from harvey.runner.world_port import WorldPort

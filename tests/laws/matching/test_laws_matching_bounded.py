@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.perception.matcher_large import CAMERA, generate_large
+from experiments.perception.matcher_scenes import CAMERA, generate_large
 from knowledge_sources.methods.matching import match_in_space, pose_matching
 from knowledge_sources.methods.matching.pose_pairs import PosePairs, keep_longest
 from knowledge_sources.settings import DEFAULT

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from experiments.perception.locate_camera import PoseVerdict
+from experiments.perception.repeats import locate
 from experiments.perception.repeats_scenes import CAMERA, RepeatScene, draw_scene
-from experiments.perception.repeats_trials import locate
 from experiments.perception.rivals import compute_pose_score, find_rivals, find_self_motions, group_lines
 from knowledge_sources.methods.matching.pose_pairs import build_camera_parameters
 from world_models.frames import Pose

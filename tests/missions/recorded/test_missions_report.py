@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.generated.short_missions import OFFICE, fault
+from experiments.generated.missions import OFFICE, fault
 from harvey.campaign.campaign import Task, run_task
 from harvey.report.page import build_page
 from logs.run_directory import RunDirectory

@@ -13,7 +13,7 @@ import pytest
 from blackboard.journal import decision_line
 from docs.tools.look import look
 from docs.tools.moments import moments_of
-from experiments.generated.short_missions import OFFICE, fault
+from experiments.generated.missions import OFFICE, fault
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from blackboard.scheduler import registry_of
-from experiments.generated.short_missions import OFFICE, fault
-from experiments.scale.long_journal import write_hour
+from experiments.generated.missions import OFFICE, fault
+from experiments.scale.explanations import write_hour
 from harvey.agent import Agent, build_agent
 from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main

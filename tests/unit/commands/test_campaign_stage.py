@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.generated.short_missions import OFFICE
+from experiments.generated.missions import OFFICE
 from harvey.campaign.campaign import Task
 from harvey.errors import BadInput
 from harvey.simulation.run import build_head

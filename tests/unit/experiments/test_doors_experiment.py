@@ -9,7 +9,7 @@ import pytest
 
 from driven_here import run_here
 from experiments.differences import doors
-from experiments.differences.doors_trial import DoorResult, DoorTrial, run_door_mission
+from experiments.differences.doors import DoorResult, DoorTrial, run_door_mission
 from experiments.generated.door_missions import write_door_mission
 from sim.scenario import load_scenario
 from sim.stage import build_stage

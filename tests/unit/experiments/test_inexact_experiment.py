@@ -9,7 +9,7 @@ import pytest
 
 from driven_here import run_here
 from experiments.differences import inexact
-from experiments.differences.inexact_trial import InexactResult, InexactTrial, run_inexact_mission
+from experiments.differences.inexact import InexactResult, InexactTrial, run_inexact_mission
 from experiments.generated.missions import write_inexact_mission
 from sim.differences.inexact import TrueInexact
 from sim.scenario import load_scenario

@@ -10,7 +10,7 @@ import pytest
 
 from driven_here import run_here
 from experiments.differences import light
-from experiments.differences.light_trial import LightResult, LightTrial, run_light_mission, write_light_mission
+from experiments.differences.light import LightResult, LightTrial, run_light_mission, write_light_mission
 from experiments.generated.light import LIGHT_KINDS, LightKind, draw_light
 from sim.render.light.lighting import Lighting
 from sim.scenario import load_scenario

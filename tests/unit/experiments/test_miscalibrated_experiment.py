@@ -9,7 +9,7 @@ import pytest
 
 from driven_here import run_here
 from experiments.differences import miscalibrated
-from experiments.differences.miscalibrated_trial import CameraResult, CameraTrial, run_camera_mission
+from experiments.differences.miscalibrated import CameraResult, CameraTrial, run_camera_mission
 from experiments.generated.missions import CAMERA_CASES, MAX_TURN_RAD, write_camera_mission
 from sim.scenario import load_scenario
 from sim.stage import build_stage

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from experiments.bounds import at_least, at_most
-from experiments.differences.obstacles_truth import Lacking, count_stops, find_shortest_m, judge
+from experiments.differences.obstacles_trial import Lacking, count_stops, find_shortest_m, judge
+from experiments.trials import at_least, at_most
 from sim.body.collision import ROBOT_RADIUS_M, Obstacles
 from world_models.frames import Pose2
 

@@ -11,7 +11,7 @@ import pytest
 
 from driven_here import run_here
 from experiments.differences import twins
-from experiments.differences.twins_trial import TwinResult, TwinTrial
+from experiments.differences.twins import TwinResult, TwinTrial
 from experiments.generated.floors import generated_floor
 from experiments.generated.missions import write_twin_mission
 from sim.scenario import load_scenario

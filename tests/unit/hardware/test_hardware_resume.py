@@ -39,7 +39,7 @@ def test_what_is_no_time_and_no_number_is_said(
 
 @pytest.fixture(scope="module")
 def short_run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
-    from experiments.generated.short_missions import OFFICE
+    from experiments.generated.missions import OFFICE
     from sim.scenario import parse_scenario
     from sim.stage import build_stage
 

@@ -1,27 +1,92 @@
-"""Pose recovery from one perturbed pose in a photograph of the corridor: ours, the paper's and the peer's."""
+"""The corridor photographs (Oxford VGG) with their surveyed lines: poses recovered in them, and pictures of those."""
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
 from experiments.paper.pose_peer import Peer
 from experiments.perception.locate_camera import CameraFix, PoseVerdict, locate_camera
-from experiments.perception.photographs.data import Corridor, CorridorFrame, load_corridor
 from experiments.perception.rivals import CAMERA_MIN_LINE_LENGTH_PX
-from experiments.shared_data import CORRIDOR, describe_absence
+from experiments.report import OURS, PEER, chart
+from experiments.shared_data import CORRIDOR, data_path, describe_absence
 from harvey.errors import BadInput
 from knowledge_sources.methods.features.lines import LineSegments, find_lines
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.matching import match_lines
 from knowledge_sources.methods.pose import med_r_and_t
 from knowledge_sources.settings import DEFAULT, PAPER_MATCHING
+from world_models.camera import Camera
 from world_models.frames import Pose
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CorridorFrame:
+    """A photograph (h, w), its camera, its reference pose and its publishers' segments (k, 2, 2)."""
+
+    image: NDArray[np.uint8]
+    camera: Camera
+    camera_from_world: Pose
+    segments_px: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Corridor:
+    """Model lines (m, 2, 3) in the survey's own unit of length, and the frames."""
+
+    model_lines: Array
+    frames: tuple[CorridorFrame, ...]
+
+    @property
+    def step(self) -> float:
+        """Mean distance of the camera between frames."""
+        places = np.array([frame.camera_from_world.inverse().translation for frame in self.frames])
+        return float(np.mean(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+
+
+def load_corridor(folder: Path | None = None) -> Corridor | None:
+    """Load the data; ``None`` if there are none.
+
+    Raises:
+        BadInput: the file is there but is not what it should be.
+    """
+    folder = folder or data_path(CORRIDOR)
+    path = folder / "corridor.json"
+    if not path.is_file():
+        return None
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        model = np.asarray(data["model_lines"], float).reshape(-1, 2, 3)
+        frames = tuple(_frame(folder, entry) for entry in data["frames"])
+    except KeyError as missing:
+        raise BadInput(f"{path}: expected a key {missing}, there is none") from None
+    except (ValueError, TypeError, OSError) as wrong:
+        raise BadInput(f"{path}: expected lines and frames of the corridor, got {wrong}") from None
+    if len(frames) < 2:
+        raise BadInput(f"{path}: expected at least 2 frames, got {len(frames)}")
+    return Corridor(model, frames)
+
+
+def _frame(folder: Path, entry: Mapping[str, Any]) -> CorridorFrame:
+    pose = entry["camera_from_world"]
+    return CorridorFrame(
+        read_picture((folder / entry["image"]).read_bytes()).grey,
+        Camera(*(entry[name] for name in ("fx", "fy", "cx", "cy", "width", "height"))),
+        Pose(np.asarray(pose["rotation"], float), np.asarray(pose["translation"], float)),
+        np.asarray(entry["segments"], float).reshape(-1, 2, 2),
+    )
+
 
 PERTURB_STEPS, PERTURB_RAD = 0.5, math.radians(3.0)
 MAX_ERROR_STEPS, MAX_ERROR_RAD = 0.05, math.radians(0.3)
@@ -170,3 +235,26 @@ def _errors(pose: Pose, frame: CorridorFrame, step: float) -> tuple[float, float
 def _is_recovered(pose: Pose, frame: CorridorFrame, step: float) -> bool:
     shift, turn = _errors(pose, frame, step)
     return shift <= MAX_ERROR_STEPS and turn <= MAX_ERROR_RAD
+
+
+SIZE_IN = (7.0, 7.3)
+
+
+def draw_attempt(data: Corridor, attempt: Attempt, path: Path) -> None:
+    """Draw a photograph with the model from the perturbed pose (orange) and from the pose found (blue)."""
+    frame = data.frames[attempt.frame]
+    prior, rng = perturb_reference(attempt)
+    found = locate_from(attempt.frame, prior, rng)
+    verdict = "no pose found" if found is None else found.verdict.value
+    with chart(path, f"Frame {attempt.frame}, {attempt.test.name}: {verdict}", "u [px]", "v [px]", SIZE_IN) as axes:
+        axes.grid(visible=False)
+        axes.imshow(frame.image, cmap="gray", vmin=0, vmax=255)
+        perturbed = select_visible(data.model_lines, frame, prior)[1]
+        axes.add_collection(_lines(perturbed, PEER, "model at the perturbed pose"))
+        if found is not None:
+            shown = select_visible(data.model_lines, frame, found.camera_from_world)[1]
+            axes.add_collection(_lines(shown, OURS, "model at the pose found"))
+
+
+def _lines(segments_px: Array, colour: str, label: str) -> LineCollection:
+    return LineCollection(list(segments_px), colors=colour, linewidths=1.0, label=label)

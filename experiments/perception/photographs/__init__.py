@@ -1,1 +1,0 @@
-"""The corridor photographs: data, trials and pictures, for ``corridor``."""

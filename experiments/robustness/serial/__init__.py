@@ -1,1 +1,0 @@
-"""Drivers over bad serial lines."""
