@@ -2,7 +2,7 @@
 
 In reading order:
 
-* :mod:`.portals`: the locales in view through chains of doorways, each with a window of the image.
-* :mod:`.shadows`: what convex surfaces hide of segments and points (shadow volumes).
+* :mod:`.culling`: the locales in view through chains of doorways, each with a window of the image; what convex surfaces
+  hide of segments and points (shadow volumes).
 * :mod:`.lines_and_points`: visible model lines and landmark corners, from both.
 """

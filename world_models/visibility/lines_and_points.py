@@ -2,7 +2,7 @@
 
 Seen from the optical centre, a convex one-sided surface hides what lies in its shadow volume: beyond its plane and
 within the pyramid of its sides. Each of these bounds is linear in a point, so that the hidden part of a segment is an
-interval, computed for all pairs of lines and surfaces at once (:mod:`world_models.visibility.shadows`). Locales that no
+interval, computed for all pairs of lines and surfaces at once (:mod:`world_models.visibility.culling`). Locales that no
 chain of doorways opens to the camera are left out beforehand (§3.4: the locale network as a focusing mechanism).
 """
 
@@ -20,15 +20,17 @@ from world_models.building.geometry.landmarks import Landmark
 from world_models.building.geometry.scene import Scene
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose
-from world_models.visibility.portals import Window, find_visible_locales, image_window
-from world_models.visibility.shadows import (
+from world_models.visibility.culling import (
     MIN_PIECE,
     Shadows,
+    Window,
     bounding_windows,
     build_shadows,
     clipped_spans,
     cut_segments,
+    find_visible_locales,
     hidden_points,
+    image_window,
     lengths_px,
     overlap,
     visible_spans,

@@ -21,8 +21,8 @@ from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
+from world_models.visibility.culling import CONTACT_M
 from world_models.visibility.lines_and_points import VisibleLines, visible_lines, visible_points
-from world_models.visibility.shadows import CONTACT_M
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0))
 MOUNT = CameraMount(1.2, 0.05)
