@@ -18,8 +18,6 @@ from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import networkx as nx
-
 from world_models.building.locales import Doorway, Link
 
 if TYPE_CHECKING:
@@ -130,6 +128,8 @@ class _Hierarchy:
 
 def _number_components(nodes: list[Numbered], edges: list[PassageEdge]) -> dict[Numbered, int]:
     """The connected component of each node, numbered in the order of the nodes."""
+    import networkx as nx  # here, so that a frame can be read without it
+
     graph: nx.Graph = nx.Graph()
     graph.add_nodes_from(nodes)
     graph.add_edges_from(edge.between for edge in edges)
@@ -262,6 +262,8 @@ class OpenPassages:
     def _first_of(self, container: str, component: Component) -> Component:
         """The component by which all are named that open passages of a container join with this one."""
         if container not in self._groups:
+            import networkx as nx
+
             graph: nx.Graph = nx.Graph(edge.between for edge in self.edges(container))
             groups: dict[Component, Component] = {}
             for first in graph:
