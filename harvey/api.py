@@ -214,8 +214,9 @@ class RecordedRun:
             BadInput: a value is of a kind, or of a version of it, that is not known here.
         """
         for record in self.records():
-            if not record.is_gone and (kind is None or record.kind is kind):
-                store = self._store if record.kind is LocaleFrame else None
+            found = self._kinds.get(record.type)
+            if not record.is_gone and (kind is None or found is kind):
+                store = self._store if found is LocaleFrame else None
                 yield entry_of(record, self._kinds, store)
 
     def pictures(self) -> Iterator[Picture]:

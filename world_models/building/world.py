@@ -9,9 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any, TypeVar
-
-import networkx as nx
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from world_models.building.building import Building
 from world_models.building.geometry.faces import Face
@@ -31,6 +29,9 @@ from world_models.building.locales import (
 )
 from world_models.building.passages import build_passage_graphs, drivable_passages
 from world_models.frames import Pose
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 K = TypeVar("K")
 T = TypeVar("T")
@@ -170,6 +171,8 @@ class World(Building):
     @cached_property
     def passages(self) -> nx.Graph:
         """Rooms joined by open doorways; each edge carries ``doorways`` (tuple of Doorway)."""
+        import networkx as nx  # here, so that a world can be read without it
+
         graph = nx.Graph()
         graph.add_nodes_from(self.rooms)
         for doorway in self.doorways:
@@ -183,6 +186,8 @@ class World(Building):
 
         It searches the passages of the whole world.
         """
+        import networkx as nx
+
         passages: tuple[Doorway | Link, ...] = (*self.doorways, *self.links)
         ways: nx.Graph = nx.Graph(passage.between for passage in passages)
         try:

@@ -23,6 +23,7 @@ from harvey.simulation.serial_body import body_kind
 from sim.emulators.denning import ConstantSpeedMotion, DenningEmulator
 from sim.emulators.emulator import IdealGround
 from sim.emulators.line import PseudoTerminal
+from sim.emulators.registry import emulator_kinds
 from world_models import plugins
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.camera_file import camera_text
@@ -128,7 +129,9 @@ def test_a_base_is_named_by_its_protocol_and_its_port(port: str) -> None:
 @pytest.mark.parametrize("absent", ["p2os", "create2"])
 def test_of_an_absent_extra_it_is_told_what_to_install(absent: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plugins, "entry_points", lambda group: ())
-    hardware_base.base_kinds.cache_clear()
+    kept = (hardware_base.base_kinds, emulator_kinds)
+    for kinds in kept:
+        kinds.cache_clear()
     try:
         with pytest.raises(BadInput, match=f"{absent} needs harvey-bases: pip install ./extras/harvey-bases"):
             open_base(f"{absent}:/dev/ttyUSB0")
@@ -136,7 +139,8 @@ def test_of_an_absent_extra_it_is_told_what_to_install(absent: str, monkeypatch:
             body_kind(f"serial:{absent}")
         assert main(["emulate", absent]) == 2
     finally:
-        hardware_base.base_kinds.cache_clear()
+        for kinds in kept:
+            kinds.cache_clear()
 
 
 @pytest.mark.parametrize(("number", "told"), [
