@@ -182,10 +182,7 @@ class World(Building):
         return graph
 
     def walk(self, origin: str, destination: str) -> list[str] | None:
-        """The rooms of the route with the fewest passages, stairs included; None where there is none.
-
-        It searches the passages of the whole world.
-        """
+        """The rooms of the route with the fewest passages of the whole world, stairs included; None for no route."""
         import networkx as nx
 
         passages: tuple[Doorway | Link, ...] = (*self.doorways, *self.links)
