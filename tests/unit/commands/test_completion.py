@@ -10,7 +10,7 @@ import pytest
 
 from experiments import list_names
 from harvey.cli import main
-from harvey.commands import MODULES
+from harvey.commands import MODULES, find_added_commands
 from sim.scenario_names import list_scenarios
 
 COMPLETE = """
@@ -31,7 +31,7 @@ def script(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="expected bash, got none")
 @pytest.mark.parametrize(("words", "expected"), [
-    ([""], set(MODULES)),
+    ([""], {*MODULES, *(command.name for command in find_added_commands())}),
     (["run", ""], {*list_scenarios(), "mine.toml"}),
     (["run", "hallway"], {"hallway-kidnap"}),
     (["experiment", ""], {*list_names(), "mine.toml"}),
