@@ -49,25 +49,21 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
     "robustness": {
         "crash": "Missions killed at random moments and resumed",
         "imported-building": "Missions between the rooms of a house from IFC",
-        "imported-floors": "Plans between floors of a university from IndoorGML",
         "kidnap": "Kidnaps to anywhere on generated floors of 40 rooms",
         "malformed-worlds": "World and building files with errors put in",
         "missions": "1,000 missions without trouble and 1,000 with",
         "rosmaps": "ROS maps traced into worlds: rooms, doorways, missions",
         "serial-chaos": "Drivers of bases over serial lines with errors",
         "soak": "Errands in one building, day after day: 1,000 km",
-        "video-stream": "A mission's frames through VideoCapture, compared",
     },
     "scale": {
         "agenda": "Activations per second with 10 to 100,000 pending",
         "explanations": "Missions of every scenario, explained and replayed",
         "frame-budget": "Time of perception per frame",
         "questions": "Questions after runs: harvey why against deciding again",
-        "recorder": "Time and size of the recording",
         "render-speed": "Simulated camera: frame rate and edge accuracy",
         "reports": "Reports in a browser: size, first view, barriers",
         "watchers": "The live page: what 50 watchers cost, hostile requests",
-        "world-size": "The same mission in worlds of 12 to 100,000 locales",
     },
 }
 """Name and one-line summary of each experiment, by folder; both in alphabetical order."""

@@ -9,7 +9,7 @@ FOLDER = Path(__file__).parents[2] / "shared" / "data"
 SHOWN = "../shared/data"
 VARIABLE = "HARVEY_DATA"
 CORRIDOR = "corridor"
-DUPLEX, UNIVERSITY = "buildings/Ifc2x3_Duplex_Architecture.ifc", "buildings/pnu_abc.gml"
+DUPLEX = "buildings/Ifc2x3_Duplex_Architecture.ifc"
 MAP_PLANS = "maps/plans"
 
 

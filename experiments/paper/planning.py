@@ -34,7 +34,6 @@ class Clock:
 
     def __init__(self) -> None:
         self.ms = dict.fromkeys(PLANNERS, 0.0)
-        self.steps_ms: list[float] = []
         self.sketches = self.milestones = 0
         self.begin()
 
@@ -50,8 +49,7 @@ class Clock:
     def __call__(self, decision: Decision) -> None:
         now = time.thread_time()
         if decision.chosen is not None and decision.chosen.source.name in self.ms:
-            self.steps_ms.append(1000.0 * (now - self._began))
-            self.ms[decision.chosen.source.name] += self.steps_ms[-1]
+            self.ms[decision.chosen.source.name] += 1000.0 * (now - self._began)
         values = [change.entry.value for change in decision.made if change.entry.revision == 0]
         self.sketches += sum(1 for value in values if isinstance(value, PlanSketch))
         self.milestones += sum(1 for value in values if isinstance(value, Milestone))
@@ -88,32 +86,12 @@ def run(quick: bool, seed: int) -> Report:
 
 
 def _plan_afresh(known: World, scenario: Scenario) -> Clock:
-    return plan(World(known.frames), scenario)  # results are kept with the frames of a world
-
-
-def plan(world: World, scenario: Scenario) -> Clock:
-    """Dry-run a scenario's mission."""
-    mission = DryMission(world, scenario)
-    while mission.step():
-        pass
-    return mission.clock
-
-
-class DryMission:
-    """Dry run of a scenario's mission, decision by decision.
-
-    Attributes:
-        clock: time of the planners, and number of sketches and milestones.
-    """
-
-    def __init__(self, world: World, scenario: Scenario) -> None:
-        self.clock = Clock()
-        self._scheduler = build_dry_run(world, build_robot_model(scenario, world), sinks=(self.clock,))
-        self._scheduler.tell([Post(scenario.command)], "user")
-
-    def step(self) -> bool:
-        """Make one decision; False when there is an outcome."""
-        self.clock.begin()
-        if self._scheduler.step() is None:
-            self._scheduler.tell([Post(Quiescence(self._scheduler.cycle))], "scheduler")
-        return self._scheduler.view.latest(Outcome) is None
+    """Dry-run a scenario's mission in a new world: what is computed is kept with a world's frames."""
+    world, clock = World(known.frames), Clock()
+    scheduler = build_dry_run(world, build_robot_model(scenario, world), sinks=(clock,))
+    scheduler.tell([Post(scenario.command)], "user")
+    while scheduler.view.latest(Outcome) is None:
+        clock.begin()
+        if scheduler.step() is None:
+            scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
+    return clock

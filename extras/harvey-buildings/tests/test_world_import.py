@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from experiments.robustness.imported_building import draw_trips
-from experiments.robustness.imported_floors import plan_pairs
 from harvey.cli import main
 from harvey_buildings import BuildingError, ImportedBuilding, import_building
 from harvey_buildings.building_plan import Furnishing, Names, Space, WallOpening, slug
@@ -139,12 +138,13 @@ def test_a_wheeled_robot_changes_floors_of_the_university_by_elevator(university
 @no_gml
 def test_between_floors_of_the_university_only_stairs_are_not_for_wheels(university: Building) -> None:
     world = university[1]
-    pairs = plan_pairs(world, university[0].network)
-    assert len(pairs) == 166 and all(pair.walked and pair.length_m for pair in pairs)
-    assert sum(pair.driven is not None for pair in pairs) == 63
+    pairs = [(a, b) for a, b in combinations(world.rooms, 2) if world.locale(a).parent != world.locale(b).parent]
+    assert len(pairs) == 166 and all(world.walk(*pair) for pair in pairs)
+    driven = [route for pair in pairs if (route := world.route(*pair)) is not None]
+    assert len(driven) == 63
     assert world.walk("corridor3", "corridor2") is not None and world.route("corridor3", "corridor2") is None
-    lifts = [pair for pair in pairs if pair.driven and any("elevator" in room for room in pair.driven)]
-    assert len(lifts) == 63, "nothing but an elevator joins floors on wheels"
+    assert all(any("elevator" in step.passage.name for step in route.steps) for route in driven), (
+        "nothing but an elevator joins floors on wheels")
 
 
 @no_ifc
