@@ -43,7 +43,6 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "matcher": "2D matching of growing problems: success and time",
         "milestones": "Milestones at right and wrong places: error rates",
         "milestones-calibrate": "Fits the weights of the evidence for milestones",
-        "repeats": "Stairs, shelves, doors: a pose one repetition off",
         "visibility": "Visibility by the model against the renderer",
     },
     "robustness": {
@@ -62,7 +61,6 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "frame-budget": "Time of perception per frame",
         "questions": "Questions after runs: harvey why against deciding again",
         "render-speed": "Simulated camera: frame rate and edge accuracy",
-        "reports": "Reports in a browser: size, first view, barriers",
         "watchers": "The live page: what 50 watchers cost, hostile requests",
     },
 }

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.paper.pose_peer import NOT_INSTALLED, Peer
+from experiments.perception.locate_camera import CAMERA_MIN_LINE_LENGTH_PX
 from experiments.perception.photographs import (
     MAX_ERROR_RAD,
     MAX_ERROR_STEPS,
@@ -22,7 +23,6 @@ from experiments.perception.photographs import (
     run_attempt,
     select_visible,
 )
-from experiments.perception.rivals import CAMERA_MIN_LINE_LENGTH_PX
 from experiments.report import Cell, Report
 from experiments.shared_data import CORRIDOR, describe_absence
 from experiments.trials import campaign_folder, run_trials

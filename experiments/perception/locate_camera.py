@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from experiments.perception.rivals import CAMERA_MIN_LINE_LENGTH_PX, Rival, find_rivals
 from knowledge_sources.methods.arrays import Floats, Indices
 from knowledge_sources.methods.features.lines import LineSegments, find_lines, remove_duplicates
 from knowledge_sources.methods.matching import match_in_space
@@ -27,6 +26,7 @@ from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose
 
+CAMERA_MIN_LINE_LENGTH_PX = 8.0  # shortest projected model line that is matched
 CAMERA_BAND_PX = 6.0  # half-width of the bands that are searched for edges around the first pose
 CAMERA_SECOND_PRIOR = 0.15  # standard deviation of the first pose, as a part of the prior's
 CAMERA_COARSE_PAIR_PX = 5.0  # restricted space of the first match (§6.1.4)
@@ -41,8 +41,6 @@ CAMERA_MIN_COVERAGE = 2.0 / 3.0  # smallest covered part of the model of a verif
 CAMERA_DISPLACEMENT_SIGMAS = 2.0  # displacement of the poses at which chance is counted, in the prior's deviations
 CAMERA_TOLERANCE_SIGMAS = 3.0  # standard deviations of a verified pose that fit into the tolerance
 CAMERA_MAX_RESTARTS = 3  # most times that a pose is replaced by a better one found from it
-RIVAL_MIN_LEAD = 5.0  # log likelihood ratio by which a verified pose leads every rival
-RIVAL_DISTINCT_TOLERANCES = 2.0  # distance of a rival, in tolerances of the pose: nearer ones are the same pose
 
 RESTLESS = "each pose that is found leads to a better one"
 
@@ -66,9 +64,7 @@ class CameraFix:
         evidence: which of the model lines are matched, and how many would be by chance.
         coverage: covered part of their length in view, 0..1.
         verdict: refuted if the agreement may well be by chance, where so many lines would tell; verified only if most
-            of the model is covered, the covariance, scaled by the residuals, fits into the tolerance, and no other
-            pose within the prior explains comparably much.
-        rival: the pose that explains most besides, where one was looked for and found.
+            of the model is covered, and the covariance, scaled by the residuals, fits into the tolerance.
         reason: why it is not verified, in words; "" where it is.
     """
 
@@ -78,7 +74,6 @@ class CameraFix:
     evidence: Agreement
     coverage: float
     verdict: PoseVerdict
-    rival: Rival | None = None
     reason: str = ""
 
     @property
@@ -98,7 +93,6 @@ def locate_camera(
     tolerance_rad: float,
     rng: np.random.Generator,
     segments: LineSegments | None = None,
-    with_rivals: bool = True,
 ) -> CameraFix | None:
     """Find the pose near the prior that the picture shows; None if too few lines are matched.
 
@@ -113,14 +107,13 @@ def locate_camera(
         tolerance_m, tolerance_rad: how precise a verified pose must be.
         rng: draws subsets of lines.
         segments: those of the whole image, if they are known already.
-        with_rivals: whether poses at which the model repeats itself are looked for.
     """
     if segments is None:
         segments = find_lines(image)
     parameters = build_camera_parameters(prior, prior_covariance)
     search = _Search(
         parameters, np.asarray(model_lines_world, float), image, camera, np.asarray(prior_covariance, float),
-        segments.segments_px, tolerance_m, tolerance_rad, rng, with_rivals)
+        segments.segments_px, tolerance_m, tolerance_rad, rng)
     best = search.locate(prior, search.covariance)
     for _ in range(CAMERA_MAX_RESTARTS):
         best, is_better = search.look_elsewhere(best)
@@ -144,10 +137,9 @@ class _Search:
     tolerance_m: float
     tolerance_rad: float
     rng: np.random.Generator
-    with_rivals: bool
 
     def look_elsewhere(self, best: CameraFix | None) -> tuple[CameraFix | None, bool]:
-        """A better pose, from here or where the model repeats itself; else the same, held against its rivals."""
+        """A better pose that is found from here, and whether it is another place."""
         if best is None:
             return None, False
         pose = best.camera_from_world
@@ -155,33 +147,8 @@ class _Search:
         if other is not None and other.coverage > best.coverage:
             if not self.is_same(other.camera_from_world, pose):
                 return other, True
-            best, pose = other, other.camera_from_world
-        rivals = self._find_rivals(best)
-        for rival in rivals:
-            if rival.lead < 0.0:
-                near = CAMERA_SECOND_PRIOR**2 * self.covariance
-                there = self.locate(rival.camera_from_world, near)
-                if there is not None and not self.is_same(there.camera_from_world, pose):
-                    return there, True
-        return self._hold_against(best, rivals), False
-
-    def _find_rivals(self, fix: CameraFix) -> list[Rival]:
-        """Poses within the prior that explain the picture too, the likeliest first."""
-        if not self.with_rivals:
-            return []
-        apart = RIVAL_DISTINCT_TOLERANCES
-        return find_rivals(
-            lambda _: self.model, self.segments_px, self.camera, self.prior, fix.camera_from_world,
-            fix.evidence.chance, same_m=apart * self.tolerance_m, same_rad=apart * self.tolerance_rad)
-
-    def _hold_against(self, fix: CameraFix, rivals: list[Rival]) -> CameraFix:
-        """The verdict, now that the rivals are known."""
-        if not rivals:
-            return fix
-        strongest = rivals[0]
-        if fix.verdict is PoseVerdict.VERIFIED and strongest.lead < RIVAL_MIN_LEAD:
-            return replace(fix, verdict=PoseVerdict.NOT_TESTABLE, rival=strongest, reason=strongest.sentence())
-        return replace(fix, rival=strongest)
+            best = other
+        return best, False
 
     def locate(self, prior: Pose, covariance: Floats) -> CameraFix | None:
         """The pose that the picture shows within a prior, with its own verdict."""

@@ -15,8 +15,12 @@ from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
 from experiments.paper.pose_peer import Peer
-from experiments.perception.locate_camera import CameraFix, PoseVerdict, locate_camera
-from experiments.perception.rivals import CAMERA_MIN_LINE_LENGTH_PX
+from experiments.perception.locate_camera import (
+    CAMERA_MIN_LINE_LENGTH_PX,
+    CameraFix,
+    PoseVerdict,
+    locate_camera,
+)
 from experiments.report import OURS, PEER, chart
 from experiments.shared_data import CORRIDOR, data_path, describe_absence
 from harvey.errors import BadInput

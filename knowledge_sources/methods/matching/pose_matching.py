@@ -27,7 +27,6 @@ from knowledge_sources.methods.matching.pose_pairs import (
     build_scene,
     find_allowed_pairs,
     find_near_pairs,
-    find_pairs_near,
     keep_longest,
     linearise_pairs,
     project_model,
@@ -244,26 +243,6 @@ def find_start_poses(scene: LineScene, wide: PosePairs) -> list[Pose]:
     scores = np.array([score for _, score in exact])
     best = _select_distinct(reached, scores, MAX_POSE_STARTS, scene)
     return [_refine_pose(scene, wide, exact[i][0], [groups[-1][-2:]])[0] for i in best]
-
-
-def refine_pose(
-    model_lines_world: Any, segments_px: Any, camera: Camera, parameters: PoseParameters, pose: Pose, widths: Widths,
-) -> Pose:
-    """The pose near ``pose`` at which model lines (m, 2, 3) [m] fit data lines (k, 2, 2) [px], the prior as one term.
-
-    Args:
-        parameters: the prior and its unknowns.
-        widths: of the loss, narrowing; data further than the first [px] from their lines are left out.
-    """
-    scene = build_scene(model_lines_world, segments_px, camera, parameters)
-    for width in widths:
-        pairs = find_pairs_near(scene, pose, width, MAX_POSE_PAIR_RAD)
-        if not len(pairs.model):
-            break
-        still, offset = np.zeros((1, len(parameters.root))), parameters.compute_step(pose)
-        steps, _ = _refine_steps(pairs, still, parameters.information, offset, (width, width))
-        pose = parameters.move(pose, steps[0])
-    return pose
 
 
 def _refine_pose(

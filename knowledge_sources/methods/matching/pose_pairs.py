@@ -315,13 +315,6 @@ def linearise_pairs(scene: LineScene, pose: Pose, i: Indices, k: Indices) -> Pos
     return PosePairs(i, k, distances, slopes, along, lengths[i], angles, shares)
 
 
-def find_pairs_near(scene: LineScene, pose: Pose, pair_px: float, pair_rad: float) -> PosePairs:
-    """Pairs that are within the limits at a pose, linearised there."""
-    px, _, visible = project_model(scene, pose)
-    pairs = linearise_pairs(scene, pose, *_find_nearly_parallel(px, visible, scene.data, pair_rad))
-    return pairs.take(find_near_pairs(pairs, pair_px, pair_rad))
-
-
 def find_near_pairs(pairs: PosePairs, pair_px: float, pair_rad: float) -> Mask:
     """(p,) which lie within the limits across, overlap along and are nearly parallel."""
     near = (np.abs(pairs.distances).max(axis=1) <= pair_px) & (np.abs(pairs.angles) <= pair_rad)
