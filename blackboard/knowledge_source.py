@@ -1,4 +1,4 @@
-"""KnowledgeSource: it watches the board, rates its own activations, and acts by returning effects."""
+"""KnowledgeSource: a rule. It watches the board, binds what it needs, and acts by returning effects."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Any, ClassVar
 
 from blackboard.board import View
-from blackboard.change import Change, Retracted, Watch
+from blackboard.change import Change, Watch
 from blackboard.effect import Effect
 from blackboard.level import Level
 
@@ -16,27 +16,29 @@ from blackboard.level import Level
 class KnowledgeSource(ABC):
     """One knowledge source. It keeps no memory between acts but the board; what it is built with must be immutable.
 
+    Its trigger, precondition and action are those of the classic blackboard systems (Hearsay-II, BB1): a change that it
+    watches for triggers it, :meth:`bind` finds what it needs or says that it is not all there, and :meth:`act` gets
+    what was found. A trigger stands while its entry is the current revision; a retraction stands for good.
+
     Class attributes:
         level: the servo level (Figure 2) at which it works.
         closes: the servo loop that it closes, if any: switched off with that level.
-        watches: the changes that trigger it.
+        on: the changes that trigger it.
+        priority: how urgent its act is, 0..1, where no :meth:`rate` of its own tells from the case.
         writes: the types of value that its effects may touch; the scheduler refuses any other.
     """
 
     level: ClassVar[Level]
     closes: ClassVar[Level | None] = None
-    watches: ClassVar[tuple[Watch, ...]]
+    on: ClassVar[tuple[Watch, ...]]
+    priority: ClassVar[float] = 0.5
     writes: ClassVar[tuple[type[Any], ...]]
-
-    has_own_word: ClassVar[bool]
-    """Whether it says itself which triggers still stand; where not, the scheduler knows the answer without asking."""
 
     _called: ClassVar[str]
 
     def __init_subclass__(cls, **more: Any) -> None:
         super().__init_subclass__(**more)
         cls._called = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
-        cls.has_own_word = cls.still_valid is not KnowledgeSource.still_valid
 
     @classmethod
     def called(cls) -> str:
@@ -48,18 +50,18 @@ class KnowledgeSource(ABC):
         """Its class name in snake case, as in the folder listing."""
         return self._called
 
-    def rate(self, view: View, trigger: Change) -> float | None:
-        """How well it could answer this trigger, 0..1; None when it could not. Pure."""
-        return 0.5
+    def bind(self, view: View, trigger: Change) -> Any | None:
+        """The case: all that the act needs, found; None when it could not act. Pure.
 
-    def still_valid(self, view: View, trigger: Change) -> bool:
-        """Whether the trigger still stands; :meth:`rate` then tells whether it could be answered. Pure.
-
-        A trigger stands while its entry is the current revision; a retraction stands for good. It is asked when the
-        trigger's entry has changed, and again, with ``rate``, when the knowledge source is about to be chosen.
+        Unless it says otherwise, the trigger is all that it needs. It is asked when the trigger comes, when the
+        activation is about to be chosen, and for the act itself.
         """
-        return isinstance(trigger, Retracted) or view.is_current(trigger.entry)
+        return trigger
+
+    def rate(self, case: Any) -> float:
+        """How urgent a case is, 0..1: its ``priority``, unless it can tell by the case. Pure."""
+        return float(self.priority)
 
     @abstractmethod
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        """The effects that it asks for: a pure function of the view and the trigger."""
+    def act(self, view: View, case: Any) -> Iterable[Effect]:
+        """The effects that it asks for: a pure function of the view and what :meth:`bind` found."""

@@ -147,28 +147,26 @@ class Scheduler:
 
     def _drop_if_stale(self, activation: Activation, obviated: list[Obviated]) -> None:
         """What was triggered by an earlier revision of an entry that changed goes."""
-        source, trigger = activation.source, activation.trigger
-        if not (source.still_valid(self.view, trigger) if source.has_own_word else self._stands(trigger)):
+        if not self._stands(activation.trigger):
             self._agenda.take(activation)
-            obviated.append(Obviated(activation, self._staleness(trigger)))
+            obviated.append(Obviated(activation, self._staleness(activation.trigger)))
 
     def _staleness(self, trigger: Change) -> str:
         now = self.view.get(trigger.entry.id)
         return f"stale trigger: {trigger.entry.ref} is {f'now {now.ref}' if now else 'retracted'}"
 
     def _watchers_of(self, change: type[Change], value: type[Any]) -> Watchers:
-        found = ((source, [w.where for w in source.watches if w.is_for(change, value)]) for source in self._sources)
+        found = ((source, [w.where for w in source.on if w.is_for(change, value)]) for source in self._sources)
         return tuple((source, () if always in wheres else tuple(wheres)) for source, wheres in found if wheres)
 
     def _hear_bids_on(
         self, change: Change, watchers: Watchers, activated: list[Activation], obviated: list[Obviated]
     ) -> None:
         view, value = self.view, change.entry.value
-        stands = self._stands(change)
+        if not self._stands(change):
+            return
         for source, wheres in watchers:
             if wheres and not any(where(value) for where in wheres):
-                continue
-            if not (source.still_valid(view, change) if source.has_own_word else stands):
                 continue
             rating = _rate(source, view, change)
             if rating is None:
@@ -183,7 +181,7 @@ class Scheduler:
                 obviated.append(replaced)
 
     def _stands(self, trigger: Change) -> bool:
-        """What :meth:`KnowledgeSource.still_valid` says, which most sources leave as it is."""
+        """A trigger stands while its entry is the current revision; a retraction stands for good."""
         entry = trigger.entry
         return self._current.get(entry.id) is entry or isinstance(trigger, Retracted)
 
@@ -213,7 +211,7 @@ class Scheduler:
                 return best
             reason = "raised when it was asked"
             try:
-                if not (source.still_valid(view, trigger) if source.has_own_word else self._stands(trigger)):
+                if not self._stands(trigger):
                     reason = self._staleness(trigger)
                 else:
                     reason = "could not answer any more" if _rate(source, view, trigger) is None else ""
@@ -230,7 +228,8 @@ class Scheduler:
         source, view = chosen.source, TracedView(self.board, self._traced)
         try:
             try:
-                effects = tuple(source.act(view, chosen.trigger))
+                case = source.bind(view, chosen.trigger)
+                effects = () if case is None else tuple(source.act(view, case))
                 made, refused = self._apply(source, effects)
             except MissingEntryError as missing:
                 made, refused = self._ask(chosen, missing.request)
@@ -273,13 +272,14 @@ def registry_of(
     Raises:
         NotAKindError: one of them is not marked; ValueError: two are of one name.
     """
-    of_sources = ((*(watch.value_type for watch in s.watches), *s.writes) for s in sources)
+    of_sources = ((*(watch.value_type for watch in s.on), *s.writes) for s in sources)
     return Registry((Discrepancy, Quiescence, *kinds, *chain.from_iterable(of_sources)))
 
 
 def _rate(source: KnowledgeSource, view: View, trigger: Change) -> float | None:
     try:
-        return source.rate(view, trigger)
+        case = source.bind(view, trigger)
+        return None if case is None else source.rate(case)
     except MissingEntryError:
         return MISSING_RATING
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import harvey
-from harvey import Change, Effect, Level, Post, Revise, Revised, View, Watch
+from harvey import Change, Effect, Entry, Level, Post, Revise, Revised, View, Watch
 from world_models.entries.location import Hypothesis
 
 OUT = Path("runs") / "largest-correction"
@@ -26,16 +26,17 @@ class DoubtKeeper(harvey.KnowledgeSource):
     """Notes the largest doubt about the robot's place."""
 
     level = Level.ACTION
-    watches = (Watch(Hypothesis, (Revised,), lambda hypothesis: hypothesis.is_held),)
+    on = (Watch(Hypothesis, (Revised,), lambda hypothesis: hypothesis.is_held),)
+    priority = 0.05
     writes = (LargestDoubt,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def bind(self, view: View, trigger: Change) -> Entry[Hypothesis] | None:
         known = view.latest(LargestDoubt)
-        return 0.05 if known is None or trigger.entry.value.sigma_m > known.value.sigma_m else None
+        return trigger.entry if known is None or trigger.entry.value.sigma_m > known.value.sigma_m else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        known, doubt = view.latest(LargestDoubt), LargestDoubt(trigger.entry.value.sigma_m)
-        yield Post(doubt, (trigger.entry,)) if known is None else Revise(known, doubt, (trigger.entry,))
+    def act(self, view: View, case: Entry[Hypothesis]) -> Iterable[Effect]:
+        known, doubt = view.latest(LargestDoubt), LargestDoubt(case.value.sigma_m)
+        yield Post(doubt, (case,)) if known is None else Revise(known, doubt, (case,))
 
 
 result = harvey.run("forty-foot-hallway", seed=1, out=OUT, knowledge_sources=[DoubtKeeper])

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import harvey
-from harvey import Change, Effect, Level, Post, Posted, View, Watch
+from harvey import Change, Effect, Entry, Level, Post, Posted, View, Watch
 
 WORDS = {"go": ("go",), "kitchen": ("kit", "chen"), "to": ("to",), "the": ("the",), "chent": ("chen", "to")}
 GRAMMAR = ("go", "to", "the", "kitchen")
@@ -35,7 +35,7 @@ class WordGuesser(harvey.KnowledgeSource):
     """Guesses every word whose last syllable was just heard."""
 
     level = Level.PLAN
-    watches = (Watch(Syllable, (Posted,)),)
+    on = (Watch(Syllable, (Posted,)),)
     writes = (Word,)
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
@@ -51,20 +51,21 @@ class Parser(harvey.KnowledgeSource):
     """Finds the sentence of the grammar in the words, once it is whole."""
 
     level = Level.GOAL
-    watches = (Watch(Word, (Posted,)),)
+    on = (Watch(Word, (Posted,), lambda word: word.text == GRAMMAR[-1]),)
+    priority = 0.9
     writes = (Sentence,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
-        return 0.9 if trigger.entry.value.text == GRAMMAR[-1] else None
-
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def bind(self, view: View, trigger: Change) -> list[Entry[Word]] | None:
         chain, end = [trigger.entry], trigger.entry.value.start
         for text in reversed(GRAMMAR[:-1]):
             before = view.latest(Word, lambda word, text=text, end=end: word.text == text and word.end == end)
             if before is None:
-                return
+                return None
             chain, end = [before, *chain], before.value.start
-        yield Post(Sentence(" ".join(entry.value.text for entry in chain)), tuple(chain))
+        return chain
+
+    def act(self, view: View, case: list[Entry[Word]]) -> Iterable[Effect]:
+        yield Post(Sentence(" ".join(entry.value.text for entry in case)), tuple(case))
 
 
 decisions: list[harvey.Decision] = []

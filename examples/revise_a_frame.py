@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import harvey
-from harvey import Change, Effect, Level, Posted, Revise, View, Watch
+from harvey import Change, Effect, Entry, Level, Posted, Revise, View, Watch
 from knowledge_sources.questions import find_building, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locale_frame import CHANGED, FrameChange, LocaleFrame
@@ -24,18 +24,19 @@ class Timetable(RobotKnowledgeSource):
     """Knows at what time a door is locked, and revises the frames of both its rooms."""
 
     level = Level.ACTION
-    watches = (Watch(MotionReport, (Posted,), lambda report: report.sim_time_s >= LOCKED_AT_S),)
+    on = (Watch(MotionReport, (Posted,), lambda report: report.sim_time_s >= LOCKED_AT_S),)
+    priority = 1.0
     writes = (LocaleFrame,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def bind(self, view: View, trigger: Change) -> Entry[MotionReport] | None:
         known = [change.name for frame in view.having(CHANGED, True) for change in frame.value.changes]
-        return None if DOOR in known else 1.0
+        return None if DOOR in known else trigger.entry
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def act(self, view: View, case: Entry[MotionReport]) -> Iterable[Effect]:
         rooms = find_building(view).find_elements(DOOR)
         for frame in find_frames(view, rooms):
             shut = frame.value.changed(FrameChange("shut", DOOR, self.name))
-            yield Revise(frame, shut, (trigger.entry, frame))
+            yield Revise(frame, shut, (case, frame))
 
 
 FILE.write_text(MISSION, encoding="utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from blackboard.board import View
 from blackboard.change import Change
@@ -52,18 +53,18 @@ class WrappedSource(KnowledgeSource):
 
     def __init__(self, inner: KnowledgeSource) -> None:
         self._inner = inner
-        for name in ("level", "closes", "watches", "writes"):
+        for name in ("level", "closes", "on", "writes"):
             setattr(self, name, getattr(inner, name))
 
     @property
     def name(self) -> str:
         return self._inner.name
 
-    def rate(self, view: View, trigger: Change) -> float | None:
-        return self._inner.rate(view, trigger)
+    def bind(self, view: View, trigger: Change) -> Any | None:
+        return self._inner.bind(view, trigger)
 
-    def still_valid(self, view: View, trigger: Change) -> bool:
-        return self._inner.still_valid(view, trigger)
+    def rate(self, case: Any) -> float:
+        return self._inner.rate(case)
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        return self._inner.act(view, trigger)
+    def act(self, view: View, case: Any) -> Iterable[Effect]:
+        return self._inner.act(view, case)

@@ -80,7 +80,7 @@ class AcceptEveryMilestone(KnowledgeSource):
     """Verifies every expected milestone."""
 
     level = Level.PLAN
-    watches = (Watch(Milestone, (Posted, Revised), lambda m: m.status == "expected"),)
+    on = (Watch(Milestone, (Posted, Revised), lambda m: m.status == "expected"),)
     writes = (Milestone, Hypothesis)
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:

@@ -11,12 +11,14 @@ import shapely
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
+from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.methods.floor.seen_floor import find_floor
 from knowledge_sources.questions import find_belief, find_building, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Frame
 from world_models.entries.floor import FreeFloor
+from world_models.entries.location import Hypothesis
 from world_models.frames import Pose2
 
 FAR_M = 8.0
@@ -26,16 +28,15 @@ class IdealFloorWatcher(RobotKnowledgeSource):
     """Posts after each picture what a perfect eye would see of the floor."""
 
     level = Level.ACTION
-    watches = (Watch(Frame, (Posted,)),)
+    on = (Watch(Frame, (Posted,)),)
     writes = (FreeFloor,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
-        return 0.5 if find_belief(view) is not None else None
-
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def bind(self, view: View, trigger: Change) -> tuple[Entry[Hypothesis], Entry[Frame]] | None:
         belief, frame = find_belief(view), view.latest(Frame)
-        if belief is None or frame is None:
-            return
+        return None if belief is None or frame is None else (belief, frame)
+
+    def act(self, view: View, case: tuple[Entry[Hypothesis], Entry[Frame]]) -> Iterable[Effect]:
+        belief, frame = case
         robot, building = find_robot(view), find_building(view)
         pose = belief.value.world_from_robot(building)
         near = building.rooms_near(pose.position, 6.0)

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+from acting import answer
 from blackboard.board import Blackboard, TracedView
 from blackboard.change import Change, Posted, Retracted, Revised
 from blackboard.effect import Effect, MissingEntryError, Post
@@ -75,7 +76,7 @@ class RebuiltBoard:
         assert chosen is not None
         view, trigger = TracedView(self.board, TRACED), CHANGES[chosen.kind](self.entries[ref_of(chosen.trigger)])
         try:
-            effects = tuple(SOURCES[chosen.source](DEFAULT).act(view, trigger))
+            effects = answer(SOURCES[chosen.source](DEFAULT), view, trigger) or ()
         except MissingEntryError as missing:
             effects = (Post(missing.request, (trigger.entry,)),)
         changes = _apply_aside(self.board, effects, chosen.source, decision.cycle)

@@ -85,7 +85,7 @@ class Player(KnowledgeSource):
     def __init__(self, called: str, level: Level, lines: Sequence[Line]) -> None:
         self._called, self._lines = called, lines
         self.level = level
-        self.watches = (Watch(Cue, where=lambda cue: cue.who == called),)
+        self.on = (Watch(Cue, where=lambda cue: cue.who == called),)
         self.writes = WRITES
 
     @property

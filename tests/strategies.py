@@ -42,7 +42,6 @@ class Scripted(KnowledgeSource):
         on: the type of value that it watches.
         act: what it does.
         rate: its rating, or a function of view and trigger.
-        valid: a function that replaces still_valid; None leaves that as it is.
     """
 
     def __init__(
@@ -52,29 +51,29 @@ class Scripted(KnowledgeSource):
         act: Callable[[View, Change], Iterable[Effect]] = silent,
         *,
         rate: float | Callable[[View, Change], float | None] = 0.5,
-        valid: Callable[[View, Change], bool] | None = None,
         level: Level = Level.PLAN,
         closes: Level | None = None,
         kinds: tuple[type[Change], ...] = (Posted, Revised),
         where: Callable[[Any], bool] = lambda _value: True,
         writes: tuple[type[Any], ...] = (Note, Tally),
     ) -> None:
-        self._called, self._act, self._rate, self._valid = called, act, rate, valid
+        self._called, self._act, self._rate = called, act, rate
         self.level, self.closes, self.writes = level, closes, writes
-        self.watches = (Watch(on, kinds, where),)
+        self.on = (Watch(on, kinds, where),)
 
     @property
     def name(self) -> str:
         return self._called
 
-    def rate(self, view: View, trigger: Change) -> float | None:
-        return self._rate(view, trigger) if callable(self._rate) else self._rate
+    def bind(self, view: View, trigger: Change) -> tuple[Change, float] | None:
+        rating = self._rate(view, trigger) if callable(self._rate) else self._rate
+        return None if rating is None else (trigger, rating)
 
-    def still_valid(self, view: View, trigger: Change) -> bool:
-        return self._valid(view, trigger) if self._valid else super().still_valid(view, trigger)
+    def rate(self, case: tuple[Change, float]) -> float:
+        return case[1]
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        return self._act(view, trigger)
+    def act(self, view: View, case: tuple[Change, float]) -> Iterable[Effect]:
+        return self._act(view, case[0])
 
 
 def run(scheduler: Scheduler, limit: int = 50) -> list[Decision]:

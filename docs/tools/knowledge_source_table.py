@@ -23,7 +23,7 @@ def rows(sources: Iterable[type[KnowledgeSource]]) -> list[str]:
 
 def _row(source: type[KnowledgeSource]) -> str:
     what = (source.__doc__ or "").strip().split("\n\n")[0]
-    wakes = ", ".join(dict.fromkeys(watch.value_type.__name__ for watch in source.watches))
+    wakes = ", ".join(dict.fromkeys(watch.value_type.__name__ for watch in source.on))
     writes = ", ".join(kind.__name__ for kind in source.writes if kind not in EVERYBODY_WRITES)
     level = str(source.level) + ("" if source.closes is None else ", closes it")
     name = source.__module__.rpartition(".")[2]

@@ -9,6 +9,7 @@ import timeit
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 from blackboard.board import Blackboard, View
 from blackboard.change import Change, Posted
@@ -40,7 +41,7 @@ class Cost:
 
     Attributes:
         cycles, activations, obviated: counts.
-        sources_s: time in the knowledge sources' ``rate`` and ``act``.
+        sources_s: time in the knowledge sources' ``bind`` and ``act``.
         scheduler_s: time in the rest of the cycles: board, indexes, agenda, choice, retention.
         lines_s: time to make the journal's lines.
         max_pending: most activations pending at once.
@@ -69,15 +70,15 @@ class _Timed(WrappedSource):
         super().__init__(inner)
         self.spent_s = 0.0
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def bind(self, view: View, trigger: Change) -> Any | None:
         began_s = time.process_time()
-        rating = super().rate(view, trigger)
+        case = super().bind(view, trigger)
         self.spent_s += time.process_time() - began_s
-        return rating
+        return case
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def act(self, view: View, case: Any) -> Iterable[Effect]:
         began_s = time.process_time()
-        effects = tuple(super().act(view, trigger))
+        effects = tuple(super().act(view, case))
         self.spent_s += time.process_time() - began_s
         return effects
 

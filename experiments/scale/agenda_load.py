@@ -51,11 +51,11 @@ class Worker(KnowledgeSource):
     """Revises a task, which triggers the next activation."""
 
     level = Level.PLAN
-    watches = (Watch(Task),)
+    on = (Watch(Task),)
     writes = (Task,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
-        rating: float = trigger.entry.value.rating
+    def rate(self, case: Change) -> float:
+        rating: float = case.entry.value.rating
         return rating
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
@@ -66,7 +66,8 @@ class Competitor(KnowledgeSource):
     """Is triggered by some tasks too, but always rated lower; when the task is revised its activation is obviated."""
 
     level = Level.PLAN
-    watches = (Watch(Task),)
+    on = (Watch(Task),)
+    priority = 0.0
     writes = (Task,)
 
     def __init__(self, number: int, can_act: Callable[[Task], bool]) -> None:
@@ -76,8 +77,8 @@ class Competitor(KnowledgeSource):
     def name(self) -> str:
         return f"competitor_{self._number}"
 
-    def rate(self, view: View, trigger: Change) -> float | None:
-        return 0.0 if self._can_act(trigger.entry.value) else None
+    def bind(self, view: View, trigger: Change) -> Change | None:
+        return trigger if self._can_act(trigger.entry.value) else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         return ()

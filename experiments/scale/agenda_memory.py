@@ -45,7 +45,7 @@ class Seer(KnowledgeSource):
     """Takes a picture into the belief and posts the next one; now and then it posts a discrepancy."""
 
     level = Level.ACTION
-    watches = (Watch(Picture, (Posted,)),)
+    on = (Watch(Picture, (Posted,)),)
     writes = (Belief, Picture, Discrepancy)
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
@@ -64,11 +64,9 @@ class Corrector(KnowledgeSource):
     """Closes a discrepancy."""
 
     level = Level.ACTION
-    watches = (Watch(Discrepancy, (Posted,), lambda found: found.is_open),)
+    on = (Watch(Discrepancy, (Posted,), lambda found: found.is_open),)
+    priority = 0.9
     writes = (Discrepancy,)
-
-    def rate(self, view: View, trigger: Change) -> float | None:
-        return 0.9
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         yield Revise(trigger.entry, trigger.entry.value.corrected(), (trigger.entry,))

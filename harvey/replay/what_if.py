@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from blackboard.board import View
-from blackboard.change import Change
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.scheduler import Scheduler
@@ -147,9 +146,9 @@ class SegmentHider(LineFinder):
     def name(self) -> str:
         return "line_finder"
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        hidden = [segment for frame, segment in self._segments if trigger.entry.id == f"Frame-{frame}"]
-        for effect in super().act(view, trigger):
+    def act(self, view: View, case: Entry[Frame]) -> Iterable[Effect]:
+        hidden = [segment for frame, segment in self._segments if case.id == f"Frame-{frame}"]
+        for effect in super().act(view, case):
             if isinstance(effect, Post) and isinstance(effect.value, Segments) and hidden:
                 yield Post(_hide(effect.value, hidden), effect.because)
             else:

@@ -114,7 +114,7 @@ def why_absent(
         BadInput: the run has no such cycle, or a value of the journal is not of its type.
     """
     seen = changes(history, cycle, kinds, store)
-    woken = [change for change in seen if any(watch.sees(change) for watch in source.watches)]
+    woken = [change for change in seen if any(watch.sees(change) for watch in source.on)]
     if not woken:
         yield from _tell_why_not_triggered(source, seen, cycle)
         return
@@ -127,14 +127,14 @@ def _tell_why_not_triggered(source: KnowledgeSource, seen: Sequence[Change], cyc
     """Nothing came of the kinds that it watches for, or the condition of its watch did not hold for what came."""
     name = words.source(source.name)
     held_back = [change for change in seen if any(
-        watch.is_for(type(change), type(change.entry.value)) for watch in source.watches)]
+        watch.is_for(type(change), type(change.entry.value)) for watch in source.on)]
     if held_back:
         came = ", ".join(f"{change.entry.ref} {change.kind.lower()}" for change in held_back)
         yield (f"In cycle {cycle} came what the {name} watches for, {came}, but its watch has a condition, which did"
                " not hold for the values:")
         yield from (f"  {change.entry.ref}: {sentence(change.entry.value)}" for change in held_back)
         return
-    watched = ", ".join(dict.fromkeys(f"{w.value_type.__name__} {_kinds(w.kinds)}" for w in source.watches))
+    watched = ", ".join(dict.fromkeys(f"{w.value_type.__name__} {_kinds(w.kinds)}" for w in source.on))
     came = ", ".join(f"{change.entry.ref} {change.kind.lower()}" for change in seen) or "nothing"
     yield f"Nothing that the {name} watches for came in cycle {cycle}. It watches for: {watched}; what came: {came}."
 
@@ -147,13 +147,13 @@ def _ask_rating(source: KnowledgeSource, board: Blackboard, change: Change) -> I
         return
     view = AskedView(board)
     try:
-        rating = source.rate(view, change)
+        case = source.bind(view, change)
     except MissingEntryError as missing:
         yield (f"{ref} woke the {name}; asked again, it lacks something to tell whether it could act:"
                f" it {sentence(missing.request)}.")
         return
-    if rating is not None:
-        yield f"{ref} woke the {name}; asked again, it says that it could have acted, rated {rating:.2f}."
+    if case is not None:
+        yield f"{ref} woke the {name}; asked again, it says that it could have acted, rated {source.rate(case):.2f}."
         return
     yield f"{ref} woke the {name}, but it could not act. What it asked of the board, and found:"
     yield from (f"  {question}: {', '.join(dict.fromkeys(answers)) or 'nothing'}" for question, answers in view.asked)

@@ -39,7 +39,7 @@ from knowledge_sources.questions import (
     open_discrepancy,
     unmeasured_doubt,
 )
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from knowledge_sources.tolerances import action_px
 from world_models.entries.body import Frame
 from world_models.entries.location import Hypothesis, covariance_tuple
@@ -74,25 +74,25 @@ class Renewed(NamedTuple):
     hypothesis: Hypothesis
 
 
-class CorrelatorTracker(RobotKnowledgeSource):
+class CorrelatorTracker(OlderSource):
     """Follows landmarks from frame to frame, corrects the belief by them, and posts the size of the correction."""
 
     level = Level.ACTION
     closes = Level.ACTION
-    watches = (
+    on = (
         Watch(Frame, (Posted,), lambda f: f.purpose == "track"),
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in ("milestone", "relocalization")),
     )
     writes = (Tracks, Hypothesis, Drift, Discrepancy)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         if find_belief(view) is None or view.latest(Frame) is None or open_discrepancy(view, Level.GOAL) is not None:
             return None
         if unmeasured_doubt(view) is not None:  # tracking failed: the plan level looks where the robot is
             return None
         return 0.9
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         frame, belief, old = view.latest(Frame), find_belief(view), view.latest(Tracks)
         if belief is None or frame is None:
             return

@@ -15,7 +15,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.camera_knowledge import compute_camera_covariance, find_camera
 from knowledge_sources.questions import find_belief, find_contact, find_robot
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.actuator import ActuatorModel
 from world_models.camera import YAW
 from world_models.entries.body import BodyFault, Course, Look, MotionReport, MotorCommand
@@ -29,7 +29,7 @@ UNSEEN = ("command", "relocalization")
 """What a belief rests on that no way is measured from."""
 
 
-class DeadReckoner(RobotKnowledgeSource):
+class DeadReckoner(OlderSource):
     """Moves the belief by the odometry's report, corrected for drift, and asks for a picture to check it.
 
     Of a motion that was broken off, the unreported rest may have been driven in part or whole: it is added to the
@@ -37,14 +37,14 @@ class DeadReckoner(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (Watch(MotionReport, (Posted,)),)
+    on = (Watch(MotionReport, (Posted,)),)
     writes = (Hypothesis, Drift, Travel, Look, Discrepancy)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         belief = find_belief(view)
         return None if belief is None or belief.value.motion == trigger.entry.id else 1.0
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief = find_belief(view)
         if belief is None:
             return

@@ -31,7 +31,7 @@ from knowledge_sources.questions import (
     is_over,
     is_up_to_date,
 )
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.body import Frame
 from world_models.entries.door_state import DoorPicture, DoorState
@@ -39,7 +39,7 @@ from world_models.entries.location import Hypothesis
 from world_models.entries.task import Milestone
 
 
-class DoorWatcher(RobotKnowledgeSource):
+class DoorWatcher(OlderSource):
     """Looks whether the doors in view are open or shut, and puts what it finds into the frames of both their rooms.
 
     It looks at pictures as long as the belief is trusted: at those that track landmarks, and at those by which a
@@ -49,19 +49,19 @@ class DoorWatcher(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (
+    on = (
         Watch(Frame, (Posted,), lambda f: f.purpose == "track"),
         Watch(Milestone, (Revised,), lambda m: m.status == "verified"),
     )
     writes = (DoorState, LocaleFrame)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         belief, frame = find_belief(view), view.latest(Frame)
         if belief is None or frame is None or not self._is_trusted(view, belief.value):
             return None
         return 0.8 if any(True for _ in list_doors_in_view(view, belief.value)) else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, frame = find_belief(view), view.latest(Frame)
         if belief is None or frame is None:
             return

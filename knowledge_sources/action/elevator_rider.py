@@ -21,7 +21,7 @@ from knowledge_sources.questions import (
     open_discrepancy,
     open_fault,
 )
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.entries.body import BodyFault, Ride, RideReport
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Tracks
@@ -32,28 +32,28 @@ ELEVATOR_SIGMA_M = 0.01  # standard deviation of where an elevator car stops, fr
 ELEVATOR_SIGMA_RAD = 0.003  # standard deviation of the heading of an elevator car, from floor to floor
 
 
-class ElevatorRider(RobotKnowledgeSource):
+class ElevatorRider(OlderSource):
     """Asks for the ride that a verified sketch needs, and moves the belief to the floor where the doors open.
 
     It takes the reported floor for true. So nothing else is done there before a milestone is verified.
     """
 
     level = Level.ACTION
-    watches = (
+    on = (
         Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and s.verified),
         Watch(RideReport, (Posted,)),
         Watch(BodyFault, (Revised,)),
     )
     writes = (Ride, Hypothesis, PlanSketch, Tracks)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         if is_over(view) or find_belief(view) is None:
             return None
         if isinstance(trigger.entry.value, RideReport):
             return 1.0
         return 0.3 if self._find_wanted_ride(view) is not None else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         if isinstance(trigger.entry.value, RideReport):
             yield from self._take_over_belief(view, trigger.entry)
             return

@@ -12,12 +12,12 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.questions import is_over
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.entries.body import STOP_KEY, BodyFault, Course, MotorCommand, Recovery
 from world_models.entries.task import Outcome
 
 
-class FaultHandler(RobotKnowledgeSource):
+class FaultHandler(OlderSource):
     """Asks for recovery from a fault of the body, and closes the fault when it is over, or ends the mission.
 
     A motion that was broken off puts the belief in doubt: a milestone must be verified before the robot moves on. The
@@ -26,16 +26,16 @@ class FaultHandler(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (
+    on = (
         Watch(BodyFault, (Posted,)),
         Watch(Recovery, (Revised,), lambda r: r.status != "asked"),
     )
     writes = (Recovery, BodyFault, Discrepancy, Outcome)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         return None if is_over(view) else 1.0
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         value = trigger.entry.value
         if isinstance(value, BodyFault):
             yield from self._ask_for_recovery(trigger.entry)

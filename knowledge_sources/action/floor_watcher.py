@@ -19,7 +19,7 @@ from knowledge_sources.questions import (
     is_up_to_date,
     rolling_course,
 )
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.entries.body import Frame
 from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor
 from world_models.entries.location import Hypothesis
@@ -35,7 +35,7 @@ CORRECTED_BY = ("milestone", "tracks", "relocalization")
 """What the belief rests on when a picture has corrected it."""
 
 
-class FloorWatcher(RobotKnowledgeSource):
+class FloorWatcher(OlderSource):
     """Looks at the floor in each picture, once the belief was corrected by it.
 
     It says how far the floor is free in each direction, and what ends it: something of the model, or a thing that the
@@ -45,13 +45,13 @@ class FloorWatcher(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (
+    on = (
         Watch(Frame, (Posted,), lambda f: f.purpose not in ("milestone", "probe")),
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in CORRECTED_BY),
     )
     writes = (FreeFloor, FloorAppearance, FloorView)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         frame, belief = view.latest(Frame), find_belief(view)
         if frame is None or belief is None or is_over(view) or is_in_doubt(view) or not is_up_to_date(view):
             return None
@@ -61,7 +61,7 @@ class FloorWatcher(RobotKnowledgeSource):
             return None
         return 0.8
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         frame, belief = view.latest(Frame), find_belief(view)
         if frame is None or belief is None:
             return

@@ -11,12 +11,12 @@ from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.questions import find_building, find_frames
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
 from world_models.entries.told import DOOR_STATES, Told
 
 
-class ModelReviser(RobotKnowledgeSource):
+class ModelReviser(OlderSource):
     """Revises the frames that have a door or a thing of which somebody told the robot that it is otherwise.
 
     A door is in the frames of both its rooms. What cannot be taken up, because the model has nothing of that name, is
@@ -24,13 +24,13 @@ class ModelReviser(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (Watch(Told, (Posted,)),)
+    on = (Watch(Told, (Posted,)),)
     writes = (LocaleFrame, Told)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         return 1.0
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         told: Entry[Told] = trigger.entry
         try:
             frames = find_frames(view, find_building(view).find_elements(told.value.what))

@@ -35,7 +35,7 @@ from knowledge_sources.questions import (
     open_milestone,
     unmeasured_doubt,
 )
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import BodyFault, MotorCommand
 from world_models.entries.location import Hypothesis
@@ -53,7 +53,7 @@ MAX_LOOK_ERROR_RAD = math.radians(6.0)
 """The robot looks where the floor is to be seen when it faces there to within this."""
 
 
-class Motor(RobotKnowledgeSource):
+class Motor(OlderSource):
     """Commands the next increment of a leg, steered from the believed pose by pure pursuit.
 
     It begins a leg when a verified sketch has a primitive subgoal, and turns to where a milestone is to be looked for.
@@ -64,7 +64,7 @@ class Motor(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (
+    on = (
         Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and s.verified),
         Watch(Leg, (Posted,)),
         Watch(Hypothesis, (Posted, Revised), lambda h: h.is_held),
@@ -74,7 +74,7 @@ class Motor(RobotKnowledgeSource):
     )
     writes = (MotorCommand, Leg, Discrepancy)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         if is_over(view) or open_fault(view) is not None or not is_standing(view):
             return None
         milestone = open_milestone(view)
@@ -86,7 +86,7 @@ class Motor(RobotKnowledgeSource):
             return 0.3
         return 0.3 if _sketch_for_leg(view) is not None else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, milestone = find_belief(view), open_milestone(view)
         if belief is None:
             return

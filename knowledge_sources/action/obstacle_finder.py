@@ -45,7 +45,7 @@ from knowledge_sources.questions import (
     is_in_doubt,
     last_motion,
 )
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from knowledge_sources.settings import ActionSettings
 from world_models.building.building import Building
 from world_models.building.locale_frame import FrameChange, LocaleFrame
@@ -82,7 +82,7 @@ class _Draft:
     because: list[object] = field(default_factory=list)
 
 
-class ObstacleFinder(RobotKnowledgeSource):
+class ObstacleFinder(OlderSource):
     """Concludes that something stands in the way, and puts it into the frame of its locale; or that it is gone.
 
     Of a contact it waits until a milestone was verified where the robot touched: as long as its place is in doubt, a
@@ -97,14 +97,14 @@ class ObstacleFinder(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (
+    on = (
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in ("milestone", "relocalization")),
         Watch(FreeFloor, (Posted,)),
         Watch(Leg, (Revised,), lambda leg: leg.status == "halted"),
     )
     writes = (Obstacle, LocaleFrame)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         if isinstance(trigger.entry.value, FreeFloor):
             if find_belief(view) is None or is_in_doubt(view):
                 return None
@@ -115,7 +115,7 @@ class ObstacleFinder(RobotKnowledgeSource):
             return 0.95
         return None if self._find_sure_touch(view) is None else 0.95
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         if isinstance(trigger.entry.value, FreeFloor):
             drafts = list(self._weigh_floor(view, trigger.entry))
         elif isinstance(trigger.entry.value, Leg):

@@ -34,7 +34,7 @@ from knowledge_sources.questions import (
     open_milestone,
     rolling_course,
 )
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import Course
 from world_models.entries.location import Hypothesis
@@ -50,7 +50,7 @@ MAX_ROLLING_ERROR_RAD = math.radians(12.0)  # the path follower stops when its a
 MAX_CURVATURE_PER_M = 1.0  # largest curvature that is steered on the move
 
 
-class PathFollower(RobotKnowledgeSource):
+class PathFollower(OlderSource):
     """Drives a leg without stopping at each increment, and corrects the course by each picture.
 
     It stops at once when anything is in doubt, above the action level or beyond the action level's bound. It also stops
@@ -59,7 +59,7 @@ class PathFollower(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (
+    on = (
         Watch(Leg, (Posted,)),
         Watch(Hypothesis, (Revised,), lambda h: h.is_held),
         Watch(Discrepancy, (Posted, Revised), lambda d: d.is_open),
@@ -68,14 +68,14 @@ class PathFollower(RobotKnowledgeSource):
     )
     writes = (Course, Leg, Discrepancy)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         if open_fault(view) is not None:
             return None
         if rolling_course(view) is not None:
             return (1.0 if self._must_stop(view) else 0.3) if is_up_to_date(view) else None
         return 0.4 if self._may_start(view) else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, course, driving = find_belief(view), rolling_course(view), current_leg(view)
         if belief is None:
             return

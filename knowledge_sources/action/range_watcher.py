@@ -12,7 +12,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.questions import find_belief, find_robot, is_in_doubt, is_up_to_date
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.entries.floor import FreeFloor
 from world_models.entries.obstacle import Ranges
 
@@ -21,7 +21,7 @@ MAX_RANGE_AGE_S = 5.0  # a reading is compared with those that are no older
 MAX_EARLIER_READINGS = 4  # readings that the newest is compared with
 
 
-class RangeWatcher(RobotKnowledgeSource):
+class RangeWatcher(OlderSource):
     """Concludes from a reading of range sensors where the floor is free, and what ends it.
 
     It acts after the tracker has corrected the belief by the picture of the same moment, and only while the robot knows
@@ -29,16 +29,16 @@ class RangeWatcher(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (Watch(Ranges, (Posted,)),)
+    on = (Watch(Ranges, (Posted,)),)
     writes = (FreeFloor,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         s, belief = self._settings.floor, find_belief(view)
         if not s.use_ranges or belief is None or is_in_doubt(view) or not is_up_to_date(view):
             return None
         return 0.6 if view.latest(Ranges) is trigger.entry and belief.value.sigma_m <= MAX_BELIEF_SIGMA_M else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         reading: Entry[Ranges] = trigger.entry
         belief = find_belief(view)
         if belief is None:

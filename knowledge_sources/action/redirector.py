@@ -11,14 +11,14 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.questions import active_goal, find_belief, find_building, open_discrepancy, open_milestone
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.commands import read_destination
 from world_models.entries.location import Place
 from world_models.entries.task import Goal, Milestone
 from world_models.entries.told import Redirection
 
 
-class Redirector(RobotKnowledgeSource):
+class Redirector(OlderSource):
     """Abandons the goal for the one that somebody asks for, from where the robot believes to be.
 
     A milestone that waits to be judged is withdrawn; the sketcher supersedes the sketches of the old goal. A robot that
@@ -28,14 +28,14 @@ class Redirector(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (Watch(Redirection, (Posted,)), Watch(Goal, (Posted,), lambda goal: goal.is_active))
+    on = (Watch(Redirection, (Posted,)), Watch(Goal, (Posted,), lambda goal: goal.is_active))
     writes = (Redirection, Goal, Milestone)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         is_ready = active_goal(view) is not None and find_belief(view) is not None
         return 1.0 if is_ready and _list_unanswered(view) else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         goal, belief, building = active_goal(view), find_belief(view), find_building(view)
         if goal is None or belief is None:
             return

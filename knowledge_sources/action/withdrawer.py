@@ -15,7 +15,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.questions import active_goal, find_belief, find_robot
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from knowledge_sources.settings import Settings
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.obstacle import Obstacle
@@ -25,7 +25,7 @@ from world_models.entries.task import Milestone, PlanSketch
 LEG_SLACK_M = 0.03  # an obstacle that is nearer to a leg than the least clearance by so much blocks it
 
 
-class Withdrawer(RobotKnowledgeSource):
+class Withdrawer(OlderSource):
     """Withdraws milestones, plan sketches and tracks that rested on what a frame no longer says.
 
     A milestone that waits to be judged is withdrawn where its prediction rested on the frame; one that was verified,
@@ -35,13 +35,13 @@ class Withdrawer(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (Watch(LocaleFrame, (Revised,)),)
+    on = (Watch(LocaleFrame, (Revised,)),)
     writes = (Milestone, PlanSketch, Tracks)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         return 1.0 if any(True for _ in _withdrawals(view, trigger.entry, self._settings)) else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         yield from _withdrawals(view, trigger.entry, self._settings)
 
 

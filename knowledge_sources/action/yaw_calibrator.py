@@ -17,7 +17,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.camera_knowledge import compute_camera_covariance, find_camera, to_tuples
 from knowledge_sources.questions import find_belief, find_building, is_standing
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.camera import CAMERA_UNKNOWNS, YAW
 from world_models.entries.location import Hypothesis, Travel, begin_travel, turn_about_camera
 from world_models.entries.robot import CameraState, Drift
@@ -32,7 +32,7 @@ class Measured(NamedTuple):
     variance: float
 
 
-class YawCalibrator(RobotKnowledgeSource):
+class YawCalibrator(OlderSource):
     """Learns the camera's yaw on the robot from the direction in which the robot came from one milestone to another.
 
     No single picture can tell it from the robot's heading. Where the heading is wrong by the yaw, the robot comes to a
@@ -41,13 +41,13 @@ class YawCalibrator(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    watches = (
+    on = (
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),
         Watch(Discrepancy, (Posted,), lambda d: d.level is Level.GOAL or d.magnitude == math.inf),
     )
     writes = (CameraState, Hypothesis, Drift, Travel)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         travel, belief = view.latest(Travel), find_belief(view)
         if isinstance(trigger.entry.value, Discrepancy):
             return None if travel is None or travel.value.is_broken else 0.95
@@ -64,7 +64,7 @@ class YawCalibrator(RobotKnowledgeSource):
         known = compute_camera_covariance(find_camera(view), self._settings.camera_state)[YAW, YAW]
         return 1.0 if measured.variance < (1.0 - self._settings.camera_state.min_learnt) * known else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         travel, belief, camera = view.latest(Travel), find_belief(view), view.latest(CameraState)
         if travel is not None and isinstance(trigger.entry.value, Discrepancy):
             yield Revise(travel, replace(travel.value, is_broken=True), (travel, trigger.entry))

@@ -10,7 +10,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.level import Level
 from knowledge_sources.questions import find_building
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.commands import read_places
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.task import Command, Goal, Outcome
@@ -18,7 +18,7 @@ from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 
 
-class Interpreter(RobotKnowledgeSource):
+class Interpreter(OlderSource):
     """Reads ``(ptrans (locale (x,y,z)) (locale (x,y,z)))``, from where to where, in feet in each locale's frame.
 
     It also understands "Go from the laboratory to Allen's office", from the middle of one room to that of another. The
@@ -26,10 +26,10 @@ class Interpreter(RobotKnowledgeSource):
     """
 
     level = Level.GOAL
-    watches = (Watch(Command, (Posted,)),)
+    on = (Watch(Command, (Posted,)),)
     writes = (Goal, Hypothesis, Outcome)
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         command: Command = trigger.entry.value
         try:
             origin, destination = _read_places(find_building(view), command)

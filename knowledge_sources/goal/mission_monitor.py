@@ -10,25 +10,25 @@ from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.questions import is_over, open_discrepancy, open_milestone
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.task import Goal, Outcome
 
 
-class MissionMonitor(RobotKnowledgeSource):
+class MissionMonitor(OlderSource):
     """Declares ``reached`` when the goal is, and ``lost`` or ``failed`` when nothing is left to do before that."""
 
     level = Level.GOAL
-    watches = (
+    on = (
         Watch(Goal, (Revised,), lambda goal: goal.status == "reached"),
         Watch(Quiescence, (Posted,)),
     )
     writes = (Outcome,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         return None if is_over(view) else 1.0
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         if isinstance(trigger.entry.value, Goal):
             reason = f"every milestone on the way to {trigger.entry.value.destination} was verified"
             yield Post(Outcome("reached", reason), (trigger.entry,))

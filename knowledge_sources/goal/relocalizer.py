@@ -36,7 +36,7 @@ from knowledge_sources.questions import (
     is_standing,
     open_discrepancy,
 )
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from knowledge_sources.settings import LocalizationSettings
 from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
@@ -54,7 +54,7 @@ MAX_PROBES = 8  # so many looks are taken when lost and no place fits; then the 
 MAX_DARK_FRAMES = 150  # so many dark frames are taken while waiting for light
 
 
-class Relocalizer(RobotKnowledgeSource):
+class Relocalizer(OlderSource):
     """Keeps every place of the floor that agrees with its pictures, and takes more until one place is left.
 
     The next picture is taken after the turn or short safe move by which the candidates' views are expected to differ
@@ -67,14 +67,14 @@ class Relocalizer(RobotKnowledgeSource):
 
     level = Level.GOAL
     closes = Level.GOAL
-    watches = (
+    on = (
         Watch(Discrepancy, (Posted,), lambda d: d.is_open and d.level is Level.GOAL),
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "odometry"),
         Watch(Segments, (Posted,), lambda s: s.milestone == ""),
     )
     writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama, Obstruction, PlaceOdds, CameraState)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         lost = open_discrepancy(view, Level.GOAL)
         if lost is None or find_belief(view) is None or is_over(view):
             return None
@@ -82,7 +82,7 @@ class Relocalizer(RobotKnowledgeSource):
             return None
         return 0.7
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         lost, belief = open_discrepancy(view, Level.GOAL), find_belief(view)
         if lost is None or belief is None:
             return

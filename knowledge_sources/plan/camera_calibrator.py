@@ -11,7 +11,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Revise
 from blackboard.level import Level
 from knowledge_sources.camera_knowledge import compute_camera_covariance, learn
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.camera import YAW
 from world_models.entries.location import Travel, begin_travel
 from world_models.entries.percepts import PoseFix
@@ -19,7 +19,7 @@ from world_models.entries.robot import CameraState
 from world_models.entries.task import Certificate
 
 
-class CameraCalibrator(RobotKnowledgeSource):
+class CameraCalibrator(OlderSource):
     """Takes over what the lines of a verified milestone say of the camera: tilt, roll, height, lens.
 
     The pose was solved for with the same camera, so it acts before the plan adjuster takes the pose over. After a knock
@@ -27,14 +27,14 @@ class CameraCalibrator(RobotKnowledgeSource):
     """
 
     level = Level.PLAN
-    watches = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
+    on = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
     writes = (CameraState, Travel)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         fix = view.get(trigger.entry.value.fix)
         return 1.0 if fix is not None and fix.value.camera_step else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         fix, camera = view.get(trigger.entry.value.fix), view.latest(CameraState)
         if fix is None or camera is None:
             return

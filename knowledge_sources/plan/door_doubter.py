@@ -39,7 +39,7 @@ from knowledge_sources.questions import (
     is_up_to_date,
     open_discrepancy,
 )
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.body import Frame
 from world_models.entries.door_state import DoorPicture, DoorState
@@ -58,7 +58,7 @@ MIN_FEW_SHARE = 0.6  # least share of these that must be there
 MIN_SURE_FRAME_SHARE = 0.8  # where there are fewer, least share of the opening's frame that has the model's color
 
 
-class DoorDoubter(RobotKnowledgeSource):
+class DoorDoubter(OlderSource):
     """Holds "I am where I believe, and this door is shut" against a picture by which a milestone was refuted.
 
     Through a door that is shut nothing is seen of what was expected there, so that the picture does not fit the belief.
@@ -68,10 +68,10 @@ class DoorDoubter(RobotKnowledgeSource):
     """
 
     level = Level.PLAN
-    watches = (Watch(Milestone, (Revised,), lambda m: m.status in ("refuted", "not testable")),)
+    on = (Watch(Milestone, (Revised,), lambda m: m.status in ("refuted", "not testable")),)
     writes = (DoorState, LocaleFrame, Discrepancy)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         belief, doubt = find_belief(view), open_discrepancy(view, Level.PLAN)
         if belief is None or doubt is None or not doubt.value.exceeds or is_over(view) or not is_up_to_date(view):
             return None
@@ -81,7 +81,7 @@ class DoorDoubter(RobotKnowledgeSource):
             return None
         return 1.0 if any(not w.is_shut for w in list_doors_in_view(view, belief.value)) else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, segments = find_belief(view), _find_segments(view, trigger.entry)
         doubt = open_discrepancy(view, Level.PLAN)
         if belief is None or segments is None or doubt is None:

@@ -12,7 +12,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy, last_escalated
 from knowledge_sources.questions import deepest_sketch, is_over
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.entries.task import Outcome, PlanSketch
 
 GIVEN_UP: Mapping[Level, tuple[str, str]] = {
@@ -22,7 +22,7 @@ GIVEN_UP: Mapping[Level, tuple[str, str]] = {
 """The outcome when a level was asked too often, and its reason."""
 
 
-class Escalator(RobotKnowledgeSource):
+class Escalator(OlderSource):
     """Closes a discrepancy beyond its bound and posts it one level up; after too many, it ends the mission.
 
     The level above measures it by its own means. As each level is asked only so often, the same failure is not answered
@@ -30,13 +30,13 @@ class Escalator(RobotKnowledgeSource):
     """
 
     level = Level.PLAN
-    watches = (Watch(Discrepancy, where=lambda d: d.exceeds),)
+    on = (Watch(Discrepancy, where=lambda d: d.exceeds),)
     writes = (Discrepancy, Outcome)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         return 1.0
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         closed, raised = trigger.entry.value.escalated()
         sketch = deepest_sketch(view) if raised.level is Level.PLAN else None
         tried, last = _describe_attempt(sketch), last_escalated(view, closed.level)

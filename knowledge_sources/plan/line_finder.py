@@ -7,9 +7,11 @@ from collections.abc import Iterable
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
+from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.methods.features.lines import find_lines
 from knowledge_sources.methods.features.picture import compute_mean_and_deviation, read_picture
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_robot, open_milestone
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import Frame
@@ -25,16 +27,15 @@ class LineFinder(RobotKnowledgeSource):
     It searches the whole frame, not only where lines are expected: agreement by chance must be counted too.
     """
 
-    level = Level.PLAN
-    watches = (Watch(Frame, (Posted,), lambda f: f.purpose in ("milestone", "probe")),)
+    level, priority = Level.PLAN, Priority.SEE
+    on = (Watch(Frame, (Posted,), lambda f: f.purpose in ("milestone", "probe")),)
     writes = (Segments,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
-        return 0.8
+    def bind(self, view: View, trigger: Change) -> Entry[Frame]:
+        return trigger.entry
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        frame = trigger.entry
-        robot = find_robot(view)
+    def act(self, view: View, case: Entry[Frame]) -> Iterable[Effect]:
+        frame, robot = case, find_robot(view)
         image = read_picture(frame.value.jpeg).rectified(robot.lens, robot.camera)
         found = find_lines(image, min_length_px=MIN_SEGMENT_LENGTH_PX,
                            settings=self._settings.features)

@@ -24,7 +24,7 @@ from knowledge_sources.camera_knowledge import (
 from knowledge_sources.methods.localization.camera_matching import match_with_camera, rate_match
 from knowledge_sources.methods.matching import Match, PoseMatch, match_lines, match_on_floor
 from knowledge_sources.questions import find_belief, find_robot
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, Segments
 from world_models.entries.task import Milestone
@@ -36,7 +36,7 @@ MAX_RIGID_SIGMA_PX = 6.0  # up to this uncertainty lines are matched in the imag
 Floats = NDArray[np.float64]
 
 
-class Matcher(RobotKnowledgeSource):
+class Matcher(OlderSource):
     """Matches the lines that a milestone expects to the segments of the picture.
 
     Search, objective and starts are §6.1's. Where the belief is sure enough, the projected model is fitted as a rigid
@@ -45,14 +45,14 @@ class Matcher(RobotKnowledgeSource):
     """
 
     level = Level.PLAN
-    watches = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
+    on = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
     writes = (LineMatch,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         milestone = view.get(trigger.entry.value.milestone)
         return 0.8 if milestone is not None and milestone.value.status == "expected" and find_belief(view) else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         segments, belief = trigger.entry, find_belief(view)
         milestone = view[segments.value.milestone]
         if belief is None:

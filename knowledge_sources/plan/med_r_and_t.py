@@ -24,14 +24,14 @@ from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.methods.pose.estimate import PlanarEstimate
 from knowledge_sources.methods.pose.with_camera import CameraEstimate, estimate_camera_and_pose
 from knowledge_sources.questions import find_belief, find_robot
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.entries.percepts import LineMatch, PoseFix
 from world_models.entries.task import Milestone
 from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
 
 
-class MedRAndT(RobotKnowledgeSource):
+class MedRAndT(OlderSource):
     """Solves for the pose on the floor, and names the pairs that are outliers.
 
     The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose
@@ -41,13 +41,13 @@ class MedRAndT(RobotKnowledgeSource):
     """
 
     level = Level.PLAN
-    watches = (Watch(LineMatch, (Posted,)),)
+    on = (Watch(LineMatch, (Posted,)),)
     writes = (PoseFix,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         return 0.8 if find_belief(view) is not None else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         match, belief, milestone = trigger.entry, find_belief(view), view.get(trigger.entry.value.milestone)
         if belief is None or milestone is None:
             return

@@ -26,7 +26,7 @@ from knowledge_sources.methods.verification.pose_confidence import (
     compute_motion_tolerance_px,
 )
 from knowledge_sources.questions import find_belief, find_robot, find_robot_in, has_followed, open_discrepancy
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.entries.body import Frame
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
@@ -95,7 +95,7 @@ class Verdict:
     p_false: float
 
 
-class MilestoneJudge(RobotKnowledgeSource):
+class MilestoneJudge(OlderSource):
     """Certifies a milestone from a pose fix, and posts how far the picture differs from what was expected.
 
     The evidence are lines and the colours of faces (:mod:`knowledge_sources.methods.verification.pose_confidence`),
@@ -107,13 +107,13 @@ class MilestoneJudge(RobotKnowledgeSource):
     """
 
     level = Level.PLAN
-    watches = (Watch(PoseFix, (Posted,)),)
+    on = (Watch(PoseFix, (Posted,)),)
     writes = (Certificate, Milestone, Discrepancy)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         return 0.8 if _milestone_of(view, trigger.entry.value) is not None else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         fix, milestone = trigger.entry, _milestone_of(view, trigger.entry.value)
         if milestone is None:
             return

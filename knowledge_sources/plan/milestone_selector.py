@@ -37,7 +37,7 @@ from knowledge_sources.questions import (
     open_milestone,
     unmeasured_doubt,
 )
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.building import Building
 from world_models.building.model_errors import pack_errors
@@ -61,7 +61,7 @@ INDEPENDENT_LOOK_RAD = math.radians(65.0)
 """Looks that differ by so much show nothing twice; nearer ones count less (the field of view)."""
 
 
-class MilestoneSelector(RobotKnowledgeSource):
+class MilestoneSelector(OlderSource):
     """Predicts what should be seen before a subgoal (M0 first), and asks for the picture.
 
     It prefers the present view, then the next one on the way, then the one that tells the place best; before a leg that
@@ -71,7 +71,7 @@ class MilestoneSelector(RobotKnowledgeSource):
     """
 
     level = Level.PLAN
-    watches = (
+    on = (
         Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and not s.verified),
         Watch(Discrepancy, (Posted, Revised)),
         Watch(Hypothesis, (Revised,), lambda h: h.is_held),
@@ -80,7 +80,7 @@ class MilestoneSelector(RobotKnowledgeSource):
     )
     writes = (Milestone, Look)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         if isinstance(trigger.entry.value, Obstruction):
             return 0.9 if find_belief(view) is not None and _awaited_milestone(view) is not None else None
         task = self._find_task(view)
@@ -88,7 +88,7 @@ class MilestoneSelector(RobotKnowledgeSource):
             return None
         return 0.7 if isinstance(task.value, Discrepancy) else 0.5
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief = find_belief(view)
         if belief is None:
             return

@@ -14,7 +14,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.methods.localization.views import CameraView, update_obstruction
 from knowledge_sources.questions import active_goal, find_robot, unmeasured_doubt
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from knowledge_sources.settings import Settings
 from world_models.camera import Camera
 from world_models.entries.obstacle import Obstruction
@@ -25,7 +25,7 @@ MIN_OBSTRUCTION_LOOKS = 3  # what stands still in so many looks is before the ca
 MIN_OBSTRUCTION_PART = 0.04  # smallest part of the picture that an obstruction covers
 
 
-class ObstructionFinder(RobotKnowledgeSource):
+class ObstructionFinder(OlderSource):
     """Finds what is at the same place in pictures taken in several directions: it is before the camera.
 
     It acts when a milestone was not testable or the belief is in doubt, before the new picture is judged. While the
@@ -33,16 +33,16 @@ class ObstructionFinder(RobotKnowledgeSource):
     """
 
     level = Level.PLAN
-    watches = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
+    on = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
     writes = (Obstruction,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         milestone = view.get(trigger.entry.value.milestone)
         if milestone is None or not (milestone.value.tried or unmeasured_doubt(view) is not None):
             return None
         return 0.9 if self._find_change(view) is not None else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         news = self._find_change(view)
         if news is not None:
             yield news

@@ -17,7 +17,7 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.motion.footprints import MIN_SIDE_M, build_polygon, list_corners
 from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
 from knowledge_sources.questions import ACTIVE_SKETCH, active_goal, find_belief, find_building, find_frames, find_robot
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch, Subgoal
@@ -30,7 +30,7 @@ INEXACT_TOLERANCE_SIGMAS = 2.0
 """Deviations of the belief that are added to the tolerance of a goal where the model is inexact."""
 
 
-class Sketcher(RobotKnowledgeSource):
+class Sketcher(OlderSource):
     """Draws (M0 (ptrans a b) M1 ... Mg) for a goal, then for the current subgoal, until that is primitive (Figure 9).
 
     It acts on a new goal, a verified milestone (go on, refine, or repeat a subgoal whose end was missed), a leg that
@@ -38,7 +38,7 @@ class Sketcher(RobotKnowledgeSource):
     """
 
     level = Level.PLAN
-    watches = (
+    on = (
         Watch(Goal, (Posted,), lambda goal: goal.is_active),
         Watch(Milestone, (Revised,), lambda m: m.status == "verified" and m.sketch != ""),
         Watch(Leg, (Revised,), lambda leg: leg.status != "moving"),
@@ -47,7 +47,7 @@ class Sketcher(RobotKnowledgeSource):
     )
     writes = (PlanSketch, Goal, Outcome, Discrepancy)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         value = trigger.entry.value
         if isinstance(value, Goal):
             return 0.8 if find_belief(view) else None
@@ -55,7 +55,7 @@ class Sketcher(RobotKnowledgeSource):
             return 0.8 if _find_goal_without_sketch(view, value) is not None and find_belief(view) else None
         return 0.6 if self._sketch_of(view, value) else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         value = trigger.entry.value
         if isinstance(value, Goal):
             yield from self._begin(view, trigger.entry)

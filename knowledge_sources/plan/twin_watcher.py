@@ -22,7 +22,7 @@ from knowledge_sources.methods.localization.pose_candidates import are_distinct
 from knowledge_sources.methods.localization.refinement import compute_pose_likelihood
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.questions import find_belief, find_building, find_robot_in, is_over, open_discrepancy
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.entries.location import Hypothesis, PlaceOdds, Twin, TwinOdds
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Certificate
@@ -30,7 +30,7 @@ from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 
-class TwinWatcher(RobotKnowledgeSource):
+class TwinWatcher(OlderSource):
     """Keeps the odds of the believed place against the places that look like it, by every verified milestone.
 
     The first milestone is verified in each of many identical rooms. What the robot was told speaks for one of them;
@@ -40,10 +40,10 @@ class TwinWatcher(RobotKnowledgeSource):
     """
 
     level = Level.PLAN
-    watches = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
+    on = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
     writes = (TwinOdds, Discrepancy)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def judge(self, view: View, trigger: Change) -> float | None:
         if is_over(view) or open_discrepancy(view, Level.GOAL) is not None or find_belief(view) is None:
             return None
         fix = view.get(trigger.entry.value.fix)
@@ -52,7 +52,7 @@ class TwinWatcher(RobotKnowledgeSource):
         known = _find_odds(view)
         return 1.0 if known is None or (known.value.twins and self._is_new(known.value, fix.value)) else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, fix = find_belief(view), view.get(trigger.entry.value.fix)
         match = None if fix is None else view.get(fix.value.match)
         if belief is None or fix is None or match is None:

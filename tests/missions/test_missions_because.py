@@ -86,14 +86,23 @@ class Watched:
         self.unnamed: dict[tuple[str, str], str] = {}
 
     def watch(self, source: KnowledgeSource) -> KnowledgeSource:
-        real = source.act
+        bind, act = source.bind, source.act
+        bound: list[Change] = []
 
-        def act(view: View, trigger: Change) -> Iterable[Effect]:
-            effects = tuple(real(view, trigger))
-            self._check(source.name, real, view._board, trigger, effects)
+        def remember(view: View, trigger: Change) -> Any:
+            bound[:] = [trigger]
+            return bind(view, trigger)
+
+        def again(view: View, trigger: Change) -> Iterable[Effect]:
+            case = bind(view, trigger)
+            return () if case is None else act(view, case)
+
+        def checked(view: View, case: Any) -> Iterable[Effect]:
+            effects = tuple(act(view, case))
+            self._check(source.name, again, view._board, bound[0], effects)
             return effects
 
-        source.act = act
+        source.bind, source.act = remember, checked
         return source
 
     def _check(self, name: str, act: Any, board: Blackboard, trigger: Change, effects: tuple[Effect, ...]) -> None:

@@ -76,7 +76,7 @@ class Odometer(KnowledgeSource):
     """A knowledge source of its own: counts motion reports."""
 
     level = Level.ACTION
-    watches = (Watch(MotionReport, (Posted,)),)
+    on = (Watch(MotionReport, (Posted,)),)
     writes = (Counted,)
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
@@ -161,24 +161,29 @@ def test_rating_and_acting_are_pure(short_stage: Stage) -> None:
         def __init__(self, inner: KnowledgeSource) -> None:
             self._inner = inner
             self.level, self.closes = inner.level, inner.closes
-            self.watches, self.writes = inner.watches, inner.writes
+            self.on, self.writes = inner.on, inner.writes
 
         @property
         def name(self) -> str:
             return self._inner.name
 
-        def rate(self, view: View, trigger: Change) -> float | None:
+        def bind(self, view: View, trigger: Change) -> Any | None:
             nonlocal checked
-            size, rating = len(view), self._inner.rate(view, trigger)
-            assert self._inner.rate(view, trigger) == rating
-            assert rating is None or 0.0 <= rating <= 1.0
+            size, case, again = len(view), self._inner.bind(view, trigger), self._inner.bind(view, trigger)
+            assert (case is None) == (again is None)
+            if case is not None:
+                assert self._inner.rate(case) == self._inner.rate(again)
+                assert 0.0 <= self._inner.rate(case) <= 1.0
             assert len(view) == size
             checked += 1
-            return rating
+            return case
 
-        def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+        def rate(self, case: Any) -> float:
+            return self._inner.rate(case)
+
+        def act(self, view: View, case: Any) -> Iterable[Effect]:
             size = len(view)
-            first, second = tuple(self._inner.act(view, trigger)), tuple(self._inner.act(view, trigger))
+            first, second = tuple(self._inner.act(view, case)), tuple(self._inner.act(view, case))
             assert [_plain(e) for e in first] == [_plain(e) for e in second]
             assert len(view) == size
             return first

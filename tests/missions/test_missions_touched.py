@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from acting import answer
 from blackboard.board import Blackboard
 from blackboard.change import Revised
 from blackboard.effect import Post, Revise
@@ -97,11 +98,9 @@ def touch(world: World, pose: Pose2, contact: Contact, *, sigma_m: float = 0.01)
                        author="test", cycle=1)
     seen = Hypothesis("north-hall", pose, diagonal(sigma_m, 0.005), "milestone")
     (revised,) = board.apply([Revise(made[-1].entry, seen)], author="test", cycle=2)
-    source, view = ObstacleFinder(), board.view
     assert isinstance(revised, Revised)
-    if source.rate(view, revised) is None:
-        return []
-    return [e.value for e in source.act(view, revised) if isinstance(e, Post) and isinstance(e.value, Obstacle)]
+    effects = answer(ObstacleFinder(), board.view, revised) or ()
+    return [e.value for e in effects if isinstance(e, Post) and isinstance(e.value, Obstacle)]
 
 
 MIDDLE = Pose2(4.0, 1.2, 0.0)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
+from blackboard.entry import Entry
 from blackboard.kinds import inference
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
@@ -36,12 +37,13 @@ class Timekeeper(KnowledgeSource):
     """Warns once when half of the battery is used up, by the time that the wheels report (§3.2)."""
 
     level = Level.ACTION
-    watches = (Watch(MotionReport, (Posted,)),)
+    on = (Watch(MotionReport, (Posted,)),)
+    priority = 0.9
     writes = (RunningShort,)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def bind(self, view: View, trigger: Change) -> Entry[MotionReport] | None:
         is_due = trigger.entry.value.sim_time_s > BATTERY_S / 2.0
-        return 0.9 if is_due and view.latest(RunningShort) is None else None
+        return trigger.entry if is_due and view.latest(RunningShort) is None else None
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        yield Post(RunningShort(BATTERY_S - trigger.entry.value.sim_time_s), (trigger.entry,))
+    def act(self, view: View, case: Entry[MotionReport]) -> Iterable[Effect]:
+        yield Post(RunningShort(BATTERY_S - case.value.sim_time_s), (case,))

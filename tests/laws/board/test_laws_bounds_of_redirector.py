@@ -6,6 +6,7 @@ from itertools import product
 
 import pytest
 
+from acting import answer
 from blackboard.board import Blackboard
 from blackboard.change import Change
 from blackboard.effect import Effect, Post, Revise
@@ -48,11 +49,9 @@ def decide(*texts: str, goal: str = "active", is_lost: bool = False, is_waiting:
     if is_lost:
         apply(Post(Discrepancy(Level.GOAL, "it fits nowhere", None, (0.0, 0.0), "px")))
     asked = [apply(Post(Redirection(text)))[0] for text in texts][-1]
-    source = Redirector(DEFAULT)
-    rating = source.rate(board.view, asked)
-    effects = list(source.act(board.view, asked))
-    assert (rating is None) == (not effects)
-    return effects if rating is not None else None
+    effects = answer(Redirector(DEFAULT), board.view, asked)
+    assert effects is None or effects
+    return None if effects is None else list(effects)
 
 
 def summary(effects: list[Effect] | None) -> list[tuple[str, str]]:

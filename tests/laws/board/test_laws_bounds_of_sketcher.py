@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from acting import answer
 from blackboard.board import Blackboard
 from blackboard.change import Change
 from blackboard.effect import Effect, Post, Revise
@@ -48,10 +49,9 @@ def decide(off_m: float, adjustments: int, earlier_goals: int = 0) -> Effect:
     (sketch,) = apply(Post(PlanSketch(goal.entry.id, (), "", (way,), at=1, adjustments=adjustments)))
     (expected,) = apply(Post(Milestone(sketch.entry.id, 1, "the end", 0.0)))
     (verified,) = apply(Revise(expected.entry, replace(expected.entry.value, status="verified")))
-    source = Sketcher(DEFAULT)
-    assert source.rate(board.view, verified) is not None
-    first, *_ = source.act(board.view, verified)
-    return first
+    effects = answer(Sketcher(DEFAULT), board.view, verified)
+    assert effects is not None
+    return effects[0]
 
 
 @pytest.mark.parametrize(("off_m", "is_repeated"), [(TOLERANCE_M - SMALL, False), (TOLERANCE_M + SMALL, True)])

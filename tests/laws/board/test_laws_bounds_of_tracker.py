@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from acting import answer
 from blackboard.board import Blackboard
 from blackboard.change import Change
 from blackboard.effect import Effect, Post, Retract
@@ -114,9 +115,9 @@ def follow(found: int, hidden: int = 0, misses: int = 0) -> list[Effect]:
     anchor = Anchor("Frame-1", seen.start.x_m, seen.start.y_m, covariance_tuple(np.array(SURE)))
     apply(Post(Tracks("Frame-1", DEFAULT.tracking.template_half_px, tuple(tracks), (anchor,), len(tracks))))
     (taken,) = apply(Post(Frame(compress_jpeg(image, 95), 1, 1.0, "track")))
-    source = CorrelatorTracker(NO_EDGES)
-    assert source.rate(board.view, taken) is not None
-    return list(source.act(board.view, taken))
+    effects = answer(CorrelatorTracker(NO_EDGES), board.view, taken)
+    assert effects is not None
+    return list(effects)
 
 
 def written(effects: Sequence[Effect]) -> list[Any]:

@@ -155,13 +155,18 @@ def run_with(check: Callable[[Blackboard, Change], None]) -> None:
     def sources(settings: Settings) -> list[Any]:
         out: list[Any] = list(knowledge_sources(settings))
         judge = next(source for source in out if isinstance(source, MilestoneJudge))
-        real = judge.act
+        bind, act = judge.bind, judge.act
+        bound: list[Change] = []
 
-        def act(view: View, trigger: Change) -> Iterable[Effect]:
-            check(view._board, trigger)
-            return real(view, trigger)
+        def remember(view: View, trigger: Change) -> Any:
+            bound[:] = [trigger]
+            return bind(view, trigger)
 
-        judge.act = act
+        def checked(view: View, case: Any) -> Iterable[Effect]:
+            check(view._board, bound[0])
+            return act(view, case)
+
+        judge.bind, judge.act = remember, checked
         return out
 
     run_mission(build_stage(parse_scenario(OFFICE)), 3, sources=sources)

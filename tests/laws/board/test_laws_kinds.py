@@ -105,7 +105,7 @@ def test_every_kind_that_is_watched_or_written_is_registered() -> None:
     registry = registry_of(sources, KINDS)
     assert set(registry.values()) == set(ALL)
     for source in sources:
-        assert {watch.value_type for watch in source.watches} | set(source.writes) <= set(registry.values())
+        assert {watch.value_type for watch in source.on} | set(source.writes) <= set(registry.values())
 
 
 @pytest.mark.parametrize("kind", ALL, ids=lambda kind: kind.__name__)

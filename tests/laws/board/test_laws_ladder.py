@@ -65,14 +65,14 @@ def figure(frame: Entry[Frame]) -> float:
 class ScriptedTracker(RobotKnowledgeSource):
     """Posts what the action level measures, and corrects the belief where it may."""
 
-    level, closes = Level.ACTION, Level.ACTION
-    watches = (Watch(Frame, (Posted,), lambda f: f.purpose == "track"),)
+    level, closes, priority = Level.ACTION, Level.ACTION, 0.9
+    on = (Watch(Frame, (Posted,), lambda f: f.purpose == "track"),)
     writes = (Hypothesis, Discrepancy)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
+    def bind(self, view: View, trigger: Change) -> Change | None:
         if unmeasured_doubt(view) is not None or open_discrepancy(view, Level.GOAL) is not None:
             return None
-        return 0.9 if find_belief(view) is not None else None
+        return trigger if find_belief(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, last = find_belief(view), open_discrepancy(view, Level.ACTION)
@@ -87,12 +87,12 @@ class ScriptedTracker(RobotKnowledgeSource):
 class ScriptedJudge(RobotKnowledgeSource):
     """Posts what the plan level measures of the milestone that is looked for, and its verdict."""
 
-    level = Level.PLAN
-    watches = (Watch(Frame, (Posted,), lambda f: f.purpose == "milestone"),)
+    level, priority = Level.PLAN, 0.8
+    on = (Watch(Frame, (Posted,), lambda f: f.purpose == "milestone"),)
     writes = (PoseFix, Certificate, Milestone, Discrepancy)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
-        return 0.8 if find_belief(view) is not None and open_milestone(view) is not None else None
+    def bind(self, view: View, trigger: Change) -> Change | None:
+        return trigger if find_belief(view) is not None and open_milestone(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, milestone, last = find_belief(view), open_milestone(view), open_discrepancy(view, Level.PLAN)
@@ -120,13 +120,13 @@ def _next_fix(view: View) -> str:
 class ScriptedRelocalizer(RobotKnowledgeSource):
     """Finds the robot where it believes to be, or not at all."""
 
-    level, closes = Level.GOAL, Level.GOAL
-    watches = (Watch(Discrepancy, (Posted,), lambda d: d.is_open and d.level is Level.GOAL),
-               Watch(Frame, (Posted,), lambda f: f.purpose == "probe"))
+    level, closes, priority = Level.GOAL, Level.GOAL, 0.7
+    on = (Watch(Discrepancy, (Posted,), lambda d: d.is_open and d.level is Level.GOAL),
+          Watch(Frame, (Posted,), lambda f: f.purpose == "probe"))
     writes = (Look, Hypothesis, Goal, Discrepancy)
 
-    def rate(self, view: View, trigger: Change) -> float | None:
-        return 0.7 if open_discrepancy(view, Level.GOAL) is not None and find_belief(view) is not None else None
+    def bind(self, view: View, trigger: Change) -> Change | None:
+        return trigger if open_discrepancy(view, Level.GOAL) is not None and find_belief(view) is not None else None
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         belief, lost, goal = find_belief(view), open_discrepancy(view, Level.GOAL), active_goal(view)

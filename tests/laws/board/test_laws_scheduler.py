@@ -54,7 +54,7 @@ def test_a_cycle_goes_in_order() -> None:
         heard.append(word)
         return answer
 
-    pending = Scripted("pending", valid=lambda v, t: said("still valid", True), rate=0.1)
+    pending = Scripted("pending", rate=0.1)
     source = Scripted(
         "source", Tally, lambda v, t: said("act", [Post(Tally(2))]), rate=lambda v, t: said("rate", 0.9),
         where=lambda tally: tally.count == 1,
@@ -66,7 +66,7 @@ def test_a_cycle_goes_in_order() -> None:
     post(scheduler, Tally(1))
     decision = scheduler.step()
     assert decision.chosen.source is source
-    assert heard == ["rate", "still valid", "act", "sink", ("port", "Tally-2")]
+    assert heard == ["rate", "rate", "act", "sink", ("port", "Tally-2")]
 
 
 def test_changes_made_now_wait_a_cycle() -> None:
@@ -100,8 +100,8 @@ def test_the_journal_has_the_decision_before_any_port_sees_it() -> None:
     assert heard == [("one", 1), ("two", 1), ("port", "Tally-1")]
 
 
-def test_a_newer_trigger_on_the_same_entry_replaces_the_pending_one() -> None:
-    patient = Scripted("patient", Note, rate=0.1, valid=lambda v, t: True)
+def test_a_revision_obviates_what_the_entry_before_it_triggered() -> None:
+    patient = Scripted("patient", Note, rate=0.1)
 
     def rewrite(view: View, trigger: Change) -> Iterable[Effect]:
         yield Revise(trigger.entry, Note("b"))
@@ -111,7 +111,7 @@ def test_a_newer_trigger_on_the_same_entry_replaces_the_pending_one() -> None:
     first, second, third, *rest = run(scheduler)
     assert names(first.activated) == ["patient", "editor", "patient"] and first.pending == 2
     (dropped,) = second.obviated
-    assert dropped.activation is first.activated[0] and dropped.reason == "newer trigger Note-1.1"
+    assert dropped.activation is first.activated[0] and dropped.reason == "stale trigger: Note-1.0 is now Note-1.1"
     assert [d.chosen.trigger.entry.ref for d in (second, third)] == [("Note-2", 0), ("Note-1", 1)] and rest == []
 
 
@@ -212,7 +212,7 @@ def fail(*_args: Any) -> Any:
 
 @pytest.mark.parametrize(
     "bad",
-    [Scripted("bad", rate=fail), Scripted("bad", valid=fail), Scripted("bad", where=fail), Scripted("bad", rate=1.5),
+    [Scripted("bad", rate=fail), Scripted("bad", where=fail), Scripted("bad", rate=1.5),
      Scripted("bad", rate=float("nan"))],
 )
 def test_a_source_that_raises_when_it_is_asked_is_journalled_and_nobody_acts(bad: Scripted) -> None:

@@ -169,7 +169,7 @@ class Visitor(RobotKnowledgeSource):
     """Goes to the room of a note, and asks for what is known of it and of its neighbours."""
 
     level = Level.ACTION
-    watches = (Watch(Note, (Posted,)),)
+    on = (Watch(Note, (Posted,)),)
     writes = (Hypothesis,)
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:

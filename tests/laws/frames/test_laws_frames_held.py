@@ -100,7 +100,7 @@ class Hoarder(RobotKnowledgeSource):
     """Holds something, in its own way."""
 
     level = Level.ACTION
-    watches = (Watch(Told),)
+    on = (Watch(Told),)
     writes = (Told,)
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
@@ -135,7 +135,7 @@ def _by_default(thing: object) -> Hoarder:
 
 
 def _in_watch(thing: object) -> Hoarder:
-    return type("InWatch", (Hoarder,), {"watches": (Watch(Told, where=lambda _told: thing is not None),)})()
+    return type("InWatch", (Hoarder,), {"on": (Watch(Told, where=lambda _told: thing is not None),)})()
 
 
 WAYS: Mapping[str, Callable[[Any], Hoarder]] = {

@@ -11,6 +11,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from acting import answer
 from blackboard.board import Blackboard
 from blackboard.change import Change, Posted
 from blackboard.effect import Effect, Post, Revise
@@ -74,9 +75,9 @@ class Hall:
         self.cycle += 1
         (posted,) = self.board.apply([Post(scan)], author="floor_watcher", cycle=self.cycle)
         assert isinstance(posted, Posted)
-        if self.source.rate(self.board.view, posted) is None:
+        effects = answer(self.source, self.board.view, posted)
+        if effects is None:
             return ()
-        effects: list[Effect] = list(self.source.act(self.board.view, posted))
         return self.board.apply(effects, author=self.source.name, cycle=self.cycle)
 
     def touch(self, direction_rad: float, *, turns: tuple[float, ...], basis: str) -> None:
@@ -90,8 +91,7 @@ class Hall:
         pose = Pose2(2.0, 1.2, sum(turns))
         known = Hypothesis(HALL, pose, diagonal(0.01, 0.005), basis)
         (found,) = self._apply(Revise(belief, known, (belief,)))
-        if self.source.rate(self.board.view, found) is not None:
-            self._apply(*self.source.act(self.board.view, found))
+        self._apply(*(answer(self.source, self.board.view, found) or ()))
 
     def verify(self, verdict: MilestoneVerdict = "verified") -> None:
         """A milestone is judged."""
@@ -103,8 +103,7 @@ class Hall:
         belief = self.board.view.latest(Hypothesis)
         assert belief is not None
         (found,) = self._apply(Revise(belief, replace(belief.value, basis=basis), (belief,)))
-        if self.source.rate(self.board.view, found) is not None:
-            self._apply(*self.source.act(self.board.view, found))
+        self._apply(*(answer(self.source, self.board.view, found) or ()))
 
     def _apply(self, *effects: Effect) -> tuple[Change, ...]:
         self.cycle += 1
@@ -152,7 +151,7 @@ def test_a_move_after_the_touch_leaves_it_open_what_was_touched(hall: Hall) -> N
     belief = hall.board.view.latest(Hypothesis)
     assert belief is not None
     (found,) = hall._apply(Revise(belief, replace(belief.value, basis="milestone"), (belief,)))
-    assert hall.source.rate(hall.board.view, found) is None
+    assert answer(hall.source, hall.board.view, found) is None
 
 
 @pytest.mark.parametrize(("aside_rad", "obstacles"), [(0.0, 1), (0.8, 2)])

@@ -8,6 +8,7 @@ from typing import Any, get_args
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from acting import answer
 from blackboard.board import Blackboard, View
 from blackboard.change import Revised
 from blackboard.effect import Post, Revise
@@ -67,9 +68,9 @@ def test_what_rested_on_a_frame_is_withdrawn_and_nothing_else(
             expected.add(entry.id)
             is_unverified |= status == "verified" and is_active and is_verified and index == 1
     trigger = Revised(frame)
-    source = Withdrawer()
-    assert (source.rate(View(board), trigger) is not None) == bool(expected)
-    effects: list[Any] = list(source.act(View(board), trigger))
+    answered = answer(Withdrawer(), View(board), trigger)
+    assert (answered is not None) == bool(expected)
+    effects: list[Any] = list(answered or ())
     assert {e.entry.id for e in effects if e.value.__class__ is Milestone} == expected
     assert all(e.value.status == "withdrawn" for e in effects if isinstance(e.value, Milestone))
     sketches = [e.value for e in effects if isinstance(e.value, PlanSketch)]

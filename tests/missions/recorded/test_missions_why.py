@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from acting import rating
 from blackboard.scheduler import registry_of
 from experiments.generated.missions import OFFICE, fault
 from experiments.scale.explanations import write_hour
@@ -138,8 +139,8 @@ def test_who_is_not_named_could_not_act_and_who_is_says_so_again(
         for source in agent.sources:
             for change in changes(history, cycle, KNOWN, agent.store):
                 key = (source.name, str(change.entry.ref))
-                if any(watch.sees(change) for watch in source.watches) and board.view.is_current(change.entry):
-                    assert source.rate(AskedView(board), change) == ratings.get(key)
+                if any(watch.sees(change) for watch in source.on) and board.view.is_current(change.entry):
+                    assert rating(source, AskedView(board), change) == ratings.get(key)
                     asked += 1
         absent = [e for e in agent.sources if not in_cycle(history, e.name, cycle)]
         for source in absent[:: len(absent) // 2 or 1]:

@@ -13,8 +13,15 @@ import pytest
 
 ROOT = Path(__file__).parents[3]
 LINES = {
-    "blackboard": 1_800, "world_models": 9_880, "knowledge_sources": 22_300, "sim": 7_100, "logs": 8_870,
-    "harvey": 10_500, "experiments": 11_500, "tests": 33_900, "extras": 12_680,
+    "blackboard": 1_800,
+    "world_models": 9_880,
+    "knowledge_sources": 22_300,
+    "sim": 7_100,
+    "logs": 8_870,
+    "harvey": 10_500,
+    "experiments": 11_500,
+    "tests": 33_900,
+    "extras": 12_720,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}

@@ -59,8 +59,8 @@ def test_every_knowledge_source_is_wired() -> None:
 @each_source
 def test_it_says_at_which_level_it_works_what_it_watches_and_what_it_writes(source: type[KnowledgeSource]) -> None:
     assert isinstance(source.level, Level) and (source.closes is None or isinstance(source.closes, Level))
-    assert source.watches and source.writes
-    for kind in (*(watch.value_type for watch in source.watches), *source.writes):
+    assert source.on and source.writes
+    for kind in (*(watch.value_type for watch in source.on), *source.writes):
         assert dataclasses.is_dataclass(kind) and kind.__dataclass_params__.frozen, kind
 
 
@@ -71,7 +71,7 @@ def test_it_says_what_it_is_and_where_the_method_comes_from(source: type[Knowled
 
 def test_what_is_watched_is_written_by_somebody() -> None:
     written = {kind for source in KNOWLEDGE_SOURCES.values() for kind in source.writes} | FROM_OUTSIDE
-    watched = {watch.value_type for source in KNOWLEDGE_SOURCES.values() for watch in source.watches}
+    watched = {watch.value_type for source in KNOWLEDGE_SOURCES.values() for watch in source.on}
     assert sorted(kind.__name__ for kind in watched - written) == []
 
 
@@ -116,22 +116,25 @@ def asked_twice(source: KnowledgeSource, impure: list[str]) -> KnowledgeSource:
     """The same knowledge source, but every question is put to it twice, and a change of answer or board is noted."""
     cls = type(source)
 
-    def twice(question: str, record: Any) -> Any:
-        def ask(self: KnowledgeSource, view: View, trigger: Change) -> Any:
-            before = state(view)
-            first, second = (getattr(cls, question)(self, view, trigger) for _ in range(2))
-            first, second = (tuple(x) if question == "act" else x for x in (first, second))
-            if record(first) != record(second) or state(view) != before:
-                impure.append(f"{cls.__name__}.{question} on {trigger.entry.ref}")
-            return first
+    def bind(self: KnowledgeSource, view: View, trigger: Change) -> Any:
+        before = state(view)
+        case, again = cls.bind(self, view, trigger), cls.bind(self, view, trigger)
+        rated = [None if c is None else cls.rate(self, c) for c in (case, again)]
+        if rated[0] != rated[1] or state(view) != before:
+            impure.append(f"{cls.__name__}.bind on {trigger.entry.ref}")
+        return None if case is None else (case, again)
 
-        return ask
+    def rate(self: KnowledgeSource, case: Any) -> float:
+        return cls.rate(self, case[0])
 
-    questions = {
-        "rate": twice("rate", lambda x: x),
-        "still_valid": twice("still_valid", lambda x: x),
-        "act": twice("act", lambda effects: [effect_record(e) for e in effects]),
-    }
+    def act(self: KnowledgeSource, view: View, case: Any) -> Any:
+        before = state(view)
+        first, second = (tuple(cls.act(self, view, one)) for one in case)
+        if [effect_record(e) for e in first] != [effect_record(e) for e in second] or state(view) != before:
+            impure.append(f"{cls.__name__}.act")
+        return first
+
+    questions = {"bind": bind, "rate": rate, "act": act}
     source.__class__ = type(cls.__name__, (cls,), questions)
     return source
 
