@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 
-from experiments import trials
+from experiments import drives, trials
 
 
 def run_here(
     monkeypatch: pytest.MonkeyPatch, folder: Path, experiment: ModuleType, work: Callable[[Any], Any], **how: Any
 ) -> Any:
-    """The report of an experiment whose trials end as ``work`` says; its results are kept in ``folder``."""
+    """The report of an experiment whose missions end as ``work`` says; its table is kept in ``folder``."""
     def here(_: Any, jobs: Sequence[Any], *__: Any) -> list[Any]:
         return [work(job) for job in jobs]
 
     monkeypatch.setattr(trials, "RUNS", folder)
-    monkeypatch.setattr(experiment, "run_trials", here)
+    monkeypatch.setattr(drives, "run_trials", here)
     return experiment.run(seed=0, **how)

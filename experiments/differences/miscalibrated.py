@@ -8,68 +8,59 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from blackboard.journal import Decision
-from experiments.generated.missions import CAMERA_CASES, CameraCase, write_camera_mission
+from experiments import drives
+from experiments.drives import Claim, Driven, End, Trial
+from experiments.generated.missions import write_camera_mission
 from experiments.report import Cell, Report
-from experiments.trials import RESULTS, at_least, at_most, campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
 from sim.faults.kinds import CameraKnocked
 from sim.scenario import Scenario, load_scenario
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, subtract_cameras
 from world_models.entries.body import MotionReport
 from world_models.entries.robot import CameraState
+from world_models.units import INCH_M
 
 FAR_M = 10.0
 """Way after which the camera's state is judged; the end of the mission where it is shorter."""
+MISSIONS = 1_000
+SHARES: Mapping[str, float] = {"as told": 0.2, "miscalibrated": 0.5, "knocked": 0.3}
+MIN_REACHED: Mapping[str, float] = {"as told": 0.99, "miscalibrated": 0.99, "knocked": 0.97}
+TILT, YAW, HEIGHT = (CAMERA_UNKNOWNS.index(name) for name in ("tilt_rad", "yaw_rad", "height_m"))
+MIN_FOUND = 0.95
+FOUND = (("tilt", TILT, math.radians(0.05), "0.05 degrees"), ("yaw", YAW, math.radians(0.5), "half a degree"),
+         ("height", HEIGHT, 0.005, "5 mm"))
+"""How well the camera is to be known, in so large a part of the missions; the yaw is the hardest."""
+MIN_WITHIN = 0.93
+"""Least part of what was learnt that is within two standard deviations."""
 
 
 @dataclass(frozen=True, slots=True)
-class CameraTrial:
-    """A mission.
+class CameraEnd(End):
+    """How a mission ended.
 
     Attributes:
-        case: how the camera is otherwise; floor: seed of the generated floor, and of all chance.
+        found: error of what the robot had learnt of the camera after 10 m, by :data:`CAMERA_UNKNOWNS`; sigmas: what it
+            stated for that; empty where it had learnt nothing.
     """
 
-    case: CameraCase
-    floor: int
-
-
-@dataclass(frozen=True, slots=True)
-class CameraResult:
-    """How a mission ended, in plain types.
-
-    Attributes:
-        told: error of what the robot was told of the camera, by :data:`CAMERA_UNKNOWNS`; found: of what it had learnt
-            after 10 m; sigmas: what it stated for that.
-        is_learnt: whether it had learnt anything; knocked: whether the knock had happened.
-        gone_m: as the wheels claim.
-    """
-
-    case: str
-    floor: int
-    outcome: str
-    reason: str
-    error_m: float
-    false_accepts: int
-    relocations: int
-    told: list[float]
     found: list[float]
     sigmas: list[float]
-    is_learnt: bool
-    is_knocked: bool
-    gone_m: float
-    robot_s: float
-    wall_s: float
+
+    @property
+    def is_right(self) -> bool:
+        """Whether it reached its goal within an inch."""
+        return self.is_reached and self.error_m <= INCH_M
 
 
 class _Watch:
-    """A sink that keeps the camera's state after so much of the way, and at the end."""
+    """A sink that keeps the camera's state after so much of the way as the wheels claim, and at the end."""
 
     def __init__(self) -> None:
         self.gone_m = 0.0
@@ -87,24 +78,20 @@ class _Watch:
                 self.state = value
 
 
-def run_camera_mission(trial: CameraTrial) -> CameraResult:
-    """Run the mission of a trial."""
+def drive(trial: Trial) -> CameraEnd:
+    """Drive the mission of a trial."""
     watch = _Watch()
     with TemporaryDirectory() as folder:
-        path = write_camera_mission(Path(folder), trial.floor, trial.case)
+        path = write_camera_mission(Path(folder), trial.seed, trial.row)
         scenario = load_scenario(path)
-        r = run_task(Task(str(path), (), trial.floor), sinks=[watch])
-    is_knocked = trial.case == "knocked" and not any("knocked" in words for words in r.amiss)
-    camera, mount = find_true_camera(scenario, is_knocked)
-    state = (watch.state if trial.case == "knocked" else watch.far) or watch.state
-    told = subtract_cameras(scenario.camera.camera, scenario.camera.mount, camera, mount)
-    found = told if state is None else subtract_cameras(state.lens, state.mount, camera, mount)
+        result = run_task(Task(str(path), (), trial.seed), sinks=[watch])
+    is_knocked = trial.row == "knocked" and not any("knocked" in words for words in result.amiss)
+    state = (watch.state if trial.row == "knocked" else watch.far) or watch.state
+    lens, mount = (scenario.camera.camera, scenario.camera.mount) if state is None else (state.lens, state.mount)
+    found = subtract_cameras(lens, mount, *find_true_camera(scenario, is_knocked))
     is_learnt = state is not None and bool(state.covariance)
     sigmas = np.sqrt(np.diag(np.array(state.covariance))).tolist() if state is not None and is_learnt else []
-    return CameraResult(
-        trial.case, trial.floor, r.outcome, r.reason, r.error_m, r.false_accepts, r.relocalizations, list(told),
-        list(found), sigmas or [math.inf] * len(CAMERA_UNKNOWNS), is_learnt, is_knocked, watch.gone_m, r.sim_time_s,
-        r.wall_time_s)
+    return CameraEnd.of(trial, result, found=list(found), sigmas=sigmas)
 
 
 def find_true_camera(scenario: Scenario, is_knocked: bool) -> tuple[Camera, CameraMount]:
@@ -116,101 +103,55 @@ def find_true_camera(scenario: Scenario, is_knocked: bool) -> tuple[Camera, Came
     return camera, mount
 
 
-MISSIONS, QUICK_MISSIONS = 1_000, 2
-FIRST_SEED, SEEDS_APART = 100_000, 10_000
-"""Seeds below 1,000 are for development: constants were chosen on some of them."""
-PARTS: Mapping[CameraCase, float] = {"as told": 0.2, "miscalibrated": 0.5, "knocked": 0.3}
-INCH_M = 0.0254
-MIN_REACHED: Mapping[CameraCase, float] = {"as told": 0.99, "miscalibrated": 0.99, "knocked": 0.97}
-MIN_FOUND, MAX_TILT_RAD, MAX_YAW_RAD, MAX_HEIGHT_M = 0.95, math.radians(0.05), math.radians(0.5), 0.005
-"""How well the camera is to be known, and in which part of the missions; the yaw is the hardest."""
-MIN_WITHIN = 0.93
-"""Least part of what was learnt that is within two standard deviations."""
-TILT, YAW, HEIGHT = (CAMERA_UNKNOWNS.index(name) for name in ("tilt_rad", "yaw_rad", "height_m"))
-WORST_SHOWN = 6
-COLUMNS = ("camera", "paper", "peer", "missions", "within an inch", "proves at least", "false accepts", "tilt off deg",
-           "yaw off deg", "height off mm", "in 2 sigma", "relocated", "robot's mean s", "mean CPU s")
+def _median(ends: Sequence[CameraEnd], unknown: int, unit: float) -> Cell:
+    return float(np.median([abs(e.found[unknown]) for e in ends])) / unit
+
+
+def _share_within(ends: Sequence[CameraEnd]) -> float:
+    """Which part of what was learnt is within two standard deviations."""
+    learnt, last = [e for e in ends if e.sigmas], HEIGHT + 2
+    within = np.abs([e.found[:last] for e in learnt]) <= 2.0 * np.array([e.sigmas[:last] for e in learnt])
+    return float(np.mean(within)) if learnt else 1.0
+
+
+FIGURES: Mapping[str, drives.Figure[CameraEnd]] = {
+    **drives.pick("missions"), "within an inch": drives.total(lambda e: e.is_right),
+    "proves at least": drives.proved(lambda e: e.is_right), **drives.pick("false accepts"),
+    "tilt off deg": partial(_median, unknown=TILT, unit=math.radians(1.0)),
+    "yaw off deg": partial(_median, unknown=YAW, unit=math.radians(1.0)),
+    "height off mm": partial(_median, unknown=HEIGHT, unit=0.001),
+    "in 2 sigma": lambda ends: f"{_share_within(ends):.0%}",
+    **drives.pick("relocated", "robot's mean s", "mean CPU s"),
+}
 
 
 def run(quick: bool, seed: int, missions: int | None = None) -> Report:
     """Drive each case's share of so many missions, of seeds 100,000 + 10,000 ``seed`` + 0, 1, ...."""
-    number = missions or (QUICK_MISSIONS if quick else MISSIONS)
-    first = FIRST_SEED + SEEDS_APART * seed
-    trials = [CameraTrial(case, first + k) for case in CAMERA_CASES
-              for k in range(math.ceil(number * PARTS[case] - 1e-9))]
-    folder = campaign_folder(f"miscalibrated-{missions}" if missions else "miscalibrated", seed, quick=quick)
-    ends = run_trials(run_camera_mission, trials, CameraResult, folder, "mission")
-    found = {case: [end for end in ends if end.case == case] for case in CAMERA_CASES}
-    report = Report(
-        "Missions with a camera that is not mounted as told", COLUMNS,
-        tuple(_row(case, e) for case, e in found.items()),
+    trials = drives.spread(SHARES, drives.first_seed(seed, 100_000), missions or (None if quick else MISSIONS))
+    driven = drives.drive_all("miscalibrated", drive, trials, CameraEnd, quick=quick, seed=seed, missions=missions)
+    return driven.report(
+        "Missions with a camera that is not mounted as told", "camera", FIGURES,
         notes=(
-            f"Seeds {first} to {max(trial.floor for trial in trials)}; no constant was chosen on them. Bounds are"
-            " one-sided, of 95 %, by Clopper and Pearson.",
             "Off: median error of what was learnt within 10 m of way (of a knocked camera: by the end). in 2 sigma: of"
             " tilt, roll, yaw, height and focal length, one of each a mission. false accepts: milestones verified"
             " while the robot was elsewhere.",
             "The paper calls for an accurate sensor model (§3.2) and has no figure; a peer that navigates by a"
             " building's lines and learns its camera's mounting is not known.",
-            *(line for case, e in found.items() for line in _worst(case, e)),
-            f"One line per mission: {folder / RESULTS}",
         ),
-        claims=tuple(_claims(found)),
-    )
-    (folder / "table.txt").write_text(report.text() + "\n", encoding="utf-8")
-    return report
-
-
-def is_right(end: CameraResult) -> bool:
-    """Whether a mission reached its goal within an inch."""
-    return end.outcome == "reached" and end.error_m <= INCH_M
-
-
-def _row(case: str, ends: Sequence[CameraResult]) -> tuple[Cell, ...]:
-    right = sum(map(is_right, ends))
-    return (
-        case, None, None, len(ends), right, f"{at_least(right, len(ends)):.1%}", sum(e.false_accepts for e in ends),
-        math.degrees(_median(ends, TILT)), math.degrees(_median(ends, YAW)), 1000.0 * _median(ends, HEIGHT),
-        f"{_share_within(ends):.0%}", sum(e.relocations for e in ends), math.fsum(e.robot_s for e in ends) / len(ends),
-        math.fsum(e.wall_s for e in ends) / len(ends),
+        claims=_claims(driven), is_flawed=lambda e: not e.is_right or e.false_accepts > 0,
+        tell=lambda e: f"{e.outcome}: {e.reason}; {1000.0 * e.error_m:.0f} mm off",
     )
 
 
-def _median(ends: Sequence[CameraResult], unknown: int) -> float:
-    return float(np.median([abs(e.found[unknown]) for e in ends]))
-
-
-def _share_within(ends: Sequence[CameraResult]) -> float:
-    """Which part of what was learnt is within two standard deviations."""
-    learnt = [e for e in ends if e.is_learnt]
-    if not learnt:
-        return 1.0
-    off = np.abs([e.found[: HEIGHT + 2] for e in learnt]) <= 2.0 * np.array([e.sigmas[: HEIGHT + 2] for e in learnt])
-    return float(np.mean(off))
-
-
-def _claims(found: Mapping[CameraCase, Sequence[CameraResult]]) -> Iterator[tuple[str, bool]]:
-    everywhere = [e for ends in found.values() for e in ends]
-    accepts = sum(bool(e.false_accepts) for e in everywhere)
-    yield (f"no milestone is accepted at a wrong place: {accepts} of {len(everywhere)} missions, so in at most"
-           f" {at_most(accepts, len(everywhere)):.2%}", not accepts)
-    for case, ends in found.items():
-        right = sum(map(is_right, ends))
-        yield (f"{case}: at least {MIN_REACHED[case]:.0%} reach within an inch: {right} of {len(ends)}, so at least"
-               f" {at_least(right, len(ends)):.1%}", right >= MIN_REACHED[case] * len(ends))
-    wrong = [e for e in found["miscalibrated"] if e.is_learnt]
-    for what, unknown, limit, unit in (
-            ("tilt", TILT, MAX_TILT_RAD, "0.05 degrees"), ("yaw", YAW, MAX_YAW_RAD, "half a degree"),
-            ("height", HEIGHT, MAX_HEIGHT_M, "5 mm")):
+def _claims(driven: Driven[CameraEnd]) -> Iterator[Claim]:
+    yield drives.claim_none("no milestone is accepted at a wrong place", driven.ends)
+    for case, ends in driven.rows.items():
+        yield drives.claim_share(f"{case}: at least {MIN_REACHED[case]:.0%} reach within an inch",
+                                 lambda e: e.is_right, ends, MIN_REACHED[case])
+    wrong = [e for e in driven.rows["miscalibrated"] if e.sigmas]
+    for what, unknown, limit, unit in FOUND:
         near = sum(abs(e.found[unknown]) <= limit for e in wrong)
         yield (f"miscalibrated: {what} is found to {unit} within 10 m in at least {MIN_FOUND:.0%}: in {near} of"
                f" {len(wrong)} missions", near >= MIN_FOUND * len(wrong))
-    share = _share_within(everywhere)
+    share = _share_within(driven.ends)
     yield f"what was learnt is within 2 sigma in at least {MIN_WITHIN:.0%}: in {share:.1%}", share >= MIN_WITHIN
-
-
-def _worst(case: str, ends: Sequence[CameraResult]) -> list[str]:
-    """Name the floors to look at."""
-    flawed = [e for e in ends if not is_right(e) or e.false_accepts][:WORST_SHOWN]
-    told = "; ".join(f"{e.floor} ({e.outcome}: {e.reason}; {1000.0 * e.error_m:.0f} mm off)" for e in flawed)
-    return [f"{case}, floors to look at: {told}"] if flawed else []

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal, get_args
 
 import numpy as np
 
-LightKind = Literal["flat", "lamps", "half the lamps off", "dim", "sun", "glossy floor", "glass", "coloured walls",
-                    "slow camera", "all at once"]
+LIGHT_KINDS = ("flat", "lamps", "half the lamps off", "dim", "sun", "glossy floor", "glass", "coloured walls",
+               "slow camera", "all at once")
 """flat: no ``[light]``, the same everywhere. lamps: panels in every room, auto exposure. The others have them too. dim:
 1 to 6 % of their light. sun: daylight, and hard patches of sun. coloured walls: other colours than the model's, tinted
 lamps, and a white balance. slow camera: exposure and white balance lag by 1 to 3 s, with half the lamps off."""
-LIGHT_KINDS: tuple[LightKind, ...] = get_args(LightKind)
 Values = dict[str, float | list[float]]
 
 
-def draw_light(kind: LightKind, seed: int) -> Values | None:
+def draw_light(kind: str, seed: int) -> Values | None:
     """The settings of ``[light]``, the same for the same arguments; None for flat light."""
     if kind == "flat":
         return None
@@ -32,7 +30,7 @@ def draw_light(kind: LightKind, seed: int) -> Values | None:
             for key, value in values.items()}
 
 
-def _draw_part(kind: LightKind, rng: np.random.Generator) -> Values:
+def _draw_part(kind: str, rng: np.random.Generator) -> Values:
     if kind == "half the lamps off":
         return {"lamps_off": rng.uniform(0.3, 0.7)}
     if kind == "dim":

@@ -9,116 +9,93 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from experiments import drives
+from experiments.drives import Claim, End, Trial
 from experiments.generated.light import LIGHT_KINDS, MOST_SAG_DEG, SAG_DEG_PER_DAY, write_soak_mission
 from experiments.report import Cell, Report
 from experiments.scale.agenda_memory import resident_bytes
-from experiments.trials import RESULTS, at_most, campaign_folder, run_trials
+from experiments.trials import at_most
 from harvey.campaign.campaign import Task, run_task
 
 MISSIONS, QUICK_MISSIONS, A_DAY = 20_000, 2, 10
-FIRST_SEED, SEEDS_APART = 1_000_000, 100_000
-"""Seeds below 100,000 are for development."""
+SEEDS_APART = 100_000
 MIN_REACHED, MAX_MB_PER_MISSION = 0.99, 0.5
-WORST_SHOWN = 6
 MB = 1e6
-COLUMNS = ("light", "paper", "peer", "missions", "km", "reached", "milestones", "refuted", "accepted wrongly",
-           "proves at most", "lost and found", "contacts", "robot's hours", "CPU hours")
 
 
 @dataclass(frozen=True, slots=True)
-class SoakTrial:
-    """A mission: the seed of its errands and of all chance, and its day."""
+class SoakEnd(End):
+    """How a mission ended, and how large the process that drove it was after it."""
 
-    seed: int
-    day: int
-
-
-@dataclass(frozen=True, slots=True)
-class SoakResult:
-    """How a mission ended, in plain types.
-
-    Attributes:
-        memory_mb: of the process that ran it, after it.
-        process: that process.
-    """
-
-    seed: int
-    day: int
-    outcome: str
-    reason: str
-    error_m: float
-    path_m: float
-    verified: int
-    refuted: int
-    not_testable: int
-    false_accepts: int
-    relocations: int
-    contacts: int
-    robot_s: float
-    wall_s: float
     memory_mb: float
     process: int
 
 
-def run_soak_mission(trial: SoakTrial) -> SoakResult:
-    """Run the mission of a trial."""
+def find_day(seed: int) -> int:
+    """The day of a mission, by its seed."""
+    return seed % SEEDS_APART // A_DAY
+
+
+def make_trial(seed: int) -> Trial:
+    """The mission of a seed, in the row of its day's light."""
+    return Trial(LIGHT_KINDS[find_day(seed) % len(LIGHT_KINDS)], seed)
+
+
+def drive(trial: Trial) -> SoakEnd:
+    """Drive the mission of a trial."""
     with TemporaryDirectory() as folder:
-        r = run_task(Task(str(write_soak_mission(Path(folder), trial.day, trial.seed)), (), trial.seed))
-    count = {key: value or 0 for key, value in r.milestones.items()}
-    return SoakResult(
-        trial.seed, trial.day, r.outcome, r.reason, r.error_m, r.path_length_m, count["verified"], count["refuted"],
-        count["not_testable"], r.false_accepts, r.relocalizations, r.collisions or 0, r.sim_time_s, r.wall_time_s,
-        resident_bytes() / MB, os.getpid())
+        path = write_soak_mission(Path(folder), find_day(trial.seed), trial.seed)
+        result = run_task(Task(str(path), (), trial.seed))
+    return SoakEnd.of(trial, result, memory_mb=resident_bytes() / MB, process=os.getpid())
+
+
+def _wrong_at_most(ends: Sequence[SoakEnd]) -> Cell:
+    judged = sum(e.verified for e in ends)
+    return f"{at_most(sum(e.false_accepts for e in ends), judged):.2%}" if judged else None
+
+
+FIGURES: Mapping[str, drives.Figure[SoakEnd]] = {
+    **drives.pick("missions"), "km": lambda ends: math.fsum(e.path_m for e in ends) / 1e3, **drives.pick("reached"),
+    "milestones": drives.total(lambda e: e.verified), **drives.pick("refuted"),
+    "accepted wrongly": drives.total(lambda e: e.false_accepts), "proves at most": _wrong_at_most,
+    "lost and found": drives.total(lambda e: e.relocations), **drives.pick("contacts"),
+    "robot's hours": lambda ends: math.fsum(e.robot_s for e in ends) / 3600.0,
+    "CPU hours": lambda ends: math.fsum(e.wall_s for e in ends) / 3600.0,
+}
 
 
 def run(quick: bool, seed: int, missions: int | None = None) -> Report:
     """Drive so many missions, of seeds 1,000,000 + 100,000 ``seed`` + 0, 1, ....; ``A_DAY`` a day."""
-    number = missions or (QUICK_MISSIONS if quick else MISSIONS)
-    first = FIRST_SEED + SEEDS_APART * seed
-    folder = campaign_folder(f"soak-{missions}" if missions else "soak", seed, quick=quick)
-    ends = run_trials(run_soak_mission, [SoakTrial(first + k, k // A_DAY) for k in range(number)], SoakResult, folder,
-                      "mission")
-    by_light = {kind: [end for end in ends if LIGHT_KINDS[end.day % len(LIGHT_KINDS)] == kind] for kind in LIGHT_KINDS}
-    rows = [_row(kind, some) for kind, some in by_light.items() if some]
-    if len(rows) > 1:
-        rows.append(_row("all", ends))
+    first = drives.first_seed(seed, apart=SEEDS_APART)
+    trials = [make_trial(first + k) for k in range(missions or (QUICK_MISSIONS if quick else MISSIONS))]
+    driven = drives.drive_all("soak", drive, trials, SoakEnd, quick=quick, seed=seed, missions=missions,
+                              rows=LIGHT_KINDS)
+    ends = sorted(driven.ends, key=lambda e: e.seed)
     growth = _find_growth_mb(ends)
-    report = Report(
-        "Errands in one building, day after day", COLUMNS, tuple(rows),
+    if len(driven.rows) > 1:
+        driven = replace(driven, rows={**driven.rows, "all": ends})
+    otherwise = Counter(end.outcome for end in ends if not end.is_reached).most_common()
+    return driven.report(
+        "Errands in one building, day after day", "light", FIGURES,
         notes=(
-            f"Seeds {first} to {first + number - 1}, {A_DAY} a day; no constant was chosen on them. The camera looks"
-            f" {SAG_DEG_PER_DAY:g} degrees lower each day than believed, up to {MOST_SAG_DEG:g}. Bounds are one-sided,"
-            " of 95 %, by Clopper and Pearson.",
+            f"{A_DAY} missions a day. The camera looks {SAG_DEG_PER_DAY:g} degrees lower each day than believed, up to"
+            f" {MOST_SAG_DEG:g}.",
             f"The memory of a process grows by at most {growth:.2f} MB a mission." if math.isfinite(growth) else
             "No process ran enough missions to tell how its memory grows.",
-            "Ended otherwise than reached: " + (", ".join(f"{n} {kind}" for kind, n in Counter(
-                end.outcome for end in ends if end.outcome != "reached").most_common()) or "none"),
-            *_worst([end for end in ends if end.outcome != "reached" or end.false_accepts]),
+            f"Ended otherwise than reached: {', '.join(f'{n} {kind}' for kind, n in otherwise) or 'none'}",
             "The paper drove for minutes, not days; peers publish no such figures.",
-            f"One line per mission: {folder / RESULTS}",
         ),
-        claims=tuple(_claims(ends, growth, quick=quick)),
+        claims=_claims(ends, growth, quick=quick), is_flawed=lambda e: not e.is_reached or e.false_accepts > 0,
+        tell=lambda e: f"day {find_day(e.seed)}, {e.outcome}: {e.reason}",
     )
-    (folder / "table.txt").write_text(report.text() + "\n", encoding="utf-8")
-    return report
 
 
-def _row(name: str, ends: Sequence[SoakResult]) -> tuple[Cell, ...]:
-    judged = sum(e.verified for e in ends)
-    wrong = sum(e.false_accepts for e in ends)
-    return (
-        name, None, None, len(ends), math.fsum(e.path_m for e in ends) / 1e3, sum(e.outcome == "reached" for e in ends),
-        judged, sum(e.refuted for e in ends), wrong, f"{at_most(wrong, judged):.2%}" if judged else None,
-        sum(e.relocations for e in ends), sum(e.contacts for e in ends), math.fsum(e.robot_s for e in ends) / 3600.0,
-        math.fsum(e.wall_s for e in ends) / 3600.0)
-
-
-def _find_growth_mb(ends: Sequence[SoakResult]) -> float:
+def _find_growth_mb(ends: Sequence[SoakEnd]) -> float:
     """By how much a process grows with a mission, once it has run ``A_DAY``: the worst; NaN where none ran more."""
     found = []
     for process in sorted({end.process for end in ends}):
@@ -129,20 +106,13 @@ def _find_growth_mb(ends: Sequence[SoakResult]) -> float:
     return max(found, default=math.nan)
 
 
-def _worst(ends: Sequence[SoakResult]) -> list[str]:
-    """Name the missions to look at."""
-    told = "; ".join(f"{e.seed} of day {e.day} ({e.outcome}: {e.reason})" for e in ends[:WORST_SHOWN])
-    return [f"missions to look at: {told}"] if told else []
-
-
-def _claims(ends: Sequence[SoakResult], growth_mb: float, *, quick: bool) -> Iterator[tuple[str, bool]]:
+def _claims(ends: Sequence[SoakEnd], growth_mb: float, *, quick: bool) -> Iterator[Claim]:
     wrong, judged = sum(e.false_accepts for e in ends), sum(e.verified for e in ends)
     yield (f"no milestone is accepted wrongly: {wrong} of {judged}"
            + (f", so at most {at_most(wrong, judged):.2%}" if judged else ""), wrong == 0)
     if quick:
         return
-    reached = sum(e.outcome == "reached" for e in ends)
-    yield f"at least {MIN_REACHED:.0%} reach: {reached} of {len(ends)}", reached >= MIN_REACHED * len(ends)
+    yield drives.claim_share(f"at least {MIN_REACHED:.0%} reach", lambda e: e.is_reached, ends, MIN_REACHED)
     if math.isfinite(growth_mb):
         yield (f"a process grows by at most {MAX_MB_PER_MISSION:g} MB a mission: {growth_mb:.2f}",
                growth_mb <= MAX_MB_PER_MISSION)

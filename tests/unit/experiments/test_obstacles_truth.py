@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from experiments.differences.obstacles_trial import Lacking, count_stops, find_shortest_m, judge
+from experiments.differences.obstacles import Lacking, count_stops, find_shortest_m, judge
 from experiments.trials import at_least, at_most
 from sim.body.collision import ROBOT_RADIUS_M, Obstacles
 from world_models.frames import Pose2

@@ -1,0 +1,203 @@
+"""The form of experiments that drive missions: what is driven, how each mission ended, and the table over them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, Self, TypeVar
+
+from experiments.report import Cell, Report
+from experiments.trials import RESULTS, at_least, at_most, campaign_folder, run_trials
+from harvey.runner.result import MissionResult
+
+WORST_SHOWN = 6
+NO_PEER = "no peer with one camera and a building's model is known."
+JUDGED = "; no constant was chosen on them. Bounds are one-sided, of 95 %, by Clopper and Pearson."
+Claim = tuple[str, bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A mission: the row of the table that it counts in, and the seed of what is drawn for it and of all chance."""
+
+    row: str
+    seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """How a mission ended, in plain types.
+
+    Attributes:
+        error_m: true distance from the goal.
+        false_accepts: milestones that were verified while the robot was elsewhere.
+        robot_s: time of the robot; wall_s: of the processor, and waiting.
+    """
+
+    row: str
+    seed: int
+    outcome: str
+    reason: str
+    error_m: float
+    path_m: float
+    verified: int
+    refuted: int
+    not_testable: int
+    false_accepts: int
+    contacts: int
+    relocations: int
+    replans: int
+    robot_s: float
+    wall_s: float
+
+    @classmethod
+    def of(cls, trial: Trial, r: MissionResult, **more: Any) -> Self:
+        """The end of a trial; ``more`` are the fields of the experiment's own kind."""
+        count = {key: value or 0 for key, value in r.milestones.items()}
+        return cls(trial.row, trial.seed, r.outcome, r.reason, r.error_m, r.path_length_m, count["verified"],
+                   count["refuted"], count["not_testable"], r.false_accepts, r.collisions or 0, r.relocalizations,
+                   r.replans, r.sim_time_s, r.wall_time_s, **more)
+
+    @property
+    def is_reached(self) -> bool:
+        """Whether it says that it reached its goal."""
+        return self.outcome == "reached"
+
+
+def first_seed(seed: int, first: int = 1_000_000, apart: int = 10_000) -> int:
+    """Of the missions that judge, on none of which a constant was chosen; ``seed`` is the experiment's own."""
+    return first + apart * seed
+
+
+E = TypeVar("E", bound=End)
+Figure = Callable[[Sequence[E]], Cell]
+"""A cell of the table, from the missions of its row."""
+
+
+def total(value: Callable[[E], int]) -> Figure[E]:
+    """The sum of something over the missions."""
+    return lambda ends: sum(map(value, ends))
+
+
+def mean(value: Callable[[E], float]) -> Figure[E]:
+    """The mean of something over the missions."""
+    return lambda ends: math.fsum(map(value, ends)) / len(ends) if ends else math.nan
+
+
+def proved(is_right: Callable[[E], bool]) -> Figure[E]:
+    """The lower bound of the share of missions that are right."""
+    return lambda ends: f"{at_least(sum(map(is_right, ends)), len(ends)):.1%}"
+
+
+COMMON: Mapping[str, Figure[End]] = {
+    "missions": len, "reached": total(lambda e: e.is_reached), "proves at least": proved(lambda e: e.is_reached),
+    "verified": total(lambda e: e.verified), "refuted": total(lambda e: e.refuted),
+    "not testable": total(lambda e: e.not_testable), "false accepts": total(lambda e: e.false_accepts),
+    "contacts": total(lambda e: e.contacts), "relocated": total(lambda e: e.relocations),
+    "replans": total(lambda e: e.replans), "robot's mean s": mean(lambda e: e.robot_s),
+    "mean CPU s": mean(lambda e: e.wall_s),
+}
+
+
+def pick(*names: str) -> Mapping[str, Figure[End]]:
+    """Columns that several experiments have."""
+    return {name: COMMON[name] for name in names}
+
+
+def claim_share(what: str, is_right: Callable[[E], bool], ends: Sequence[E], least: float) -> Claim:
+    """That at least such a share of the missions is right; ``what``: "told right: at least 99% reach"."""
+    right = sum(map(is_right, ends))
+    return f"{what}: {right} of {len(ends)}, so at least {at_least(right, len(ends)):.1%}", right >= least * len(ends)
+
+
+def has_false_accept(end: End) -> bool:
+    """Whether a milestone was verified while the robot was elsewhere."""
+    return end.false_accepts > 0
+
+
+def claim_none(what: str, ends: Sequence[E], is_wrong: Callable[[E], bool] = has_false_accept) -> Claim:
+    """That something happens in no mission; ``what``: "no milestone is accepted at a wrong place"."""
+    wrong = sum(map(is_wrong, ends))
+    return f"{what}: {wrong} of {len(ends)} missions, so in at most {at_most(wrong, len(ends)):.2%}", not wrong
+
+
+def spread(shares: Mapping[str, float], first: int, number: int | None) -> list[Trial]:
+    """Each row's share of so many missions, from a seed on; one of each row without a number."""
+    return [Trial(row, first + k) for row, share in shares.items()
+            for k in range(1 if number is None else max(1, math.ceil(number * share - 1e-9)))]
+
+
+@dataclass(frozen=True)
+class Driven(Generic[E]):
+    """Missions that were driven: their ends by row, and the folder of the campaign."""
+
+    rows: Mapping[str, list[E]]
+    folder: Path
+
+    @property
+    def ends(self) -> list[E]:
+        """All of them."""
+        return [end for ends in self.rows.values() for end in ends]
+
+    def report(
+        self, title: str, what: str, figures: Mapping[str, Figure[E]], *, notes: Sequence[str], claims: Iterable[Claim],
+        is_flawed: Callable[[E], bool], tell: Callable[[E], str] = lambda end: f"{end.outcome}: {end.reason}",
+        worst: Callable[[E], Any] = lambda end: end.seed, sides: Sequence[str] = ("paper", "peer"), about: str = JUDGED,
+    ) -> Report:
+        """The table, a row a line, written into the folder too.
+
+        Args:
+            what: the missions of a row differ in.
+            is_flawed, tell: which missions are to be looked at, and what is said of them; worst: their order.
+            sides: columns of others, who have no figures.
+            about: what is to be said of the seeds.
+        """
+        none = (None,) * len(sides)
+        report = Report(
+            title, (what, *sides, *figures),
+            tuple((row, *none, *(figure(ends) for figure in figures.values())) for row, ends in self.rows.items()),
+            notes=(
+                f"{self.seeds}{about}", *notes, *self.name_flawed(is_flawed, tell, worst),
+                f"One line per mission: {self.folder / RESULTS}",
+            ),
+            claims=tuple(claims),
+        )
+        return self.keep(report)
+
+    @property
+    def seeds(self) -> str:
+        """The first and the last."""
+        seeds = [end.seed for end in self.ends]
+        return f"Seeds {min(seeds)} to {max(seeds)}"
+
+    def name_flawed(
+        self, is_flawed: Callable[[E], bool], tell: Callable[[E], str], worst: Callable[[E], Any]
+    ) -> Iterator[str]:
+        """The missions to look at, some of each row."""
+        for row, ends in self.rows.items():
+            if flawed := sorted(filter(is_flawed, ends), key=worst)[:WORST_SHOWN]:
+                yield f"{row}, missions to look at: {'; '.join(f'{end.seed} ({tell(end)})' for end in flawed)}"
+
+    def keep(self, report: Report) -> Report:
+        """Write a report beside the results."""
+        (self.folder / "table.txt").write_text(report.text() + "\n", encoding="utf-8")
+        return report
+
+
+def drive_all(
+    name: str, drive: Callable[[Trial], E], trials: Sequence[Trial], kind: type[E], *, quick: bool, seed: int,
+    missions: int | None = None, rows: Sequence[str] = (),
+) -> Driven[E]:
+    """Drive the missions of an experiment; those that its folder has already are not driven again.
+
+    Args:
+        drive: a function of a module: drives one mission.
+        missions: as the user gave it; such campaigns have a folder of their own.
+        rows: their order; that of the trials unless given.
+    """
+    folder = campaign_folder(f"{name}-{missions}" if missions else name, seed, quick=quick)
+    ends = run_trials(drive, trials, kind, folder, "mission")
+    names = rows or list(dict.fromkeys(trial.row for trial in trials))
+    return Driven({row: some for row in names if (some := [end for end in ends if end.row == row])}, folder)
