@@ -102,6 +102,15 @@ class Blackboard:
         (self._stores.get(kind) or self._store(kind)).put(entry)
         return new_tuple(Revised if revision else Posted, (entry, ()))
 
+    def follow(self, change: Change) -> None:
+        """Take over a change that was made on another board, as one that a journal or a recorder tells of."""
+        entry = change.entry
+        if not isinstance(change, Retracted):
+            self._current[entry.id] = entry
+            self._store(type(entry.value)).put(entry)
+        elif entry.id in self._current:
+            self._remove(entry.id)
+
     def forget(self, id: str) -> None:
         """Let go of an entry that nobody can need any more. That is no change: nobody is told.
 

@@ -14,7 +14,7 @@ from rerun.error_utils import RerunWarning
 
 from logs.errors import RecordingError
 from logs.recording.loggers.decisions import RECORD
-from logs.recording.loggers.frames import NUMBER
+from logs.recording.loggers.picture import NUMBER
 from logs.recording.paths import IMAGE, RECORDS, TRUE_ROBOT
 
 ROW_ID = "rerun.controls.RowId"

@@ -133,6 +133,10 @@ class EntryRecord(Generic[T_co]):
         """Whether it is the first of the entry."""
         return self.change == Posted.__name__
 
+    def field(self, name: str, otherwise: Any = None) -> Any:
+        """One field of the value without decoding it; ``otherwise`` where there is none of that name."""
+        return self.fields.get(name, otherwise) if isinstance(self.fields, dict) else otherwise
+
     @cached_property
     def kind(self) -> Kind:
         """The class of its value, which need not be decoded for that; Opaque where it is not known here."""

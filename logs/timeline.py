@@ -16,11 +16,12 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from logs.errors import BadInput
 from logs.journal_file import out_of_step
 from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of, is_a
+from world_models.building.locale_frame import FrameReference, LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Tracks
 from world_models.entries.task import Outcome
@@ -83,6 +84,11 @@ class Timeline:
         """What the journal says of a revision; None where it says nothing."""
         return self._find(ref, self._entries.get(ref.encode(errors="replace")), retracted=False)
 
+    def cycle_of_ref(self, ref: str) -> int:
+        """In which cycle a revision came about; 0 where the journal says nothing of it."""
+        record = self.entry(ref)
+        return 0 if record is None else record.cycle
+
     def retraction(self, ref: str) -> EntryRecord[Any] | None:
         """How a revision was retracted; None where it was not."""
         return self._find(ref, self._retracted.get(ref.encode(errors="replace")), retracted=True)
@@ -123,6 +129,14 @@ class Timeline:
             record = self.entry(ref) if ref.startswith(heads) else None
             if record is not None and (until is None or record.cycle <= until):
                 yield record
+
+    def frames(self, until: int | None = None) -> Iterator[EntryRecord[FrameReference]]:
+        """All revisions of locale frames, each by what the journal keeps of it."""
+        return cast(Iterator[EntryRecord[FrameReference]], self.of_kind(LocaleFrame, until=until))
+
+    def last_of_kind(self, kind: type[K]) -> Iterator[EntryRecord[K]]:
+        """The last revision of each entry of a kind, in the order in which the entries came about."""
+        return (record for id in self.ids_of(kind) if (record := self.entry(self.newest[id])) is not None)
 
     def ids_of(self, kind: type[Any]) -> list[str]:
         """Of the entries of a kind, in the order in which they came about."""
@@ -194,6 +208,11 @@ class Timeline:
         """The first entry of a kind that an entry rests on directly."""
         refs = (ref for ref in record.because if ref.startswith(f"{kind.__name__}-"))
         return next((found for ref in refs if (found := self.entry(ref)) is not None), None)
+
+    def because(self, record: EntryRecord[Any], kind: type[K]) -> K | None:
+        """The value of that entry."""
+        found = self.reason(record, kind)
+        return None if found is None else found.value
 
     def within(self, record: EntryRecord[Any]) -> Iterator[EntryRecord[Any]]:
         """An entry and what it rests on, nearest first, each once; not more than FAR."""

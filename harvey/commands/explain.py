@@ -77,13 +77,12 @@ def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
 
 def _stories(run: RunDirectory, history: Timeline, args: Namespace) -> Iterator[Story]:
     from logs.explain.model import WorldFile
-    from logs.explain.questions import answers, answers_of_the_run, is_question
+    from logs.explain.questions import answers, is_question
     from logs.explain.subjects import milestone_story, milestones, stories_of
 
     world = WorldFile(run)
     if args.entry is not None and is_question(args.entry):
-        of_the_run = answers_of_the_run(run, history, args.entry, args.at)
-        yield from answers(history, args.entry, args.at) if of_the_run is None else of_the_run
+        yield from answers(history, args.entry, args.at, run)
         return
     if args.milestone is None:
         yield from stories_of(history, args.entry if args.at is None else args.at, world)

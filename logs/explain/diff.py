@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
@@ -25,24 +25,21 @@ if TYPE_CHECKING:
     from logs.run_head import RunHead
 
 MEANINGS: Mapping[str, str] = {
-    "cycle": "the number of the cycle",
-    "observed": "what came from outside",
-    "seen": "the changes taken up",
-    "obviated": "what was dropped from the agenda",
-    "focus": "the level in focus",
-    "activated": "who could act",
-    "chosen": "what was chosen",
-    "runner_up": "what came second",
-    "pending": "how many were left pending",
-    "made": "what the act brought about",
-    "refused": "why the act was refused",
+    "cycle": "the number of the cycle", "observed": "what came from outside", "seen": "the changes taken up",
+    "obviated": "what was dropped from the agenda", "focus": "the level in focus", "activated": "who could act",
+    "chosen": "what was chosen", "runner_up": "what came second", "pending": "how many were left pending",
+    "made": "what the act brought about", "refused": "why the act was refused",
 }
 """The fields of a decision, in the order in which one follows from the other."""
-
-MOST_VALUES = 6
-"""How many differing values of one field are told."""
-
+MOST_VALUES, MOST_SETTINGS = 6, 8
+"""How many differing values of one field, and how many settings, are told."""
 LONGEST = 60
+"""Of a value [characters]."""
+IGNORED = frozenset({"harvey", "code", "arithmetic", "folder", "world_sha256"})
+"""Of a run's head: what is told apart, or follows from the rest."""
+
+Records = Sequence[EntryRecord[Any]]
+Maybe = EntryRecord[Any] | None
 
 
 class _Absent:
@@ -67,40 +64,42 @@ def first_difference(
     return agreed, None, None
 
 
+def agreement(agreed: int) -> str:
+    """How long the runs agree."""
+    return f"The two runs agree for {count(agreed, 'decision')}."
+
+
 def describe(agreed: int, one: DecisionRecord | None, other: DecisionRecord | None) -> Iterator[str]:
     """The answer in plain words; the runs are called first and second."""
     if one is None and other is None:
         yield f"The two runs agree in all of their {count(agreed, 'decision')}."
         return
-    yield f"The two runs agree for {count(agreed, 'decision')}."
+    yield agreement(agreed)
     if one is None or other is None:
-        ended, name = ("first", "second") if one is None else ("second", "first")
-        yield f"Then the {ended} run ends, while the {name} goes on: {_what(one or other)}."
+        (ended, name), d = (("first", "second"), other) if one is None else (("second", "first"), one)
+        acts = "nothing is chosen" if d is None or d.chosen is None else (
+            f"in cycle {d.cycle} {d.chosen.source} acts on {d.chosen.trigger}")
+        yield f"Then the {ended} run ends, while the {name} goes on: {acts}."
         return
     yield f"In cycle {one.cycle} they differ:"
     if not (fields := [key for key in MEANINGS if as_line(one.data[key]) != as_line(other.data[key])]):
         yield "  only in how the line is written"
     for key in fields:
         yield f"  {MEANINGS[key]} ({key}):"
-        yield from _field(key, one, other)
+        if key in ("observed", "made"):
+            yield from _entries(getattr(one, key), getattr(other, key))
+        else:
+            yield f"    first:  {_to_text(getattr(one, key))}"
+            yield f"    second: {_to_text(getattr(other, key))}"
 
 
-def _field(key: str, one: DecisionRecord, other: DecisionRecord) -> Iterator[str]:
-    if key in ("observed", "made"):
-        yield from _entries(getattr(one, key), getattr(other, key))
-        return
-    for name, decision in (("first", one), ("second", other)):
-        yield f"    {name + ':':<8}{_to_text(key, decision)}"
-
-
-def _entries(ours: tuple[EntryRecord[Any], ...], theirs: tuple[EntryRecord[Any], ...]) -> Iterator[str]:
+def _entries(ours: Records, theirs: Records) -> Iterator[str]:
     for a, b in zip_longest(ours, theirs):
-        if a is not None and b is not None and same(a, b):
+        if same(a, b):
             continue
         if a is not None and b is not None and a.ref == b.ref:
             yield f"    {a.ref}:"
-            yield f"      first:  {sentence(a)}"
-            yield f"      second: {sentence(b)}"
+            yield from (f"    {line}" for line in (f"  first:  {sentence(a)}", f"  second: {sentence(b)}"))
             yield from (f"      {line}" for line in _values(a, b))
         else:
             yield from (f"    only in the {name}: {e.ref}: {sentence(e)}"
@@ -110,10 +109,9 @@ def _entries(ours: tuple[EntryRecord[Any], ...], theirs: tuple[EntryRecord[Any],
 def _values(a: EntryRecord[Any], b: EntryRecord[Any]) -> list[str]:
     """The differing leaves of two records of the same entry."""
     pairs = (("author", a.author, b.author), ("change", a.change, b.change), ("rests on", a.because, b.because))
-    lines = [f"{name}: {short(x)} against {short(y)}" for name, x, y in pairs if x != y]
-    leaves = [f"{path}: {short(x)} against {short(y)}" for path, x, y in differing_leaves(a.fields, b.fields)]
+    leaves = [_against(*leaf) for leaf in differing_leaves(a.fields, b.fields)]
     more = [f"and {len(leaves) - MOST_VALUES} more values"] if len(leaves) > MOST_VALUES else []
-    return lines + leaves[:MOST_VALUES] + more
+    return [_against(*pair) for pair in pairs if pair[1] != pair[2]] + leaves[:MOST_VALUES] + more
 
 
 def differing_leaves(a: Any, b: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
@@ -132,33 +130,23 @@ def differing_leaves(a: Any, b: Any, path: str = "") -> Iterator[tuple[str, Any,
         yield path or "value", a, b
 
 
-def short(value: Any) -> str:
+def _against(path: str, a: Any, b: Any) -> str:
+    return f"{path}: {_short(a)} against {_short(b)}"
+
+
+def _short(value: Any) -> str:
     """A value in a few words."""
     text = f"{len(value)} values" if isinstance(value, list) and len(value) > 4 else str(value)
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
-def _to_text(key: str, d: DecisionRecord) -> str:
-    value = getattr(d, key)
+def _to_text(value: Any) -> str:
     if isinstance(value, tuple):
-        return ", ".join(_candidate(v) if isinstance(v, Candidate) else str(v) for v in value) or "nothing"
+        return ", ".join(map(_to_text, value)) or "nothing"
     if isinstance(value, Candidate):
-        return _candidate(value)
+        reason = f" ({value.reason})" if value.reason else ""
+        return f"{value.source} on {value.trigger} rated {value.rating:.4g}{reason}"
     return "nothing" if value in (None, "") else str(value).rstrip().splitlines()[-1]
-
-
-def _candidate(c: Candidate) -> str:
-    return f"{c.source} on {c.trigger} rated {c.rating:.4g}" + (f" ({c.reason})" if c.reason else "")
-
-
-def _what(d: DecisionRecord | None) -> str:
-    if d is None or d.chosen is None:
-        return "nothing is chosen"
-    return f"in cycle {d.cycle} {d.chosen.source} acts on {d.chosen.trigger}"
-
-
-MOST_SETTINGS = 8
-IGNORED = frozenset({"harvey", "code", "arithmetic", "folder", "world_sha256"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,38 +174,30 @@ def parting(ours: Timeline, theirs: Timeline, agreed: int) -> Parting:
         one, other = ours.cycle_of(cycle), theirs.cycle_of(cycle)
         if one is None or other is None:
             break
+        acts_otherwise = _to_action(one) != _to_action(other)
         observation = observation or _first(one.observed, other.observed)
-        acted = _to_action(one), _to_action(other)
-        if not source and acted[0] != acted[1]:
-            source = cycle
-        if not decision and (acted[0] != acted[1] or _first(one.made, other.made) or one.refused != other.refused):
-            decision = cycle
-        motion = motion or _first(_motions(one), _motions(other))
+        source = source or cycle * acts_otherwise
+        decision = decision or cycle * bool(acts_otherwise or _first(one.made, other.made)
+                                            or one.refused != other.refused)
+        motion = motion or _first(*([r for r in d.made if r.kind is MotorCommand] for d in (one, other)))
         if observation and decision and motion and source:
             break
     return Parting(observation, decision, motion, source)
 
 
-def _first(ours: tuple[EntryRecord[Any], ...], theirs: tuple[EntryRecord[Any], ...]) -> str:
+def _first(ours: Records, theirs: Records) -> str:
     """The first entry that is not the same in both."""
-    for a, b in zip(ours, theirs, strict=False):
-        if not same(a, b):
-            return a.ref
-    longer = ours if len(ours) > len(theirs) else theirs
-    return longer[min(len(ours), len(theirs))].ref if len(ours) != len(theirs) else ""
+    differing = (a or b for a, b in zip_longest(ours, theirs) if not same(a, b))
+    return next((one.ref for one in differing if one is not None), "")
 
 
-def same(a: EntryRecord[Any] | None, b: EntryRecord[Any] | None) -> bool:
+def same(a: Maybe, b: Maybe) -> bool:
     """Whether two runs say the same of an entry, to the last bit."""
     return a == b if a is None or b is None else a == b and as_line(a.fields) == as_line(b.fields)
 
 
 def _to_action(d: DecisionRecord) -> tuple[str, str]:
     return ("", "") if d.chosen is None else (d.chosen.source, d.chosen.trigger)
-
-
-def _motions(d: DecisionRecord) -> tuple[EntryRecord[Any], ...]:
-    return tuple(r for r in d.made if r.kind is MotorCommand)
 
 
 def grounds(ours: Timeline, theirs: Timeline, ref: str) -> Iterator[tuple[EntryRecord[Any], EntryRecord[Any]]]:
@@ -229,14 +209,12 @@ def grounds(ours: Timeline, theirs: Timeline, ref: str) -> Iterator[tuple[EntryR
     met, roots = [ref], list[str]()
     for name in met:  # which grows meanwhile
         below = _differing(ours, theirs, name)
-        if not below:
-            roots.append(name)
+        roots += [name] * (not below)
         for under in below:
             if under not in above:
                 above[under] = name
                 met.append(under)
-    oldest = min(roots, key=lambda name: (_cycle(ours, name), name), default=ref)
-    way = [oldest]
+    way = [min(roots, key=lambda name: (ours.cycle_of_ref(name), name), default=ref)]
     while above[way[-1]]:
         way.append(above[way[-1]])
     for name in reversed(way):
@@ -253,11 +231,6 @@ def _differing(ours: Timeline, theirs: Timeline, ref: str) -> list[str]:
     return [name for name, one, other in pairs if one is not None and other is not None and not same(one, other)]
 
 
-def _cycle(history: Timeline, ref: str) -> int:
-    record = history.entry(ref)
-    return 0 if record is None else record.cycle
-
-
 def settings(first: RunHead, second: RunHead) -> Iterator[str]:
     """What was set differently, and by which code and on what it was decided where both say so and differ."""
     if first.harvey != second.harvey:
@@ -267,9 +240,8 @@ def settings(first: RunHead, second: RunHead) -> Iterator[str]:
     if first.arithmetic and second.arithmetic and first.arithmetic != second.arithmetic:
         yield f"calculated on different processors: {first.arithmetic} against {second.arithmetic}"
     ours, theirs = (json.loads(json.dumps(asdict(head))) for head in (first, second))
-    keys = [key for key in {**ours, **theirs} if key not in IGNORED]
-    told = [f"{path}: {short(a)} against {short(b)}" for key in keys
-            for path, a, b in differing_leaves({key: ours.get(key)}, {key: theirs.get(key)})]
+    told = [_against(*leaf) for key in {**ours, **theirs} if key not in IGNORED
+            for leaf in differing_leaves({key: ours.get(key)}, {key: theirs.get(key)})]
     yield from told[:MOST_SETTINGS]
     if len(told) > MOST_SETTINGS:
         yield f"and {len(told) - MOST_SETTINGS} more"
@@ -282,23 +254,31 @@ def because(ours: Timeline, theirs: Timeline, agreed: int, settings: tuple[str, 
         yield from _tell_observation(ours, theirs, where)
     if where.decision:
         yield from _tell_decision(ours, theirs, where, settings)
-    if where.motion and where.motion not in (where.observation, ""):
-        yield from _tell_first_motion(ours, theirs, where.motion)
+    if where.motion and where.motion != where.observation:
+        yield from _tell_entry(ours, theirs, where.motion, "motion")
+        yield from _tell_grounds(ours, theirs, where.motion)
     if where.source and where.source != where.decision:
         yield from _others(ours, theirs, where.source)
 
 
 def _tell_observation(ours: Timeline, theirs: Timeline, where: Parting) -> Iterator[str]:
-    a, b = ours.entry(where.observation), theirs.entry(where.observation)
-    cycle = (a or b or EntryRecord("", "", "", "", (), None, 0, True)).cycle
+    cycle = _cycle(ours, theirs, where.observation)
     later = "" if not where.decision or cycle <= where.decision else ", after they had decided differently"
-    yield f"The first observation that differs is {where.observation}, in cycle {cycle}{later}:"
-    yield from _both(a, b)
-    if a is not None and b is not None and a.kind is Frame and b.kind is Frame:
+    yield from _tell_entry(ours, theirs, where.observation, "observation", later)
+    if all(one is not None and one.kind is Frame for one in (h.entry(where.observation) for h in (ours, theirs))):
         yield "  (the same picture was asked for, and another came: other noise, or the robot stood elsewhere)"
 
 
-def _both(a: EntryRecord[Any] | None, b: EntryRecord[Any] | None) -> Iterator[str]:
+def _tell_entry(ours: Timeline, theirs: Timeline, ref: str, what: str, later: str = "") -> Iterator[str]:
+    yield f"The first {what} that differs is {ref}, in cycle {_cycle(ours, theirs, ref)}{later}:"
+    yield from _both(ours.entry(ref), theirs.entry(ref))
+
+
+def _cycle(ours: Timeline, theirs: Timeline, ref: str) -> int:
+    return ours.cycle_of_ref(ref) or theirs.cycle_of_ref(ref)
+
+
+def _both(a: Maybe, b: Maybe) -> Iterator[str]:
     yield f"  first:  {sentence(a) if a else 'none'}"
     yield f"  second: {sentence(b) if b else 'none'}"
     if a is not None and b is not None:
@@ -309,33 +289,27 @@ def _both(a: EntryRecord[Any] | None, b: EntryRecord[Any] | None) -> Iterator[st
 
 def _tell_decision(ours: Timeline, theirs: Timeline, where: Parting, settings: tuple[str, ...]) -> Iterator[str]:
     one, other = ours.decision(where.decision), theirs.decision(where.decision)
+    head = "The first decision that differs is in cycle"
     if _to_action(one) != _to_action(other):
-        yield from _others(ours, theirs, where.decision, "The first decision that differs is in cycle")
+        yield from _others(ours, theirs, where.decision, head)
     else:
         ref = _first(one.made, other.made)
-        who = words.source(_to_action(one)[0])
-        yield f"The first decision that differs is in cycle {where.decision}, of the {who}: {ref or 'nothing'}"
-        yield from _both(_find_entry(one, ref), _find_entry(other, ref))
+        yield f"{head} {where.decision}, of the {words.source(_to_action(one)[0])}: {ref or 'nothing'}"
+        yield from _both(*(next((r for r in d.made if r.ref == ref), None) for d in (one, other)))
         if one.refused != other.refused:
             yield f"  refused in the {'first' if one.refused else 'second'}: {(one.refused or other.refused).strip()}"
         yield from _tell_grounds(ours, theirs, ref)
-    if not where.observation or _cycle(ours, where.observation) > where.decision:
+    if not where.observation or ours.cycle_of_ref(where.observation) > where.decision:
         yield from _minds(one, other, settings)
 
 
 def _minds(one: DecisionRecord, other: DecisionRecord, settings: tuple[str, ...]) -> Iterator[str]:
     """Everything that came from outside was the same: then who decides is not."""
-    only = [(name, sorted({c.source for c in a.activated} - {c.source for c in b.activated}))
-            for name, a, b in (("first", one, other), ("second", other, one))]
-    for name, sources in only:
-        if sources:
+    for name, a, b in (("first", one, other), ("second", other, one)):
+        if sources := sorted({c.source for c in a.activated} - {c.source for c in b.activated}):
             yield f"  able to act only in the {name}: {', '.join(map(words.source, sources))}"
     why = "see \"set differently\" above" if settings else "the runs name no setting that differs"
     yield f"Until then both observed the same, so the knowledge sources, their settings or their code differ: {why}."
-
-
-def _find_entry(d: DecisionRecord, ref: str) -> EntryRecord[Any] | None:
-    return next((r for r in d.made if r.ref == ref), None)
 
 
 def _tell_grounds(ours: Timeline, theirs: Timeline, ref: str) -> Iterator[str]:
@@ -343,14 +317,6 @@ def _tell_grounds(ours: Timeline, theirs: Timeline, ref: str) -> Iterator[str]:
     for a, b in list(grounds(ours, theirs, ref))[1:]:
         yield f"  because of {a.ref}" + (", which came from outside" if a.observed else "") + ":"
         yield from (f"  {line}" for line in _both(a, b))
-
-
-def _tell_first_motion(ours: Timeline, theirs: Timeline, ref: str) -> Iterator[str]:
-    a, b = ours.entry(ref), theirs.entry(ref)
-    cycle = (a or b or EntryRecord("", "", "", "", (), None, 0, True)).cycle
-    yield f"The first motion that differs is {ref}, in cycle {cycle}:"
-    yield from _both(a, b)
-    yield from _tell_grounds(ours, theirs, ref)
 
 
 def _others(
@@ -375,17 +341,14 @@ def apart(first: RunDirectory, second: RunDirectory, ours: Timeline, theirs: Tim
     a, b = first.read_result(), second.read_result()
     for key in ("outcome", "final_error_m", "sim_time_s", "path_length_m", "relocalizations", "collisions"):
         if key in a or key in b:
-            rows.append([key, *(_cell(result.get(key)) for result in (a, b))])
+            cells = (result.get(key) for result in (a, b))
+            rows.append([key, *(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells)])
     try:
         far, at = _furthest(ours, theirs)
     except STRANGE:
         far, at = 0.0, ""
     tail = f"\nthe two beliefs were furthest apart before {at}: {metres(far)}" if at else ""
     return table(["", "first", "second"], rows) + tail
-
-
-def _cell(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _furthest(ours: Timeline, theirs: Timeline) -> tuple[float, str]:
@@ -403,8 +366,3 @@ def _furthest(ours: Timeline, theirs: Timeline) -> tuple[float, str]:
         if away > far:
             far, at = away, a.id
     return far, at
-
-
-def agreement(agreed: int) -> str:
-    """How long the runs agree."""
-    return f"The two runs agree for {count(agreed, 'decision')}."

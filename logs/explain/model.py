@@ -4,7 +4,7 @@ from which file and line of it a locale, door, thing, landmark or face comes."""
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -31,19 +31,13 @@ Sentence = tuple[str, tuple[str, ...]]
 """A sentence, and the entries that say so."""
 
 
-def find_frames(history: Timeline, refs: Iterable[str]) -> dict[str, EntryRecord[Any]]:
+def find_frames(history: Timeline, refs: Iterable[str]) -> dict[str, EntryRecord[FrameReference]]:
     """The locale frames among some entries, by locale; of several revisions the first that is named."""
-    found: dict[str, EntryRecord[Any]] = {}
+    found: dict[str, EntryRecord[FrameReference]] = {}
     for ref in refs:
         record = history.entry(ref) if ref.startswith(FRAME) else None
         if record is not None:
-            found.setdefault(reference_of(record).locale, record)
-    return found
-
-
-def reference_of(record: EntryRecord[Any]) -> FrameReference:
-    """What the journal keeps of a locale frame. Raises BadInput."""
-    found: FrameReference = record.value
+            found.setdefault(record.value.locale, record)
     return found
 
 
@@ -52,30 +46,26 @@ def tell_used(history: Timeline, record: EntryRecord[Any]) -> Iterator[Sentence]
     used = () if record.observed else history.decision(record.cycle).used
     frames = find_frames(history, used)
     revised = [ref for ref in used if not ref.startswith(FRAME) and not ref.endswith(".0")]
-    changed = [name for name, frame in frames.items() if reference_of(frame).changes]
+    changed = [name for name, frame in frames.items() if frame.value.changes]
     named = list(dict.fromkeys((*changed, *frames)))[: max(MAX_LISTED, len(changed))]
     parts = [f"what was known of {listed([*named, *list(frames)[len(named):]], len(named))}"] * bool(named)
     parts += [f"the revised model of the robot itself ({', '.join(revised)})"] * bool(revised)
-    if not parts:
-        return
-    said = "".join(f"; {text}" for text in _changes(frames[name] for name in changed))
-    yield f"The act went by {' and by '.join(parts)}{said}.", (*(frames[name].ref for name in named), *revised)
+    if parts:
+        said = "".join(f"; {text}" for text in _changes(frames[name] for name in changed))
+        yield f"The act went by {' and by '.join(parts)}{said}.", (*(frames[name].ref for name in named), *revised)
 
 
 def tell_changes(history: Timeline, record: EntryRecord[Any]) -> Iterator[tuple[str, EntryRecord[Any]]]:
     """What the frames that an entry rests on hold otherwise than the world's file; of equal ones the first."""
-    told: set[str] = set()
-    for frame in find_frames(history, record.because).values():
-        text = listed(_changes([frame]), MAX_LISTED)
-        if text and text not in told:
-            told.add(text)
+    told = [(listed(_changes([frame]), MAX_LISTED), frame) for frame in find_frames(history, record.because).values()]
+    for number, (text, frame) in enumerate(told):
+        if text and text not in (before for before, _ in told[:number]):
             yield f"It was known otherwise than in the world's file: {text}.", frame
 
 
-def _changes(frames: Iterable[EntryRecord[Any]]) -> list[str]:
+def _changes(frames: Iterable[EntryRecord[FrameReference]]) -> list[str]:
     """What is said otherwise, each once."""
-    changes = (change for frame in frames for change in reference_of(frame).changes)
-    return list(dict.fromkeys(change.sentence() for change in changes))
+    return list(dict.fromkeys(change.sentence() for frame in frames for change in frame.value.changes))
 
 
 def tell_model_lines(history: Timeline, fix: EntryRecord[Any], world: WorldFile | None) -> Iterator[Sentence]:
@@ -91,8 +81,7 @@ def tell_model_lines(history: Timeline, fix: EntryRecord[Any], world: WorldFile 
     used = (*history.decision(expected.cycle).used, *history.decision(match.cycle).used)
     frames = find_frames(history, (*expected.because, *used))
     names = [name for name, _ in phrases.by_landmark(history, fix.value, match)]
-    held = {name: _find_holder(name, frames, world) for name in names}
-    locales = list(dict.fromkeys(locale for locale in held.values() if locale))
+    locales = [locale for locale in dict.fromkeys(_find_holder(name, frames, world) for name in names) if locale]
     if not locales:
         return
     where = [f"{landmark(name)} ({_find_line(name, world)})" for name in names if world and not world.missing]
@@ -102,17 +91,16 @@ def tell_model_lines(history: Timeline, fix: EntryRecord[Any], world: WorldFile 
     yield f"{text}.{lost}", tuple(frames[locale].ref for locale in locales[:MAX_LISTED])
 
 
-def _find_holder(name: str, frames: dict[str, EntryRecord[Any]], world: WorldFile | None) -> str:
+def _find_holder(name: str, frames: Mapping[str, EntryRecord[Any]], world: WorldFile | None) -> str:
     """The locale whose frame holds a landmark; that of an open door's casing is not in its name."""
     locale, slash, _ = name.partition("/")
-    if slash:
-        return locale if locale in frames else ""
-    element = None if world is None else world.element(name)
-    return "" if element is None else next((locale for locale in element.locales if locale in frames), "")
+    element = None if slash or world is None else world.element(name)
+    locales = (locale,) if slash else element.locales if element is not None else ()
+    return next((locale for locale in locales if locale in frames), "")
 
 
-def _find_line(name: str, world: WorldFile | None) -> str:
-    element = None if world is None else world.element(name)
+def _find_line(name: str, world: WorldFile) -> str:
+    element = world.element(name)
     return element.source if element is not None else "not in the world's file"
 
 
@@ -156,8 +144,7 @@ class WorldFile:
             locale = world.locale(name)
             return Element(name, locale.kind, (name,), _brief(locale.source))
         if (passage := world.find_passage(name)) is not None:
-            kind = getattr(passage, "kind", "open door")
-            return Element(name, kind, tuple(passage.between), _brief(passage.source))
+            return Element(name, getattr(passage, "kind", "open door"), tuple(passage.between), _brief(passage.source))
         frame = self._frame(name)
         return None if frame is None else _find_in(frame, name)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from textwrap import fill
 from typing import Any
 
@@ -21,7 +21,7 @@ from logs.records import WHAT_IF, Candidate, EntryRecord
 from logs.timeline import Timeline
 from world_models import words
 from world_models.building.locale_frame import FrameRequest
-from world_models.entries.body import Course, Frame, MotionReport, MotorCommand
+from world_models.entries.body import Course, MotionReport, MotorCommand
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
 from world_models.entries.task import Certificate, Goal, Leg, Milestone, PlanSketch
@@ -36,6 +36,8 @@ SLIGHT_RAD = math.radians(0.05)
 CORRECTED_BY: Mapping[Level, str] = {
     Level.ACTION: "on the move", Level.PLAN: "at a milestone", Level.GOAL: "by finding out anew where it is",
 }
+Find = Callable[[type[Any]], Any]
+"""Gives the value of the first entry of a kind that something rests on; None where there is none."""
 
 
 def capital(text: str) -> str:
@@ -49,6 +51,12 @@ def wrap(text: str, first: str = "", rest: str | None = None) -> str:
     return fill(text, WIDTH, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False)
 
 
+def named(text: str, refs: Iterable[str]) -> str:
+    """A text, and behind it in brackets the entries that say so."""
+    inside = ", ".join(refs)
+    return f"{text}  [{inside}]" if inside else text
+
+
 def sentence(record: EntryRecord[Any]) -> str:
     """One sentence, without the entry's name and without a full stop."""
     try:
@@ -56,6 +64,11 @@ def sentence(record: EntryRecord[Any]) -> str:
     except (BadInput, ValueError, TypeError, OverflowError):  # a kind, or fields, that this version does not know
         text = words.fields(record.fields)
     return f"{text}; no longer believed" if record.is_gone else text
+
+
+def plainly(record: EntryRecord[Any]) -> str:
+    """An entry's own sentence as a whole one."""
+    return f"{capital(sentence(record))}."
 
 
 def describe_decision(history: Timeline, record: EntryRecord[Any]) -> str:
@@ -66,51 +79,39 @@ def describe_decision(history: Timeline, record: EntryRecord[Any]) -> str:
         return f"It was revised in {when.rstrip(',')} by the question what if."
     if record.observed:
         return f"It came from outside, from {record.author}, and was taken up in {when.rstrip(',')}."
-    decision = history.decision(record.cycle)
-    text = f"Decided in {when} by the {words.source(record.author)}"
+    decision, text = history.decision(record.cycle), f"Decided in {when} by the {words.source(record.author)}"
     if decision.chosen is None:
         return text + "."
-    asked = tell_questions(history, record)
-    next_best = decision.runner_up
-    second = f"; next best was {describe_candidate(next_best)}" if next_best else "; nobody else could act"
-    return f"{text}, woken by {decision.chosen.trigger}, rated {decision.chosen.rating:.2f}{second}.{asked}"
+    second = f"; next best was {_bid(decision.runner_up)}" if decision.runner_up else "; nobody else could act"
+    return (f"{text}, woken by {decision.chosen.trigger}, rated {decision.chosen.rating:.2f}{second}."
+            f"{_tell_questions(history, record, decision.chosen)}")
 
 
-def describe_candidate(c: Candidate) -> str:
+def _bid(c: Candidate) -> str:
     return f"the {words.source(c.source)}, rated {c.rating:.2f}"
 
 
-def tell_questions(history: Timeline, record: EntryRecord[Any]) -> str:
+def _tell_questions(history: Timeline, record: EntryRecord[Any], chosen: Candidate) -> str:
     """What the act that made an entry had asked for before it came again; "" where it lacked nothing."""
-    chosen = history.decision(record.cycle).chosen
-    if record.observed or chosen is None or chosen.since == record.cycle:
-        return ""
-    asked: list[EntryRecord[Any]] = []
-    for request in history.of_kind(FrameRequest):
-        if request.revision or not chosen.since <= request.cycle < record.cycle:
-            continue
-        before = history.decision(request.cycle).chosen
-        if before is not None and before.number == chosen.number:
-            asked.append(request)
-    if not asked:
-        return ""
-    wanted = listed([f"{sentence(request).removeprefix('asks ')} ({request.ref})" for request in asked], MAX_LISTED)
-    return f" It had waited for an answer first: it asked for {wanted}."
+    asked = [] if chosen.since == record.cycle else [
+        request for request in history.of_kind(FrameRequest)
+        if not request.revision and chosen.since <= request.cycle < record.cycle
+        and (before := history.decision(request.cycle).chosen) is not None and before.number == chosen.number]
+    wanted = [f"{sentence(request).removeprefix('asks ')} ({request.ref})" for request in asked]
+    return f" It had waited for an answer first: it asked for {listed(wanted, MAX_LISTED)}." if wanted else ""
 
 
 def tell_answer(history: Timeline, request: EntryRecord[Any]) -> Iterator[tuple[str, tuple[str, ...]]]:
     """What became of the act that asked."""
     asked = history.entry(f"{request.id}.0") or request
-    decision = history.decision(asked.cycle)
-    if decision.chosen is None:
-        return
-    for later in history.naming(decision.chosen.trigger):
-        if later.cycle <= asked.cycle or later.chosen is None or later.chosen.number != decision.chosen.number:
-            continue
-        made = listed([record.ref for record in later.made], MAX_LISTED) or "nothing"
-        text = f"The act waited for the answer, and came again in cycle {later.cycle}: it made {made}."
-        yield text, tuple(record.ref for record in later.made[:MAX_LISTED])
-        return
+    act = history.decision(asked.cycle).chosen
+    for later in () if act is None else history.naming(act.trigger):
+        if act is not None and later.cycle > asked.cycle and later.chosen and later.chosen.number == act.number:
+            refs = tuple(record.ref for record in later.made)
+            made = listed(refs, MAX_LISTED) or "nothing"
+            yield (f"The act waited for the answer, and came again in cycle {later.cycle}: it made {made}.",
+                   refs[:MAX_LISTED])
+            return
 
 
 def place(p: Place) -> str:
@@ -124,9 +125,14 @@ def pose(h: Hypothesis) -> str:
     return f"{point(p.x_m, p.y_m)} of {h.locale}, heading {degrees(p.heading_rad)} ({sure})"
 
 
-def picture(frame: EntryRecord[Any] | None, ref: str = "") -> str:
-    """A picture by the name of its entry: ``Frame-49``."""
-    return frame.id if frame is not None else ref or "a picture"
+def believed(h: Hypothesis) -> str:
+    return f"It believed that it stood at {pose(h)}."
+
+
+def perhaps(hypotheses: Iterable[Hypothesis]) -> str:
+    """The places that come into question, with their weights, the likeliest first; "" where there are none."""
+    candidates = sorted((h for h in hypotheses if h.status == "candidate"), key=lambda h: -h.weight)
+    return listed([f"{h.place()} ({h.weight:.0%})" for h in candidates], MAX_LISTED)
 
 
 def line(leg: Leg, sketch: PlanSketch | None) -> str:
@@ -141,26 +147,23 @@ def line(leg: Leg, sketch: PlanSketch | None) -> str:
     beside = f"{metres(abs(leg.left_m))} to the {side} of" if abs(leg.left_m) >= 0.0005 else "on"
     text += f", it stood {beside} the line"
     if leg.status == "moving" and leg.aim_rad is not None:
-        text += f", and the point of the line that it steers at lay {turn(leg.aim_rad)} of where it faced"
-    else:
-        text += f", near enough within {metres(leg.tolerance_m)}"
-    return text + "."
+        return text + f", and the point of the line that it steers at lay {turn(leg.aim_rad)} of where it faced."
+    return text + f", near enough within {metres(leg.tolerance_m)}."
 
 
-def tracking(tracks: Tracks, frame: EntryRecord[Any] | None) -> str:
+def tracking(tracks: Tracks) -> str:
     """Which landmarks were found where, against where they were expected."""
-    found = tracks.found_again()
-    old = [t for t in tracks.items if t.template_frame != tracks.frame]
-    where = picture(frame, tracks.frame)
+    found, where = tracks.found_again(), tracks.frame
+    old = [t for t in tracks.items if t.template_frame != where]
     if not found:
         return f"In {where} none of {count(len(old), 'landmark')} that it follows was found." if old else (
             f"It chose {count(len(tracks.items), 'landmark')} of {where} to follow.")
     middle = sorted(math.hypot(*track.shift_px) for track in found)[len(found) // 2]
     return (f"In {where} it found {len(found)} of the {count(len(old), 'landmark')} that it follows; a corner of"
-            f" {off(found[0])}, the furthest of them; half of them were within {middle:.1f} px.")
+            f" {_off(found[0])}, the furthest of them; half of them were within {middle:.1f} px.")
 
 
-def off(track: Track) -> str:
+def _off(track: Track) -> str:
     """Where a landmark was, against its prediction."""
     (du, dv), (u, v) = track.shift_px, track.predicted_px
     parts = [f"{abs(du):.1f} px {'right' if du >= 0 else 'left'} of"] if abs(du) >= 0.05 else []
@@ -190,38 +193,25 @@ def describe_line_match(history: Timeline, record: EntryRecord[Any]) -> str:
     match, fix = history.reason(record, LineMatch), record.value
     if match is None:
         return f"The pose was solved from {fix.match}."
-    seen = history.reason(match, Segments)
-    by_name = by_landmark(history, fix, match)
-    where = f" in {picture(None if seen is None else history.reason(seen, Frame), 'a picture')}"
-    agreeing = int(fix.inliers.sum())
+    seen, by_name = history.because(match, Segments), by_landmark(history, fix, match)
+    where, agreeing = f" in {seen.frame if seen else 'a picture'}", int(fix.inliers.sum())
     if not by_name:
         return f"The pose was solved from {count(agreeing, 'pair')} of segment and model line{where}."
     (best, numbers), *others = by_name
     rest = [f"{landmark(name)} ({len(pairs)})" for name, pairs in others]
     more = f"; the other {agreeing - len(numbers)} with {listed(rest)}" if rest else ""
-    of_all = f" of {count(len(seen.value.segments_px), 'line segment')}" if seen is not None else ""
+    of_all = f" of {count(len(seen.segments_px), 'line segment')}" if seen is not None else ""
     lines = len(np.unique(match.value.pairs[fix.inliers][:, 0]))
     return (f"{agreeing}{of_all}{where} were matched with {count(lines, 'model line')}: {_segments(numbers)} with"
             f" {landmark(best)}{more}.")
 
 
-def best_pairs(history: Timeline, record: EntryRecord[Any], match: EntryRecord[Any]) -> str:
-    """The segments of the landmark with most of them: ``segments 12, 31 and 40 in Frame-88 against ...``."""
-    fix, seen = record.value, history.reason(match, Segments)
-    where = picture(None if seen is None else history.reason(seen, Frame))
-    by_name = by_landmark(history, fix, match)
-    if not by_name:
-        return f"{count(int(fix.inliers.sum()), 'pair')} in {where}"
-    best, numbers = by_name[0]
-    return f"{_segments(numbers)} in {where} against {landmark(best)}"
-
-
 def by_landmark(history: Timeline, fix: PoseFix, match: EntryRecord[Any]) -> list[tuple[str, list[int]]]:
     """Landmarks with the segments that agree with the pose, those with most segments first."""
-    expected = history.reason(match, Milestone)
-    if expected is None:
+    milestone = history.because(match, Milestone)
+    if milestone is None:
         return []
-    milestone, pairs = expected.value, match.value.pairs[fix.inliers].tolist()
+    pairs = match.value.pairs[fix.inliers].tolist()
     names = [milestone.landmarks[milestone.landmark_of[model]] for model, _ in pairs]
     return [(name, [segment for other, (_, segment) in zip(names, pairs, strict=True) if other == name])
             for name, _ in Counter(names).most_common()]
@@ -235,13 +225,12 @@ def verdict(certificate: Certificate, milestone: Milestone | None) -> str:
     """What was concluded, with the numbers that decided."""
     what = milestone_name(milestone) if milestone is not None else certificate.milestone
     chance = f"the probability that so much agrees at a wrong place is {certificate.p_false:.2g}"
-    away = (f"the pose is {metres(certificate.deviation_m)} and {degrees(abs(certificate.deviation_rad))} from what was"
-            " believed")
     if certificate.verdict != "verified":
         judged = f"(at the pose that was found; from the belief it expected {count(certificate.expected, 'line')})"
         return f"{what} was judged {certificate.verdict}: {certificate.reason} {judged}; {chance}."
+    off = f"{metres(certificate.deviation_m)} and {degrees(abs(certificate.deviation_rad))} from what was believed"
     return (f"{what} was verified: {certificate.reason} (up to {certificate.tolerance_px:.0f} px may be corrected);"
-            f" {away}; {chance}.")
+            f" the pose is {off}; {chance}.")
 
 
 def milestone_name(milestone: Milestone) -> str:
@@ -260,32 +249,32 @@ def expectation(milestone: Milestone) -> str:
 
 def plan(sketch: PlanSketch) -> str:
     """Which sketch, how far along."""
-    subgoals, where = sketch.subgoals, sketch.where()
-    end = place(subgoals[-1].destination)
+    where, end = sketch.where(), place(sketch.subgoals[-1].destination)
+    part = f"part {sketch.at + 1} of {len(sketch.subgoals)}"
     if sketch.status == "done":
         return f"Its plan {where} was carried out to its end, {end}."
     if sketch.status != "active":
-        return f"Its plan {where} was {sketch.status} in part {sketch.at + 1} of {len(subgoals)}."
+        return f"Its plan {where} was {sketch.status} in {part}."
     if sketch.current is None:
         return f"This is in its plan {where}: at its end, {end}."
-    by = f" by {sketch.current.passage}" if sketch.current.passage else ""
-    to = f"to {place(sketch.current.destination)}{by}"
-    return f"This is in its plan {where}: part {sketch.at + 1} of {len(subgoals)}, {to}."
+    return f"This is in its plan {where}: {part}, to {steps([sketch.current])}."
+
+
+def steps(subgoals: Iterable[Any]) -> str:
+    """Where some subgoals lead, one after the other."""
+    return ", then ".join(place(s.destination) + (f" by {s.passage}" if s.passage else "") for s in subgoals)
 
 
 def goal(value: Goal) -> str:
+    said = {"reached": "The goal was reached", "abandoned": "The goal was given up for a new one"}
     way = f"from {place(value.origin)} to {place(value.destination)}"
-    if value.status == "reached":
-        return f"The goal was reached: {way}."
-    if value.status == "abandoned":
-        return f"The goal was given up for a new one: {way}."
-    return f"All of it serves the goal: {way}."
+    return f"{said.get(value.status, 'All of it serves the goal')}: {way}."
 
 
-def describe_segments(segments: Segments, frame: EntryRecord[Any] | None) -> str:
+def describe_segments(segments: Segments) -> str:
     """``179 line segments in Frame-49 (contrast 41 of 255)``."""
     found = count(len(segments.segments_px), "line segment")
-    return f"{found} in {picture(frame, segments.frame)} (contrast {segments.contrast:.0f} of 255)"
+    return f"{found} in {segments.frame} (contrast {segments.contrast:.0f} of 255)"
 
 
 def doubt(d: Discrepancy) -> str:
@@ -293,54 +282,49 @@ def doubt(d: Discrepancy) -> str:
     bound = f"; up to {quantity(d.bound, d.unit)} may be corrected there" if math.isfinite(d.bound) else ""
     large = "" if d.magnitude is None else f" ({size(d.magnitude, d.unit)}{bound})"
     came = {"escalated": ", so the next level had to deal with it", "corrected": ", and was corrected"}
-    return f"Something was not as expected, to be dealt with {CORRECTED_BY[d.level]}: {d.what}{large}" + (
-        came.get(d.status, "") + ".")
+    end = f"{d.what}{large}{came.get(d.status, '')}."
+    return f"Something was not as expected, to be dealt with {CORRECTED_BY[d.level]}: {end}"
+
+
+def motive(find: Find) -> Iterator[str]:
+    """Why a motion was commanded, by what it rests on."""
+    leg, milestone, segments = find(Leg), find(Milestone), find(Segments)
+    if leg is not None and leg.aim_rad is not None:
+        yield f"because the line to follow lay {turn(leg.aim_rad)} of where it believed that it faced"
+    elif milestone is not None:
+        yield f"because it had to face {milestone_name(milestone)} to look for it"
+    elif leg is None and segments is not None:
+        yield f"because it did not know where it was, and did not find it out from {describe_segments(segments)}"
 
 
 def in_one_sentence(history: Timeline, command: EntryRecord[Any]) -> str:
     """Why the robot moved as it did; "" for entries that are no motor command."""
     if command.kind not in (MotorCommand, Course):
         return ""
-    parts = list(_because(history, command))
+    belief = history.reason(command, Hypothesis)
+    parts = [*motive(lambda kind: history.because(command, kind)),
+             *(() if belief is None else (*_tell_worst_landmark(history, belief), *_tell_match(history, belief)))]
     return f"Harvey was told to {sentence(command)} {', '.join(parts)}." if parts else ""
 
 
-def _because(history: Timeline, command: EntryRecord[Any]) -> Iterator[str]:
-    leg, milestone = history.reason(command, Leg), history.reason(command, Milestone)
-    belief = history.reason(command, Hypothesis)
-    aim_rad = None if leg is None else leg.value.aim_rad
-    if aim_rad is not None:
-        yield f"because the line to follow lay {turn(aim_rad)} of where it believed that it faced"
-    elif milestone is not None:
-        yield f"because it had to face {milestone_name(milestone.value)} to look for it"
-    elif leg is None and (segments := history.reason(command, Segments)) is not None:
-        seen = describe_segments(segments.value, history.reason(segments, Frame))
-        yield f"because it did not know where it was, and did not find it out from {seen}"
-    if belief is not None:
-        yield from _describe_worst_landmark(history, belief)
-        yield from _describe_match(history, belief)
-
-
-def _describe_worst_landmark(history: Timeline, belief: EntryRecord[Any]) -> Iterator[str]:
+def _tell_worst_landmark(history: Timeline, belief: EntryRecord[Any]) -> Iterator[str]:
     """The landmark that was furthest from its prediction, and the pose that the prediction was made from."""
     tracks, before = history.tracks_of(belief), history.reason(belief, Hypothesis)
-    if belief.value.basis != "tracks" or tracks is None or before is None:
-        return
-    value = tracks.value
-    if not value.found_again():
-        return
-    frame = picture(history.reason(belief, Frame), value.frame)
-    yield f"because in {frame} {off(value.found_again()[0])} ({tracks.ref})"
-    yield f"made from pose {before.ref}"
+    if belief.value.basis == "tracks" and tracks and before and (found := tracks.value.found_again()):
+        yield f"because in {tracks.value.frame} {_off(found[0])} ({tracks.ref})"
+        yield f"made from pose {before.ref}"
 
 
-def _describe_match(history: Timeline, belief: EntryRecord[Any]) -> Iterator[str]:
-    """The match that the belief goes back to."""
+def _tell_match(history: Timeline, belief: EntryRecord[Any]) -> Iterator[str]:
+    """The match that the belief goes back to, by the landmark of which most segments agree with it."""
     anchor = history.anchor_of(belief)
     fix = None if anchor is None else history.reason(anchor, PoseFix)
     match = None if fix is None else history.reason(fix, LineMatch)
-    whose = "" if belief.value.basis == "tracks" else "where its pose was "
     if fix is not None and match is not None:
-        yield f"{whose}made from match {match.id} of {best_pairs(history, fix, match)}"
+        seen, by_name = history.because(match, Segments), by_landmark(history, fix.value, match)
+        where = f"in {seen.frame if seen else 'a picture'}"
+        best = f"{_segments(by_name[0][1])} {where} against {landmark(by_name[0][0])}" if by_name else (
+            f"{count(int(fix.value.inliers.sum()), 'pair')} {where}")
+        yield f"{'' if belief.value.basis == 'tracks' else 'where its pose was '}made from match {match.id} of {best}"
     elif anchor is not None:
         yield f"made from pose {anchor.ref} by {anchor.value.basis}"

@@ -1,4 +1,4 @@
-"""What a story is made of: sentences, each with the cycle that it tells of, in sections."""
+"""A run told in a page of text: sentences, each with the cycle that it tells of, and a table of milestones."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from logs.errors import BadInput
 from logs.explain import phrases
-from logs.explain.phrases import STRANGE, capital, sentence, wrap
-from logs.explain.turning_points import TurningPoint, read_collisions, read_turning_points, turn_lines
-from logs.records import EntryRecord
+from logs.explain.phrases import STRANGE, capital, named, plainly, sentence, wrap
+from logs.explain.turning_points import TurningPoint, at, read_collisions, read_turning_points, turn_lines
+from logs.records import EntryRecord, is_a
 from logs.run_directory import RunDirectory
 from logs.tables import table
 from logs.timeline import Timeline
@@ -28,6 +28,26 @@ from world_models.entries.robot import CameraState, find_camera_lessons
 from world_models.entries.task import Certificate, Command, Goal, Milestone, Outcome, PlanSketch
 from world_models.entries.told import Redirection, Told
 from world_models.words import count, listed, metres
+
+WITHOUT: Mapping[str, str] = {
+    "action": "no landmark was followed, and it drove by dead reckoning between milestones",
+    "plan": "no pose was taken over from a milestone",
+    "goal": "a robot that is lost does not look for where it is",
+}
+"""What it means that a level is off."""
+WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, Told, Redirection)
+"""What changes the knowledge of a locale."""
+PLANS: tuple[type[Any], ...] = (Goal, PlanSketch)
+MOST_PLACES = 4
+"""So many places that came into question are told, the newest."""
+COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong")
+MOST_ROWS = 60
+"""Of more rows only those are printed that were not verified, and the last ones."""
+MILESTONES = "Milestones"
+LEGEND = """\
+Places are in metres in each room's own frame. Times are by the body's clock. All of it is from the journal, as the
+robot knew it, except where the simulator is named. Names in brackets are entries: ask on with harvey why RUN NAME, or
+with harvey why RUN --at CYCLE."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,18 +75,52 @@ class Section:
     sentences: tuple[Sentence, ...]
 
 
-def sentence_of(history: Timeline, text: str, record: EntryRecord[Any], *others: EntryRecord[Any] | None) -> Sentence:
-    """A sentence that a record tells, in its cycle; ``others`` say so too."""
-    refs = dict.fromkeys(one.ref for one in (record, *others) if one is not None)
-    return Sentence(text, record.cycle, history.time_at(record.cycle), tuple(refs))
+@dataclass(frozen=True, slots=True)
+class MilestoneRow:
+    """What became of a milestone.
+
+    Attributes:
+        cycle: of the verdict; of a milestone that was not judged its last.
+        time_s: since the run began; None where nothing told it.
+        name: ``M1 of hallway``, or ``check of the belief``.
+        verdict: verified, refuted, not testable; or withdrawn, expected, turning.
+        expected, matched: numbers of model lines.
+        deviation_m, deviation_rad: from the belief that predicted it; None where it was not judged.
+        p_false: probability that so much agrees at a wrong place.
+        refs: certificate and milestone.
+    """
+
+    cycle: int
+    time_s: float | None
+    name: str
+    verdict: str
+    expected: int
+    matched: int
+    deviation_m: float | None
+    deviation_rad: float | None
+    p_false: float | None
+    refs: tuple[str, ...]
 
 
-WITHOUT: Mapping[str, str] = {
-    "action": "no landmark was followed, and it drove by dead reckoning between milestones",
-    "plan": "no pose was taken over from a milestone",
-    "goal": "a robot that is lost does not look for where it is",
-}
-"""What it means that a level is off."""
+@dataclass(frozen=True, slots=True)
+class RunStory:
+    """What happened in a run.
+
+    Attributes:
+        opening: its first lines.
+        turning_points: all of them, as the robot knew them.
+        sections: what happened, by subject.
+        milestones: what became of each.
+    """
+
+    opening: tuple[str, ...]
+    turning_points: tuple[TurningPoint, ...]
+    sections: tuple[Section, ...]
+    milestones: tuple[MilestoneRow, ...]
+
+    def record(self) -> dict[str, Any]:
+        """As JSON types."""
+        return asdict(self)
 
 
 def run_name(run: RunDirectory) -> str:
@@ -99,46 +153,83 @@ def _head(run: RunDirectory) -> dict[str, Any]:
     return head if isinstance(head, dict) else {}
 
 
-WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, Told, Redirection)
-"""What changes the knowledge of a locale."""
+def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
+    """Which run it is, how it ended, and what went wrong on the way: the first lines of a story.
+
+    Raises:
+        BadInput: the journal has no decision, or ``result.json`` is malformed.
+    """
+    if not history.cycles:
+        history.verify()
+        raise BadInput(f"{history.source}: expected at least one decision, got none")
+    try:
+        outcome = _outcome(history)
+        cycle = history.cycles[-1] if outcome is None else outcome.cycle
+        time_s = history.time_at(cycle)
+        when = f"in cycle {cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run")
+        yield f"{run_name(run)}: {'cut off' if outcome is None else outcome.value.kind} {when}."
+        yield from levels_off(run)
+        yield from turn_lines(history, run.read_result())
+    except STRANGE as error:
+        raise _strange(history, error) from error
+
+
+def first_lines(path: Path | None) -> tuple[str, ...]:
+    """As :func:`opening`, of a run that has just ended; none where it is not on the disk."""
+    if path is None:
+        return ()
+    run = RunDirectory(path)
+    return tuple(opening(run, Timeline(run.journal)))
+
+
+def tell_run(run: RunDirectory, history: Timeline) -> RunStory:
+    """The story of a run. Raises BadInput where journal or ``result.json`` cannot be read as this version's."""
+    first, result = tuple(opening(run, history)), run.read_result()
+    try:
+        turns = tuple(read_turning_points(history))
+        sections = (
+            tell_errand(history), tell_plans(history), tell_lost(history), tell_contacts(history, turns, result),
+            tell_things(turns), tell_camera(history), tell_end(history, result))
+        return RunStory(first, turns, sections, read_milestones(history))
+    except STRANGE as error:
+        raise _strange(history, error) from error
+
+
+def _strange(history: Timeline, error: Exception) -> BadInput:
+    return BadInput(f"{history.source}: expected entries as this version writes them, got others ({error!r})")
+
+
+def _said(history: Timeline, text: str, record: EntryRecord[Any], *others: EntryRecord[Any] | None) -> Sentence:
+    """A sentence that a record tells, in its cycle; ``others`` say so too."""
+    refs = dict.fromkeys(one.ref for one in (record, *others) if one is not None)
+    return Sentence(text, record.cycle, history.time_at(record.cycle), tuple(refs))
 
 
 def tell_errand(history: Timeline) -> Section:
     """What was asked for, and what it was told on the way."""
-    told = (record for record in history.of_kind(Command, Told, Redirection) if record.observed)
-    return Section("What it was to do", tuple(
-        sentence_of(history, f"{capital(sentence(record))}.", record) for record in told))
+    told = [_said(history, plainly(r), r) for r in history.of_kind(Command, Told, Redirection) if r.observed]
+    return Section("What it was to do", tuple(told))
 
 
 def tell_plans(history: Timeline) -> Section:
     """Each goal, each sketch, and each that was withdrawn."""
-    told: list[Sentence] = []
-    for record in history.of_kind(Goal, PlanSketch):
-        text = _goal(record) if record.kind is Goal else _sketch(history, record)
-        told += [sentence_of(history, text, record)] if text else []
-    return Section("How it planned", tuple(told))
+    told = [(_plan(history, record), record) for record in history.of_kind(*PLANS)]
+    return Section("How it planned", tuple(_said(history, text, record) for text, record in told if text))
 
 
-def _goal(record: EntryRecord[Any]) -> str:
-    return f"{capital(sentence(record))}." if record.is_new or record.fields["status"] != "active" else ""
-
-
-def _sketch(history: Timeline, record: EntryRecord[Any]) -> str:
+def _plan(history: Timeline, record: EntryRecord[Any]) -> str:
     sketch = record.value
+    if isinstance(sketch, Goal):
+        return plainly(record) if record.is_new or not sketch.is_active else ""
     if record.is_new:
         look = "to look from elsewhere, " if sketch.is_look else ""
-        return f"Plan {look}{sketch.where()}, {count(len(sketch.subgoals), 'part')}: to {_steps(sketch)}."
-    if not record.is_gone and sketch.status == "superseded":
-        causes = listed([cause for ref in record.because if (cause := _cause(history, ref))]) or "it no longer held"
-        part = f"in part {sketch.at + 1} of {len(sketch.subgoals)}"
-        return f"The plan {sketch.where()} was withdrawn {part}, because of this: {causes}."
-    return ""
-
-
-def _steps(sketch: PlanSketch) -> str:
-    return ", then ".join(
-        phrases.place(step.destination) + (f" by {step.passage}" if step.passage else "") for step in sketch.subgoals
-    )
+        parts = count(len(sketch.subgoals), "part")
+        return f"Plan {look}{sketch.where()}, {parts}: to {phrases.steps(sketch.subgoals)}."
+    if record.is_gone or sketch.status != "superseded":
+        return ""
+    causes = listed([cause for ref in record.because if (cause := _cause(history, ref))]) or "it no longer held"
+    part = f"in part {sketch.at + 1} of {len(sketch.subgoals)}"
+    return f"The plan {sketch.where()} was withdrawn {part}, because of this: {causes}."
 
 
 def _cause(history: Timeline, ref: str) -> str:
@@ -154,78 +245,49 @@ def _cause(history: Timeline, ref: str) -> str:
     return sentence(record).partition(";")[0]
 
 
-MOST_PLACES = 4
-"""So many places that came into question are told, the newest."""
-
-
 def tell_lost(history: Timeline) -> Section:
-    """Each time that it was lost."""
+    """Each time that it was lost: that nobody below the goal level could correct where it believed to be."""
     told: list[Sentence] = []
-    lost = [record for record in history.of_kind(Discrepancy) if is_lost(record)]
-    found = [record for record in history.of_kind(Hypothesis) if is_found(record)]
-    for record in lost:
-        until = next((one for one in found if one.cycle >= record.cycle), None)
-        told += sorted(_tell_loss(history, record, until), key=lambda one: one.cycle or 0)
+    found = [record for record in history.of_kind(Hypothesis)
+             if not record.is_gone and record.field("basis") == "relocalization" and record.value.is_held]
+    for record in history.of_kind(Discrepancy):
+        is_escalated = not record.is_gone and record.field("status") == "escalated"
+        if is_escalated and record.value.level.above is Level.GOAL:
+            until = next((one for one in found if one.cycle >= record.cycle), None)
+            told += sorted(_tell_loss(history, record, until), key=lambda one: one.cycle or 0)
     return Section("Lost and found", tuple(told) or (Sentence("It was never lost."),))
 
 
-def is_lost(record: EntryRecord[Discrepancy]) -> bool:
-    """Whether with it the robot no longer knew where it was: nobody below the goal level could correct it."""
-    if record.is_gone or record.fields.get("status") != "escalated":
-        return False
-    return record.value.level.above is Level.GOAL
-
-
-def is_found(record: EntryRecord[Hypothesis]) -> bool:
-    """Whether with it the robot knew where it was again."""
-    if record.is_gone or record.fields.get("basis") != "relocalization":
-        return False
-    return record.value.is_held
-
-
-def _tell_loss(history: Timeline, lost: EntryRecord[Any], found: EntryRecord[Any] | None) -> Iterator[Sentence]:
-    below = history.nearest(lost, Hypothesis)
-    where = "" if below is None else f" It believed that it stood at {phrases.pose(below.value)}."
-    yield sentence_of(history, f"It was lost: {lost.value.what}.{where}", lost, below)
-    yield from _tell_reasons(history, lost)
-    yield from _tell_search(history, lost, found)
+def _tell_loss(
+    history: Timeline, lost: EntryRecord[Discrepancy], found: EntryRecord[Hypothesis] | None
+) -> Iterator[Sentence]:
+    what, below = lost.value.what, history.nearest(lost, Hypothesis)
+    where = "" if below is None else f" {phrases.believed(below.value)}"
+    yield _said(history, f"It was lost: {what}.{where}", lost, below)
+    if (certificate := history.nearest(lost, Certificate)) is not None:
+        verdict = f"{certificate.value.verdict}: {certificate.value.reason}"
+        yield _said(history, f"The last verdict on a milestone was {verdict}.", certificate)
+    began = next((one for one in history.within(lost) if is_a(one, Discrepancy) and one.value.what != what), None)
+    if began is not None:
+        yield _said(history, f"It began to doubt: {began.value.what}.", history.entry(f"{began.id}.0") or began)
+    yield from _tell_search(history, lost, history.cycles[-1] if found is None else found.cycle)
     if found is None:
         yield Sentence("It did not find out where it was.", history.cycles[-1], history.time_at(history.cycles[-1]))
         return
-    now = found.value
+    now, then_s, now_s = found.value, history.time_at(lost.cycle), history.time_at(found.cycle)
+    later = f"{count(found.cycle - lost.cycle, 'cycle')} later"
+    later += "" if then_s is None or now_s is None else f", after {now_s - then_s:.1f} s"
     how = f": {now.evidence}" if now.evidence else ""
-    at = f"at {phrases.pose(now)}{_apart(below, now)}{how}"
-    yield sentence_of(history, f"It found out where it was, {_after(history, lost, found)}: {at}.", found)
+    where = f"{phrases.pose(now)}{'' if below is None else _apart(below.value, now)}{how}"
+    yield _said(history, f"It found out where it was, {later}: at {where}.", found)
 
 
-def _tell_reasons(history: Timeline, lost: EntryRecord[Any]) -> Iterator[Sentence]:
-    """The verdict that it was lost by, and with what the doubt had begun."""
-    certificate = history.nearest(lost, Certificate)
-    if certificate is not None:
-        yield sentence_of(history, f"{_verdict(certificate.value)}.", certificate)
-    what = lost.value.what
-    for record in history.within(lost):
-        if record.kind is Discrepancy and record.value.what != what:
-            first = _first(history, record)
-            yield sentence_of(history, f"It began to doubt: {record.value.what}.", first)
-            return
-
-
-def _verdict(certificate: Certificate) -> str:
-    return f"The last verdict on a milestone was {certificate.verdict}: {certificate.reason}"
-
-
-def _first(history: Timeline, record: EntryRecord[Any]) -> EntryRecord[Any]:
-    return history.entry(f"{record.id}.0") or record
-
-
-def _tell_search(history: Timeline, lost: EntryRecord[Any], found: EntryRecord[Any] | None) -> Iterator[Sentence]:
+def _tell_search(history: Timeline, lost: EntryRecord[Any], last: int) -> Iterator[Sentence]:
     """How many pictures it took to find itself, and which places came into question."""
-    last = found.cycle if found is not None else history.cycles[-1]
     looks = [record for record in history.of_kind(Look, until=last)
              if record.cycle >= lost.cycle and record.value.purpose == "probe"]
     candidates = [record for record in history.of_kind(Hypothesis, until=last)
-                  if record.cycle >= lost.cycle and record.is_new and record.fields["status"] == "candidate"]
+                  if record.cycle >= lost.cycle and record.is_new and record.field("status") == "candidate"]
     if not looks and not candidates:
         return
     text = f"To find out where it was it took {count(len(looks), 'picture')}"
@@ -233,20 +295,11 @@ def _tell_search(history: Timeline, lost: EntryRecord[Any], found: EntryRecord[A
         places = [f"{record.value.place()} ({record.value.weight:.0%})" for record in candidates]
         text += f"; it may have stood at {listed(places, MOST_PLACES)}"
     first = min((*looks, *candidates), key=lambda record: record.cycle)
-    yield sentence_of(history, f"{text}.", first, *candidates)
+    yield _said(history, f"{text}.", first, *candidates)
 
 
-def _after(history: Timeline, lost: EntryRecord[Any], found: EntryRecord[Any]) -> str:
-    text = f"{count(found.cycle - lost.cycle, 'cycle')} later"
-    then, now = history.time_at(lost.cycle), history.time_at(found.cycle)
-    return text if then is None or now is None else f"{text}, after {now - then:.1f} s"
-
-
-def _apart(believed: EntryRecord[Any] | None, now: Hypothesis) -> str:
+def _apart(before: Hypothesis, now: Hypothesis) -> str:
     """How far that is from where it had believed to be, where both are in one frame."""
-    if believed is None:
-        return ""
-    before = believed.value
     if before.locale != now.locale:
         return f", and not in {before.locale}"
     return f", {metres(now.locale_from_robot.distance_to(before.locale_from_robot))} from where it had believed"
@@ -254,103 +307,89 @@ def _apart(believed: EntryRecord[Any] | None, now: Hypothesis) -> str:
 
 def tell_contacts(history: Timeline, turns: tuple[TurningPoint, ...], result: Mapping[str, Any]) -> Section:
     """What it felt; and, where the simulator says so, what it truly touched."""
-    told = _sentences(turns, "contact") or [Sentence("It felt no contact.")]
     truly = [Sentence(f"It truly touched something at {point.text}.", point.cycle, point.time_s)
              for point in read_collisions(history, result)]
-    told += truly
+    told = [*(_points(turns, "contact") or [Sentence("It felt no contact.")]), *truly]
     if result.get("collisions") is None:
-        nobody = "What it touched without feeling it nobody recorded: there is no result of the simulator."
-        told.append(Sentence(nobody))
+        told += [Sentence("What it touched without feeling it nobody recorded: there is no result of the simulator.")]
     elif (missing := result["collisions"] - len(truly)) > 0:
-        told.append(Sentence(f"The simulator counts {missing} more, and does not say where."))
+        told += [Sentence(f"The simulator counts {missing} more, and does not say where.")]
     return Section("What it touched", tuple(told))
 
 
 def tell_things(turns: tuple[TurningPoint, ...]) -> Section:
     """Doors found shut, things in the way, and what became of them; faults of its body."""
     nothing = Sentence("No door was found otherwise than known, nothing stood in the way, and nothing failed.")
-    told = _sentences(turns, "door", "thing", "fault", "resumed") or [nothing]
+    told = _points(turns, "door", "thing", "fault", "resumed") or [nothing]
     return Section("Doors, things in the way and faults", tuple(told))
 
 
-def tell_camera(history: Timeline) -> Section:
-    """What has turned out to be otherwise about the camera than told: each since when it was so to the end."""
-    records = list(history.of_kind(CameraState))
-    states = [record.value for record in records]
-    lessons = [find_camera_lessons(states[0], state) for state in states]
-    told: list[Sentence] = []
-    for lesson in lessons[-1] if lessons else ():
-        since = next(
-            i for i, _ in enumerate(lessons) if all(lesson.what in (one.what for one in later) for later in lessons[i:])
-        )
-        told.append(sentence_of(history, f"The {lesson.text()}; known since then.", records[since], records[-1]))
-    return Section("The camera", tuple(told) or (Sentence("The camera was found to be as told."),))
-
-
-def _sentences(turns: tuple[TurningPoint, ...], *kinds: str) -> list[Sentence]:
+def _points(turns: tuple[TurningPoint, ...], *kinds: str) -> list[Sentence]:
     """The turning points of some kinds."""
     return [Sentence(f"{capital(point.text)}.", point.cycle, point.time_s) for point in turns if point.kind in kinds]
 
 
-COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong")
-MOST_ROWS = 60
-"""Of more rows only those are printed that were not verified, and the last ones."""
+def tell_camera(history: Timeline) -> Section:
+    """What has turned out to be otherwise about the camera than told: each since when it was so to the end."""
+    records, told = list(history.of_kind(CameraState)), list[Sentence]()
+    lessons = [find_camera_lessons(records[0].value, record.value) for record in records]
+    for lesson in lessons[-1] if lessons else ():
+        has_it = [any(one.what == lesson.what for one in then) for then in lessons]
+        since = max((i for i, has in enumerate(has_it) if not has), default=-1) + 1
+        told.append(_said(history, f"The {lesson.text()}; known since then.", records[since], records[-1]))
+    return Section("The camera", tuple(told) or (Sentence("The camera was found to be as told."),))
 
 
-@dataclass(frozen=True, slots=True)
-class MilestoneRow:
-    """What became of a milestone.
+def _outcome(history: Timeline) -> EntryRecord[Outcome] | None:
+    """The outcome of a run; None where it has none."""
+    return next(iter([*history.of_kind(Outcome)][-1:]), None)
 
-    Attributes:
-        cycle: of the verdict; of a milestone that was not judged its last.
-        time_s: since the run began; None where nothing told it.
-        name: ``M1 of hallway``, or ``check of the belief``.
-        verdict: verified, refuted, not testable; or withdrawn, expected, turning.
-        expected, matched: numbers of model lines.
-        deviation_m, deviation_rad: from the belief that predicted it; None where it was not judged.
-        p_false: probability that so much agrees at a wrong place.
-        refs: certificate and milestone.
-    """
 
-    cycle: int
-    time_s: float | None
-    name: str
-    verdict: str
-    expected: int
-    matched: int
-    deviation_m: float | None
-    deviation_rad: float | None
-    p_false: float | None
-    refs: tuple[str, ...]
+def tell_end(history: Timeline, result: Mapping[str, Any]) -> Section:
+    """The outcome, the last belief, and the errors that only the simulator knows."""
+    outcome = _outcome(history)
+    told = [] if outcome is None else [_said(history, plainly(outcome), outcome)]
+    beliefs = (history.entry(ref) for ref in reversed(history.refs) if ref.startswith("Hypothesis-"))
+    last = next((record for record in beliefs if record is not None and record.value.is_held), None)
+    if last is not None:
+        now = history.newest[last.id] == last.ref and history.retraction(last.ref) is None
+        text = "It believed that it stood at" if now else "The last place where it had believed to stand was"
+        told.append(_said(history, f"{text} {phrases.pose(last.value)}.", last))
+    truth = ", ".join(_truth(result))
+    told.append(Sentence(f"In truth, by the simulator's result.json: {truth}." if truth else
+                         "Where it truly was nobody recorded: there is no result of the simulator."))
+    return Section("How it ended", tuple(told))
+
+
+def _truth(result: Mapping[str, Any]) -> Iterator[str]:
+    off_m, touched, path_m = (result.get(key) for key in ("final_error_m", "collisions", "path_length_m"))
+    if off_m is None:
+        return
+    yield f"it stood {metres(off_m)} from the goal"
+    if path_m is not None:
+        yield f"had driven {path_m:.1f} m"
+    if touched is not None:
+        yield f"had touched something {count(touched, 'time')}" if touched else "had touched nothing"
+    wrong = (result.get("milestones") or {}).get("false_accepts")
+    if isinstance(wrong, int):
+        yield f"and accepted {count(wrong, 'milestone')} wrongly" if wrong else "and accepted no milestone wrongly"
 
 
 def read_milestones(history: Timeline) -> tuple[MilestoneRow, ...]:
     """Every verdict of a run, and every milestone that got none, in the order of time."""
-    rows = [*_judged(history)]
-    judged = {ref.rpartition(".")[0] for row in rows for ref in row.refs}
-    rows += _not_judged(history, judged)
-    return tuple(sorted(rows, key=lambda row: row.cycle))
-
-
-def _judged(history: Timeline) -> Iterator[MilestoneRow]:
+    rows: list[MilestoneRow] = []
     for record in history.of_kind(Certificate):
-        if record.is_gone:
-            continue
-        certificate, below = record.value, history.reason(record, Milestone)
-        name = certificate.milestone if below is None else _name(below)
-        refs = (record.ref, below.ref if below is not None else f"{certificate.milestone}.0")
-        yield MilestoneRow(
-            record.cycle, history.time_at(record.cycle), name, certificate.verdict, certificate.expected,
-            certificate.matched, certificate.deviation_m, certificate.deviation_rad, certificate.p_false, refs)
-
-
-def _not_judged(history: Timeline, judged: set[str]) -> Iterator[MilestoneRow]:
-    for id, ref in history.newest.items():
-        record = history.entry(ref) if id.startswith("Milestone-") and id not in judged else None
-        if record is not None:
-            yield MilestoneRow(
-                record.cycle, history.time_at(record.cycle), _name(record), str(record.fields["status"]),
-                len(record.fields["expected"]), 0, None, None, None, (ref,))
+        if not record.is_gone:
+            c, below = record.value, history.reason(record, Milestone)
+            name, ref = (c.milestone, f"{c.milestone}.0") if below is None else (_name(below), below.ref)
+            rows.append(MilestoneRow(
+                record.cycle, history.time_at(record.cycle), name, c.verdict, c.expected, c.matched, c.deviation_m,
+                c.deviation_rad, c.p_false, (record.ref, ref)))
+    judged = {ref.rpartition(".")[0] for row in rows for ref in row.refs}
+    rows += [MilestoneRow(one.cycle, history.time_at(one.cycle), _name(one), str(one.fields["status"]),
+                          len(one.fields["expected"]), 0, None, None, None, (one.ref,))
+             for one in history.last_of_kind(Milestone) if one.id not in judged]
+    return tuple(sorted(rows, key=lambda row: row.cycle))
 
 
 def _name(record: EntryRecord[Any]) -> str:
@@ -375,139 +414,9 @@ def milestone_lines(rows: Sequence[MilestoneRow]) -> Iterator[str]:
 def _cells(row: MilestoneRow) -> tuple[str, ...]:
     off_m, off_rad, p = row.deviation_m, row.deviation_rad, row.p_false
     return (
-        str(row.cycle),
-        "-" if row.time_s is None else f"{row.time_s:.1f}",
-        row.name,
-        row.verdict,
-        f"{row.matched} of {row.expected}",
-        "-" if off_m is None else f"{1e3 * off_m:.1f}",
-        "-" if off_rad is None else f"{math.degrees(abs(off_rad)):.1f}",
-        "-" if p is None else f"{p:.1g}",
-    )
-
-
-def how_it_ended(history: Timeline) -> str:
-    """``reached in cycle 774, 104.6 s into the run``; of a run without an outcome where its journal ends."""
-    outcome = outcome_of(history)
-    cycle = history.cycles[-1] if outcome is None else outcome.cycle
-    time_s = history.time_at(cycle)
-    when = f"in cycle {cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run")
-    return f"cut off {when}" if outcome is None else f"{outcome.value.kind} {when}"
-
-
-def outcome_of(history: Timeline) -> EntryRecord[Any] | None:
-    """The outcome of a run; None where it has none."""
-    return next(iter([*history.of_kind(Outcome)][-1:]), None)
-
-
-def tell_end(history: Timeline, result: Mapping[str, Any]) -> Section:
-    """The outcome, the last belief, and the errors that only the simulator knows."""
-    outcome, told = outcome_of(history), list[Sentence]()
-    if outcome is not None:
-        told.append(sentence_of(history, f"{capital(sentence(outcome))}.", outcome))
-    told += _tell_belief(history)
-    text = ", ".join(_truth(result))
-    told.append(Sentence(f"In truth, by the simulator's result.json: {text}." if text else
-                         "Where it truly was nobody recorded: there is no result of the simulator."))
-    return Section("How it ended", tuple(told))
-
-
-def _tell_belief(history: Timeline) -> Iterator[Sentence]:
-    for ref in reversed([ref for ref in history.refs if ref.startswith("Hypothesis-")]):
-        record = history.entry(ref)
-        if record is not None and record.value.is_held:
-            now = history.newest[record.id] == ref and history.retraction(ref) is None
-            text = "It believed that it stood at" if now else "The last place where it had believed to stand was"
-            yield sentence_of(history, f"{text} {phrases.pose(record.value)}.", record)
-            return
-
-
-def _truth(result: Mapping[str, Any]) -> Iterator[str]:
-    off_m, touched, path_m = (result.get(key) for key in ("final_error_m", "collisions", "path_length_m"))
-    if off_m is None:
-        return
-    yield f"it stood {metres(off_m)} from the goal"
-    if path_m is not None:
-        yield f"had driven {path_m:.1f} m"
-    if touched is not None:
-        yield f"had touched something {count(touched, 'time')}" if touched else "had touched nothing"
-    wrong = (result.get("milestones") or {}).get("false_accepts")
-    if isinstance(wrong, int):
-        yield f"and accepted {count(wrong, 'milestone')} wrongly" if wrong else "and accepted no milestone wrongly"
-
-
-MILESTONES = "Milestones"
-LEGEND = """\
-Places are in metres in each room's own frame. Times are by the body's clock. All of it is from the journal, as the
-robot knew it, except where the simulator is named. Names in brackets are entries: ask on with harvey why RUN NAME, or
-with harvey why RUN --at CYCLE."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunStory:
-    """What happened in a run.
-
-    Attributes:
-        opening: its first lines.
-        turning_points: all of them, as the robot knew them.
-        sections: what happened, by subject.
-        milestones: what became of each.
-    """
-
-    opening: tuple[str, ...]
-    turning_points: tuple[TurningPoint, ...]
-    sections: tuple[Section, ...]
-    milestones: tuple[MilestoneRow, ...]
-
-    def record(self) -> dict[str, Any]:
-        """As JSON types."""
-        return asdict(self)
-
-
-def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
-    """Which run it is, how it ended, and what went wrong on the way: the first lines of a story.
-
-    Raises:
-        BadInput: the journal has no decision, or ``result.json`` is malformed.
-    """
-    if not history.cycles:
-        history.verify()
-        raise BadInput(f"{history.source}: expected at least one decision, got none")
-    try:
-        yield f"{run_name(run)}: {how_it_ended(history)}."
-        yield from levels_off(run)
-        yield from turn_lines(history, run.read_result())
-    except STRANGE as error:
-        raise _strange(history, error) from error
-
-
-def first_lines(path: Path | None) -> tuple[str, ...]:
-    """As :func:`opening`, of a run that has just ended; none where it is not on the disk."""
-    if path is None:
-        return ()
-    run = RunDirectory(path)
-    return tuple(opening(run, Timeline(run.journal)))
-
-
-def tell_run(run: RunDirectory, history: Timeline) -> RunStory:
-    """The story of a run. Raises BadInput where journal or ``result.json`` cannot be read as this version's."""
-    first = tuple(opening(run, history))
-    try:
-        return _sections(first, history, run.read_result())
-    except STRANGE as error:
-        raise _strange(history, error) from error
-
-
-def _sections(first: tuple[str, ...], history: Timeline, result: Mapping[str, Any]) -> RunStory:
-    turns = tuple(read_turning_points(history))
-    sections = (
-        tell_errand(history), tell_plans(history), tell_lost(history), tell_contacts(history, turns, result),
-        tell_things(turns), tell_camera(history), tell_end(history, result))
-    return RunStory(first, turns, sections, read_milestones(history))
-
-
-def _strange(history: Timeline, error: Exception) -> BadInput:
-    return BadInput(f"{history.source}: expected entries as this version writes them, got others ({error!r})")
+        str(row.cycle), "-" if row.time_s is None else f"{row.time_s:.1f}", row.name, row.verdict,
+        f"{row.matched} of {row.expected}", "-" if off_m is None else f"{1e3 * off_m:.1f}",
+        "-" if off_rad is None else f"{math.degrees(abs(off_rad)):.1f}", "-" if p is None else f"{p:.1g}")
 
 
 def story_lines(story: RunStory) -> Iterator[str]:
@@ -522,14 +431,7 @@ def story_lines(story: RunStory) -> Iterator[str]:
 
 
 def _section_lines(section: Section) -> Iterator[str]:
-    heads = [_when(one) for one in section.sentences]
+    heads = ["" if one.cycle is None else at(one.cycle, one.time_s) for one in section.sentences]
     width = max(map(len, heads), default=0)
     for head, one in zip(heads, section.sentences, strict=True):
-        refs = f"  [{', '.join(one.refs)}]" if one.refs else ""
-        yield wrap(one.text + refs, f"  {head:<{width}}" + "  " * (width > 0))
-
-
-def _when(one: Sentence) -> str:
-    if one.cycle is None:
-        return ""
-    return f"cycle {one.cycle}" + ("" if one.time_s is None else f"  {one.time_s:7.1f} s")
+        yield wrap(named(one.text, one.refs), f"  {head:<{width}}" + "  " * (width > 0))

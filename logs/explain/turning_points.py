@@ -7,19 +7,19 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from blackboard.change import Change, Posted, Retracted, Revised
+from blackboard.change import Change, Posted, Retracted
 from blackboard.entry import Entry
 from blackboard.journal import Decision
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from logs.errors import BadInput
 from logs.explain.phrases import wrap
-from logs.recording.board_mirror import Mirror, is_held
-from logs.records import EntryRecord, Opaque
+from logs.mirror import Mirror, find_belief
+from logs.records import EntryRecord, Opaque, is_a
 from logs.timeline import Timeline
 from world_models import words
 from world_models.entries.body import BodyFault, Recovery
@@ -36,9 +36,16 @@ IMPASSABLE = ("shut", "ajar")
 """States of a door through which no way leads."""
 REMEMBERED = 8
 """The newest entries of a type that are looked back for."""
+MARKS, NOT_VERIFIED = ("escalated", "relocalization"), ("refuted", "not testable")
+"""A turning point has one of these words in its line of the journal, or is of one of these kinds."""
+TOLD_KINDS: tuple[type[Any], ...] = (BodyFault, Contact, DoorState, Obstacle, Resumed, Told, Redirection)
+KINDS: tuple[type[Any], ...] = (*TOLD_KINDS, Goal, PlanSketch, Certificate, Outcome)
+NOTHING = "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
 
 Get = Callable[[str], Entry[Any] | None]
 """Gives the current revision of an entry by its id."""
+Believed = Callable[[int], Entry[Hypothesis] | None]
+"""Gives where the robot believed to be in a cycle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +69,16 @@ class TurningPoint:
     def is_told(self) -> bool:
         """Whether a short account of the run must not leave it out."""
         return self.kind in TOLD
+
+    @property
+    def when(self) -> str:
+        """As a line of text begins that tells it."""
+        return at(self.cycle, self.time_s)
+
+
+def at(cycle: int, time_s: float | None) -> str:
+    """``cycle 360     63.9 s``, as a line of text begins."""
+    return f"cycle {cycle}" + ("" if time_s is None else f"  {time_s:7.1f} s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,28 +108,13 @@ class TurningPointFinder:
 
     def find(self, decision: Decision) -> list[TurningPoint]:
         """The turning points of the next decision."""
-        points: list[TurningPoint] = []
-        before = self._mirror.latest(Hypothesis, is_held)
-        changes = (*decision.observed, *decision.made)
-        for change in changes:
-            self._mirror.take(change)
+        before, changes = find_belief(self._mirror), (*decision.observed, *decision.made)
+        self._mirror.take(*changes)
         times = [when for change in decision.observed if (when := time_of(change.entry.value)) is not None]
         self._time_s = max(times, default=self._time_s)
-        now = self._mirror.latest(Hypothesis, is_held)
-        for change in changes:
-            was = self._states.get(change.entry.id, "")
-            if state := state_of(change.entry.value):
-                self._states[change.entry.id] = state
-            found = turning_points(change, decision.cycle, self._mirror.get, now or before, was)
-            points += (replace(point, time_s=self._time_s) for point in found)
-        return points
-
-
-def state_of(value: Any) -> str:
-    """Of what changes its state: a thing, as there or gone; a door, as open or shut. "" of anything else."""
-    if isinstance(value, Obstacle):
-        return value.status
-    return value.state if isinstance(value, DoorState) else ""
+        found = _turns(changes, decision.cycle, self._mirror.get, lambda _: find_belief(self._mirror) or before,
+                       self._states)
+        return [replace(point, time_s=self._time_s) for point in found]
 
 
 def time_of(value: Any) -> float | None:
@@ -123,34 +125,40 @@ def time_of(value: Any) -> float | None:
     return float(found) if isinstance(found, int | float) and math.isfinite(found) else None
 
 
-def turning_points(
-    change: Change, cycle: int, get: Get, belief: Entry[Hypothesis] | None, was: str = ""
+def _turns(
+    changes: Iterable[Change], cycle: int, get: Get, believed: Believed, states: dict[str, str]
 ) -> Iterator[TurningPoint]:
-    """The turning point that a change is, if it is one.
+    """The turning points among the changes of a cycle; of doors and things it is noted how they were before."""
+    for change in changes:
+        value, id = change.entry.value, change.entry.id
+        if not isinstance(change, Retracted):
+            yield from _turn(value, isinstance(change, Posted), cycle, get, believed, states.get(id, ""))
+        if isinstance(value, Obstacle | DoorState):
+            states[id] = value.status if isinstance(value, Obstacle) else value.state
 
-    Args:
-        cycle: of the decision.
-        get: gives an entry by its id.
-        belief: where the robot believed to be.
-        was: the state of the thing or door before, by :func:`state_of`; "" where it is new.
-    """
-    if isinstance(change, Retracted):
-        return
-    value, is_new = change.entry.value, isinstance(change, Posted)
+
+def _turn(value: Any, is_new: bool, cycle: int, get: Get, believed: Believed, was: str) -> Iterator[TurningPoint]:
+    """The turning point that a new revision is, if it is one; ``was``: the state of the thing or door before."""
     if isinstance(value, Goal) and (is_new or not value.is_active):
         yield TurningPoint(cycle, "goal", f"{value.destination.locale}{'' if is_new else ': ' + value.status}")
     elif isinstance(value, PlanSketch) and is_new:
-        yield TurningPoint(cycle, "plan", f"{value.where()}, {words.count(len(value.subgoals), 'part')}")
+        yield TurningPoint(cycle, "plan", f"{value.where()}, {count(len(value.subgoals), 'part')}")
     elif isinstance(value, Certificate):
-        yield TurningPoint(cycle, value.verdict, _verdict(value, get))
+        entry = get(value.milestone)
+        what = entry.value.name() if entry is not None and isinstance(entry.value, Milestone) else value.milestone
+        said = f"{words.metres(value.deviation_m)} off" if value.verdict == "verified" else value.reason
+        yield TurningPoint(cycle, value.verdict, f"{what}: {said}")
     elif isinstance(value, Discrepancy) and value.status == "escalated":
-        yield _to_turning_point(value, cycle, belief)
+        is_lost = value.level.above is Level.GOAL
+        belief = believed(cycle) if is_lost else None
+        where = "" if belief is None else f"{belief.value.place()} by its belief; "
+        yield TurningPoint(cycle, "lost" if is_lost else "doubt", f"{where}{value.what}")
     elif isinstance(value, Hypothesis) and value.is_held and value.basis == "relocalization":
-        how = value.evidence or "it knows again where it is"
-        yield TurningPoint(cycle, "found", f"{value.place()}; {how}")
+        yield TurningPoint(cycle, "found", f"{value.place()}; {value.evidence or 'it knows again where it is'}")
     elif isinstance(value, BodyFault):
         yield TurningPoint(cycle, "fault", f"{value.part}: {value.what}{'' if value.is_open else ', over'}")
     elif isinstance(value, Contact):
+        belief = believed(cycle)
         where = "" if belief is None else f", at {belief.value.place()} by its belief"
         yield TurningPoint(cycle, "contact", f"{words.brief(value)}{where}")
     elif isinstance(value, DoorState) and value.is_passable is (was in IMPASSABLE):
@@ -159,39 +167,15 @@ def turning_points(
         yield TurningPoint(cycle, "thing", words.brief(value))
     elif isinstance(value, Resumed):
         yield TurningPoint(cycle, "resumed", f"after cycle {value.after_cycle}, where the run was cut off")
-    elif isinstance(value, Told) and value.answer:
-        yield TurningPoint(cycle, "told", f"{value.what} is {value.state}; {value.answer}")
-    elif isinstance(value, Redirection) and value.answer:
-        yield TurningPoint(cycle, "told", f"to go elsewhere: {value.text}; {value.answer}")
+    elif isinstance(value, Told | Redirection) and value.answer:
+        said = f"{value.what} is {value.state}" if isinstance(value, Told) else f"to go elsewhere: {value.text}"
+        yield TurningPoint(cycle, "told", f"{said}; {value.answer}")
     elif isinstance(value, Outcome):
         yield TurningPoint(cycle, "the end", f"{value.kind}: {value.reason}")
 
 
-def _to_turning_point(discrepancy: Discrepancy, cycle: int, belief: Entry[Hypothesis] | None) -> TurningPoint:
-    if discrepancy.level.above is not Level.GOAL:
-        return TurningPoint(cycle, "doubt", discrepancy.what)
-    where = f"{belief.value.place()} by its belief; " if belief is not None else ""
-    return TurningPoint(cycle, "lost", f"{where}{discrepancy.what}")
-
-
-def _verdict(certificate: Certificate, get: Get) -> str:
-    entry = get(certificate.milestone)
-    what = entry.value.name() if entry is not None and isinstance(entry.value, Milestone) else certificate.milestone
-    if certificate.verdict == "verified":
-        return f"{what}: {words.metres(certificate.deviation_m)} off"
-    return f"{what}: {certificate.reason}"
-
-
-MARKS = ("escalated", "relocalization")
-"""A turning point has one of these words in its line of the journal, or is of one of these kinds."""
-TOLD_KINDS: tuple[type[Any], ...] = (BodyFault, Contact, DoorState, Obstacle, Resumed, Told, Redirection)
-KINDS: tuple[type[Any], ...] = (*TOLD_KINDS, Goal, PlanSketch, Certificate, Outcome)
-NOT_VERIFIED = ("refuted", "not testable")
-NOTHING = "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
-
-
 def read_turning_points(history: Timeline, *, told: bool = False) -> Iterator[TurningPoint]:
-    """What :class:`~logs.turning_points.TurningPointFinder` finds, from those entries only that may be one.
+    """What :class:`TurningPointFinder` finds, from those entries only that may be one.
 
     Entries of another version are passed over.
 
@@ -204,28 +188,46 @@ def read_turning_points(history: Timeline, *, told: bool = False) -> Iterator[Tu
     beliefs = [ref for ref in history.refs if ref.startswith("Hypothesis-")]
     states: dict[str, str] = {}
     for cycle in sorted(cycles):
-        decision = history.decision(cycle)
-        for record in (*decision.observed, *decision.made):
-            entry = _entry(record) if _may_turn(record) else None
-            if entry is None:
-                continue
-            change = Posted(entry) if record.is_new else Revised(entry)
-            was, states[record.id] = states.get(record.id, ""), state_of(entry.value)
-            belief = _belief(history, beliefs, cycle) if record.kind in (Discrepancy, Contact) else None
-            for point in turning_points(change, cycle, lambda id: _newest(history, id), belief, was):
-                if point.is_told or not told:
-                    yield replace(point, time_s=history.time_at(cycle))
+        changes = [change for record in history.decision(cycle).changes if (change := _change_of(record)) is not None]
+        found = _turns(changes, cycle, lambda id: _newest(history, id),
+                       lambda then: _belief(history, beliefs, then), states)
+        yield from (replace(point, time_s=history.time_at(cycle)) for point in found if point.is_told or not told)
 
 
-def _may_turn(record: EntryRecord[Any]) -> bool:
-    """Whether a record can be a turning point, as far as is seen without decoding it."""
-    if record.is_gone or not isinstance(record.fields, dict):
-        return False
-    if record.kind is Discrepancy:
-        return record.fields.get("status") == "escalated"
-    if record.kind is Hypothesis:
-        return record.fields.get("basis") == "relocalization"
-    return record.kind in KINDS
+def _change_of(record: EntryRecord[Any]) -> Change | None:
+    """None where it cannot be a turning point, as far as is seen without decoding it, or is of another version."""
+    may_turn = record.kind in KINDS or (
+        record.field("status") == "escalated" if record.kind is Discrepancy else
+        record.kind is Hypothesis and record.field("basis") == "relocalization")
+    try:
+        return None if record.is_gone or not may_turn else record.change_of_board
+    except BadInput:
+        return None
+
+
+def _entry(record: EntryRecord[Any] | None) -> Entry[Any] | None:
+    """None for one of another version, or of a kind that is not known here."""
+    try:
+        return None if record is None or record.kind is Opaque else record.change_of_board.entry
+    except BadInput:
+        return None
+
+
+def _belief(history: Timeline, refs: list[str], cycle: int) -> Entry[Hypothesis] | None:
+    """The newest belief that was held in a cycle, or until then."""
+    for ref in reversed(refs[: bisect_right(refs, cycle, key=history.cycle_of_ref)]):
+        entry = _entry(history.entry(ref))
+        if entry is not None and entry.value.is_held:
+            return entry
+    return None
+
+
+def _newest(history: Timeline, id: str) -> Entry[Any] | None:
+    """An entry as it was last; of a milestone without its lines, which take long to decode and are not told."""
+    record = history.entry(history.newest[id]) if id in history.newest else None
+    if is_a(record, Milestone) and isinstance(record.fields, dict):
+        record = replace(record, fields={k: [] if isinstance(v, list) else v for k, v in record.fields.items()})
+    return _entry(record)
 
 
 def read_collisions(history: Timeline, result: Mapping[str, Any]) -> Iterator[TurningPoint]:
@@ -253,40 +255,7 @@ def turn_lines(history: Timeline, result: Mapping[str, Any]) -> Iterator[str]:
         yield NOTHING
         return
     yield "On the way:"
-    heads = [f"  cycle {p.cycle}" + ("" if p.time_s is None else f"  {p.time_s:7.1f} s") for p in points]
-    width, kind = max(map(len, heads), default=0), max((len(point.kind) for point in points), default=0)
-    for head, point in zip(heads, points, strict=True):
-        yield wrap(point.text, f"{head:<{width}}  {point.kind:<{kind}}  ")
+    width, kind = (max(map(len, column), default=0) for column in ([p.when for p in points], [p.kind for p in points]))
+    yield from (wrap(p.text, f"  {p.when:<{width}}  {p.kind:<{kind}}  ") for p in points)
     if unplaced > 0:
         yield f"  {count(unplaced, 'collision')}; this run does not say where"
-
-
-def _belief(history: Timeline, refs: list[str], cycle: int) -> Entry[Hypothesis] | None:
-    """The newest belief that was held in a cycle, or until then."""
-    for ref in reversed(refs[: bisect_right(refs, cycle, key=lambda ref: _cycle(history, ref))]):
-        record = history.entry(ref)
-        entry = None if record is None else _entry(record)
-        if entry is not None and isinstance(entry.value, Hypothesis) and entry.value.is_held:
-            return entry
-    return None
-
-
-def _cycle(history: Timeline, ref: str) -> int:
-    record = history.entry(ref)
-    return 0 if record is None else record.cycle
-
-
-def _newest(history: Timeline, id: str) -> Entry[Any] | None:
-    """An entry as it was last; of a milestone without its lines, which take long to decode and are not told."""
-    record = history.entry(history.newest[id]) if id in history.newest else None
-    if record is not None and record.kind is Milestone and isinstance(record.fields, dict):
-        record = replace(record, fields={k: [] if isinstance(v, list) else v for k, v in record.fields.items()})
-    return None if record is None else _entry(record)
-
-
-def _entry(record: EntryRecord[Any]) -> Entry[Any] | None:
-    """None for one of another version, or of a kind that is not known here."""
-    try:
-        return None if record.kind is Opaque else record.change_of_board.entry
-    except BadInput:
-        return None

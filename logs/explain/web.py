@@ -22,6 +22,22 @@ from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone
 from world_models.entries.told import Redirection, Told
 from world_models.words import count
 
+DEEPEST_INDENT, FEW = 20, 2
+DEPTH = 5
+"""How many steps down the walk goes unless told otherwise."""
+PRINCIPAL = (Outcome, MotorCommand, Goal, PlanSketch, Recovery, Hypothesis, Certificate, Milestone, Leg, Look)
+"""Of what one act makes, the first of these is what it was done for."""
+GOAL, MODEL, SENSOR = "goal", "model", "sensor"
+KINDS = (GOAL, MODEL, SENSOR)
+"""What an explanation may end in: what was asked for, what is known of building and robot, what the camera saw."""
+GROUNDS: Mapping[type[Any], str] = {
+    Command: GOAL, Goal: GOAL, Frame: SENSOR,
+    **dict.fromkeys((LocaleFrame, CameraState, Wheels, Footprint, Told, Redirection), MODEL)}
+"""The kinds of entries that are such an end themselves; what the robot is told of the model is a part of it."""
+NAMING: Mapping[type[Any], str] = {Milestone: "landmarks", Tracks: "items", PlanSketch: "subgoals"}
+"""The fields by which others name what is in the model."""
+Kind = Callable[[EntryRecord[Any]], str | None]
+
 
 def printing(out: TextIO) -> Sink:
     """A sink that prints every cycle."""
@@ -41,13 +57,12 @@ class Trace:
 
     def lines(self, decision: DecisionRecord) -> Iterator[str]:
         """What to print for the next decision."""
-        candidates = {**self._pending, **{c.number: c for c in decision.activated}}
+        self._pending |= {c.number: c for c in decision.activated}
         for dropped in decision.obviated:
-            candidates.pop(dropped.number, None)
-        chosen = decision.chosen
-        yield from cycle_lines(decision, ranked(candidates.values(), chosen))
-        gone = chosen.number if chosen is not None and decision.asks is None else None
-        self._pending = {number: c for number, c in candidates.items() if number != gone}
+            self._pending.pop(dropped.number, None)
+        yield from cycle_lines(decision, ranked(self._pending.values(), decision.chosen))
+        if decision.chosen is not None and decision.asks is None:
+            self._pending.pop(decision.chosen.number, None)
 
 
 def cycle_lines(decision: DecisionRecord, candidates: Iterable[Candidate]) -> Iterator[str]:
@@ -58,16 +73,13 @@ def cycle_lines(decision: DecisionRecord, candidates: Iterable[Candidate]) -> It
     if inside := [ref for ref in decision.seen if ref not in outside]:
         yield f"  sees      {', '.join(inside)}"
     yield from (f"  drops     {_activation(c)}: {c.reason}" for c in decision.obviated)
-    yield from (_candidate_line(c, decision) for c in candidates)
+    first, second = (c and c.number for c in (decision.chosen, decision.runner_up))
+    for c in candidates:
+        word = "chooses" if c.number == first else "next" if c.number == second else "pending"
+        yield f"  {word:<9} {_activation(c)}, rated {c.rating:.2f}"
     yield from (_change_line(change.change.lower(), change) for change in decision.made)
     if decision.refused:
         yield f"  refused   {decision.refused.rstrip().splitlines()[-1]}"
-
-
-def _candidate_line(c: Candidate, decision: DecisionRecord) -> str:
-    chosen = decision.chosen is not None and c.number == decision.chosen.number
-    second = decision.runner_up is not None and c.number == decision.runner_up.number
-    return f"  {'chooses' if chosen else 'next' if second else 'pending':<9} {_activation(c)}, rated {c.rating:.2f}"
 
 
 def _activation(c: Candidate) -> str:
@@ -76,12 +88,6 @@ def _activation(c: Candidate) -> str:
 
 def _change_line(word: str, change: EntryRecord[Any]) -> str:
     return f"  {word:<9} {change.ref} by {change.author}: {sentence(change)}"
-
-
-DEEPEST_INDENT = 20
-FEW = 2
-DEPTH = 5
-"""How many steps down the walk goes unless told otherwise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +109,20 @@ class Reason:
     after: EntryRecord[Any] | None = None
     known: str = ""
     hidden: int = 0
+
+    def text(self) -> str:
+        """The sentence; of an earlier revision of what rests on it, only what little was different, if it was little.
+        """
+        if self.known:
+            return f"{self.ref}, as {self.known}"
+        if self.record is None:
+            return f"{self.ref}, of which the journal says nothing"
+        tail = f" (and so on: {count(self.hidden, 'reason')} below)" if self.hidden else ""
+        before = list(differing_leaves(self.record.fields, self.after.fields)) if (
+            self.after is not None and self.after.id == self.record.id) else []
+        if 0 < len(before) <= FEW:
+            return f"{self.ref}: before that, {', '.join(f'{path} = {then}' for path, then, _ in before)}{tail}"
+        return f"{self.ref}: {sentence(self.record)}{tail}"
 
 
 def walk(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Iterator[Reason]:
@@ -130,10 +150,8 @@ def _distances(history: Timeline, refs: Sequence[str], depth: int) -> dict[str, 
     queue = deque(refs)
     while queue:
         name = queue.popleft()
-        record = history.entry(name)
-        if record is None or nearest[name] >= depth:
-            continue
-        for reason in record.because:
+        record = history.entry(name) if nearest[name] < depth else None
+        for reason in () if record is None else record.because:
             if reason not in nearest:
                 nearest[reason] = nearest[name] + 1
                 queue.append(reason)
@@ -151,78 +169,33 @@ def explain(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Itera
         history.verify()
     for index, reason in enumerate(reasons):
         if reason.depth == 0 and reason.record is not None:
-            yield from ["", _who(reason.record, history)] if index else [_who(reason.record, history)]
+            yield from [""] * (index > 0)
+            yield wrap(f"{reason.ref}: {describe_decision(history, reason.record)}")
         leads_on = index + 1 < len(reasons) and reasons[index + 1].depth > reason.depth
-        yield _wrap(reason.depth, _describe(reason) + (", because" if leads_on else ""))
+        indent = "  " * min(reason.depth, DEEPEST_INDENT)
+        yield wrap(reason.text() + (", because" if leads_on else ""), indent, indent + "    ")
     if any(reason.hidden for reason in reasons):
         yield f"(--depth {depth + 1} goes on where it says \"and so on\")"
 
 
-def _wrap(depth: int, text: str) -> str:
-    indent = "  " * min(depth, DEEPEST_INDENT)
-    return wrap(text, indent, indent + "    ")
+def find_refs(history: Timeline, what: str | int | None) -> list[str]:
+    """The entries that explain an entry (by name), a cycle (by number), or the outcome (None). Raises BadInput.
 
-
-def _describe(reason: Reason) -> str:
-    if reason.known:
-        return f"{reason.ref}, as {reason.known}"
-    if reason.record is None:
-        return f"{reason.ref}, of which the journal says nothing"
-    tail = f" (and so on: {count(reason.hidden, 'reason')} below)" if reason.hidden else ""
-    return f"{reason.ref}: {_describe_record(reason.record, reason.after)}{tail}"
-
-
-def _describe_record(record: EntryRecord[Any], after: EntryRecord[Any] | None) -> str:
-    """The sentence; of an earlier revision of what rests on it, only what little was different, if it was little."""
-    if after is not None and after.id == record.id:
-        changed = list(differing_leaves(record.fields, after.fields))
-        if 0 < len(changed) <= FEW:
-            return "before that, " + ", ".join(f"{path} = {then}" for path, then, _ in changed)
-    return sentence(record)
-
-
-def _who(record: EntryRecord[Any], history: Timeline) -> str:
-    return wrap(f"{record.ref}: {describe_decision(history, record)}")
-
-
-PRINCIPAL = (
-    Outcome, MotorCommand, Goal, PlanSketch, Recovery, Hypothesis, Certificate, Milestone, Leg,
-    Look,
-)
-"""Of what one act makes, the first of these is what it was done for."""
+    Of a cycle that is the chief entry that it made, or what woke those who made nothing.
+    """
+    if not isinstance(what, int):
+        return [history.resolve(what) if what else history.outcome()]
+    decision = history.decision(what)
+    if decision.made:
+        return [min(decision.made, key=_rank).ref]
+    return [decision.chosen.trigger] if decision.chosen is not None else list(decision.seen[:1])
 
 
 def _rank(record: EntryRecord[Any]) -> int:
     """A smaller number for what an act was rather done for; that it found out where it is comes before its new goal."""
-    value = record.fields if isinstance(record.fields, dict) else {}
-    if record.kind is Hypothesis and value.get("basis") == "relocalization" and value.get("status") == "held":
+    if record.kind is Hypothesis and (record.field("basis"), record.field("status")) == ("relocalization", "held"):
         return 0
     return 1 + (PRINCIPAL.index(record.kind) if record.kind in PRINCIPAL else len(PRINCIPAL))
-
-
-def find_refs(history: Timeline, what: str | int | None) -> list[str]:
-    """The entries that explain an entry (by name), a cycle (by number), or the outcome (None). Raises BadInput."""
-    if isinstance(what, int):
-        return principal(history.decision(what))
-    return [history.resolve(what) if what else history.outcome()]
-
-
-def principal(decision: DecisionRecord) -> list[str]:
-    """What to explain of a decision: the chief entry that it made, or what woke those who made nothing."""
-    made = sorted(decision.made, key=_rank)
-    if made:
-        return [made[0].ref]
-    if decision.chosen is not None:
-        return [decision.chosen.trigger]
-    return list(decision.seen[:1])
-
-
-GOAL, MODEL, SENSOR = "goal", "model", "sensor"
-KINDS = (GOAL, MODEL, SENSOR)
-"""What an explanation may end in: what was asked for, what is known of building and robot, what the camera saw."""
-KNOWN = frozenset({LocaleFrame, CameraState, Wheels, Footprint, Told, Redirection})
-"""The kinds of entries that are a part of the model, and what the robot is told of it."""
-Kind = Callable[[EntryRecord[Any]], str | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,42 +231,8 @@ class Accounted:
 
 def kind_of(record: EntryRecord[Any]) -> str | None:
     """The kind of ground that an entry is itself; None where it is none."""
-    value = record.fields if isinstance(record.fields, dict) else {}
-    if record.kind in (Command, Goal):
-        return GOAL
-    if record.kind is Frame:
-        return SENSOR
-    if record.kind in KNOWN:
-        return MODEL
-    return MODEL if _names_the_model(record.kind, value) else None
-
-
-def _names_the_model(kind: type[Any], value: Mapping[str, Any]) -> bool:
-    if kind is Milestone:
-        return bool(value.get("landmarks"))
-    if kind is Tracks:
-        return bool(value.get("items"))
-    return kind is PlanSketch and bool(value.get("subgoals"))
-
-
-def reaches(entry: Callable[[str], EntryRecord[Any] | None], refs: Iterable[str], kind_of: Kind = kind_of) -> Grounds:
-    """What some entries rest on, by walking ``because`` as far as it leads; each entry is looked at once."""
-    todo, known = list(refs), set[str]()
-    kinds: set[str] = set()
-    lacking: list[str] = []
-    while todo:
-        ref = todo.pop()
-        if ref in known:
-            continue
-        known.add(ref)
-        record = entry(ref)
-        if record is None:
-            lacking.append(ref)
-            continue
-        if (kind := kind_of(record)) is not None:
-            kinds.add(kind)
-        todo += record.because
-    return Grounds(tuple(k for k in KINDS if k in kinds), tuple(sorted(lacking)))
+    names_the_model = record.kind in NAMING and record.field(NAMING[record.kind])
+    return MODEL if names_the_model else GROUNDS.get(record.kind)
 
 
 def explained_by(decision: DecisionRecord) -> tuple[str, ...]:
@@ -313,18 +252,13 @@ def trace_grounds(decisions: Iterable[DecisionRecord], kind_of: Kind = kind_of) 
     """Each decision of a run with what it rests on; reasons are older than what rests on them, so one pass does."""
     known: dict[str, Grounds] = {}
     for decision in decisions:
-        for record in (*decision.observed, *decision.made):
+        for record in decision.changes:
             if not record.is_gone or record.ref not in known:
-                known[record.ref] = _together(record, known, kind_of(record))
-        refs = explained_by(decision)
-        yield Accounted(decision, {ref: known.get(ref, Grounds((), (ref,))) for ref in refs})
-
-
-def _together(record: EntryRecord[Any], known: Mapping[str, Grounds], own: str | None) -> Grounds:
-    below = [known.get(ref, Grounds((), (ref,))) for ref in record.because]
-    kinds = {kind for grounds in below for kind in grounds.kinds} | {own}
-    lacking = sorted({ref for grounds in below for ref in grounds.lacking})
-    return Grounds(tuple(k for k in KINDS if k in kinds), tuple(lacking))
+                below = [known.get(ref, Grounds((), (ref,))) for ref in record.because]
+                kinds = {kind_of(record), *(kind for grounds in below for kind in grounds.kinds)}
+                lacking = sorted({ref for grounds in below for ref in grounds.lacking})
+                known[record.ref] = Grounds(tuple(k for k in KINDS if k in kinds), tuple(lacking))
+        yield Accounted(decision, {ref: known.get(ref, Grounds((), (ref,))) for ref in explained_by(decision)})
 
 
 def ground_names() -> tuple[str, ...]:
@@ -352,15 +286,12 @@ class Check:
 
 def check(history: Timeline) -> Check:
     """Every decision of a run. Raises BadInput where a line of its journal is malformed."""
-    decisions = acts = reached = 0
-    by_kind = dict.fromkeys(KINDS, 0)
-    failing: list[Accounted] = []
+    decisions = acts = 0
+    by_kind, failing = dict.fromkeys(KINDS, 0), list[Accounted]()
     for one in trace_grounds(history.decisions()):
         decisions += 1
         acts += one.decision.chosen is not None
-        reached += one.holds
         for kind in sorted({kind for grounds in one.grounds.values() for kind in grounds.kinds}):
             by_kind[kind] += 1
-        if not one.holds:
-            failing.append(one)
-    return Check(decisions, acts, reached, by_kind, tuple(failing))
+        failing += [one] * (not one.holds)
+    return Check(decisions, acts, decisions - len(failing), by_kind, tuple(failing))

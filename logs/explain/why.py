@@ -16,8 +16,8 @@ from blackboard.servoing import Discrepancy
 from logs.errors import BadInput
 from logs.explain import model, phrases
 from logs.explain.model import WorldFile, tell_source
-from logs.explain.phrases import STRANGE, capital, describe_decision, sentence, tell_answer, wrap
-from logs.records import EntryRecord
+from logs.explain.phrases import STRANGE, capital, describe_decision, named, plainly, sentence, tell_answer, wrap
+from logs.records import EntryRecord, is_a
 from logs.timeline import Timeline
 from world_models import words
 from world_models.building.locale_frame import FrameRequest, LocaleFrame
@@ -41,9 +41,12 @@ from world_models.entries.robot import CameraState, Drift, Footprint, Wheels
 from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, Outcome, PlanSketch, Resumed
 from world_models.entries.told import Redirection, Told
 
-MOST = 24
-"""So many things are told at the most."""
-MOST_PLAIN, MOST_MET = 12, 200
+MOST, MOST_PLAIN, MOST_MET = 24, 12, 200
+"""So many things are told at the most, of a run of another version, and so many entries come to."""
+LEGEND = """\
+Places are in metres in each room's own frame, headings counter-clockwise from its x axis; pixels count right and
+down from the top left. Model lines are edges that the map of the building says can be seen. Names in brackets are
+entries of the journal: ask on with harvey why RUN NAME, and of a landmark, door or room by its name too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,10 +81,16 @@ class Story:
     steps: tuple[Step, ...]
 
 
-LEGEND = """\
-Places are in metres in each room's own frame, headings counter-clockwise from its x axis; pixels count right and
-down from the top left. Model lines are edges that the map of the building says can be seen. Names in brackets are
-entries of the journal: ask on with harvey why RUN NAME, and of a landmark, door or room by its name too."""
+def step(label: str, text: str, *records: EntryRecord[Any] | None) -> Step:
+    """A sentence that some entries say."""
+    return Step(label, text, tuple(dict.fromkeys(record.ref for record in records if record is not None)))
+
+
+def story_of(
+    history: Timeline, record: EntryRecord[Any], head: str, steps: Iterable[Step] = (), *, ref: str = ""
+) -> Story:
+    """A story under a headline of one's own; ``ref``: of what, where that is another revision."""
+    return Story(ref or record.ref, head, describe_decision(history, record), tuple(steps))
 
 
 def tell_stories(history: Timeline, refs: Iterable[str], world: WorldFile | None = None) -> Iterator[Story]:
@@ -105,38 +114,29 @@ def story(history: Timeline, record: EntryRecord[Any], world: WorldFile | None =
         steps = [*teller.own(record), *teller.reasons(record), *teller.used(record), *teller.context(record)]
         head = phrases.in_one_sentence(history, record) or headline(record)
     except STRANGE:
-        steps, head = list(_plain_steps(history, record)), _plainly(history, record)
-    return Story(record.ref, head, describe_decision(history, record), tuple(steps))
+        below = itertools.islice(history.within(record), 1, MOST_PLAIN)
+        steps, head = [step(label_of(one), plainly(one), one) for one in below], plainly(record)
+    return story_of(history, record, head, steps)
 
 
-def _plain_steps(history: Timeline, record: EntryRecord[Any]) -> Iterator[Step]:
-    """The entries nearest below, each in its own sentence."""
-    for below in itertools.islice(history.within(record), 1, MOST_PLAIN):
-        yield Step(LABELS.get(below.kind, below.type), _plainly(history, below), (below.ref,))
+def label_of(record: EntryRecord[Any]) -> str:
+    """What an entry is about, in a word or two."""
+    return LABELS.get(record.kind, record.type)
 
 
 def headline(record: EntryRecord[Any]) -> str:
     """What the entry is, as something that Harvey did where it is an act."""
-    said = sentence(record)
     if record.kind in (MotorCommand, Course):
-        return f"Harvey was told to {said}."
+        return f"Harvey was told to {sentence(record)}."
     if record.kind in (Told, Redirection):
-        return _describe_telling(record)
-    if record.kind is Look:
+        return f"It {sentence(record)}."
+    if is_a(record, Look):
         return f"A picture was taken {words.purpose(record.value.purpose)}."
-    if record.kind is Hypothesis and record.value.is_held:
-        return _describe_belief(record.value)
-    return f"{capital(said)}." if said else record.ref
-
-
-def _describe_telling(record: EntryRecord[Any]) -> str:
-    return f"It {sentence(record)}."
-
-
-def _describe_belief(hypothesis: Hypothesis) -> str:
-    if hypothesis.basis == "relocalization":
-        return f"It found out where it is: at {phrases.pose(hypothesis)}."
-    return f"It believed that it stood at {phrases.pose(hypothesis)}."
+    if is_a(record, Hypothesis) and record.value.is_held:
+        if record.value.basis == "relocalization":
+            return f"It found out where it is: at {phrases.pose(record.value)}."
+        return phrases.believed(record.value)
+    return plainly(record) if sentence(record) else record.ref
 
 
 @dataclass(slots=True)
@@ -153,7 +153,7 @@ class _Teller:
         if record.kind is FrameRequest:
             yield from (Step("answered", *told) for told in tell_answer(self.history, record))
         elif record.kind is LocaleFrame and self.world is not None:
-            yield Step("described", tell_source(self.world, model.reference_of(record).locale), (record.ref,))
+            yield step("described", tell_source(self.world, record.value.locale), record)
 
     def used(self, record: EntryRecord[Any]) -> Iterator[Step]:
         """By what the act went that made an entry."""
@@ -166,14 +166,14 @@ class _Teller:
         elif record.kind is Certificate:
             yield from self._certificate(record)
         elif record.kind is PoseFix:
-            yield from self._tell_match(record)
+            yield from self._match(record)
         if (kinds := FOLLOW.get(record.kind)) is not None:
-            named = [below for kind in kinds for below in self._below(record, kind)]
+            below = [one for kind in kinds for one in self._below(record, kind)]
         else:
             order = [ref.rpartition("-")[0] for ref in record.because]
-            named = sorted(self._below(record), key=lambda below: order.index(below.ref.rpartition("-")[0]))
-        for below in named:
-            yield from self._tell(below, record)
+            below = sorted(self._below(record), key=lambda one: order.index(one.ref.rpartition("-")[0]))
+        for one in below:
+            yield from self._tell(one, record)
         for text, frame in model.tell_changes(self.history, record):
             if frame.ref not in self.met:
                 self.met.add(frame.ref)
@@ -191,108 +191,83 @@ class _Teller:
     def _below(self, record: EntryRecord[Any], kind: type[Any] | None = None) -> Iterator[EntryRecord[Any]]:
         """What an entry rests on beside itself, of a kind or of any."""
         for ref in record.because:
-            named = kind is None or ref.startswith(f"{kind.__name__}-")
-            found = self.history.entry(ref) if named else None
-            if found is not None and found.id != record.id:
-                yield found
+            if kind is None or ref.startswith(f"{kind.__name__}-"):
+                found = self.history.entry(ref)
+                if found is not None and found.id != record.id:
+                    yield found
 
     def _tell(self, record: EntryRecord[Any], above: EntryRecord[Any]) -> Iterator[Step]:
         """An entry that something rests on, then what it rests on itself."""
-        perhaps = record.kind is Hypothesis and record.value.status == "candidate"
+        perhaps = is_a(record, Hypothesis) and record.value.status == "candidate"
         key = record.id if record.kind in SEVERAL or perhaps else record.type
         if key in self.told or record.ref in self.met or len(self.told) > MOST or len(self.met) > MOST_MET:
             return
         self.met.add(record.ref)
-        if record.kind is Segments and above.kind in (MotorCommand, Look):
+        label, say, frame = label_of(record), SAY.get(record.kind, _plainly), None
+        if perhaps:
+            label, text = "thought", f"It may have stood at {phrases.pose(record.value)} ({record.value.weight:.0%})."
+        elif is_a(record, Segments) and above.kind in (MotorCommand, Look):
             frame = self.history.reason(record, Frame)
-            seen = phrases.describe_segments(record.value, frame)
-            text = f"It saw {seen}; where it is did not yet follow from them."
-            yield from self._one(key, "seen", text, record, frame)
-        elif perhaps:
-            candidate = record.value
-            text = f"It may have stood at {phrases.pose(candidate)} ({candidate.weight:.0%})."
-            yield from self._one(key, "thought", text, record)
+            text = f"It saw {phrases.describe_segments(record.value)}; where it is did not yet follow from them."
+        else:
+            text = "" if record.kind in FOLDED else say(self.history, record)
+        yield from self._one(key, label, text, record, frame)
+        if perhaps:
             for below in self._below(record, Panorama):
                 yield from self._tell(below, record)
-            return
-        elif record.kind is Hypothesis:
-            text = f"It believed that it stood at {phrases.pose(record.value)}."
-            yield from self._one(key, "believed", text, record)
-        elif record.kind not in FOLDED:
-            say = SAY.get(record.kind, _plainly)
-            yield from self._one(key, LABELS.get(record.kind, record.type), say(self.history, record), record)
-        yield from self.reasons(record)
+        else:
+            yield from self.reasons(record)
 
     def _one(self, key: str, label: str, text: str, *records: EntryRecord[Any] | None) -> Iterator[Step]:
         if text and key not in self.told:
             self.told.add(key)
-            yield Step(label, text, tuple(dict.fromkeys(r.ref for r in records if r is not None)))
+            yield step(label, text, *records)
 
-    def _belief(self, record: EntryRecord[Any]) -> Iterator[Step]:
+    def _belief(self, record: EntryRecord[Hypothesis]) -> Iterator[Step]:
         """What it saw, what it had expected; what it was sure of last."""
-        basis = record.value.basis
-        if basis == "tracks":
-            yield from self._tell_tracks(record)
-        elif basis == "odometry":
-            yield from self._tell_odometry(record)
-        yield from self._tell_anchor(record)
-
-    def _tell_tracks(self, record: EntryRecord[Any]) -> Iterator[Step]:
-        history = self.history
-        before, frame = history.reason(record, Hypothesis), history.reason(record, Frame)
-        tracks = history.tracks_of(record)
-        if tracks is not None:
-            now = record.value
-            moved = phrases.describe_belief_change(now, before.value) if before is not None else ""
-            text = f"{phrases.tracking(tracks.value, frame)} {moved}".strip()
-            yield from self._one("Tracks", "seen", text, tracks, frame)
-        if before is not None and before.value.basis == "odometry":
-            yield from self._tell_odometry(before)
-
-    def _tell_odometry(self, record: EntryRecord[Any]) -> Iterator[Step]:
-        report = self.history.reason(record, MotionReport)
+        history, before, expected = self.history, self.history.reason(record, Hypothesis), record
+        if record.value.basis == "tracks":
+            if (tracks := history.tracks_of(record)) is not None:
+                moved = phrases.describe_belief_change(record.value, before.value) if before is not None else ""
+                text = f"{phrases.tracking(tracks.value)} {moved}".strip()
+                yield from self._one("Tracks", "seen", text, tracks, history.reason(record, Frame))
+            expected = before or record
+        report = history.reason(expected, MotionReport) if expected.value.basis == "odometry" else None
         if report is not None:
-            led_to = phrases.pose(record.value)
+            led_to = phrases.pose(expected.value)
             text = f"That was expected because {phrases.wheels(report.value)}, which led to {led_to}."
-            yield from self._one("MotionReport", "expected", text, record, report)
+            yield from self._one("MotionReport", "expected", text, expected, report)
+        yield from self._anchor(record)
 
-    def _tell_anchor(self, record: EntryRecord[Any]) -> Iterator[Step]:
+    def _anchor(self, record: EntryRecord[Hypothesis]) -> Iterator[Step]:
         """What the belief began with: a milestone, finding itself anew, or what the user told."""
         anchor = self.history.anchor_of(record)
         if anchor is None:
             return
-        command, certificate = self.history.reason(anchor, Command), self.history.reason(anchor, Certificate)
-        begun = anchor.value
-        if begun.basis == "relocalization":
-            yield from self._tell_recognition(anchor)
+        begun, certificate = phrases.pose(anchor.value), self.history.reason(anchor, Certificate)
+        if anchor.value.basis == "relocalization":
+            segments, lost = self.history.reason(anchor, Segments), self.history.reason(anchor, Discrepancy)
+            frame = None if segments is None else self.history.reason(segments, Frame)
+            found = f"; {anchor.value.evidence}" if anchor.value.evidence else ""
+            picture = frame.id if frame is not None else "a picture"
+            text = f"It found out anew where it was, in cycle {anchor.cycle}, from {picture}: at {begun}{found}."
+            yield from self._one("recognized", "recognized", text, anchor, segments, frame)
+            if lost is not None:
+                yield from self._tell(lost, anchor)
         elif certificate is not None:
             yield from self._certificate(certificate, f"In cycle {certificate.cycle} ")
-        elif command is not None:
-            text = f"Where it began it was told by the user: at {phrases.pose(begun)}."
+        elif (command := self.history.reason(anchor, Command)) is not None:
+            text = f"Where it began it was told by the user: at {begun}."
             yield from self._one("told", "told", text, anchor, command)
 
-    def _tell_recognition(self, anchor: EntryRecord[Any]) -> Iterator[Step]:
-        """It was lost, and found where it was."""
-        segments, lost = self.history.reason(anchor, Segments), self.history.reason(anchor, Discrepancy)
-        frame = None if segments is None else self.history.reason(segments, Frame)
-        begun = anchor.value
-        found = f"; {begun.evidence}" if begun.evidence else ""
-        text = (f"It found out anew where it was, in cycle {anchor.cycle}, from {phrases.picture(frame)}: at"
-                f" {phrases.pose(begun)}{found}.")
-        yield from self._one("recognized", "recognized", text, anchor, segments, frame)
-        if lost is not None:
-            yield from self._tell(lost, anchor)
-
-    def _certificate(self, record: EntryRecord[Any], when: str = "") -> Iterator[Step]:
-        history = self.history
-        fix, milestone = history.reason(record, PoseFix), history.reason(record, Milestone)
-        judged = None if milestone is None else milestone.value
-        said = capital(when + phrases.verdict(record.value, judged))
+    def _certificate(self, record: EntryRecord[Certificate], when: str = "") -> Iterator[Step]:
+        fix, milestone = self.history.reason(record, PoseFix), self.history.reason(record, Milestone)
+        said = capital(when + phrases.verdict(record.value, None if milestone is None else milestone.value))
         yield from self._one(record.id, "checked", said, record, milestone)
         if fix is not None:
-            yield from self._tell_match(fix)
+            yield from self._match(fix)
 
-    def _tell_match(self, fix: EntryRecord[Any]) -> Iterator[Step]:
+    def _match(self, fix: EntryRecord[PoseFix]) -> Iterator[Step]:
         """From pixels and model to a pose."""
         match = self.history.reason(fix, LineMatch)
         segments = None if match is None else self.history.reason(match, Segments)
@@ -304,28 +279,28 @@ class _Teller:
 
 
 def _plainly(_history: Timeline, record: EntryRecord[Any]) -> str:
-    return f"{capital(sentence(record))}."
+    return plainly(record)
 
 
-def _line(history: Timeline, record: EntryRecord[Any]) -> str:
+def _line(history: Timeline, record: EntryRecord[Leg]) -> str:
     sketch = history.nearest(record, PlanSketch)
-    leg = record.value
-    return phrases.line(leg, sketch.value if sketch is not None and sketch.id == leg.sketch else None)
+    return phrases.line(record.value, sketch.value if sketch and sketch.id == record.value.sketch else None)
 
 
 SAY: Mapping[type[Any], Callable[[Timeline, EntryRecord[Any]], str]] = {
     Leg: _line,
+    Hypothesis: lambda _, r: phrases.believed(r.value),
     Milestone: lambda _, r: phrases.expectation(r.value),
     Discrepancy: lambda _, r: phrases.doubt(r.value),
     PlanSketch: lambda _, r: phrases.plan(r.value),
     Goal: lambda _, r: phrases.goal(r.value),
-    Told: lambda _, r: _describe_telling(r),
-    Redirection: lambda _, r: _describe_telling(r),
+    Told: lambda _, r: headline(r),
+    Redirection: lambda _, r: headline(r),
     Command: lambda _, r: f"The user asked for it: {r.value.text}.",
 }
 LABELS: Mapping[type[Any], str] = {
-    Leg: "driving", Milestone: "looked for", Discrepancy: "doubted", PlanSketch: "plan", Goal: "goal",
-    Command: "command", Tracks: "seen", Frame: "picture", MotionReport: "wheels", MotorCommand: "motion",
+    Leg: "driving", Hypothesis: "believed", Milestone: "looked for", Discrepancy: "doubted", PlanSketch: "plan",
+    Goal: "goal", Command: "command", Tracks: "seen", Frame: "picture", MotionReport: "wheels", MotorCommand: "motion",
     Course: "motion",
     Look: "look", Segments: "seen", Panorama: "thought", BodyFault: "fault", Recovery: "recovery",
     Ride: "ride", RideReport: "ride", Obstruction: "hidden", Quiescence: "stillness", Outcome: "the end",
@@ -370,10 +345,8 @@ FOLLOW: Mapping[type[Any], tuple[type[Any], ...]] = {
 
 def lines_of(told: Story) -> Iterator[str]:
     """A story as paragraphs: label, sentences and the entries that say so."""
-    yield wrap(f"{told.headline}  [{told.ref}]" if told.ref else told.headline)
+    yield wrap(named(told.headline, [told.ref] * bool(told.ref)))
     if told.decided:
         yield wrap(told.decided)
-    width = max((len(step.label) for step in told.steps), default=0)
-    for step in told.steps:
-        named = f"  [{', '.join(step.refs)}]" if step.refs else ""
-        yield wrap(step.text + named, f"  {step.label.ljust(width)}  ")
+    width = max((len(one.label) for one in told.steps), default=0)
+    yield from (wrap(named(one.text, one.refs), f"  {one.label.ljust(width)}  ") for one in told.steps)

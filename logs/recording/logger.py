@@ -1,17 +1,18 @@
-"""Logger: what draws one thing, and names the panels that show it and their places in the window."""
+"""Logger: what draws one thing, and names the panels that show it; and the window with the panels of all loggers."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, Literal
 
 import rerun.blueprint as rrb
 from rerun.encodings import TimeRange
 
 from blackboard.journal import Decision, decision_line
-from logs.recording.board_mirror import Belief, Moment
+from logs.recording.moment import Moment
 from logs.recording.stream import RecordingStream
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
@@ -19,10 +20,12 @@ from world_models.camera import Camera, CameraMount
 Area = Literal["words", "world", "decisions", "measurements"]
 """``words``: the column to the left; ``world``: the middle, above; ``decisions``: the middle, below;
 ``measurements``: the column to the right."""
-
+SHARES, MIDDLE_SHARES = (11, 29, 8), (11, 10)
+"""Of the window's width: words to the left, the middle, measurements; of its height there: the world, decisions."""
+PLAYED_PER_S = 10.0
+"""Cycles, when the recording plays."""
 NEAR_CYCLES = 40
 """Lanes and plots show so many cycles to either side of the cursor."""
-
 NEAR = rrb.archetypes.TimeAxis(view_range=TimeRange(
     start=rrb.TimeRangeBoundary.cursor_relative(seq=-NEAR_CYCLES),
     end=rrb.TimeRangeBoundary.cursor_relative(seq=NEAR_CYCLES)))
@@ -46,12 +49,6 @@ class Panel:
     share: float = 5.0
 
 
-def log_view(origin: str, name: str, *columns: Literal["loglevel", "body"]) -> Any:
-    """Lines of text by cycle."""
-    shown = rrb.TextLogColumns(timeline_columns=["cycle"], text_log_columns=columns)
-    return rrb.TextLogView(origin=origin, name=name, columns=shown)
-
-
 @dataclass(frozen=True, slots=True)
 class Subject:
     """What a recording is of.
@@ -59,7 +56,6 @@ class Subject:
     Attributes:
         title: of the run.
         world, camera, mount: the robot's model of building and camera.
-        belief: the pose hypothesis that is acted on, placed in the world.
         line_of: gives a decision's line in the journal.
     """
 
@@ -67,7 +63,6 @@ class Subject:
     world: World
     camera: Camera
     mount: CameraMount
-    belief: Belief
     line_of: Callable[[Decision], str] = decision_line
 
 
@@ -80,6 +75,7 @@ class Logger(ABC):
 
     def __init__(self, subject: Subject) -> None:
         self.subject = subject
+        self._last: dict[str, object] = {}
 
     def panels(self) -> Sequence[Panel]:
         """The views that show it; none where those of other loggers do."""
@@ -91,3 +87,45 @@ class Logger(ABC):
     @abstractmethod
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         """Log what this cycle changed."""
+
+    def is_new(self, path: str, what: object) -> bool:
+        """Whether something else is to be seen at an entity path from now on."""
+        before, self._last[path] = self._last.get(path), what
+        return before != what
+
+
+def log_view(origin: str, name: str, *columns: Literal["loglevel", "body"]) -> Any:
+    """Lines of text by cycle."""
+    shown = rrb.TextLogColumns(timeline_columns=["cycle"], text_log_columns=columns)
+    return rrb.TextLogView(origin=origin, name=name, columns=shown)
+
+
+def blueprint(loggers: Sequence[Logger]) -> Any:
+    """All panels of some loggers under one cursor, in one window."""
+    panels = [panel for logger in loggers for panel in logger.panels()]
+    middle = _join(rrb.Vertical, [_area(panels, "world", rrb.Horizontal), _area(panels, "decisions", rrb.Horizontal)],
+                   MIDDLE_SHARES)
+    columns = [_area(panels, "words", rrb.Vertical), middle, _area(panels, "measurements", rrb.Vertical)]
+    return window(_join(rrb.Horizontal, columns, SHARES) or rrb.Vertical(), PLAYED_PER_S)
+
+
+def window(content: Any, played_per_s: float) -> Any:
+    """Views under one cursor, with the viewer's own panels folded away."""
+    return rrb.Blueprint(
+        content, rrb.TimePanel(timeline="cycle", state="collapsed", fps=played_per_s),
+        rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), auto_views=False)
+
+
+def _area(panels: Sequence[Panel], area: Area, container: Any) -> Any:
+    """The panels of an area in their order, those of equal order as tabs; None where there are none."""
+    inside = sorted((panel for panel in panels if panel.area == area), key=lambda panel: (panel.order, -panel.share))
+    groups = [list(group) for _, group in groupby(inside, key=lambda panel: panel.order)]
+    parts = [group[0].view if len(group) == 1 else rrb.Tabs(*(panel.view for panel in group)) for group in groups]
+    return _join(container, parts, [max(panel.share for panel in group) for group in groups])
+
+
+def _join(container: Any, parts: Sequence[Any], shares: Sequence[float]) -> Any:
+    """The parts that there are in a container; None where there are none."""
+    there = [(part, share) for part, share in zip(parts, shares, strict=True) if part is not None]
+    name = "row_shares" if container is rrb.Vertical else "column_shares"
+    return container(*(part for part, _ in there), **{name: [share for _, share in there]}) if there else None

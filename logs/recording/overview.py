@@ -14,13 +14,11 @@ from typing import Any
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from numpy.typing import NDArray
 
 from logs.errors import RecordingError
 from logs.reader import Series, read_series
-from logs.recording import paths
-from logs.recording.loggers.lanes import GAP, style
-from logs.recording.messages import ACTIVITIES
+from logs.recording.logger import window
+from logs.recording.loggers.lanes import ACTIVITIES, GAP, style
 from logs.recording.palette import BELIEVED, DONE, MATCHED, REJECTED, VERDICTS, Colour, faint
 from logs.recording.paths import (
     BELIEVED_ROBOT,
@@ -30,6 +28,7 @@ from logs.recording.paths import (
     HARVEY,
     MILESTONES,
     MOODS_OF,
+    NAMES,
     OFF,
     POSITION,
     SUMMARY,
@@ -42,13 +41,15 @@ from world_models.words import metres
 FOUND = "found itself"
 MARKED: Mapping[str, Colour] = {**VERDICTS, FOUND: BELIEVED}
 """What is marked in a run's row of milestones."""
-
 MARK_CYCLES = 5
 """A mark lasts so long, to be seen."""
-
 HEIGHT_M = 0.2
 """Ways are drawn so high above the floor."""
-
+MOST_MM = 150.0
+ABOVE, SOUTH, LEAST_M = 1.15, 0.3, 8.0
+"""The eye's height and way to the south, in lengths of the diagonal of all places, which counts as so much at least."""
+PLAYED_PER_S = 20.0
+"""Cycles, when the overview plays."""
 COLUMNS = ("run", "scenario", "seed", "outcome", "error", "milestones", "refuted", "relocated", "collisions", "cycles")
 
 
@@ -99,7 +100,7 @@ def write_overview(runs: Sequence[RunFiles], path: Path, title: str) -> list[str
     try:
         stream.fix(SUMMARY, rr.TextDocument(summary(runs), media_type="text/markdown"))
         for number, (run, tale) in enumerate(tales):
-            _Row(stream, number, run).draw(tale)
+            _draw(stream, number, run, tale)
         stream.fix(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         if tales:
             stream.copy(tales[0][0].recording, f"/{BUILDING}/**")
@@ -143,42 +144,27 @@ class _Tale:
             true_way or read_series(path, BELIEVED_ROBOT, "Transform3D:translation"))
 
 
-class _Row:
-    """What one run leaves in the overview."""
-
-    def __init__(self, stream: RecordingStream, number: int, run: RunFiles) -> None:
-        """A row's name begins with its number, since rows are sorted by name."""
-        self._stream, self._run = stream, run
-        self._part = rr.escape_entity_path_part(f"{number:03}_{run.name}")
-
-    def draw(self, tale: _Tale) -> None:
-        """Two lanes, a curve and a way."""
-        self._lane(f"{MOODS_OF}/{self._part}", tale.activities, ACTIVITIES)
-        self._lane(f"{MILESTONES}/{self._part}", list(_marks(tale.marks)), MARKED)
-        self._errors(tale.errors)
-        self._way(tale.way)
-
-    def _lane(self, path: str, states: Series, styles: Mapping[str, Colour]) -> None:
-        self._stream.fix(path, style(styles))
+def _draw(stream: RecordingStream, number: int, run: RunFiles, tale: _Tale) -> None:
+    """What one run leaves in the overview: two lanes, a curve and a way."""
+    part = rr.escape_entity_path_part(f"{number:03}_{run.name}")  # rows are sorted by name
+    for path, states, styles in ((f"{MOODS_OF}/{part}", tale.activities, ACTIVITIES),
+                                 (f"{MILESTONES}/{part}", [*_marks(tale.marks)], MARKED)):
+        stream.fix(path, style(styles))
         for cycle, state in states:
-            self._stream.at(cycle, 0.0)
-            self._stream.log(path, rr.StateChange, state=[state])
-
-    def _errors(self, errors: Series) -> None:
-        path = f"{OFF}/{self._part}"
-        self._stream.fix(path, rr.SeriesLines(names=[self._run.name], colors=[self._run.colour], widths=[1.5]))
-        for cycle, (ahead_mm, left_mm) in errors:
-            self._stream.at(cycle, 0.0)
-            self._stream.log(path, rr.Scalars, scalars=[math.hypot(ahead_mm, left_mm)])
-
-    def _way(self, places: Series) -> None:
-        path, colour = f"{FLEET}/{self._part}", self._run.colour
-        self._stream.fix(path, rr.Points3D.from_fields(colors=[colour], radii=0.25))
-        strip = np.array([(x, y, z + HEIGHT_M) for _, (x, y, z) in places], float).reshape(-1, 3)
-        self._stream.fix(f"{path}/way", rr.LineStrips3D([strip], colors=[faint(colour, 120)], radii=0.03))
-        for cycle, place in places:
-            self._stream.at(cycle, 0.0)
-            self._stream.log(path, rr.Points3D, positions=[place])
+            stream.at(cycle, 0.0)
+            stream.log(path, rr.StateChange, state=[state])
+    path = f"{OFF}/{part}"
+    stream.fix(path, rr.SeriesLines(names=[run.name], colors=[run.colour], widths=[1.5]))
+    for cycle, (ahead_mm, left_mm) in tale.errors:
+        stream.at(cycle, 0.0)
+        stream.log(path, rr.Scalars, scalars=[math.hypot(ahead_mm, left_mm)])
+    path = f"{FLEET}/{part}"
+    stream.fix(path, rr.Points3D.from_fields(colors=[run.colour], radii=0.25))
+    strip = np.array([(x, y, z + HEIGHT_M) for _, (x, y, z) in tale.way], float).reshape(-1, 3)
+    stream.fix(f"{path}/way", rr.LineStrips3D([strip], colors=[faint(run.colour, 120)], radii=0.03))
+    for cycle, place in tale.way:
+        stream.at(cycle, 0.0)
+        stream.log(path, rr.Points3D, positions=[place])
 
 
 def _marks(chapters: Series) -> Iterator[tuple[int, str]]:
@@ -191,39 +177,28 @@ def _marks(chapters: Series) -> Iterator[tuple[int, str]]:
             yield cycle + MARK_CYCLES, GAP
 
 
-MOST_MM = 150.0
-
-ABOVE, SOUTH, LEAST_M = 1.15, 0.3, 8.0
-"""The eye's height and way to the south, in lengths of the diagonal of all places, which counts as so much at least."""
-
-
 def overview_blueprint(places: Sequence[Sequence[float]]) -> Any:
-    """Outcomes and map to the left, one row a run to the right, errors below; ``places`` (x, y, z) are to be seen."""
-    busy = rrb.StateTimelineView(
-        origin=f"/{paths.MOODS_OF}", name="Drives blue, looks yellow, plans orange, doubts violet, lost red")
-    milestones = rrb.StateTimelineView(
-        origin=f"/{paths.MILESTONES}", name="Milestones: verified green, refuted red, found itself blue")
-    off = rrb.TimeSeriesView(
-        origin=f"/{paths.OFF}", name="How far the belief is from the truth [mm]",
-        axis_y=rrb.ScalarAxis(range=(0.0, MOST_MM)), plot_legend=rrb.PlotLegend(visible=False))
-    table = rrb.TextDocumentView(origin=f"/{paths.SUMMARY}", name="How they ended")
-    where = rrb.Spatial3DView(
-        origin=f"/{paths.WORLD}", name="All robots, and their ways", line_grid=False,
-        contents=["$origin/**", f"- /{paths.NAMES}"], background=rrb.Background(color=[28, 30, 34, 255]),
-        eye_controls=_eye(np.array([*places] or [(0.0, 0.0, 0.0)], float)))
-    return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(table, where, row_shares=[5, 4]),
-            rrb.Vertical(rrb.Horizontal(busy, milestones), off, row_shares=[3, 1]),
-            column_shares=[4, 7]),
-        rrb.TimePanel(timeline="cycle", state="collapsed", fps=20.0),
-        rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), auto_views=False)
+    """Outcomes and map to the left, one row a run to the right, errors below; ``places`` (x, y, z) are to be seen.
 
-
-def _eye(places: NDArray[np.float64]) -> Any:
-    """Above the middle of all places, a little to the south."""
-    low, high = places.min(axis=0), places.max(axis=0)
+    The eye stands above the middle of all places, a little to the south.
+    """
+    known = np.array([*places] or [(0.0, 0.0, 0.0)], float)
+    low, high = known.min(axis=0), known.max(axis=0)
     (x, y, _), size = (low + high) / 2, max(LEAST_M, float(np.linalg.norm(high - low)))
-    return rrb.EyeControls3D(
+    eye = rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital, position=[x, y - SOUTH * size, ABOVE * size], look_target=[x, y, 0.0],
         eye_up=[0.0, 0.0, 1.0])
+    busy = rrb.StateTimelineView(
+        origin=f"/{MOODS_OF}", name="Drives blue, looks yellow, plans orange, doubts violet, lost red")
+    milestones = rrb.StateTimelineView(
+        origin=f"/{MILESTONES}", name="Milestones: verified green, refuted red, found itself blue")
+    off = rrb.TimeSeriesView(
+        origin=f"/{OFF}", name="How far the belief is from the truth [mm]",
+        axis_y=rrb.ScalarAxis(range=(0.0, MOST_MM)), plot_legend=rrb.PlotLegend(visible=False))
+    table = rrb.TextDocumentView(origin=f"/{SUMMARY}", name="How they ended")
+    where = rrb.Spatial3DView(
+        origin=f"/{WORLD}", name="All robots, and their ways", line_grid=False, contents=["$origin/**", f"- /{NAMES}"],
+        background=rrb.Background(color=[28, 30, 34, 255]), eye_controls=eye)
+    return window(rrb.Horizontal(
+        rrb.Vertical(table, where, row_shares=[5, 4]),
+        rrb.Vertical(rrb.Horizontal(busy, milestones), off, row_shares=[3, 1]), column_shares=[4, 7]), PLAYED_PER_S)

@@ -10,9 +10,8 @@ from pathlib import Path
 from blackboard.journal import Decision, decision_line
 from logs.errors import RecordingError
 from logs.recording import loggers as built_in
-from logs.recording.blueprint import blueprint
-from logs.recording.board_mirror import Belief, Difference, Mirror, Moment
-from logs.recording.logger import Logger, Subject
+from logs.recording.logger import Logger, Subject, blueprint
+from logs.recording.moment import Difference, Moments
 from logs.recording.stream import LIVE_PORT, RecordingStream
 from world_models.building.geometry.faces import Face
 from world_models.building.world import World
@@ -32,7 +31,10 @@ def logger_classes() -> tuple[type[Logger], ...]:
     Raises:
         RecordingError: a logger of another package cannot be loaded.
     """
-    return (*_find_built_in_loggers(), *_foreign())
+    try:
+        return (*_find_built_in_loggers(), *load_plugin_classes(GROUP, Logger).values())
+    except PluginError as error:
+        raise RecordingError(str(error)) from error
 
 
 def _find_built_in_loggers() -> Iterator[type[Logger]]:
@@ -42,19 +44,8 @@ def _find_built_in_loggers() -> Iterator[type[Logger]]:
             yield from import_module(module.name).LOGGERS
 
 
-def _foreign() -> Iterator[type[Logger]]:
-    try:
-        yield from load_plugin_classes(GROUP, Logger).values()
-    except PluginError as error:
-        raise RecordingError(str(error)) from error
-
-
 class RecordingWriter:
-    """Draws every decision.
-
-    It learns of the mission from the decisions alone, and of the true robot, where somebody knows it, from
-    :meth:`truth`. On hardware nobody does.
-    """
+    """Draws each decision when it comes."""
 
     def __init__(
         self, path: Path | None, *, world: World, camera: Camera, mount: CameraMount, title: str, recording_id: str,
@@ -71,27 +62,22 @@ class RecordingWriter:
             RecordingError: the file cannot be written.
             ValueError: neither path nor live.
         """
-        subject = Subject(title, world, camera, mount, Belief(world), line_of)
+        subject = Subject(title, world, camera, mount, line_of)
         self._loggers = tuple(logger(subject) for logger in (logger_classes() if loggers is None else loggers))
         self._stream = RecordingStream(
             path, recording_id, title, blueprint(self._loggers), live=live, live_port=live_port)
-        self._mirror = Mirror()
-        self._sim_time_s = 0.0
-        self._truth: list[Pose2] = []
-        self._contacts: list[Place] = []
-        self._differences: list[Difference] = []
+        self._moments, self._sim_time_s = Moments(world), 0.0
         for logger in self._loggers:
             logger.begin(self._stream)
 
     def truth(self, world_from_robot: Pose2, sim_time_s: float, contacts: Sequence[Place] = ()) -> None:
         """Where the robot truly is, and where it touched something; drawn with the next decision."""
-        self._contacts += contacts
-        self._truth.append(world_from_robot)
+        self._moments.tell_truth(world_from_robot, contacts)
         self._sim_time_s = max(self._sim_time_s, sim_time_s)
 
     def true_building(self, added: tuple[Face, ...], gone: tuple[Face, ...]) -> None:
         """How the building truly differs from its model from now on; drawn with the next decision."""
-        self._differences.append(Difference(added, gone))
+        self._moments.differences.append(Difference(added, gone))
 
     def __call__(self, decision: Decision) -> None:
         """Draw one decision.
@@ -99,36 +85,19 @@ class RecordingWriter:
         Raises:
             RecordingError: the recording cannot be written any more.
         """
-        moment = self._moment(decision)
+        moment = self._moments.after(decision)
+        times_s = [*(e.value.sim_time_s for e in moment.changed(Frame)),
+                   *(e.value.sim_time_s for e in moment.changed(MotionReport))]
+        self._sim_time_s = max([self._sim_time_s, *times_s])
         self._stream.at(decision.cycle, self._sim_time_s)
         for logger in self._loggers:
             logger.log(self._stream, moment)
         self._stream.end_cycle()
 
     def flush(self) -> None:
-        """Bring everything to the disk and to the viewers now.
-
-        Raises:
-            RecordingError: the recording cannot be written any more.
-        """
+        """Bring everything to the disk and to the viewers now. Raises RecordingError where that fails."""
         self._stream.flush()
 
     def close(self) -> None:
-        """End the recording.
-
-        Raises:
-            RecordingError: its last part could not be written.
-        """
+        """End the recording. Raises RecordingError where its last part cannot be written."""
         self._stream.close()
-
-    def _moment(self, decision: Decision) -> Moment:
-        moment = Moment(decision, self._mirror, tuple(self._truth), tuple(self._contacts), tuple(self._differences))
-        self._truth.clear()
-        self._differences.clear()
-        self._contacts.clear()
-        for change in moment.changes:
-            self._mirror.take(change)
-        times = [*(e.value.sim_time_s for e in moment.changed(Frame)),
-                 *(e.value.sim_time_s for e in moment.changed(MotionReport))]
-        self._sim_time_s = max([self._sim_time_s, *times])
-        return moment

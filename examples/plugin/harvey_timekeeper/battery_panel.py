@@ -8,8 +8,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from harvey_timekeeper.timekeeper import BATTERY_S
-from logs.recording.board_mirror import Moment
 from logs.recording.logger import Logger, Panel
+from logs.recording.moment import Moment
 from logs.recording.stream import RecordingStream
 from world_models.entries.body import MotionReport
 

@@ -1,10 +1,9 @@
-"""The loggers of a recording, one a file: each turns what changed in a cycle into what a person sees of it.
+"""The loggers of a recording: each turns what changed in a cycle into what a person sees of it.
 
-In reading order: ``frames`` (the shortest), ``errors``, ``decisions``, ``chapters``, ``lanes``, ``plan``,
-``sketch_tree``, ``robots``, ``image``, ``floor_in_picture``, ``why``, ``description``; in ``surroundings`` what is
-round the robot.
+In reading order: ``errors`` (the shortest), ``decisions``, ``lanes``, ``why``, ``plan``, ``robots``, ``picture``; in
+``surroundings`` what is round the robot.
 
-To add one: a file in this folder, or in one below it, with a class as :class:`logs.recording.logger.Logger` says, and
+To add one: a class as :class:`logs.recording.logger.Logger` says, in a file in this folder, or in one below it, with
 ``LOGGERS = (TheClass,)`` at its end. In another package: the same class, and an entry point of the group
 ``harvey.loggers`` that names it.
 """

@@ -10,40 +10,32 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from blackboard.agenda import Activation
-from blackboard.change import Change
+from blackboard.change import Change, Retracted, Revised
 from blackboard.journal import Decision
 from blackboard.servoing import Discrepancy
-from logs.recording.board_mirror import Moment
 from logs.recording.logger import Logger, Panel, Subject, log_view
-from logs.recording.messages import Messages
+from logs.recording.moment import Moment
 from logs.recording.palette import DONE, LEVELS, REJECTED
 from logs.recording.paths import RECORDS, TABLE
 from logs.recording.stream import TROUBLE, RecordingStream
 from world_models import words
+from world_models.building.locale_frame import FrameRequest, LocaleFrame, has_answer
+from world_models.entries.location import Hypothesis
+from world_models.entries.robot import Drift
+from world_models.entries.task import Leg, Milestone
 
 TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "doubted", "halted")
 """Statuses of milestones, sketches, goals, hypotheses and legs that stand for something gone wrong."""
-
 COLUMNS = ("focus_level", "chosen_knowledge_source", "rating", "trigger_entry", "effects_on_the_board",
            "runner_up_with_rating", "waiting")
 """Of the decision table; the viewer makes a column as wide as its name."""
-
 MARKS: Mapping[str, str] = {"ERROR": f"{TROUBLE} ", "WARN": f"{TROUBLE} ", "INFO": "", "DEBUG": ""}
-
 RECORD = "record"
 """The component that holds a decision's line."""
 
 
-class Record:
-    """A column of decisions' lines."""
-
-    @classmethod
-    def columns(cls, **components: Any) -> Iterable[Any]:
-        return rr.AnyValues.columns(True, **components)
-
-
-class TableRow:
-    """Columns of the sentence and of the table."""
+class Row:
+    """Columns of the sentence, of the table and of the record."""
 
     @classmethod
     def columns(cls, **components: Any) -> Iterator[Any]:
@@ -57,7 +49,6 @@ class Decisions(Logger):
 
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)
-        self._line_of = subject.line_of
         self._messages = Messages()
 
     def panels(self) -> Sequence[Panel]:
@@ -70,11 +61,56 @@ class Decisions(Logger):
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         decision = moment.decision
-        stream.log(RECORDS, Record, **{RECORD: [self._line_of(decision)]})
+        stream.log(RECORDS, Row, **{RECORD: [self.subject.line_of(decision)]})
         level = log_level(decision)
         fields: dict[str, list[Any]] = {name: [value] for name, value in row(decision).items()}
-        stream.log(TABLE, TableRow, text=[MARKS[level] + sentence(decision, self._messages)], level=[level],
-                 color=[_colour(decision)], **fields)
+        stream.log(TABLE, Row, text=[MARKS[level] + sentence(decision, self._messages)], level=[level],
+                   color=[_colour(decision)], **fields)
+
+
+class Messages:
+    """Words changes in their order; it remembers the last pose hypotheses, to tell by how much each was corrected."""
+
+    def __init__(self) -> None:
+        self._hypotheses: dict[str, Hypothesis] = {}
+
+    def message(self, change: Change) -> str:
+        """The first clause of the entry's own sentence; "" for a change that is not worth a word."""
+        value = change.entry.value
+        if isinstance(change, Retracted):
+            return f"no longer believes {change.entry.id}"
+        if isinstance(value, Hypothesis):
+            return self._hypothesis(change, value)
+        if isinstance(value, LocaleFrame):  # of a frame as filed the answered request tells, in the same cycle
+            said = words.listed([one.sentence() for one in value.changes])
+            return (f"believes of {value.name}: {said}" if said else
+                    f"believes of {value.name} again what the file says" if isinstance(change, Revised) else "")
+        if isinstance(value, FrameRequest) and has_answer(value):
+            return _describe_answer(value)
+        return "" if _is_detail(change) else words.brief(value)
+
+    def _hypothesis(self, change: Change, new: Hypothesis) -> str:
+        old = self._hypotheses.get(change.entry.id)
+        self._hypotheses[change.entry.id] = new
+        if not new.is_held or old is None or old.locale != new.locale or new.basis in ("command", "relocalization"):
+            return words.brief(new)
+        return f"the belief moves by {new.distance_from(old)}, by {new.basis}"
+
+
+def _describe_answer(request: FrameRequest) -> str:
+    errors = {answer.asked: answer.error for answer in request.answers if answer.error}
+    asked = [name or "the whole building" for name in request.locales if name not in errors]
+    known = [f"what is known of {words.listed(asked)}"] * bool(asked)
+    places = [f"{answer.asked} is in {words.listed(answer.locales)}" for answer in request.answers if answer.locales]
+    return f"answer: {', '.join([*known, *places, *errors.values()])}"
+
+
+def _is_detail(change: Change) -> bool:
+    """What another entry of the same cycle says already, or what changes with every move."""
+    value = change.entry.value
+    if isinstance(value, Leg | Milestone) and isinstance(change, Revised):
+        return value.status == "moving" if isinstance(value, Leg) else not value.is_open
+    return isinstance(value, Drift)
 
 
 def sentence(decision: Decision, messages: Messages) -> str:
@@ -84,10 +120,8 @@ def sentence(decision: Decision, messages: Messages) -> str:
     done = _describe_changes(decision.made, messages) or "changes nothing"
     if decision.chosen is None:
         return f"nobody had anything to do{given}"
-    who = words.source(decision.chosen.source.name)
-    if decision.refused:
-        return f"{who}: refused, {decision.refused.splitlines()[-1]}{given}"
-    return f"{who}: {done}{given}"
+    done = f"refused, {decision.refused.splitlines()[-1]}" if decision.refused else done
+    return f"{words.source(decision.chosen.source.name)}: {done}{given}"
 
 
 def _describe_changes(changes: Iterable[Change], messages: Messages) -> str:
@@ -119,14 +153,9 @@ def row(decision: Decision) -> dict[str, str | float]:
     """The decision table's columns, by :data:`COLUMNS`."""
     chosen, second = decision.chosen, decision.runner_up
     values = (
-        str(decision.focus),
-        chosen.source.name if chosen else "",
-        float(chosen.rating) if chosen else 0.0,
-        str(chosen.trigger.entry.ref) if chosen else "",
-        _messages(decision.made),
-        _bid(second) if second else "",
-        float(decision.pending),
-    )
+        str(decision.focus), chosen.source.name if chosen else "", float(chosen.rating) if chosen else 0.0,
+        str(chosen.trigger.entry.ref) if chosen else "", _describe_effects(decision.made),
+        _bid(second) if second else "", float(decision.pending))
     return dict(zip(COLUMNS, values, strict=True))
 
 
@@ -134,11 +163,12 @@ def _bid(activation: Activation) -> str:
     return f"{activation.source.name} (rating {activation.rating:.2f})"
 
 
-def _messages(made: tuple[Change, ...]) -> str:
+def _describe_effects(made: Sequence[Change]) -> str:
+    """What was done to entries of each kind: by the name of the entry where it is one."""
     counts = Counter((change.kind.lower(), type(change.entry.value).__name__) for change in made)
-    named = {(c.kind.lower(), type(c.entry.value).__name__): str(c.entry.ref) for c in made}
-    parts = [f"{kind} {named[kind, what]}" if count == 1 else f"{kind} {count} x {what}"
-             for (kind, what), count in counts.items()]
+    named = {(change.kind.lower(), type(change.entry.value).__name__): change.entry.ref for change in made}
+    parts = [f"{done} {named[done, kind]}" if number == 1 else f"{done} {number} x {kind}"
+             for (done, kind), number in counts.items()]
     return ", ".join(parts) or "did nothing"
 
 

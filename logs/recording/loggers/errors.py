@@ -12,8 +12,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from blackboard.servoing import Discrepancy
-from logs.recording.board_mirror import Held, Moment
-from logs.recording.logger import NEAR, Logger, Panel, Subject
+from logs.recording.logger import NEAR, Logger, Panel
+from logs.recording.moment import Moment
 from logs.recording.palette import BELIEVED, LEVELS, PLANNED, faint
 from logs.recording.paths import DEVIATION, HEADING, POSITION
 from logs.recording.stream import RecordingStream
@@ -21,13 +21,9 @@ from world_models.entries.location import Hypothesis
 from world_models.frames import Pose2
 
 MM = 1e3
-
 WHEN: Mapping[str, str] = {"action": "on the move", "plan": "at a milestone"}
-
 OFF_SCALE = 2.0
 """What could not be measured at all is drawn so many times its bound high."""
-
-
 MAX_SHOWN_MM, MAX_SHOWN_DEG, MAX_SHOWN_PX = 25.0, 2.0, 40.0
 """Reach of the plots; what is beyond it is off the scale, and meant to look so."""
 
@@ -37,11 +33,6 @@ class Errors(Logger):
 
     One standard deviation of the belief lies to either side of an error: a band far from zero is too sure of itself.
     """
-
-    def __init__(self, subject: Subject) -> None:
-        super().__init__(subject)
-        self._belief = subject.belief
-        self._truth: Pose2 | None = None
 
     def panels(self) -> Sequence[Panel]:
         """Place and, behind it, heading to the left, where a scale has room; discrepancies to the right."""
@@ -53,41 +44,28 @@ class Errors(Logger):
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(POSITION, _style(["ahead ±1 sigma", "left ±1 sigma"], "mm"))
         stream.fix(HEADING, _style(["turned left ±1 sigma"], "deg"))
-        for level in ("action", "plan"):
-            colours = [LEVELS[level], faint(LEVELS[level], 110)]
-            names = [WHEN[level], "allowed there"]
-            stream.fix(f"{DEVIATION}/{level}", rr.SeriesLines(names=names, colors=colours, widths=[2.0, 1.0]))
+        for level, when in WHEN.items():
+            stream.fix(f"{DEVIATION}/{level}", rr.SeriesLines(
+                names=[when, "allowed there"], colors=[LEVELS[level], faint(LEVELS[level], 110)], widths=[2.0, 1.0]))
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
-        for pose in moment.truth[-1:]:
-            self._truth = pose
-        if moment.touched(Hypothesis):
-            self._log(stream, self._belief.now(moment.mirror))
+        if moment.touched(Hypothesis) and (held := moment.held) is not None:
+            error = moment.off or Pose2(0.0, 0.0, 0.0)
+            stream.log(POSITION, rr.Measurements, values=[MM * error.x_m, MM * error.y_m],
+                       variances=[(MM * held.sigma_m) ** 2] * 2)
+            stream.log(HEADING, rr.Measurements, values=[math.degrees(error.heading_rad)],
+                       variances=[math.degrees(held.value.sigma_rad) ** 2])
         for entry in moment.changed(Discrepancy):
-            _deviation(stream, entry.value)
-
-    def _log(self, stream: RecordingStream, held: Held | None) -> None:
-        if held is None:
-            return
-        sigma_mm, sigma_deg = MM * held.sigma_m, math.degrees(held.sigma_rad)
-        error = Pose2(0.0, 0.0, 0.0)
-        if self._truth is not None:
-            error = self._truth.inverse() @ held.world_from_robot
-        stream.log(POSITION, rr.Measurements, values=[MM * error.x_m, MM * error.y_m], variances=[sigma_mm**2] * 2)
-        stream.log(HEADING, rr.Measurements, values=[math.degrees(error.heading_rad)], variances=[sigma_deg**2])
+            found = entry.value
+            if found.magnitude is not None and found.unit == "px" and math.isfinite(found.bound):
+                seen = found.magnitude if math.isfinite(found.magnitude) else OFF_SCALE * found.bound
+                stream.log(f"{DEVIATION}/{found.level}", rr.Scalars, scalars=[seen, found.bound])
 
 
 def _style(names: list[str], unit: str) -> rr.Measurements:
     count = len(names)
     return rr.Measurements.from_fields(
         units=[unit] * count, names=names, colors=[PLANNED, BELIEVED][:count], widths=[1.5] * count)
-
-
-def _deviation(stream: RecordingStream, found: Discrepancy) -> None:
-    if found.magnitude is None or found.unit != "px" or not math.isfinite(found.bound):
-        return
-    seen = found.magnitude if math.isfinite(found.magnitude) else OFF_SCALE * found.bound
-    stream.log(f"{DEVIATION}/{found.level}", rr.Scalars, scalars=[seen, found.bound])
 
 
 def _plot(origin: str, name: str, low: float, high: float) -> rrb.TimeSeriesView:

@@ -11,9 +11,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from logs.recording.board_mirror import Mirror, Moment
-from logs.recording.logger import Logger, Panel, Subject
+from logs.recording.logger import Logger, Panel
 from logs.recording.loggers.surroundings.building import space_view
+from logs.recording.moment import Moment
 from logs.recording.palette import BELIEVED, CANDIDATE, TRUE, Colour, faint
 from logs.recording.paths import (
     BELIEVED_BODY,
@@ -31,22 +31,15 @@ from world_models.frames import Pose2, frozen
 
 RADIUS_M = 0.35
 """Of the Denning platform."""
-
 SIGMA_SCALE = 20.0
 """A few centimetres would not show in a building: the ellipse is drawn larger, and its label says so."""
-
 RING_HEIGHT_M = 1.5
 """Above the robot, which would hide a small ring."""
-
 STILL_M = 1e-3
 TRAIL_HEIGHT_M = 0.2
-
 CIRCLE = frozen([np.cos(np.linspace(0.0, 2.0 * np.pi, 33)), np.sin(np.linspace(0.0, 2.0 * np.pi, 33))])
-
 SIGHT_M = 2.5
 """Length of the wedge that shows where the camera looks."""
-
-
 CLOSE_ABOVE_M, CLOSE_SOUTH_M = 6.0, 1.2
 """The eye of the near view: above the robot, and to the south."""
 
@@ -54,12 +47,7 @@ CLOSE_ABOVE_M, CLOSE_SOUTH_M = 6.0, 1.2
 class Robots(Logger):
     """Logs both robots when they move."""
 
-    def __init__(self, subject: Subject) -> None:
-        super().__init__(subject)
-        self._world, self._belief = subject.world, subject.belief
-        self._camera, self._mount = subject.camera, subject.mount
-        self._last: dict[str, Pose2] = {}
-        self._has_candidates = False
+    _has_candidates = False
 
     def panels(self) -> Sequence[Panel]:
         """The building from near by; the eye goes with the believed robot."""
@@ -72,7 +60,7 @@ class Robots(Logger):
         wires = rr.components.FillMode.MajorWireframe
         stream.fix(BELIEVED_BODY, _cylinder(BELIEVED, RADIUS_M + 0.08, 1.3, wires))
         stream.fix(f"{BELIEVED_ROBOT}/heading", _arrow(BELIEVED, 1.35))
-        stream.fix(f"{BELIEVED_ROBOT}/sight", _wedge(self._camera, self._mount.forward_m))
+        stream.fix(f"{BELIEVED_ROBOT}/sight", _wedge(self.subject.camera, self.subject.mount.forward_m))
         stream.fix(BELIEVED_TRAIL, rr.LineStrips3D.from_fields(colors=[BELIEVED], radii=0.04))
         label = f"1 sigma, drawn {SIGMA_SCALE:.0f} times as large"
         stream.fix(BELIEVED_ROBOT, rr.LineStrips3D.from_fields(
@@ -80,30 +68,27 @@ class Robots(Logger):
         stream.fix(CANDIDATES, rr.Arrows3D.from_fields(colors=[CANDIDATE], radii=0.05, show_labels=True))
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
-        for pose in moment.truth[-1:]:
-            if TRUE_ROBOT not in self._last:
-                _begin_truth(stream)
-            self._move(stream, TRUE_ROBOT, TRUE_TRAIL, pose)
-        if moment.touched(Hypothesis):
-            self._log_belief(stream, moment.mirror)
-
-    def _log_belief(self, stream: RecordingStream, mirror: Mirror) -> None:
-        self._log_candidates(stream, mirror)
-        held = self._belief.now(mirror)
-        if held is not None:
-            pose = held.world_from_robot
-            points = ring(pose, held.value.covariance_world(self._world))
-            strip = np.column_stack([points, np.full(len(points), RING_HEIGHT_M)])
+        if moment.truth is not None:
+            if TRUE_ROBOT not in self._last:  # it has a shape only where somebody knows where it is
+                stream.fix(f"{TRUE_ROBOT}/body", _cylinder(TRUE, RADIUS_M, 0.9, rr.components.FillMode.Solid))
+                stream.fix(f"{TRUE_ROBOT}/heading", _arrow(TRUE, 0.95))
+                stream.fix(TRUE_TRAIL, rr.LineStrips3D.from_fields(colors=[TRUE], radii=0.04))
+            self._move(stream, TRUE_ROBOT, TRUE_TRAIL, moment.truth)
+        if not moment.touched(Hypothesis):
+            return
+        self._log_candidates(stream, [e.value for e in moment.mirror.all(Hypothesis) if e.value.status == "candidate"])
+        if (held := moment.held) is not None:
+            points = ring(held.world_from_robot, held.value.covariance_world(self.subject.world))
+            strip = np.insert(points, 2, RING_HEIGHT_M, axis=1)
             stream.log(BELIEVED_ROBOT, rr.LineStrips3D, strips=strip[None].astype(np.float32))
-            self._move(stream, BELIEVED_ROBOT, BELIEVED_TRAIL, pose)
+            self._move(stream, BELIEVED_ROBOT, BELIEVED_TRAIL, held.world_from_robot)
 
-    def _log_candidates(self, stream: RecordingStream, mirror: Mirror) -> None:
+    def _log_candidates(self, stream: RecordingStream, others: Sequence[Hypothesis]) -> None:
         """Where else it might be: an arrow each, the longer the likelier."""
-        others = [e.value for e in mirror.all(Hypothesis) if e.value.status == "candidate"]
         if not others and not self._has_candidates:
             return
         self._has_candidates = bool(others)
-        poses = [h.world_from_robot(self._world) for h in others]
+        poses = [h.world_from_robot(self.subject.world) for h in others]
         vectors = [((0.5 + h.weight) * math.cos(p.heading_rad), (0.5 + h.weight) * math.sin(p.heading_rad), 0.0)
                    for h, p in zip(others, poses, strict=True)]
         stream.log(CANDIDATES, rr.Arrows3D, origins=[(p.x_m, p.y_m, RING_HEIGHT_M) for p in poses], vectors=vectors,
@@ -111,21 +96,13 @@ class Robots(Logger):
 
     def _move(self, stream: RecordingStream, robot: str, trail: str, pose: Pose2) -> None:
         before = self._last.get(robot)
-        if before == pose:
+        if not self.is_new(robot, pose):
             return
-        self._last[robot] = pose
         turn = (0.0, 0.0, math.sin(pose.heading_rad / 2), math.cos(pose.heading_rad / 2))
         stream.log(robot, rr.Transform3D, translation=[(pose.x_m, pose.y_m, 0.0)], quaternion=[turn])
-        if before is not None and before.distance_to(pose) > STILL_M:
+        if isinstance(before, Pose2) and before.distance_to(pose) > STILL_M:
             step = [[(p.x_m, p.y_m, TRAIL_HEIGHT_M) for p in (before, pose)]]
             stream.log(trail, rr.LineStrips3D, strips=np.array(step, np.float32))
-
-
-def _begin_truth(stream: RecordingStream) -> None:
-    """The true robot has a shape only where somebody knows where it is."""
-    stream.fix(f"{TRUE_ROBOT}/body", _cylinder(TRUE, RADIUS_M, 0.9, rr.components.FillMode.Solid))
-    stream.fix(f"{TRUE_ROBOT}/heading", _arrow(TRUE, 0.95))
-    stream.fix(TRUE_TRAIL, rr.LineStrips3D.from_fields(colors=[TRUE], radii=0.04))
 
 
 def _cylinder(colour: Colour, radius_m: float, height_m: float, fill: Any) -> Any:

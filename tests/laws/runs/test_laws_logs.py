@@ -14,9 +14,9 @@ from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.journal import Decision, decision_record
 from blackboard.level import Level
 from logs.journal_file import JournalFile, read_journal
-from logs.recording.board_mirror import Mirror
+from logs.mirror import Mirror
+from logs.recording.loggers.plan import outline
 from logs.recording.loggers.robots import SIGMA_SCALE, ring
-from logs.recording.loggers.sketch_tree import outline
 from strategies import Note, Tally
 from world_models.entries.location import Place
 from world_models.entries.task import Goal, PlanSketch, Subgoal

@@ -13,9 +13,10 @@ from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref
 from blackboard.journal import Decision
 from blackboard.level import Level
-from logs.recording.board_mirror import Belief, Mirror, Moment
+from logs.mirror import Mirror
 from logs.recording.logger import Subject
 from logs.recording.loggers.surroundings.locale_frames import LocaleFrames, marks_path, outline_path
+from logs.recording.moment import Moment
 from logs.recording.palette import KNOWN, REVISED
 from logs.recording.paths import FRAME_LIST
 from logs.recording.stream import RecordingStream
@@ -51,7 +52,7 @@ def the_house() -> World:
 def test_what_is_drawn_and_listed_is_what_is_on_the_board(plan: list[tuple[tuple[str, str], bool]]) -> None:
     """A step may come from outside or by an act; a frame may be asked for that is there already."""
     world, board, stream = the_house(), Blackboard(), LastLogged()
-    logger, store = LocaleFrames(Subject("house", world, CAMERA, MOUNT, Belief(world))), FrameStore(world, "a file")
+    logger, store = LocaleFrames(Subject("house", world, CAMERA, MOUNT)), FrameStore(world, "a file")
     drawn = cast(RecordingStream, stream)
     for cycle, ((what, room), is_observed) in enumerate(plan, start=1):
         there = [entry for entry in board.view.all(LocaleFrame) if entry.value.name == room]

@@ -15,9 +15,7 @@ from blackboard.journal import Decision
 from blackboard.level import Level
 from logs.errors import RecordingError
 from logs.reader import read_series
-from logs.recording.blueprint import blueprint
-from logs.recording.board_mirror import Belief
-from logs.recording.logger import Subject
+from logs.recording.logger import Subject, blueprint
 from logs.recording.paths import TABLE
 from logs.recording.writer import RecordingWriter, logger_classes
 from scripted_mission import CAMERA, MOUNT, house, play
@@ -80,7 +78,7 @@ def test_its_panel_is_in_the_window_and_its_data_in_the_recording(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     install(tmp_path, monkeypatch, "changes = accounts:Changes")
-    subject = Subject("house", house(), CAMERA, MOUNT, Belief(house()))
+    subject = Subject("house", house(), CAMERA, MOUNT)
     window = blueprint([logger(subject) for logger in logger_classes()]).root_container
     assert "Changes a cycle" in [view.name for view in views(window)]
     decisions: list[Decision] = []

@@ -15,9 +15,7 @@ from rerun.chunk import RrdReader
 import docs.tools.look as looking
 from docs.tools.look import look
 from logs.errors import RecordingError
-from logs.recording.blueprint import blueprint
-from logs.recording.board_mirror import Belief
-from logs.recording.logger import Subject
+from logs.recording.logger import Subject, blueprint
 from logs.recording.paths import BELIEVED_BODY, FAULTS, IMAGE
 from logs.recording.writer import RecordingWriter, logger_classes
 from scripted_mission import CAMERA, MOUNT, house, play
@@ -55,7 +53,7 @@ def logged(recording: Path) -> Logged:
 
 def window() -> Any:
     """The blueprint of a whole recording."""
-    subject = Subject("house", house(), CAMERA, MOUNT, Belief(house()))
+    subject = Subject("house", house(), CAMERA, MOUNT)
     return blueprint([logger(subject) for logger in logger_classes()]).root_container
 
 

@@ -17,6 +17,7 @@ from blackboard.entry import Ref
 from blackboard.journal import Decision
 from blackboard.level import Level
 from logs.reader import read_series
+from logs.recording.loggers.decisions import Messages
 from logs.recording.loggers.surroundings.locale_frames import (
     HEADER,
     MAX_LISTED,
@@ -25,7 +26,6 @@ from logs.recording.loggers.surroundings.locale_frames import (
     marks_path,
     outline_path,
 )
-from logs.recording.messages import Messages
 from logs.recording.palette import KNOWN, REVISED
 from logs.recording.paths import FRAME_LIST
 from logs.recording.writer import RecordingWriter

@@ -2,14 +2,14 @@
 
 from blackboard.board import Blackboard
 from blackboard.change import Retracted
-from blackboard.effect import Post, Revise
+from blackboard.effect import Post
 from blackboard.entry import Ref
 from blackboard.journal import Decision
-from logs.recording.board_mirror import Mirror
-from logs.recording.loggers.decisions import COLUMNS, log_level, row, sentence
-from logs.recording.loggers.sketch_tree import NO_SKETCH, outline
-from logs.recording.loggers.why import story
-from logs.recording.messages import Messages, activity
+from logs.mirror import Mirror
+from logs.recording.loggers.decisions import COLUMNS, Messages, log_level, row, sentence
+from logs.recording.loggers.lanes import activity
+from logs.recording.loggers.plan import NO_SKETCH, outline
+from logs.recording.loggers.why import thoughts
 from scripted_mission import play
 from world_models.entries.body import BodyFault, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis
@@ -72,11 +72,12 @@ def faulty(status: str) -> Mirror:
 
 
 def test_a_fault_of_the_body_is_the_headline() -> None:
-    told = story(faulty("open"))
+    told = thoughts(faulty("open"))
     assert told.startswith("### Trouble: camera unplugged")
-    assert "**Trouble:** camera: camera unplugged. no picture for 2.0 s; 1 try so far." in told
-    assert activity(faulty("open")).word == "is in trouble"
-    assert "Trouble" not in story(faulty("over"))
+    assert "**Trouble:** the camera is at fault since 12.0 s into the run: camera unplugged" in told
+    assert "It waits 0.50 s and tries again; to have Look-3 answered, 1 try so far." in told
+    assert activity(faulty("open"))[0] == "is in trouble"
+    assert "Trouble" not in thoughts(faulty("over"))
 
 
 def test_trouble_stands_out() -> None:
@@ -114,35 +115,31 @@ def test_the_tree_of_nothing_is_empty() -> None:
 
 
 def test_the_story_says_what_it_wants_expects_sees_doubts_and_does() -> None:
-    told = story(play_to("PoseFix-1.0")[1])
+    told = thoughts(play_to("PoseFix-1.0")[1])
     assert told.startswith("### Looking for a milestone")
-    assert "**Harvey wants** to be in parlour (2.00, 2.00) m." in told
-    assert ("**It believes** it is in kitchen at (1.00, 1.00) m, heading 0.0 degrees, "
-            "give or take 20 mm and 0.57 degrees") in told
-    assert "**It expects** the door: 2 lines of kitchen-door." in told
-    assert "**It sees** 3 line segments, 2 matched, 1 of these agree on one pose." in told
-    assert "**It doubts:** nothing at the moment." in told
+    assert "**Goal:** from kitchen (1.00, 1.00) m to parlour (2.00, 2.00) m; active." in told
+    assert ("**It believes** that it stands at (1.00, 1.00) m of kitchen, heading 0.0 degrees "
+            "(sure to 20 mm and 0.6 degrees), by command.") in told
+    assert "**Milestone** the door is expected; " in told and "should show 2 model lines of kitchen-door." in told
+    assert "**It sees** 3 line segments found; 2 segments matched to 2 of 2 expected model lines; 1 of 2" in told
+    assert "**It doubts:** nothing now." in told
 
 
 def test_the_story_tells_of_a_discrepancy_and_of_being_lost() -> None:
-    told = story(play_to("Discrepancy-2.0")[1])
-    assert "the door is not where it was expected: not yet measured (at the plan level" in told
+    told = thoughts(play_to("Discrepancy-2.0")[1])
+    assert "**It doubts:** the door is not where it was expected: not yet measured there." in told
     assert told.startswith("### In doubt: checking where it is before it goes on")
-    assert "It does:** has halted on a straight leg of 2.24 m" in told
-    assert "turn 22.9 degrees left and move 0.60 m ahead, to follow Leg-1, as PlanSketch-2 has it for kitchen" in told
-    lost = story(play_to()[1])
-    assert lost.startswith("### The end: reached\n\n**The end:** reached: there.")
+    assert "**It does:** has halted on a straight leg of 2.24 m" in told
+    assert "**It last judged** milestone the door was verified: 2 of 2 lines" in told
+    lost = thoughts(play_to()[1])
+    assert lost.startswith("### The end: reached\n\n**The mission ended:** reached, because there.")
     assert "it is lost" in lost
 
 
-def test_an_order_whose_reasons_go_round_in_a_circle_is_told() -> None:
-    """The mirror knows the newest revisions only, so the older of two may seem to rest on the newer."""
+def test_an_order_is_told_with_the_clause_that_why_has_for_it() -> None:
     mirror, board = Mirror(), Blackboard()
-    leg = Leg("PlanSketch-1", 0, 0.0, 0.0, 1.0, 0.0, 0.1)
+    leg = Leg("PlanSketch-1", 0, 0.0, 0.0, 1.0, 0.0, 0.1, aim_rad=0.1)
     for effect in (Post(leg), Post(MotorCommand(0.1, 0.0), (Ref("Leg-1", 0),))):
-        for change in board.apply([effect], author="motor", cycle=1):
-            mirror.take(change)
-    again = Revise(board.view["Leg-1"], leg, (Ref("MotorCommand-1", 0),))
-    for change in board.apply([again], author="motor", cycle=2):
-        mirror.take(change)
-    assert "**Last order:** turn 5.7 degrees left, to follow Leg-1." in story(mirror)
+        mirror.take(*board.apply([effect], author="motor", cycle=1))
+    because = "because the line to follow lay 5.7 degrees left of where it believed that it faced"
+    assert f"**Last order:** turn 5.7 degrees left, {because}." in thoughts(mirror)

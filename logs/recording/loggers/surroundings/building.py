@@ -12,51 +12,56 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from logs.recording.board_mirror import Moment
-from logs.recording.logger import Logger, Panel, Subject
-from logs.recording.palette import DOOR, NAME, REJECTED, TRUE
+from logs.recording.logger import Logger, Panel
+from logs.recording.moment import Moment
+from logs.recording.palette import DOOR, NAME, REJECTED, TRUE, Colour
 from logs.recording.paths import BELIEVED_TRAIL, BUILDING, DOORWAYS, NAMES, TRUE_ADDED, TRUE_GONE, TRUE_TRAIL, WORLD
 from logs.recording.stream import RecordingStream, viewable
 from world_models.building.geometry.faces import LAMP, Face, Region, area_vector
 from world_models.building.geometry.scene import stack_regions
+from world_models.building.locales import Doorway
 from world_models.building.world import World
 
+Strip = NDArray[np.float32]
+"""(n, 3) points one after the other [m, world]."""
 HEAD_HIGH_M = 1.8
 """A surface that faces down and hangs higher than this is a ceiling, and left out: one looks in from above."""
-
 STOREY_M = 0.5
 """Rooms whose floors differ by less are of one storey."""
-
 UNKNOWN_GREY = 0.5
 """A surface of unknown colour is drawn so bright."""
-
-SOFT_LIGHT = 0.75
-LAMP_LIGHT = 0.35
-
-
+SOFT_LIGHT, LAMP_LIGHT = 0.75, 0.35
 ABOVE, SOUTH = 0.56, 0.11
 """The eye stands so high above the building and so far to the south of its middle, in lengths of its diagonal: steeply
 enough to look over the walls into a narrow hallway."""
 EYE_HEIGHT_M = 3.0
 """Added to the eye's height."""
-
+EDGE_M = 0.015
+"""Half the width of an outline."""
 SINCE_THE_START = rrb.VisibleTimeRange(
     "cycle", start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative())
+
+
+def strip(points: Any, height_m: float) -> Strip:
+    """Points (n, 2) of the plan at a height [m, world]."""
+    return np.insert(np.asarray(points, float), 2, height_m, axis=1).astype(np.float32)
+
+
+def across(door: Doorway) -> NDArray[np.float64]:
+    """(2, 2) from jamb to jamb of a doorway, half-way through the wall [m, world]."""
+    here, there = door.thresholds_world
+    return np.asarray((here + there[::-1]) / 2)
 
 
 class Building(Logger):
     """Logs the world model once."""
 
-    def __init__(self, subject: Subject) -> None:
-        super().__init__(subject)
-        self._world = subject.world
-
     def panels(self) -> Sequence[Panel]:
         name = "Where it is: true robot green, believed blue, plan orange"
-        return (Panel(building_view(self._world, name), "world", 1, 13),)
+        return (Panel(building_view(self.subject.world, name), "world", 1, 13),)
 
     def begin(self, stream: RecordingStream) -> None:
-        log_building(stream, self._world)
+        log_building(stream, self.subject.world)
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         """Buildings do not change."""
@@ -76,8 +81,9 @@ def record_building(world: World, out: Path, title: str | None = None) -> None:
 
     ``title``: of the recording, the world's name by default; a viewer keeps recordings with different titles apart.
     """
+    name = title or world.name
     look = rrb.Blueprint(building_view(world, world.name), rrb.TimePanel(state="hidden"), auto_views=False)
-    stream = RecordingStream(out, f"building of {title or world.name}", title or world.name, look)
+    stream = RecordingStream(out, f"building of {name}", name, look)
     try:
         log_building(stream, world)
     finally:
@@ -105,12 +111,11 @@ def space_view(name: str, eye: Any, *without: str) -> Any:
 
 def _meshes(world: World) -> Iterator[tuple[str, Any]]:
     """A mesh for each storey, so that one can take the upper ones off; they are one where there is only one."""
-    regions = [(face, region) for face in world.faces for region in (*face.front, *face.back)]
-    # Not those of the world's scene: that would find the corners of all landmarks as well.
-    polygons, normals = stack_regions([region for _, region in regions])
-    colours = np.nan_to_num([region.colour for _, region in regions], nan=UNKNOWN_GREY)
+    regions = _regions(world.faces)  # not those of the world's scene, which would find the corners of all landmarks
+    polygons, normals = stack_regions(regions)
+    colours = np.nan_to_num([region.colour for region in regions], nan=UNKNOWN_GREY)
     floors = {name: world.floor_m(name) for name in world.rooms}
-    levels = np.array([floors.get(face.locale, 0.0) for face, _ in regions])
+    levels = np.array([floors.get(face.locale, 0.0) for face in world.faces for _ in (*face.front, *face.back)])
     storeys = np.unique(np.round(levels, 1))
     for number, level_m in enumerate(storeys):
         of_storey = np.abs(levels - level_m) < STOREY_M
@@ -151,16 +156,9 @@ def _names(world: World) -> Any:
 
 
 def _doorways(world: World) -> Any:
-    strips = []
-    for doorway in world.doorways:
-        (a, b), (c, d) = doorway.thresholds_world
-        height_m = world.floor_m(doorway.between[0]) + 0.02
-        strips.append([[*corner, height_m] for corner in (a, b, c, d, a)])
+    strips = [strip(door.thresholds_world.reshape(4, 2)[[0, 1, 2, 3, 0]], world.floor_m(door.between[0]) + 0.02)
+              for door in world.doorways]
     return rr.LineStrips3D(strips, colors=[DOOR], radii=0.03)
-
-
-EDGE_M = 0.015
-"""Half the width of an outline."""
 
 
 class TrueBuilding(Logger):
@@ -168,24 +166,24 @@ class TrueBuilding(Logger):
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         for difference in moment.differences[-1:]:
-            _log_outlines(stream, f"{TRUE_ADDED}/edges", difference.added, TRUE)
-            _log_outlines(stream, TRUE_GONE, difference.gone, REJECTED)
-            _log_surfaces(stream, _regions(difference.added))
+            regions = _regions(difference.added)
+            _log_outlines(stream, f"{TRUE_ADDED}/edges", regions, TRUE)
+            _log_outlines(stream, TRUE_GONE, _regions(difference.gone), REJECTED)
+            _log_surfaces(stream, regions)
 
 
 def _regions(faces: Sequence[Face]) -> list[Region]:
     return [region for face in faces for region in (*face.front, *face.back)]
 
 
-def _log_outlines(stream: RecordingStream, path: str, faces: Sequence[Face], colour: tuple[int, int, int, int]) -> None:
-    strips = [np.concatenate([r.polygon_world, r.polygon_world[:1]]).astype(np.float32) for r in _regions(faces)]
+def _log_outlines(stream: RecordingStream, path: str, regions: Sequence[Region], colour: Colour) -> None:
+    strips = [np.concatenate([r.polygon_world, r.polygon_world[:1]]).astype(np.float32) for r in regions]
     stream.log(path, rr.LineStrips3D, strips=strips, colors=[colour] * len(strips), radii=[EDGE_M] * len(strips))
 
 
 def _log_surfaces(stream: RecordingStream, regions: Sequence[Region]) -> None:
     corners = [len(region.polygon_world) for region in regions]
-    starts = np.cumsum([0, *corners])[:-1]
-    faces = [triangles(1, k) + start for k, start in zip(corners, starts, strict=True)]
+    faces = [triangles(1, k) + start for k, start in zip(corners, np.cumsum([0, *corners])[:-1], strict=True)]
     normals = np.array([area_vector(region.polygon_world) for region in regions]).reshape(-1, 3)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     colours = light_colours(np.array([region.colour for region in regions]).reshape(-1, 3), normals)

@@ -6,33 +6,28 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from numpy.typing import NDArray
 
 from blackboard.change import Change, Retracted
 from blackboard.entry import Entry
-from logs.recording.board_mirror import Moment
 from logs.recording.logger import Logger, Panel, Subject
+from logs.recording.loggers.surroundings.building import Strip, across, strip
+from logs.recording.moment import Moment
 from logs.recording.palette import KNOWN, REVISED
 from logs.recording.paths import FRAME_LIST, FRAMES
 from logs.recording.stream import RecordingStream, viewable
 from world_models import words
-from world_models.building.locale_frame import FrameChange, FrameRequest, LocaleFrame
-from world_models.building.locales import Doorway, Thing
+from world_models.building.locale_frame import FrameRequest, LocaleFrame
 from world_models.entries.robot import CameraState, Footprint, Wheels
 
 ROBOT_KINDS = (CameraState, Wheels, Footprint)
-
 MAX_LISTED = 40
 """The list has so many frames at most."""
-
 OUTLINE_M, MARK_M = 0.04, 0.1
 """Radii of the strips."""
 BAR_M = 1.2
 """A shut door is barred, and a thing that is gone struck out, so high above the floor."""
-
 HEADER = "| locale | frame | since cycle | asked for by | otherwise than in the file |\n|:--|:--|--:|:--|:--|"
 
 
@@ -56,11 +51,9 @@ class LocaleFrames(Logger):
 
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)
-        self._world = subject.world
         self._known: dict[str, Known] = {}
         self._askers: dict[str, str] = {}
         self._robot: dict[type[Any], Entry[Any]] = {}
-        self._listed = ""
 
     def panels(self) -> Sequence[Panel]:
         view = rrb.TextDocumentView(origin=FRAME_LIST, name="Frames on the board")
@@ -73,7 +66,7 @@ class LocaleFrames(Logger):
         left = [ref.id for ref in moment.decision.left if ref.id in self._known]
         for ref in moment.decision.left:
             self._askers.pop(ref.id, None)
-        if self._listed and not left and not moment.touched(LocaleFrame, FrameRequest, *ROBOT_KINDS):
+        if self._last and not left and not moment.touched(LocaleFrame, FrameRequest, *ROBOT_KINDS):
             return
         before = self._newest()
         self._take(moment.decision.observed)
@@ -82,52 +75,42 @@ class LocaleFrames(Logger):
         self._take(moment.decision.made)
         now = self._newest()
         for name in {**before, **now}:
-            self._draw(stream, before.get(name), now.get(name))
-        text = describe(now.values(), self._robot.values())
-        if text != self._listed:
-            self._listed = text
+            if (old := before.get(name)) != (new := now.get(name)):
+                self._draw(stream, old.entry.value if old else None, new.entry.value if new else None)
+        if self.is_new(FRAME_LIST, text := describe(now.values(), self._robot.values())):
             stream.log(FRAME_LIST, rr.TextDocument, text=[text])
 
     def _take(self, changes: Iterable[Change]) -> None:
         for change in changes:
-            entry = change.entry
-            if isinstance(entry.value, FrameRequest):
+            entry, value = change.entry, change.entry.value
+            if isinstance(value, FrameRequest):
                 self._askers.setdefault(entry.id, entry.author)
-            elif isinstance(entry.value, ROBOT_KINDS):
-                self._robot[type(entry.value)] = entry
-            elif isinstance(entry.value, LocaleFrame):
-                if isinstance(change, Retracted):
-                    self._known.pop(entry.id, None)
-                else:
-                    self._know(entry)
-
-    def _know(self, entry: Entry[LocaleFrame]) -> None:
-        known = self._known.get(entry.id)
-        if known is None:
-            askers = (self._askers[ref.id] for ref in entry.because if ref.id in self._askers)
-            known = Known(entry, entry.cycle, next(askers, entry.author))
-        self._known[entry.id] = replace(known, entry=entry)
+            elif isinstance(value, ROBOT_KINDS):
+                self._robot[type(value)] = entry
+            elif isinstance(value, LocaleFrame) and isinstance(change, Retracted):
+                self._known.pop(entry.id, None)
+            elif isinstance(value, LocaleFrame):
+                asked_by = next((self._askers[ref.id] for ref in entry.because if ref.id in self._askers), entry.author)
+                known = self._known.get(entry.id) or Known(entry, entry.cycle, asked_by)
+                self._known[entry.id] = replace(known, entry=entry)
 
     def _newest(self) -> dict[str, Known]:
         """The newest frame of each locale, by its name."""
         return {known.entry.value.name: known for known in self._known.values()}
 
-    def _draw(self, stream: RecordingStream, before: Known | None, now: Known | None) -> None:
+    def _draw(self, stream: RecordingStream, old: LocaleFrame | None, new: LocaleFrame | None) -> None:
         """Draw a room whose frame came or changed; clear one whose frame left."""
-        if before == now:
-            return
-        old, new = (known.entry.value if known else None for known in (before, now))
         frame = new or old
         if frame is None or not frame.extent.is_room:
             return
-        floor_m, corners = self._world.floor_m(frame.name), self._world.outline(frame.name)
-        ring = _strip([*corners, corners[0]], floor_m + frame.locale.height_m)
-        colour = REVISED if frame.changes else KNOWN
-        stream.log(outline_path(frame.name), rr.LineStrips3D, strips=[ring] if new else [],
-                   colors=[colour], radii=[OUTLINE_M])
+        world, path = self.subject.world, outline_path(frame.name)
+        floor_m, corners = world.floor_m(frame.name), world.outline(frame.name)
+        ring = strip([*corners, corners[0]], floor_m + frame.locale.height_m)
+        stream.log(path, rr.LineStrips3D, strips=[ring] if new else [],
+                   colors=[REVISED if frame.changes else KNOWN], radii=[OUTLINE_M])
         if any(f is not None and f.changes for f in (old, new)):
             marks = list(marks_of(new, floor_m + BAR_M)) if new else []
-            stream.log(marks_path(frame.name), rr.LineStrips3D, strips=[strip for strip, _ in marks],
+            stream.log(marks_path(frame.name), rr.LineStrips3D, strips=[mark for mark, _ in marks],
                        labels=[text for _, text in marks], colors=[REVISED], radii=[MARK_M])
 
 
@@ -141,31 +124,16 @@ def marks_path(room: str) -> str:
     return f"{outline_path(room)}/changes"
 
 
-def marks_of(frame: LocaleFrame, height_m: float) -> Iterator[tuple[NDArray[np.float32], str]]:
+def marks_of(frame: LocaleFrame, height_m: float) -> Iterator[tuple[Strip, str]]:
     """A bar across each door that is believed shut, a cross over each thing that is gone, with who said so."""
     doors = {door.name: door for door in frame.shut_doorways}
     things = {thing.name: thing for thing in (frame.filed or frame).things}
     for change in frame.changes:
         if change.what == "shut" and change.name in doors:
-            yield _bar(doors[change.name], height_m), change.sentence()
+            yield strip(across(doors[change.name]), height_m), change.sentence()
         elif change.what == "gone" and change.name in things:
-            yield _cross(things[change.name], height_m), change.sentence()
-
-
-def _bar(door: Doorway, height_m: float) -> NDArray[np.float32]:
-    """From jamb to jamb, half-way through the wall."""
-    (left, right), (right_there, left_there) = door.thresholds_world
-    return _strip([(left + left_there) / 2, (right + right_there) / 2], height_m)
-
-
-def _cross(thing: Thing, height_m: float) -> NDArray[np.float32]:
-    a, b, c, d = thing.footprint_world
-    return _strip([a, c, (a + c) / 2, b, d], height_m)
-
-
-def _strip(points: Sequence[Any], height_m: float) -> NDArray[np.float32]:
-    """(n, 3) points of the plan at a height."""
-    return np.array([(*point[:2], height_m) for point in points], np.float32)
+            a, b, c, d = things[change.name].footprint_world
+            yield strip([a, c, (a + c) / 2, b, d], height_m), change.sentence()
 
 
 def describe(known: Iterable[Known], robot: Iterable[Entry[Any]]) -> str:
@@ -179,7 +147,7 @@ def describe(known: Iterable[Known], robot: Iterable[Entry[Any]]) -> str:
 
 def _row(known: Known) -> str:
     entry = known.entry
-    changes = "; ".join(map(FrameChange.sentence, entry.value.changes))
+    changes = "; ".join(change.sentence() for change in entry.value.changes)
     since = f"{known.since}, revised in {entry.cycle}" if entry.revision else str(known.since)
     return f"| {entry.value.name} | {entry.ref} | {since} | {words.source(known.asked_by)} | {changes} |"
 
