@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,49 +62,6 @@ class Worker(KnowledgeSource):
         yield Revise(trigger.entry, trigger.entry.value.next(), (trigger.entry,))
 
 
-class Competitor(KnowledgeSource):
-    """Is triggered by some tasks too, but always rated lower; when the task is revised its activation is obviated."""
-
-    level = Level.PLAN
-    on = (Watch(Task),)
-    priority = 0.0
-    writes = (Task,)
-
-    def __init__(self, number: int, can_act: Callable[[Task], bool]) -> None:
-        self._number, self._can_act = number, can_act
-
-    @property
-    def name(self) -> str:
-        return f"competitor_{self._number}"
-
-    def bind(self, view: View, trigger: Change) -> Change | None:
-        return trigger if self._can_act(trigger.entry.value) else None
-
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
-        return ()
-
-
-@dataclass(frozen=True, slots=True)
-class Load:
-    """Which knowledge sources a change triggers: ``per_cycle`` activations, one executed, the others obviated."""
-
-    name: str
-    per_cycle: float
-    sources: Callable[[], list[KnowledgeSource]]
-
-
-SINGLE = Load("a change triggers 1", 1.0, lambda: [Worker()])
-AS_IN_MISSIONS = Load(
-    "a change triggers 1.375, as in missions", 1.375,
-    lambda: [Worker(), Competitor(1, lambda task: (task.draw >> 8) % 8 < 3)],
-)
-ALL = Load(
-    "a change triggers 14", 14.0,
-    lambda: [Worker(), *(Competitor(number, lambda _task: True) for number in range(1, 14))],
-)
-LOADS = (SINGLE, AS_IN_MISSIONS, ALL)
-
-
 @dataclass(frozen=True, slots=True)
 class Speed:
     """Time per ended activation with about ``pending`` pending: best and median part [s]."""
@@ -114,7 +71,7 @@ class Speed:
     median_s: float
 
 
-def measure(load: Load, numbers_pending: Sequence[int], parts: int, seed: int) -> list[Speed]:
+def measure(numbers_pending: Sequence[int], parts: int, seed: int) -> list[Speed]:
     """Measure processor time with each number pending, in parts of PART_CYCLES cycles, with the journal in a file.
 
     Parts of different numbers alternate, so that a machine that is slow for a while slows all of them.
@@ -126,7 +83,7 @@ def measure(load: Load, numbers_pending: Sequence[int], parts: int, seed: int) -
         for pending in numbers_pending:
             journal = JournalFile(folder / f"{pending}.jsonl")
             stack.callback(journal.close)
-            schedulers.append(_fill(Scheduler(load.sources(), sinks=[journal]), round(pending / load.per_cycle), rng))
+            schedulers.append(_fill(Scheduler([Worker()], sinks=[journal]), pending, rng))
         rounds = [[_measure_part_s(scheduler) for scheduler in schedulers] for _ in range(parts)]
     return [Speed(pending, min(times_s), sorted(times_s)[parts // 2])
             for pending, times_s in zip(numbers_pending, zip(*rounds, strict=True), strict=True)]

@@ -1,4 +1,4 @@
-"""Memory of a board over very many cycles, with and without retention."""
+"""Memory of a board over very many cycles."""
 
 from __future__ import annotations
 
@@ -95,10 +95,10 @@ class Memory:
         return (self.late_bytes - self.early_bytes) / (self.cycles - self.cycles // 10)
 
 
-def long_run(cycles: int, *, retention: bool) -> Memory:
-    """Run a number of cycles, with retention as the kinds say or with none; the journal goes to the null device."""
+def long_run(cycles: int) -> Memory:
+    """Run a number of cycles; the journal goes to the null device."""
     journal = JournalFile(Path(os.devnull))
-    scheduler = Scheduler([Seer(), Corrector()], sinks=[journal], retention=None if retention else {})
+    scheduler = Scheduler([Seer(), Corrector()], sinks=[journal])
     scheduler.tell([Post(Picture(0, bytes(PIXELS)))], "user")
     early_bytes = 0
     while scheduler.cycle < cycles:
