@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from experiments.wrappers import WrappedBody
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task
 from harvey.runner.ports import Body
@@ -26,27 +25,24 @@ MOTION_S = 0.05
 """Duration of a motion, so that a kill may fall in the middle of one."""
 
 
-class LoggedBody(WrappedBody):
-    """A body that logs every command that reaches it, whatever becomes of the agent."""
+def logging_to(path: Path) -> Around:
+    """Let a mission's body log every command that reaches it to a file, whatever becomes of the agent."""
+    def around(body: Body, replaying: Callable[[], bool]) -> Body:
+        log, execute = path.open("ab", buffering=0), body.execute
 
-    def __init__(self, body: Body, replaying: Callable[[], bool], log: Path) -> None:
-        super().__init__(body)
-        self._replaying = replaying
-        self._log = log.open("ab", buffering=0)
+        def logged(command: MotorCommand) -> MotionReport | BodyFault:
+            if replaying():
+                return execute(command)
+            log.write(json.dumps({"begun": [command.turn_rad, command.move_m]}).encode() + b"\n")
+            time.sleep(MOTION_S)
+            report = execute(command)
+            log.write(b'{"ended": true}\n')
+            return report
 
-    def execute(self, command: MotorCommand) -> MotionReport | BodyFault:
-        if self._replaying():
-            return super().execute(command)
-        self._log.write(json.dumps({"begun": [command.turn_rad, command.move_m]}).encode() + b"\n")
-        time.sleep(MOTION_S)
-        report = super().execute(command)
-        self._log.write(b'{"ended": true}\n')
-        return report
+        object.__setattr__(body, "execute", logged)
+        return body
 
-
-def logging_to(log: Path) -> Around:
-    """Wrap a mission's body so that it logs its commands to a file."""
-    return lambda body, replaying: LoggedBody(body, replaying, log)
+    return around
 
 
 def main(argv: list[str]) -> int:

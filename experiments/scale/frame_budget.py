@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from blackboard.effect import Effect
 from blackboard.journal import Decision
 from blackboard.knowledge_source import KnowledgeSource
 from experiments.report import Cell, Report
-from experiments.wrappers import WrappedSource
 from harvey.simulation.run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.settings import Settings
@@ -48,18 +48,23 @@ NOTES = (
 Times = dict[str, list[float]]
 
 
-class _Timed(WrappedSource):
-    """A knowledge source whose acts are timed."""
+def _timed(source: KnowledgeSource, times: Times) -> KnowledgeSource:
+    """A knowledge source whose acts are timed, by what triggered them."""
+    bind, act, last = source.bind, source.act, list[Change]()
 
-    def __init__(self, inner: KnowledgeSource, times: Times) -> None:
-        super().__init__(inner)
-        self._times = times
+    def watched(view: View, trigger: Change) -> Any:
+        last[:] = [trigger]
+        return bind(view, trigger)
 
-    def act(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def timed(view: View, case: Any) -> Iterable[Effect]:
         began_s = time.thread_time()
-        effects = tuple(super().act(view, trigger))
-        self._times.setdefault(_act(self.name, trigger), []).append(1000.0 * (time.thread_time() - began_s))
+        effects = tuple(act(view, case))
+        times.setdefault(_act(source.name, last[0]), []).append(1000.0 * (time.thread_time() - began_s))
         return effects
+
+    object.__setattr__(source, "bind", watched)
+    object.__setattr__(source, "act", timed)
+    return source
 
 
 def _act(name: str, trigger: Change) -> str:
@@ -108,7 +113,7 @@ def _time_acts(scenario: str, seed: int) -> Times:
     timed = frozenset((TRACK, FLOOR, *MILESTONE))
 
     def sources(settings: Settings) -> Sequence[KnowledgeSource]:
-        return [_Timed(ks, times) if ks.name in timed else ks for ks in knowledge_sources(settings)]
+        return [_timed(ks, times) if ks.name in timed else ks for ks in knowledge_sources(settings)]
 
     run_mission(build_stage(load_scenario(scenario)), seed, sources=sources)
     return times
@@ -120,7 +125,7 @@ def _time_pictures(scenario: str, seed: int) -> list[float]:
     pictures: list[float] = []
 
     def sources(settings: Settings) -> Sequence[KnowledgeSource]:
-        return [_Timed(ks, acts) for ks in knowledge_sources(settings)]
+        return [_timed(ks, acts) for ks in knowledge_sources(settings)]
 
     def count(decision: Decision) -> None:
         if any(isinstance(change.entry.value, Frame) for change in decision.observed):

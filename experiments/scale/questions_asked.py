@@ -220,7 +220,7 @@ def _decided(scheduler: Scheduler) -> str:
 def _silence(sources: Sequence[KnowledgeSource]) -> None:
     """From now on, in this process, none of these can act."""
     for source in sources:
-        object.__setattr__(source, "rate", lambda view, trigger: None)
+        object.__setattr__(source, "bind", lambda view, trigger: None)
 
 
 def _acting(scheduler: Scheduler, silent: Sequence[KnowledgeSource], *, with_trigger: bool = False) -> str:
@@ -234,15 +234,20 @@ def _acting(scheduler: Scheduler, silent: Sequence[KnowledgeSource], *, with_tri
 
 def _made_without(scheduler: Scheduler, source: KnowledgeSource, gone: str) -> str:
     """What the act of the next cycle asks for, after an entry has been withdrawn beneath it, as JSON."""
-    act = source.act
-    made: list[Any] = []
+    bind, act = source.bind, source.act
+    woken, made = list[Change](), list[Any]()
 
-    def watched(view: Any, trigger: Change) -> tuple[Effect, ...]:
+    def noting(view: Any, trigger: Change) -> Any:
+        woken[:] = [trigger]
+        return bind(view, trigger)
+
+    def watched(view: Any, _case: Any) -> tuple[Effect, ...]:
         entry = view.get(_id(gone)) if gone else None
         if entry is not None:
             scheduler.board.apply([Retract(entry)], author=WHAT_IF, cycle=scheduler.cycle)
         try:
-            effects = tuple(act(view, trigger))
+            case = bind(view, woken[0])
+            effects = () if case is None else tuple(act(view, case))
         except Exception as error:  # what it lacks tells that it rests on it
             made.append(repr(error))
             return ()
@@ -253,6 +258,7 @@ def _made_without(scheduler: Scheduler, source: KnowledgeSource, gone: str) -> s
                      for effect in effects])
         return ()
 
+    object.__setattr__(source, "bind", noting)
     object.__setattr__(source, "act", watched)
     scheduler.step()
     return json.dumps(made)
