@@ -39,11 +39,9 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
     "perception": {
         "calibrate": "Camera calibration: are its standard deviations true?",
         "corridor": "Real photographs: line coverage and pose recovery",
-        "lens": "Lines through distorting lenses, rectified two ways",
         "matcher": "2D matching of growing problems: success and time",
         "milestones": "Milestones at right and wrong places: error rates",
         "milestones-calibrate": "Fits the weights of the evidence for milestones",
-        "visibility": "Visibility by the model against the renderer",
     },
     "robustness": {
         "crash": "Missions killed at random moments and resumed",

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from experiments.generated.floor_plan import FloorPlan, as_toml
-from sim.differences.inexact import TrueInexact, displace
 from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
@@ -66,12 +65,6 @@ class Floor:
                     locale["things"] = [thing for thing in locale["things"] if chance.random() >= missing]
         details = Source.parse(self.details, f"floor-{self.seed}-details")
         return read_world(Source.parse(as_toml(data), f"floor-{self.seed}"), [details])
-
-    def displaced(self, truth: TrueInexact) -> World:
-        """The building, with its details, as inexactly as the model describes it."""
-        details = Source.parse(self.details, f"floor-{self.seed}-details")
-        return read_world(Source.parse(self.text, f"floor-{self.seed}"), [details],
-                          altered=lambda spec: displace(spec, truth).spec)
 
     def write(self, folder: Path) -> tuple[Path, Path]:
         """Write the files of the model and of the details, for scenarios."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,8 +15,6 @@ from experiments.perception.milestones_cases import (
     MIN_DIFFERENCE,
     MISSING_SHARE,
     ROOMS,
-    generate_cases,
-    get_site,
 )
 from experiments.perception.milestones_trials import (
     BLOCK,
@@ -24,10 +22,9 @@ from experiments.perception.milestones_trials import (
     JudgedCase,
     Trial,
     TrialResult,
-    draw_case,
     judge_trial,
 )
-from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
+from experiments.report import Cell, Report
 from experiments.trials import campaign_folder, run_trials
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 
@@ -50,19 +47,14 @@ def run(quick: bool, seed: int) -> Report:
     counted = [j for j in judged if not j.is_same]
     right, wrong = [j for j in counted if j.kind == "right"], [j for j in counted if j.kind != "right"]
     bins = compute_reliability(counted)
-    _draw_reliability(bins, folder / "reliability.png")
-    rates = _draw_roc(right, wrong, folder / "roc.png")
-    worst = _worst(counted)
-    for j in worst:
-        _draw_worst(j, folder / "worst")
     report = Report(
         "The milestone judge on generated floors", COLUMNS, tuple(_rows(judged, right, wrong)),
         notes=(
-            *_notes(judged, counted, folder), *rates,
+            *_notes(judged, counted, folder), *_compare_scores(right, wrong),
             *(f"stated {mean:.4g}: {found:.4g} were wrong (95 % interval {low:.4g} to {high:.4g}), {n} cases"
               for mean, found, low, high, n in bins),
             *(f"worst: floor {j.floor} case {j.number} ({j.kind}): {j.verdict}, p_false {j.p_false:.2g}; {j.reason}"
-              for j in worst),
+              for j in _worst(counted)),
         ),
         claims=_claims(right, wrong, bins, quick),
     )
@@ -180,7 +172,7 @@ def _notes(judged: Sequence[JudgedCase], counted: Sequence[JudgedCase], folder: 
         f"{len(counted)} cases count. Verified up to p_false {POSE_CONFIDENCE.accept:.3g}, refuted from"
         f" {POSE_CONFIDENCE.refute:.3g}; p_false assumes that half of the places are wrong. It was fitted by harvey"
         " experiment milestones-calibrate.",
-        f"Pictures, every case and this table: {folder}",
+        f"Every case and this table: {folder}",
     ]
 
 
@@ -191,42 +183,17 @@ def _worst(judged: Sequence[JudgedCase]) -> list[JudgedCase]:
     return [*wrong[: WORST_SHOWN // 2], *refuted[: WORST_SHOWN // 2]]
 
 
-def _draw_worst(judged: JudgedCase, folder: Path) -> None:
-    case = next(iter(generate_cases(judged.floor, judged.number, 1)))
-    draw_case(get_site(judged.floor), case, folder / f"floor-{judged.floor}-case-{judged.number}.png")
-
-
-def _draw_reliability(bins: Sequence[Bin], path: Path) -> None:
-    with chart(path, "Is the stated probability true?", "stated probability that the pose is wrong",
-               "share that was wrong") as axes:
-        stated, found, low, high, n = (np.array(column) for column in zip(*bins, strict=True))
-        shown = np.maximum(found, 1e-5)
-        axes.errorbar(np.maximum(stated, 1e-5), shown, yerr=[shown - np.maximum(np.minimum(low, shown), 1e-5),
-                      np.maximum(high, shown) - shown], fmt="o", color=OURS, label="judge, 95 % interval", capsize=3)
-        for x, y, count in zip(stated, shown, n, strict=True):
-            axes.annotate(f"{count}", (max(x, 1e-5), y), textcoords="offset points", xytext=(6, -10), fontsize=7)
-        axes.plot([1e-5, 1.0], [1e-5, 1.0], color=PAPER, linestyle="--", label="true")
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-
-
-def _draw_roc(right: Sequence[JudgedCase], wrong: Sequence[JudgedCase], path: Path) -> list[str]:
-    """Draw the ROC curves of the judge and of a threshold on the covariance; describe each at the required rate."""
-    lines = []
-    with chart(path, "Accepting right places and wrong ones", "wrong places accepted", "right places accepted") as axes:
-        scores: tuple[tuple[str, str, Callable[[JudgedCase], float]], ...] = (
-            ("probability", OURS, lambda j: j.p_false), ("covariance", PEER, lambda j: j.sigma_m))
-        for name, colour, score in scores:
-            good, bad = (np.sort([score(j) for j in group if not j.doubted and (j.kind == "right") != j.is_wrong])
-                         for group in (right, wrong))
-            if not (len(good) and len(bad)):
-                continue
-            x = np.searchsorted(bad, good, side="right") / len(bad)
-            y = np.arange(1, len(good) + 1) / len(good)
-            axes.step(np.maximum(x, 1e-4), y, where="post", color=colour, label=f"threshold on the {name}")
-            at = float(np.max(y[x <= MAX_FALSE_ACCEPTS], initial=0.0))
-            area = 1.0 - float(np.mean(x))
-            lines.append(f"threshold on the {name}: {at:.1%} of the right places are accepted where at most"
-                         f" {MAX_FALSE_ACCEPTS:.1%} of the wrong ones are; area under the curve {area:.4f}")
-        axes.set_xscale("log")
-    return lines
+def _compare_scores(right: Sequence[JudgedCase], wrong: Sequence[JudgedCase]) -> Iterator[str]:
+    """How well thresholds on the stated probability and on the covariance tell right places from wrong ones."""
+    scores: tuple[tuple[str, Callable[[JudgedCase], float]], ...] = (
+        ("probability", lambda j: j.p_false), ("covariance", lambda j: j.sigma_m))
+    for name, score in scores:
+        good, bad = (np.sort([score(j) for j in group if not j.doubted and (j.kind == "right") != j.is_wrong])
+                     for group in (right, wrong))
+        if not (len(good) and len(bad)):
+            continue
+        accepted = np.searchsorted(bad, good, side="right") / len(bad)
+        part = np.arange(1, len(good) + 1) / len(good)
+        most = float(np.max(part[accepted <= MAX_FALSE_ACCEPTS], initial=0.0))
+        yield (f"threshold on the {name}: {most:.1%} of the right places are accepted where at most"
+               f" {MAX_FALSE_ACCEPTS:.1%} of the wrong ones are; area under the curve {1.0 - np.mean(accepted):.4f}")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -19,7 +19,6 @@ from experiments.generated.floors import Floor, generated_floor
 from knowledge_sources.plan.milestone_selector import choose_heading, predict_milestone
 from knowledge_sources.settings import DEFAULT
 from sim.body.building import Building
-from sim.differences.inexact import TrueInexact
 from sim.render.sensor import Occluder, SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
@@ -38,8 +37,6 @@ MISSING_SHARE = 0.1
 OCCLUDED, LIGHT_CHANGED = 0.3, 0.5
 """Shares of the cases."""
 MAX_HIDDEN_SHARE = 0.2
-INEXACT_MISSING, INEXACT_EXTRA, INEXACT_REACH_M = 0.3, 0.1, 5.0
-"""Of an inexact model's things, in every other building, and how far away its errors turn the believed heading [m]."""
 MIN_CLEARANCE_M = 0.45
 """Distance of the robot from walls."""
 MAX_TRIES = 400
@@ -98,49 +95,38 @@ class Case:
 
 
 @lru_cache(maxsize=2)
-def get_site(seed: int, inexact_m: float = 0.0) -> Site:
-    """Get the floor of a seed: every fifth is symmetric, every other fifth has identical doors.
-
-    ``inexact_m`` is the standard deviation by which the buildings differ from the model, which states it.
-    """
+def get_site(seed: int) -> Site:
+    """Get the floor of a seed: every fifth is symmetric, every other fifth has identical doors."""
     symmetric, repeated = seed % 5 == 3, seed % 5 in (3, 4)
     floor = generated_floor(seed, ROOMS, symmetric=symmetric, repeated=repeated)
-    if inexact_m:
-        floor = replace(floor, text=f"sigma_cm = {100.0 * inexact_m:g}\n{floor.text}")
     settings = CameraSettings()
     robot = RobotModel(floor.world, settings.camera, settings.mount, ActuatorModel())
-    if inexact_m:
-        true = TrueInexact(sigma_m=inexact_m, seed=seed)
-        less = replace(true, missing=INEXACT_MISSING, extra=INEXACT_EXTRA)
-        displaced, with_less = (Building.of_faces(floor.displaced(truth).faces) for truth in (true, less))
-        return Site(floor, robot, Building.of_faces(floor.world.faces), (displaced, with_less), symmetric)
     whole = Building.of_faces(floor.building.faces)
     lacking = Building.of_faces(floor.altered(MISSING_SHARE).faces)
     return Site(floor, robot, Building.of_faces(floor.world.faces), (whole, lacking), symmetric)
 
 
-def generate_cases(floor_seed: int, first: int, count: int, inexact_m: float = 0.0) -> Iterator[Case]:
+def generate_cases(floor_seed: int, first: int, count: int) -> Iterator[Case]:
     """Generate cases ``first``, ``first + 1``, ... of a floor; each is determined by its number."""
     for number in range(first, first + count):
         rng = np.random.default_rng([floor_seed, number])
         kind = str(rng.choice(KINDS, p=SHARES))
-        yield _generate_case(floor_seed, kind, rng, inexact_m)
+        yield _generate_case(floor_seed, kind, rng)
 
 
-def _generate_case(floor_seed: int, kind: str, rng: np.random.Generator, inexact_m: float) -> Case:
-    here = get_site(floor_seed, inexact_m)
-    doubt = np.diag([0.5 * inexact_m**2, 0.5 * inexact_m**2, (inexact_m / INEXACT_REACH_M) ** 2])
+def _generate_case(floor_seed: int, kind: str, rng: np.random.Generator) -> Case:
+    here = get_site(floor_seed)
     for _ in range(MAX_TRIES):
         believed, other = _draw_places(here, kind, rng)
         if believed is None or (other is None and kind != "another floor"):
             continue
-        covariance = _draw_covariance(here.robot.actuator, believed, rng) + doubt
+        covariance = _draw_covariance(here.robot.actuator, believed, rng)
         heading = choose_heading(here.robot, believed, _headings(believed), 0.1)
         turned = wrap_angle(heading - believed.heading_rad)
         believed = Pose2(believed.x_m, believed.y_m, heading)
         there, building = here, int(rng.integers(2))
         if kind == "another floor":
-            there = get_site(floor_seed + 1, inexact_m)
+            there = get_site(floor_seed + 1)
             other = _find_similar(here, there, believed, rng)
         else:
             assert other is not None

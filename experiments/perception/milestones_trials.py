@@ -1,10 +1,9 @@
-"""Verdicts of the milestone judge, with the knowledge sources on a board of their own as in a mission; pictures."""
+"""Verdicts of the milestone judge, with the knowledge sources on a board of their own as in a mission."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ import numpy as np
 from blackboard.board import View
 from blackboard.effect import Effect, Post
 from experiments.perception.milestones_cases import MIN_DIFFERENCE, Case, Site, generate_cases, get_site
-from experiments.report import OURS, PEER
 from harvey.runner.world_port import build_scheduler
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.verification.color_check import check_colors
@@ -36,12 +34,11 @@ BLOCK = 60
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """Cases of a floor, ``count`` from number ``first`` on; ``inexact_m`` as for :func:`get_site`."""
+    """Cases of a floor, ``count`` from number ``first`` on."""
 
     floor: int
     first: int
     count: int
-    inexact_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +78,8 @@ class TrialResult:
 
 def judge_trial(trial: Trial) -> TrialResult:
     """Judge every case of a trial."""
-    site = get_site(trial.floor, trial.inexact_m)
-    cases = generate_cases(trial.floor, trial.first, trial.count, trial.inexact_m)
+    site = get_site(trial.floor)
+    cases = generate_cases(trial.floor, trial.first, trial.count)
     out = [_judge_case(site, trial.floor, number, case) for number, case in enumerate(cases, trial.first)]
     return TrialResult([{name: getattr(j, name) for name in JudgedCase.__slots__} for j in out])
 
@@ -121,27 +118,3 @@ def _judge_case(site: Site, floor: int, number: int, case: Case) -> JudgedCase:
         case.kind != "right" and case.difference < MIN_DIFFERENCE, sigma_m, error_m, case.hidden, case.missing,
         case.light, evidence.values.tolist(), c.reason,
     )
-
-
-def draw_case(site: Site, case: Case, path: Path) -> None:
-    """Draw matched lines in blue and the others in orange (PNG)."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.figure import Figure
-
-    view = certify(site, case)
-    certificate, fix, segments = view.latest(Certificate), view.latest(PoseFix), view.latest(Segments)
-    assert certificate is not None and fix is not None and segments is not None
-    lines = np.array(case.milestone.expected, float).reshape(-1, 2, 3)
-    agreed = check_lines(site.robot, lines, segments.value.segments_px, fix.value.world_from_robot)
-    figure = Figure(figsize=(6.0, 6.4), dpi=110, layout="constrained")
-    axes = figure.add_subplot()
-    axes.imshow(read_picture(case.jpeg).color)
-    found = np.nan_to_num(agreed.agreement.coverage) >= 0.5
-    for some, colour in ((found, OURS), (~found, PEER)):
-        shown = agreed.projected_px[some]
-        axes.add_collection(LineCollection(list(shown[np.isfinite(shown).all(axis=(1, 2))]), colors=colour))
-    c = certificate.value
-    axes.set_title(f"{case.kind}: {c.verdict}, p_false {c.p_false:.2g}", fontsize=10)
-    axes.set_axis_off()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, format="png")

@@ -4,7 +4,7 @@ One policy on lens distortion. *As the lens made it* are ``grey``, ``color``, ``
 colors at a few places bends the places, not the picture (doors, colors of faces). *Rectified*, as a camera without
 distortion would have taken it, are ``rectified`` and ``rectified_half``: straight edges are then straight, and pixels
 follow the pinhole model (lines, templates, floor). The alternative, to find segments in the raw picture and to
-undistort their ends, is measured by ``harvey experiment lens``. Without distortion both are the same.
+undistort their ends, finds no more of the edges, and no more exactly. Without distortion both are the same.
 """
 
 from __future__ import annotations

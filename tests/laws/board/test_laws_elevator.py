@@ -1,5 +1,6 @@
 """Laws of missions that change floors: no sketch passes a barrier, a ride joins one car, and what is verified stays."""
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -11,11 +12,11 @@ from hypothesis import strategies as st
 from blackboard.change import Quiescence
 from blackboard.effect import Post
 from blackboard.journal import Decision
-from experiments.perception.visibility import CAMERA, MOUNT
 from harvey.dry_run import build_dry_run
 from towers import tower
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
+from world_models.camera import Camera, CameraMount
 from world_models.entries.body import Ride
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.task import Command, Outcome, PlanSketch, Subgoal
@@ -23,6 +24,8 @@ from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
+
+CAMERA, MOUNT = Camera.from_field_of_view(math.radians(65.0), 256, 256), CameraMount(1.0, 0.1)
 
 
 def in_locale(world: World, belief: Hypothesis, locale: str) -> Hypothesis:

@@ -1,5 +1,6 @@
 """Laws of plan sketches in made-up houses: none passes a barrier, and refinement changes nothing that is verified."""
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -11,16 +12,18 @@ from blackboard.change import Quiescence
 from blackboard.effect import Post
 from blackboard.journal import Decision
 from experiments.generated.scenes import generate_house
-from experiments.perception.visibility import CAMERA, MOUNT
 from harvey.dry_run import build_dry_run
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
+from world_models.camera import Camera, CameraMount
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command, Outcome, PlanSketch, Subgoal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.robot import RobotModel
 from world_models.units import FOOT_M
+
+CAMERA, MOUNT = Camera.from_field_of_view(math.radians(65.0), 256, 256), CameraMount(1.0, 0.1)
 
 
 def plan_sketches(world: World) -> tuple[list[PlanSketch], Outcome]:
