@@ -94,7 +94,7 @@ class Scheduler:
         self._observed: tuple[Change, ...] = ()
         self._is_waiting = False
 
-    def tell(self, effects: Iterable[Effect], author: str) -> tuple[Change, ...]:
+    def post(self, effects: Iterable[Effect], author: str) -> tuple[Change, ...]:
         """Put something on the board from outside (a command, an observation); it is seen in the next cycle."""
         changes = self.board.apply(effects, author=author, cycle=self.cycle)
         self._unseen += changes
@@ -261,7 +261,7 @@ class Scheduler:
         for change in made:
             if type(change.entry.value) in self._requests:
                 for port in self._ports:
-                    self.tell(port.answer(change), port.name)
+                    self.post(port.answer(change), port.name)
 
 
 def registry_of(

@@ -71,7 +71,7 @@ class Parser(harvey.KnowledgeSource):
 decisions: list[harvey.Decision] = []
 scheduler = harvey.Scheduler([WordGuesser(), Parser()], sinks=[decisions.append])
 for at, text in enumerate(("go", "to", "the", "kit", "chen")):
-    scheduler.tell([Post(Syllable(text, at))], "ear")
+    scheduler.post([Post(Syllable(text, at))], "ear")
 while scheduler.step():
     pass
 

@@ -43,7 +43,7 @@ FILE.write_text(MISSION, encoding="utf-8")
 result = harvey.run(FILE, out=OUT, knowledge_sources=[Timetable])
 run = harvey.open_run(OUT, knowledge_sources=[Timetable])
 for entry in (*run.entries(LocaleFrame), *run.entries(PlanSketch)):
-    if entry.author in ("timetable", "withdrawer"):
+    if entry.author in ("timetable", "dependency_withdrawer"):
         print(f"cycle {entry.cycle}: {entry.value.sentence()}")
         print(f"  [{entry.ref} by {entry.author}, because of {', '.join(map(str, entry.because))}]")
 print(f"{result.outcome}; replayed {'the same' if run.replay() is None else 'otherwise'}")

@@ -77,7 +77,7 @@ def run(name: str, *, quick: bool = False, seed: int = 0, missions: int | None =
         BadInput: there is no such experiment (similar names are given), or none by number of missions.
     """
     if name not in list_names():
-        from world_models.files.toml.settings import suggest_keys
+        from world_models.files.toml.settings_reader import suggest_keys
 
         raise BadInput(f"expected an experiment: {suggest_keys(name, list_names())}, got {name!r}")
     try:

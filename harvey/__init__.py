@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from blackboard.knowledge_source import KnowledgeSource
     from blackboard.level import Level
     from blackboard.scheduler import Scheduler
-    from harvey.api import Picture, RecordedRun, TrackPoint, build_world, open_run, run
+    from harvey.api import RecordedRun, RunPicture, TrackPoint, build_world, open_run, run
     from harvey.errors import BadInput
     from harvey.runner.result import MissionResult
     from knowledge_sources.methods.pose import (
@@ -64,7 +64,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "blackboard.knowledge_source": ("KnowledgeSource",),
     "blackboard.level": ("Level",),
     "blackboard.scheduler": ("Scheduler",),
-    "harvey.api": ("Picture", "RecordedRun", "TrackPoint", "build_world", "open_run", "run"),
+    "harvey.api": ("RunPicture", "RecordedRun", "TrackPoint", "build_world", "open_run", "run"),
     "harvey.errors": ("BadInput",),
     "harvey.runner.result": ("MissionResult",),
     "knowledge_sources.methods.pose": (
@@ -79,7 +79,7 @@ _MODULE_OF: Mapping[str, str] = {name: module for module, names in _MODULES.item
 
 __all__ = [
     "BadInput", "Camera", "CameraMount", "Change", "Decision", "Effect", "KnowledgeSource", "Level",
-    "MissionResult", "Picture", "PlanarEstimate", "Pose", "Pose2", "PoseEstimate", "Post", "Posted", "RecordedRun",
+    "MissionResult", "RunPicture", "PlanarEstimate", "Pose", "Pose2", "PoseEstimate", "Post", "Posted", "RecordedRun",
     "Retract", "Retracted", "Revise", "Revised", "Scheduler", "TrackPoint", "View", "Watch", "World", "build_world",
     "inference", "load_scenario", "load_world", "med_r_and_t", "observation", "open_run", "planar_from_lines",
     "r_and_t_ml", "request", "run", "trunc_r_and_t",

@@ -23,8 +23,8 @@ from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import Settings
 from logs.run_head import RunHead
 from world_models.building.world import World
-from world_models.entries.kinds import KINDS
-from world_models.files.toml.settings import parse_value, suggest_keys
+from world_models.entries.entry_kinds import KINDS
+from world_models.files.toml.settings_reader import parse_value, suggest_keys
 from world_models.frame_store import FrameStore
 from world_models.robot import RobotModel
 

@@ -33,7 +33,7 @@ from harvey.errors import BadInput
 from harvey.runner.replay import open_originals
 from harvey.runner.replay import replay as replay_run
 from harvey.runner.result import MissionResult
-from harvey.simulation.run import build_head, run_mission
+from harvey.simulation.simulated_run import build_head, run_mission
 from knowledge_sources.settings import Settings
 from logs import run_directory
 from logs.explain.model import WorldFile
@@ -49,7 +49,7 @@ from sim.scenario import FORMAT, Scenario, ScenarioError, load_scenario, with_se
 from sim.stage import build_stage
 from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import load_world, read_world
@@ -143,11 +143,11 @@ class TrackPoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class RunPicture:
     """A camera picture of a run.
 
     Attributes:
-        entry: its name on the board, as ``Frame-49``.
+        entry: its name on the board, as ``CameraPicture-49``.
         cycle: in which the board saw it; time_s: when it was taken, by the body's clock.
         jpeg: as the camera delivered it.
     """
@@ -219,13 +219,13 @@ class RecordedRun:
                 store = self._store if found is LocaleFrame else None
                 yield entry_of(record, self._kinds, store)
 
-    def pictures(self) -> Iterator[Picture]:
+    def pictures(self) -> Iterator[RunPicture]:
         """The camera's pictures, in order. Raises BadInput where they are missing."""
         jpegs = open_pictures(self._files)
         for record in self.records():
-            if record.kind is Frame and record.is_new:
+            if record.kind is CameraPicture and record.is_new:
                 value = record.fields
-                yield Picture(record.id, record.cycle, float(value["sim_time_s"]), jpegs[value["number"]])
+                yield RunPicture(record.id, record.cycle, float(value["sim_time_s"]), jpegs[value["number"]])
 
     def believed_track(self) -> Sequence[TrackPoint]:
         """Where the robot believed it was: one point for each revision of the held pose hypothesis."""
@@ -273,5 +273,5 @@ class RecordedRun:
 
 
 __all__ = [
-    "Picture", "RecordedRun", "TrackPoint", "build_world", "load_scenario", "load_world", "open_run", "run",
+    "RunPicture", "RecordedRun", "TrackPoint", "build_world", "load_scenario", "load_world", "open_run", "run",
 ]

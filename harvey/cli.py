@@ -93,7 +93,7 @@ def _parse(argv: Sequence[str] | None) -> Namespace:
 
 def _answer(args: Namespace) -> int:
     from harvey.errors import BadInput
-    from logs.errors import RecordingError
+    from logs.run_errors import RecordingError
     from world_models.files.toml.source import WorldError
     from world_models.plugins import PluginError
 

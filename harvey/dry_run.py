@@ -120,12 +120,12 @@ def dry_run(
     """
     scheduler = build_dry_run(world, robot, settings)
     what_if(scheduler)
-    scheduler.tell([Post(replace(task, start_covariance=diagonal(FIX_SIGMA_M, FIX_SIGMA_RAD)))], "user")
+    scheduler.post([Post(replace(task, start_covariance=diagonal(FIX_SIGMA_M, FIX_SIGMA_RAD)))], "user")
     previews: list[MilestonePreview] = []
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < MAX_CYCLES:
         decision = scheduler.step()
         if decision is None:
-            scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
+            scheduler.post([Post(Quiescence(scheduler.cycle))], "scheduler")
         elif decision.refused.startswith(RAISED):
             return tuple(previews), Outcome("failed", decision.refused.strip().splitlines()[-1])
         else:

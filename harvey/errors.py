@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from logs.errors import BadInput
+from logs.run_errors import BadInput
 
 __all__ = ["BadInput", "Terminated", "terminable"]
 

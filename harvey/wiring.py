@@ -16,24 +16,24 @@ from blackboard.scheduler import registry_of
 from blackboard.servoing import Servoing
 from knowledge_sources.action.correlator_tracker import CorrelatorTracker
 from knowledge_sources.action.dead_reckoner import DeadReckoner
+from knowledge_sources.action.dependency_withdrawer import DependencyWithdrawer
 from knowledge_sources.action.door_watcher import DoorWatcher
 from knowledge_sources.action.elevator_rider import ElevatorRider
 from knowledge_sources.action.fault_handler import FaultHandler
 from knowledge_sources.action.floor_watcher import FloorWatcher
+from knowledge_sources.action.goal_changer import GoalChanger
 from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.action.motor import Motor
 from knowledge_sources.action.obstacle_finder import ObstacleFinder
 from knowledge_sources.action.path_follower import PathFollower
 from knowledge_sources.action.range_watcher import RangeWatcher
-from knowledge_sources.action.redirector import Redirector
-from knowledge_sources.action.withdrawer import Withdrawer
 from knowledge_sources.action.yaw_calibrator import YawCalibrator
 from knowledge_sources.goal.interpreter import Interpreter
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.goal.relocalizer import Relocalizer
+from knowledge_sources.plan.alias_monitor import AliasMonitor
 from knowledge_sources.plan.camera_calibrator import CameraCalibrator
-from knowledge_sources.plan.door_doubter import DoorDoubter
-from knowledge_sources.plan.escalator import Escalator
+from knowledge_sources.plan.discrepancy_raiser import DiscrepancyRaiser
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.plan.matcher import Matcher
 from knowledge_sources.plan.med_r_and_t import MedRAndT
@@ -41,11 +41,11 @@ from knowledge_sources.plan.milestone_judge import MilestoneJudge
 from knowledge_sources.plan.milestone_selector import MilestoneSelector
 from knowledge_sources.plan.obstruction_finder import ObstructionFinder
 from knowledge_sources.plan.plan_adjuster import PlanAdjuster
+from knowledge_sources.plan.shut_door_explainer import ShutDoorExplainer
 from knowledge_sources.plan.sketcher import Sketcher
-from knowledge_sources.plan.twin_watcher import TwinWatcher
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.entries.kinds import KINDS
+from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.mission import Servo
 from world_models.plugins import SOURCES_GROUP, PluginError, load_plugin_classes
 
@@ -66,18 +66,18 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     CameraCalibrator,
     YawCalibrator,
     PlanAdjuster,
-    Escalator,
+    DiscrepancyRaiser,
     Relocalizer,
-    TwinWatcher,
+    AliasMonitor,
     FaultHandler,
     ModelReviser,
-    Redirector,
+    GoalChanger,
     FloorWatcher,
     RangeWatcher,
     ObstacleFinder,
     DoorWatcher,
-    DoorDoubter,
-    Withdrawer,
+    ShutDoorExplainer,
+    DependencyWithdrawer,
     MissionMonitor,
 )
 """Every knowledge source. The order does not matter: control comes from triggers, ratings and levels."""

@@ -11,7 +11,7 @@ from blackboard.board import View
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.settings import CameraStateSettings, Settings
 from world_models.camera import YAW, Camera
-from world_models.entries.robot import CameraState
+from world_models.entries.robot_state import CameraState
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

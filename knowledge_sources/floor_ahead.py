@@ -16,7 +16,7 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.seen_floor import (
     MAX_HIDDEN_M,
     Costs,
-    Look,
+    Lookout,
     SeenFloor,
     Sweep,
     choose_look,
@@ -29,7 +29,7 @@ from knowledge_sources.methods.motion.footprints import build_free_floor, build_
 from knowledge_sources.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.locales import EXTRA_KIND, Thing
-from world_models.entries.body import Frame, MotionReport, RideReport
+from world_models.entries.body import CameraPicture, MotionReport, RideReport
 from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Obstacle
@@ -118,11 +118,11 @@ class FloorAhead:
         """How far towards the leg's end the floor is seen to be free."""
         return measure_free_m(self._find_unseen(self._sweep(self._way, most_m)), most_m)
 
-    def choose_look(self) -> Look | None:
+    def choose_look(self) -> Lookout | None:
         """A look from here at floor that is needed behind the end of this leg, where it is the best place for that."""
         s, end = self._settings, (self._leg.x1_m, self._leg.y1_m)
         to_go_m = math.dist(end, self._here.position)
-        if to_go_m > LOOK_FROM_M or not self._beyond or len(self._leg.looks) >= s.max_looks:
+        if to_go_m > LOOK_FROM_M or not self._beyond or len(self._leg.looked_at) >= s.max_looks:
             return None
         unseen = self._find_unseen(self._sweep([end, *self._beyond], LOOK_AHEAD_M))
         if len(unseen.points) == 0:
@@ -139,7 +139,7 @@ class FloorAhead:
     def _was_tried(self, heading_rad: float) -> bool:
         """Whether the robot has looked there already from about here."""
         return any(math.dist((x, y), self._here.position) < 0.3 and abs(wrap_angle(heading_rad - there)) < 0.4
-                   for x, y, there in self._leg.looks)
+                   for x, y, there in self._leg.looked_at)
 
     def _list_poses_ahead(self, to_go_m: float) -> list[Pose2]:
         """Where pictures will be taken on what is left of the leg, and at its end in the direction of the next."""
@@ -160,9 +160,9 @@ class FloorAhead:
         """The part of a sweep that is not seen free, and not hard by something that the model has."""
         asked = sweep.only(shapely.contains_xy(self._asked, sweep.points[:, 0], sweep.points[:, 1]))
         free, scans, discs = self._seen.ask(asked.points)
-        told = [self._scans[k] for k in np.flatnonzero(scans)]
-        told += [entry for k in np.flatnonzero(discs) for entry in self._discs[k].because]
-        self._told.update((entry.id, entry) for entry in told)
+        reasons = [self._scans[k] for k in np.flatnonzero(scans)]
+        reasons += [entry for k in np.flatnonzero(discs) for entry in self._discs[k].because]
+        self._told.update((entry.id, entry) for entry in reasons)
         return asked.only(~free)
 
 
@@ -262,7 +262,7 @@ def _is_of(scan: Entry[FreeFloor], belief: Entry[Hypothesis]) -> bool:
 
 
 def _tell_time_s(view: View) -> float:
-    frame, report = view.latest(Frame), view.latest(MotionReport)
+    frame, report = view.latest(CameraPicture), view.latest(MotionReport)
     return max(0.0 if frame is None else frame.value.sim_time_s, 0.0 if report is None else report.value.sim_time_s)
 
 

@@ -16,7 +16,7 @@ from world_models.entries.body import BodyFault, Course, MotionReport, MotorComm
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Contact, Obstruction
 from world_models.entries.percepts import Tracks
-from world_models.entries.robot import CameraState, Footprint, Wheels
+from world_models.entries.robot_state import CameraState, Footprint, Wheels
 from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch
 from world_models.frame_building import FrameBuilding
 from world_models.robot import RobotModel
@@ -66,7 +66,7 @@ def find_building(view: View) -> FrameBuilding:
     return FrameBuilding(view)
 
 
-def find_building_without_finds(view: View) -> FrameBuilding | None:
+def find_building_as_filed(view: View) -> FrameBuilding | None:
     """The building without the things that it was found to have besides; None where it was found to have none."""
     changed = [entry.value for entry in view.having(CHANGED, True)]
     instead = [bare for frame in changed if (bare := frame.without_finds()) is not frame]

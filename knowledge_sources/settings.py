@@ -413,7 +413,7 @@ class PlanSettings:
     max_leg_m: float = setting(3.6, "m", "Longest leg without a milestone in between.")
     max_adjustments: int = setting(8, "count", "So often a sketch is adjusted at one milestone; then that was in vain.")
 
-    # Escalator
+    # Discrepancy raiser
     max_checks_per_subgoal: int = setting(
         20, "count", "So often the action level may ask the plan level on the way to one subgoal; then it is blocked.")
     max_lost_per_mission: int = setting(12, "count", "So often the robot may be lost in one mission.")

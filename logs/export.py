@@ -9,11 +9,11 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from logs.errors import BadInput
 from logs.explain.story import MilestoneRow, read_milestones
 from logs.explain.turning_points import TurningPoint, read_turning_points
 from logs.reader import read_true_track
 from logs.run_directory import RunDirectory
+from logs.run_errors import BadInput
 from logs.run_head import SIMULATOR, RunHead
 from logs.timeline import Timeline
 from world_models.building.world import World

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
 
-from logs.camera_file import Pictures
-from logs.errors import BadInput
+from logs.mjpeg_file import Pictures
 from logs.records import DecisionRecord, EntryRecord, is_a, read_records
 from logs.run_directory import RunDirectory
-from world_models.entries.body import Frame
+from logs.run_errors import BadInput
+from world_models.entries.body import CameraPicture
 
 
 def open_pictures(run: RunDirectory) -> Mapping[int, bytes]:
@@ -39,20 +39,20 @@ def camera_bytes(run: RunDirectory) -> int:
 
 def _sizes(decisions: Iterable[DecisionRecord]) -> Iterator[tuple[int, int]]:
     """(number, bytes) of every picture that was seen, in the order in which they came."""
-    for record in (record for decision in decisions for record in decision.observed if is_a(record, Frame)):
+    for record in (record for decision in decisions for record in decision.observed if is_a(record, CameraPicture)):
         try:
             yield int(record.fields["number"]), int(record.fields["jpeg"]["bytes"])
         except (KeyError, TypeError, ValueError):
             raise BadInput(f"{record.ref}: expected a picture's number and length, got {record.fields!r}") from None
 
 
-def find_picture(run: RunDirectory, cycle: int) -> EntryRecord[Frame]:
+def find_picture(run: RunDirectory, cycle: int) -> EntryRecord[CameraPicture]:
     """The newest picture that the board had seen in a cycle. Raises BadInput where there is none, or no such cycle."""
     newest, first, last = None, 0, 0
     for decision in read_records(run.journal):
         last = decision.cycle
         for record in decision.changes:
-            if is_a(record, Frame) and record.is_new:
+            if is_a(record, CameraPicture) and record.is_new:
                 first = first or last
                 newest = record if last <= cycle else newest
     if first == 0:
@@ -62,7 +62,7 @@ def find_picture(run: RunDirectory, cycle: int) -> EntryRecord[Frame]:
     return newest
 
 
-def write_picture(run: RunDirectory, record: EntryRecord[Frame], out: Path) -> tuple[int, int]:
+def write_picture(run: RunDirectory, record: EntryRecord[CameraPicture], out: Path) -> tuple[int, int]:
     """Writes it as PNG with the pixels of the camera's JPEG; returns width and height [px]. Raises BadInput."""
     from PIL import Image, UnidentifiedImageError
 

@@ -12,10 +12,10 @@ from typing import Any
 from rerun.chunk import RrdReader
 from rerun.error_utils import RerunWarning
 
-from logs.errors import RecordingError
 from logs.recording.loggers.decisions import RECORD
 from logs.recording.loggers.picture import NUMBER
 from logs.recording.paths import IMAGE, RECORDS, TRUE_ROBOT
+from logs.run_errors import RecordingError
 
 ROW_ID = "rerun.controls.RowId"
 JPEG = "EncodedImage:blob"

@@ -23,14 +23,14 @@ from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref
 from blackboard.kinds import Registry
 from blackboard.servoing import Discrepancy
-from logs.camera_file import Pictures
 from logs.decoding import decode
-from logs.errors import BadInput
 from logs.journal_file import JournalError, read_journal
+from logs.mjpeg_file import Pictures
+from logs.run_errors import BadInput
 from world_models import words
 from world_models.building.locale_frame import FrameReference, FrameRequest, LocaleFrame
-from world_models.entries.body import Frame
-from world_models.entries.kinds import KINDS
+from world_models.entries.body import CameraPicture
+from world_models.entries.entry_kinds import KINDS
 
 if TYPE_CHECKING:  # an explanation starts fast only where no world is imported that it does not need
     from world_models.frame_store import FrameStore
@@ -345,7 +345,7 @@ def original_of(record: EntryRecord[Any], originals: Originals, kinds: Registry)
     if record.type == LocaleFrame.__name__:
         return _restore_frame(record, originals.frames)
     kind, fields = find_kind(record, kinds), record.fields
-    if kind is Frame and isinstance(fields, dict):
+    if kind is CameraPicture and isinstance(fields, dict):
         fields = {**fields, "jpeg": _picture(record, originals.pictures)}
     try:
         return decode(fields, kind)
@@ -391,7 +391,7 @@ def entry_of(record: EntryRecord[Any], kinds: Registry, store: FrameStore | None
         BadInput: the value is of a kind that is not known, or does not fit it.
     """
     fields, kind = record.fields, find_kind(record, kinds)
-    if kind is Frame and isinstance(fields, dict):
+    if kind is CameraPicture and isinstance(fields, dict):
         fields = {**fields, "jpeg": b""}
     if kind is LocaleFrame and store is not None:
         restored: Any = _restore_frame(record, store)

@@ -16,7 +16,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from logs.errors import BadInput
+from logs.run_errors import BadInput
 
 RUNS = Path("runs")
 """Where runs are kept unless ``--out`` says otherwise."""

@@ -14,7 +14,7 @@ from typing import Any, TypeVar, cast
 from blackboard.journal import plain
 from logs.decided_by import arithmetic, deciding_code
 from logs.decoding import MisfitError, decode, fields_of
-from logs.errors import BadInput
+from logs.run_errors import BadInput
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import NOT_STATED, Camera, CameraDeviation, CameraMount

@@ -11,15 +11,15 @@ from blackboard.change import Change
 from blackboard.effect import Effect, Retract
 from blackboard.journal import Decision, Sink, decision_line
 from blackboard.scheduler import Port
-from logs.camera_file import CameraFile
 from logs.disk import sync_folder
 from logs.journal_file import JournalFile
+from logs.mjpeg_file import MjpegFile
 from logs.recording.writer import RecordingWriter
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
 from world_models.building.geometry.faces import Face
 from world_models.building.world import World
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.location import Place
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -59,7 +59,7 @@ class RunRecorder:
         """
         self.replaying = whole is not None or drawing is not None
         self._journal: JournalFile | None = None
-        self._camera: CameraFile | None = None
+        self._camera: MjpegFile | None = None
         self._recording_writer: RecordingWriter | None = None
         drawing = run.recording if run is not None else drawing
         with ExitStack() as opened:
@@ -77,7 +77,7 @@ class RunRecorder:
         keep = whole or Extent()
         self._journal = JournalFile(run.journal, keep=keep.journal)
         opened.callback(self._journal.close)
-        self._camera = CameraFile(run.camera, keep=keep.camera)
+        self._camera = MjpegFile(run.camera, keep=keep.camera)
         opened.callback(self._camera.close)
         sync_folder(run.path)
 
@@ -93,7 +93,7 @@ class RunRecorder:
     def record_picture(self, effect: Effect) -> None:
         """Put a picture on the disk, if that is what was observed. Raises CannotWriteError."""
         value = None if isinstance(effect, Retract) else effect.value
-        if self._camera is not None and isinstance(value, Frame):
+        if self._camera is not None and isinstance(value, CameraPicture):
             self._camera.add(value.jpeg)
 
     def draw_truth(self, pose: Pose2, sim_time_s: float, contacts: Sequence[Place] = ()) -> None:

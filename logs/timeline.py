@@ -18,9 +18,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from logs.errors import BadInput
 from logs.journal_file import out_of_step
 from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of, is_a
+from logs.run_errors import BadInput
 from world_models.building.locale_frame import FrameReference, LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Tracks

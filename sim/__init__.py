@@ -2,7 +2,7 @@
 
 In reading order: ``scenario`` (a mission file), ``stage`` (scenario and building, from which runs get their bodies),
 ``scenario_changes`` (a scenario against its building), ``truth`` (the true state, and the score),
-``differences`` (where building and camera differ from the model), ``body`` (the robot), ``faults`` (what goes wrong,
+``ground_truth`` (where building and camera differ from the model), ``body`` (the robot), ``faults`` (what goes wrong,
 one class a kind), ``render`` (the camera), ``emulators`` (bases on serial lines). ``scenarios`` and ``buildings`` hold
 TOML files.
 """

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from sim.body.actuator import ActuatorParameters
-from sim.body.building import Helper
 from sim.body.senses import Bumper, RangeRing
-from sim.differences.inexact import TrueInexact
-from sim.differences.table import NO_DIFFERENCES, TrueCamera, TruthTable, read_truth
-from sim.differences.things import MovedThing
+from sim.body.simulated_building import Helper
+from sim.body.wheel_errors import ActuatorParameters
 from sim.faults.fault import Fault
-from sim.faults.registry import read_fault
+from sim.faults.fault_registry import read_fault
+from sim.ground_truth.inexact import TrueInexact
+from sim.ground_truth.table import NO_DIFFERENCES, TrueCamera, TruthTable, read_truth
+from sim.ground_truth.things import MovedThing
 from sim.render.light.lighting import Lighting
 from sim.render.optics import check_lens
 from sim.render.rasterizer import sample_offsets
@@ -23,7 +23,7 @@ from sim.render.sensor import SensorParameters
 from sim.scenario_names import SCENARIOS, list_scenarios
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.mission import ROOT, TABLES, Limits, Mission, MissionFormat, named_file
-from world_models.files.toml.settings import MAX_NUMBER, read_settings, suggest_keys
+from world_models.files.toml.settings_reader import MAX_NUMBER, read_settings, suggest_keys
 from world_models.files.toml.source import Key, Source, WorldError
 from world_models.units import Bounds, check_bounds
 

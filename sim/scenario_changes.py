@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from sim.body.building import Building
 from sim.body.collision import ROBOT_RADIUS_M
-from sim.differences.changes import Change, build_leaf, compare_faces
-from sim.differences.inexact import EXACT, displace
-from sim.differences.table import ExtraThing, TrueDoor, TrueThing, TrueWall
-from sim.differences.things import MovedThing, belongs_to, build_thing, displace_faces, footprint, move_things
+from sim.body.simulated_building import SimulatedBuilding
 from sim.faults.fault import Fault
+from sim.ground_truth.inexact import EXACT, displace
+from sim.ground_truth.table import ExtraThing, TrueDoor, TrueThing, TrueWall
+from sim.ground_truth.things import MovedThing, belongs_to, build_thing, displace_faces, footprint, move_things
+from sim.ground_truth.true_changes import TrueChange, build_leaf, compare_faces
 from sim.scenario import Scenario
 from world_models.building.geometry.faces import Face
 from world_models.building.geometry.outlines import inside_polygon
@@ -21,7 +21,7 @@ from world_models.building.locales import Doorway
 from world_models.building.world import World
 from world_models.commands import parse_destination
 from world_models.entries.location import Place
-from world_models.files.toml.settings import suggest_keys
+from world_models.files.toml.settings_reader import suggest_keys
 from world_models.files.world_files import WorldError, load_world
 from world_models.units import FOOT_M
 
@@ -80,7 +80,7 @@ def move_scenario_things(scenario: Scenario, world: World, faces: Sequence[Face]
 
 
 def check_room(
-    scenario: Scenario, world: World, start: Place, building: Building, on_floor: Callable[[float], Building]
+    scenario: Scenario, world: World, start: Place, building: SimulatedBuilding, on_floor: Callable[[float], SimulatedBuilding]
 ) -> None:
     """Check that the robot has room at the start and where a fault puts it. Raises ScenarioError."""
     _check_place(scenario, ("goal",), "start", world, start, building)
@@ -92,7 +92,7 @@ def check_room(
 
 
 def _check_place(
-    scenario: Scenario, key: tuple[str | int, ...], what: str, world: World, place: Place, building: Building
+    scenario: Scenario, key: tuple[str | int, ...], what: str, world: World, place: Place, building: SimulatedBuilding
 ) -> None:
     locale = world.locale(place.locale)
     if not locale.contains((place.x_m, place.y_m)):
@@ -128,7 +128,7 @@ def find_changed_locales(scenario: Scenario, world: World) -> list[str]:
                       for locale in open_doors[door.name].between)]
 
 
-def find_changes(scenario: Scenario, world: World, around: str, faces: Sequence[Face]) -> tuple[Change, ...]:
+def find_changes(scenario: Scenario, world: World, around: str, faces: Sequence[Face]) -> tuple[TrueChange, ...]:
     """The changes of a building with these faces, those of a locale (``around``), in the order of the file.
 
     Raises:
@@ -146,7 +146,7 @@ def find_changes(scenario: Scenario, world: World, around: str, faces: Sequence[
 
 def _change_door(
     scenario: Scenario, i: int, door: TrueDoor, open_doors: dict[str, Doorway], world: World, around: str
-) -> Change:
+) -> TrueChange:
     doorway = open_doors.get(door.name)
     if doorway is None:
         return _open_door(scenario, i, door, open_doors, world, around)
@@ -155,12 +155,12 @@ def _change_door(
                                f"expected {suggest_keys(door.into, doorway.between)}, got {door.into!r}")
     is_open = door.state == "open"
     floor_m = world.floor_m(door.into or doorway.between[0])
-    return Change(door, f"door {door.name}", added=() if is_open else build_leaf(door, doorway, floor_m))
+    return TrueChange(door, f"door {door.name}", added=() if is_open else build_leaf(door, doorway, floor_m))
 
 
 def _open_door(
     scenario: Scenario, i: int, door: TrueDoor, open_doors: dict[str, Doorway], world: World, around: str
-) -> Change:
+) -> TrueChange:
     """A door that the model has closed, and that is truly open."""
     if door.state != "open":
         raise scenario.refused(("truth", "doors", i, "name"), "expected a door that is open in the model, "
@@ -175,7 +175,7 @@ def _open_door(
     return compare_faces(door, f"door {door.name}", world.faces_within(around), opened.faces_within(around))
 
 
-def _change_thing(scenario: Scenario, i: int, thing: TrueThing, world: World, faces: Sequence[Face]) -> Change:
+def _change_thing(scenario: Scenario, i: int, thing: TrueThing, world: World, faces: Sequence[Face]) -> TrueChange:
     own = [face for face in faces if belongs_to(face, MovedThing(thing.thing))]
     if not own:
         near = suggest_keys(thing.thing, [known.name for known in world.things])
@@ -184,10 +184,10 @@ def _change_thing(scenario: Scenario, i: int, thing: TrueThing, world: World, fa
     there = () if thing.missing else displace_faces(own, thing.x_m, thing.y_m, thing.heading_rad)
     for face in there:
         _check_within(scenario, ("truth", "things", i), thing.thing, face.polygon_world[:, :2], world, face.locale)
-    return Change(thing, f"thing {thing.thing}", frozenset(face.name for face in own), there)
+    return TrueChange(thing, f"thing {thing.thing}", frozenset(face.name for face in own), there)
 
 
-def _change_wall(scenario: Scenario, i: int, wall: TrueWall, faces: Sequence[Face]) -> Change:
+def _change_wall(scenario: Scenario, i: int, wall: TrueWall, faces: Sequence[Face]) -> TrueChange:
     """A wall with all that belongs to it; doorways in it have no surface, and stay."""
     walls = [face.name for face in faces if _is_wall(face)]
     if wall.wall not in walls:
@@ -195,7 +195,7 @@ def _change_wall(scenario: Scenario, i: int, wall: TrueWall, faces: Sequence[Fac
                                f"expected a wall of the building, {suggest_keys(wall.wall, walls)}, got {wall.wall!r}")
     own = [face for face in faces if face.kind == "barrier" and wall.wall in (face.name, face.parent)]
     there = () if wall.missing else displace_faces(own, wall.x_m, wall.y_m)
-    return Change(wall, f"wall {wall.wall}", frozenset(face.name for face in own), there)
+    return TrueChange(wall, f"wall {wall.wall}", frozenset(face.name for face in own), there)
 
 
 def _is_wall(face: Face) -> bool:
@@ -203,7 +203,7 @@ def _is_wall(face: Face) -> bool:
     return face.kind == "barrier" and face.parent is None and face.name.endswith("-wall")
 
 
-def _add_thing(scenario: Scenario, i: int, extra: ExtraThing, world: World) -> Change:
+def _add_thing(scenario: Scenario, i: int, extra: ExtraThing, world: World) -> TrueChange:
     place = Place(extra.locale, extra.x_m, extra.y_m, extra.heading_rad).in_world(world)
     world_from_thing = place.lifted(world.floor_m(extra.locale))
     turn = np.array([[math.cos(place.heading_rad), math.sin(place.heading_rad)],
@@ -211,7 +211,7 @@ def _add_thing(scenario: Scenario, i: int, extra: ExtraThing, world: World) -> C
     corners = footprint(extra.kind) @ turn + place.position
     _check_within(scenario, ("truth", "extra", i), f"the {extra.kind}", corners, world, extra.locale)
     name = f"{extra.locale}/extra-{i}-{extra.kind}"
-    return Change(extra, name, added=build_thing(extra.kind, name, extra.locale, world_from_thing))
+    return TrueChange(extra, name, added=build_thing(extra.kind, name, extra.locale, world_from_thing))
 
 
 def _check_within(

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.body.building import Building, Elevators
 from sim.body.simulated_body import SimulatedBody
-from sim.differences.changes import ChangingFaces, State
-from sim.differences.table import AS_TOLD
+from sim.body.simulated_building import Elevators, SimulatedBuilding
+from sim.ground_truth.table import AS_TOLD
+from sim.ground_truth.true_changes import ChangingFaces, State
 from sim.render.light.lamps import Room
 from sim.render.light.lights import Lights
 from sim.scenario import Scenario
@@ -60,7 +60,7 @@ class Stage:
 
     scenario: Scenario
     world: World
-    building: Building
+    building: SimulatedBuilding
     start_world: Pose2
     goal_world: Pose2
     put_down_world: Pose2
@@ -184,21 +184,21 @@ def _around(world: World, locales: Sequence[str]) -> str:
 
 def _storeys(
     world: World, around: str, changing: ChangingFaces, elevators: Elevators
-) -> Callable[[float], Building]:
+) -> Callable[[float], SimulatedBuilding]:
     """A function from the height of the body's floor [m] to the building there at the start of the run.
 
     Each state of each storey is built once.
     """
-    known: dict[tuple[float, State], Building] = {}
+    known: dict[tuple[float, State], SimulatedBuilding] = {}
     finders: dict[float, Callable[[Pose2], str]] = {}
 
-    def at_time(floor_m: float, time_s: float) -> Building:
+    def at_time(floor_m: float, time_s: float) -> SimulatedBuilding:
         key = round(floor_m, 3), changing.state_at(time_s)
         if key not in known:
             storey, state = key
             if storey not in finders:
                 finders[storey] = _locale_finder(world, around, floor_m)
-            known[key] = Building(
+            known[key] = SimulatedBuilding(
                 changing.renderer(state), changing.obstacles(state, floor_m), finders[storey],
                 lambda place: place.in_world(world), floor_m, elevators, on_floor,
                 partial(at_time, floor_m) if changing.is_changing else None,
@@ -206,7 +206,7 @@ def _storeys(
             )
         return known[key]
 
-    def on_floor(floor_m: float) -> Building:
+    def on_floor(floor_m: float) -> SimulatedBuilding:
         return at_time(floor_m, 0.0)
 
     return on_floor

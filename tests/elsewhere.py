@@ -11,7 +11,7 @@ PROGRAM = f"""
 import sys
 from pathlib import Path
 from experiments.generated.missions import OFFICE
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from sim.stage import build_stage
 from sim.scenario import parse_scenario
 run_mission(build_stage(parse_scenario(OFFICE, "across-allens-office")), {SEED}, out=Path(sys.argv[1]))

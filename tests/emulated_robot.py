@@ -10,7 +10,7 @@ from pathlib import Path
 
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.camera_server import CameraServer
-from sim.emulators.denning import ConstantSpeedMotion, DenningEmulator
+from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator
 from sim.emulators.emulator import SimulatedGround
 from sim.emulators.line import FaultyLine, PseudoTerminal
 from sim.faults.fault import Fault

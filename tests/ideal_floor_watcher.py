@@ -16,7 +16,7 @@ from blackboard.level import Level
 from knowledge_sources.methods.floor.seen_floor import find_floor
 from knowledge_sources.questions import find_belief, find_building, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis
 from world_models.frames import Pose2
@@ -28,14 +28,14 @@ class IdealFloorWatcher(RobotKnowledgeSource):
     """Posts after each picture what a perfect eye would see of the floor."""
 
     level = Level.ACTION
-    on = (Watch(Frame, (Posted,)),)
+    on = (Watch(CameraPicture, (Posted,)),)
     writes = (FreeFloor,)
 
-    def bind(self, view: View, trigger: Change) -> tuple[Entry[Hypothesis], Entry[Frame]] | None:
-        belief, frame = find_belief(view), view.latest(Frame)
+    def bind(self, view: View, trigger: Change) -> tuple[Entry[Hypothesis], Entry[CameraPicture]] | None:
+        belief, frame = find_belief(view), view.latest(CameraPicture)
         return None if belief is None or frame is None else (belief, frame)
 
-    def act(self, view: View, case: tuple[Entry[Hypothesis], Entry[Frame]]) -> Iterable[Effect]:
+    def act(self, view: View, case: tuple[Entry[Hypothesis], Entry[CameraPicture]]) -> Iterable[Effect]:
         belief, frame = case
         robot, building = find_robot(view), find_building(view)
         pose = belief.value.world_from_robot(building)

@@ -21,7 +21,7 @@ from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import Frame, Look, MotionReport, MotorCommand
+from world_models.entries.body import CameraPicture, MotionReport, MotorCommand, PictureRequest
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
 from world_models.entries.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch, Subgoal
@@ -60,7 +60,7 @@ kitchen-door = { between = ["kitchen", "parlour"], wall = "east", along = 2, ope
 CAMERA = Camera.from_field_of_view(math.radians(65.0))
 MOUNT = CameraMount(1.0, 0.1)
 WRITES = (Goal, PlanSketch, Leg, Milestone, Certificate, Outcome, Tracks, Segments, LineMatch, PoseFix, Hypothesis,
-          MotorCommand, Look, Discrepancy)
+          MotorCommand, PictureRequest, Discrepancy)
 
 Line = Callable[[View], Iterable[Effect]]
 
@@ -96,10 +96,10 @@ class Player(KnowledgeSource):
         return self._lines[trigger.entry.value.line](view)
 
 
-def picture(number: int) -> Frame:
+def picture(number: int) -> CameraPicture:
     """A grey picture that differs from the next one."""
     _, jpeg = cv2.imencode(".jpg", np.full((512, 512, 3), 60 + 5 * number, np.uint8))
-    return Frame(jpeg.tobytes(), number, 0.5 * number, "track")
+    return CameraPicture(jpeg.tobytes(), number, 0.5 * number, "track")
 
 
 def play(sinks: Sequence[Sink], before: Callable[[int], None] = lambda _number: None) -> Scheduler:
@@ -111,8 +111,8 @@ def play(sinks: Sequence[Sink], before: Callable[[int], None] = lambda _number: 
     for number, (who, line, observed) in enumerate(SCRIPT):
         lines.append(line)
         before(number)
-        scheduler.tell([Post(value) for value in observed], "body")
-        scheduler.tell([Post(Cue(who, number))], "prompter")
+        scheduler.post([Post(value) for value in observed], "body")
+        scheduler.post([Post(Cue(who, number))], "prompter")
         while scheduler.step() is not None:
             pass
     return scheduler
@@ -155,7 +155,7 @@ def _expect(view: View) -> Iterable[Effect]:
 
 
 def _find(view: View) -> Iterable[Effect]:
-    frame, milestone = _last(view, Frame), _last(view, Milestone)
+    frame, milestone = _last(view, CameraPicture), _last(view, Milestone)
     found = np.array([[[101.0, 60.0], [101.0, 390.0]], [[5.0, 20.0], [600.0, 290.0]], [[-9.0, -9.0], [-1.0, -1.0]]])
     yield Post(Segments(frame.id, milestone.id, found, np.full(3, 0.3), 40.0), (frame,))
     pairs = np.array([[0, 0], [1, 1]])
@@ -182,7 +182,7 @@ def _drive(view: View) -> Iterable[Effect]:
 
 
 def _track(view: View) -> Iterable[Effect]:
-    frame, belief = _last(view, Frame), _last(view, Hypothesis)
+    frame, belief = _last(view, CameraPicture), _last(view, Hypothesis)
     yield Revise(belief, Hypothesis("kitchen", Pose2(1.5, 1.3, 0.4), diagonal(0.03, 0.01), "tracks"), (frame,))
     points = (Track("kitchen-door", (4.0, 1.5, 2.0), frame.id, (9.0, 9.0), 3.0, (200.0, 90.0), (204.0, 92.0), 0.9, 0.2),
               Track("kitchen-door", (4.0, 2.5, 2.0), frame.id, (9.0, 9.0), 3.0, (505.0, 90.0), None, 0.3, 0.2, 1),

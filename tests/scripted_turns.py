@@ -34,8 +34,8 @@ def decisions() -> list[Decision]:
     act(Revise(board.view["Discrepancy-1"], replace(doubt, status="escalated"), (board.view["Hypothesis-1"],)))
     there = replace(HELD, basis="relocalization", locale_from_robot=Pose2(3.0, 1.0, 0.0))
     act(Revise(board.view["Hypothesis-1"], there))
-    fault = BodyFault("camera", "camera unplugged", "no such device", "Look-1", 7.0)
+    fault = BodyFault("camera", "camera unplugged", "no such device", "PictureRequest-1", 7.0)
     act(Post(fault))
-    act(Post(Recovery("BodyFault-1", "Look-1", 7.0, 2.0, tries=9, waited_s=30.0, status="in vain")))
+    act(Post(Recovery("BodyFault-1", "PictureRequest-1", 7.0, 2.0, tries=9, waited_s=30.0, status="in vain")))
     act(Post(Outcome("failed", "camera unplugged")))
     return made

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 from fake_cases import fake_cases, work_on
-from harvey.campaign.case_work import Answer, Killed
+from harvey.campaign.case_work import CaseAnswer, Killed
 from harvey.campaign.workers import ClusterWorkers
-from harvey.commands.command import Command, add_parser
+from harvey.commands.command import CliCommand, add_parser
 from harvey.errors import BadInput
 
 
-def check_command(command: Command, of: str = "") -> None:
+def check_command(command: CliCommand, of: str = "") -> None:
     """A command, or a verb of the command ``of``: it says what it is for, and its examples are parsed."""
     words = ["harvey", *of.split(), command.name]
     parser = ArgumentParser(prog=" ".join(words[:-1]), exit_on_error=False)
@@ -33,7 +33,7 @@ def check_cluster(workers: ClusterWorkers, cluster: str, folder: Path) -> None:
     """Workers of a cluster: each case is answered once, whoever is killed; only what kills its workers is given up."""
     cases, told = fake_cases(folder, [0, 9, 1, 0]), list[str]()
     found = list(workers.map_on_cluster(work_on, cases, cluster, told.append))
-    answers = {place: answer.value.square for place, answer in found if isinstance(answer, Answer)}
+    answers = {place: answer.value.square for place, answer in found if isinstance(answer, CaseAnswer)}
     assert answers == {place: place * place / 3.0 for place in (0, 2, 3)}
     assert [place for place, answer in found if isinstance(answer, Killed)] == [1] and len(found) == len(cases)
     assert len(told) == 1

@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 
 from experiments.robustness.serial_chaos import NOISES, Trial
 from experiments.robustness.serial_line import Findings, Killed, Noise, NoisyLine
-from harvey.hardware.base import base_kinds
-from harvey.hardware.drivers.base import Base, BaseFault
+from harvey.hardware.bases import base_kinds
+from harvey.hardware.drivers.base_driver import Base, BaseFault
 from sim.emulators.emulator import IdealGround
+from sim.emulators.emulator_registry import emulator_kinds
 from sim.emulators.line import PseudoTerminalLink
-from sim.emulators.registry import emulator_kinds
 from world_models.entries.body import MotorCommand
 from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD
 

@@ -2,13 +2,13 @@
 
 ============================  ==========================================================================
 ``harvey.knowledge_sources``  a class under ``blackboard.knowledge_source.KnowledgeSource``
-``harvey.bases``              a ``harvey.hardware.drivers.base.BaseKind``
+``harvey.bases``              a ``harvey.hardware.drivers.base_driver.BaseKind``
 ``harvey.emulators``          a ``sim.emulators.emulator.EmulatorKind``
 ``harvey.faults``             a class under ``sim.faults.fault.Fault``
 ``harvey.loggers``            a class under ``logs.recording.logger.Logger``
 ``harvey.pages``              a ``harvey.runner.page_kind.PageKind``, named ``live``
 ``harvey.workers``            a ``harvey.campaign.workers.ClusterWorkers``, named ``dask``
-``harvey.commands``           a ``harvey.commands.command.Command``; of a verb: ``world.import``
+``harvey.commands``           a ``harvey.commands.command.CliCommand``; of a verb: ``world.import``
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
 ``harvey.exporters``          a ``harvey_buildings.exporters.Exporter``
 ============================  ==========================================================================

@@ -9,7 +9,7 @@ from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
 from world_models.camera import NOT_STATED, Camera, CameraDeviation, CameraMount
 from world_models.entries.obstacle import Obstruction
-from world_models.entries.robot import CameraState, Footprint, Wheels
+from world_models.entries.robot_state import CameraState, Footprint, Wheels
 from world_models.frames import Pose, Pose2
 
 _NO_LENS = Camera(1.0, 1.0, 0.0, 0.0, 1, 1)

@@ -17,7 +17,7 @@ from matplotlib.image import imread
 
 from docs.tools.look import look
 from docs.tools.moments import Moment, moments_of
-from logs.errors import RecordingError
+from logs.run_errors import RecordingError
 
 MOMENTS = 10
 COLUMNS = 2

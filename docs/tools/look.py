@@ -21,7 +21,7 @@ from typing import Any
 
 from rerun.experimental import ViewerClient
 
-from logs.errors import RecordingError
+from logs.run_errors import RecordingError
 
 LOCALHOST = "127.0.0.1"
 START_S, SETTLE_S, ATTEMPTS = 6.0, 2.0, 10

@@ -22,10 +22,10 @@ from experiments.report import Cell, Report
 from experiments.trials import at_most
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task
-from harvey.simulation.run import SimulatedRun, build_head
+from harvey.simulation.simulated_run import SimulatedRun, build_head
 from logs.run_recorder import RunRecorder
 from sim.body.simulated_body import SimulatedBody
-from sim.differences.inexact import TrueInexact
+from sim.ground_truth.inexact import TrueInexact
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate
 from world_models.frames import wrap_angle

@@ -20,11 +20,11 @@ from experiments.drives import Claim, Driven, End, Trial
 from experiments.generated.missions import write_camera_mission
 from experiments.report import Cell, Report
 from harvey.campaign.campaign import Task, run_task
-from sim.faults.kinds import CameraKnocked
+from sim.faults.built_in_faults import CameraKnocked
 from sim.scenario import Scenario, load_scenario
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, subtract_cameras
 from world_models.entries.body import MotionReport
-from world_models.entries.robot import CameraState
+from world_models.entries.robot_state import CameraState
 from world_models.units import INCH_M
 
 FAR_M = 10.0

@@ -26,11 +26,11 @@ from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
 from experiments.trials import RESULTS, at_least, at_most
 from harvey.campaign.campaign import Task, run_task
 from sim.body.collision import Obstacles, find_free_floor, find_shortest_way
-from sim.differences.table import NO_DIFFERENCES
+from sim.ground_truth.table import NO_DIFFERENCES
 from sim.stage import Stage, build_stage
 from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
-from world_models.entries.body import Look, MotorCommand
+from world_models.entries.body import MotorCommand, PictureRequest
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Contact, Obstacle
 from world_models.frames import Pose2
@@ -217,13 +217,13 @@ class Witness:
         elif isinstance(value, Hypothesis) and value.is_held:
             pose = value.world_from_robot(self.world)
             self._at = pose.x_m, pose.y_m
-        elif isinstance(value, Look | MotorCommand):
+        elif isinstance(value, PictureRequest | MotorCommand):
             self._note_motion(value)
 
-    def _note_motion(self, value: Look | MotorCommand) -> None:
-        if isinstance(value, Look) and value.purpose != "floor":
+    def _note_motion(self, value: PictureRequest | MotorCommand) -> None:
+        if isinstance(value, PictureRequest) and value.purpose != "floor":
             return
-        motion = "look" if isinstance(value, Look) else _name_motion(value)
+        motion = "look" if isinstance(value, PictureRequest) else _name_motion(value)
         needless = motion != "go" and self._at is not None and self.lacking.is_needless(*self._at)
         self.motions.append(motion)
         self.needless.append(motion if needless else "go")

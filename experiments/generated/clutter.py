@@ -16,8 +16,8 @@ import shapely
 from numpy.typing import NDArray
 
 from sim.body.collision import ROBOT_RADIUS_M, Obstacles, find_free_floor, has_way, take_from_floor
-from sim.differences.table import ExtraThing
-from sim.differences.things import SHAPES, build_thing, footprint
+from sim.ground_truth.table import ExtraThing
+from sim.ground_truth.things import SHAPES, build_thing, footprint
 from sim.stage import Stage
 from world_models.building.locales import Doorway
 from world_models.commands import parse_command

@@ -15,8 +15,8 @@ import shapely
 from experiments.generated.floors import Floor, generated_floor
 from experiments.generated.missions import ROOM_M, ROOMS, draw_ends, draw_heading_deg, draw_rooms, format_mission
 from sim.body.collision import Obstacles, find_free_floor, find_shortest_way, has_way, take_from_floor
-from sim.differences.changes import build_leaf
-from sim.differences.table import TrueDoor
+from sim.ground_truth.table import TrueDoor
+from sim.ground_truth.true_changes import build_leaf
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage, move_ends
 from world_models.building.locales import Doorway

@@ -16,7 +16,7 @@ import numpy as np
 from experiments.generated.clutter import KEPT_FREE_M, ClutterMaker
 from experiments.generated.floors import Floor, generated_floor
 from sim.body.collision import Obstacles, find_free_floor, has_way
-from sim.differences.inexact import TrueInexact
+from sim.ground_truth.inexact import TrueInexact
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 from world_models.frames import Pose2

@@ -17,7 +17,7 @@ from blackboard.effect import Post
 from blackboard.journal import Decision
 from experiments.report import Report
 from harvey.dry_run import build_dry_run
-from harvey.simulation.run import build_robot_model
+from harvey.simulation.simulated_run import build_robot_model
 from sim.scenario import Scenario, load_scenario
 from world_models.building.world import World
 from world_models.entries.task import Milestone, Outcome, PlanSketch
@@ -89,9 +89,9 @@ def _plan_afresh(known: World, scenario: Scenario) -> Clock:
     """Dry-run a scenario's mission in a new world: what is computed is kept with a world's frames."""
     world, clock = World(known.frames), Clock()
     scheduler = build_dry_run(world, build_robot_model(scenario, world), sinks=(clock,))
-    scheduler.tell([Post(scenario.command)], "user")
+    scheduler.post([Post(scenario.command)], "user")
     while scheduler.view.latest(Outcome) is None:
         clock.begin()
         if scheduler.step() is None:
-            scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
+            scheduler.post([Post(Quiescence(scheduler.cycle))], "scheduler")
     return clock

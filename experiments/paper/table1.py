@@ -17,7 +17,7 @@ from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
 from experiments.trials import RESULTS, campaign_folder, run_trials
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task
-from harvey.simulation.run import SimulatedRun, build_head
+from harvey.simulation.simulated_run import SimulatedRun, build_head
 from logs.run_directory import RunDirectory, check_vacant
 from logs.run_recorder import RunRecorder
 from sim.stage import Stage

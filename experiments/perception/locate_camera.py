@@ -20,7 +20,7 @@ from knowledge_sources.methods.features.lines import LineSegments, find_lines, r
 from knowledge_sources.methods.matching import match_in_space
 from knowledge_sources.methods.matching.pose_pairs import CameraParameters, build_camera_parameters
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml, trunc_r_and_t
-from knowledge_sources.methods.pose.med_r_and_t import MIN_NOISE_PART
+from knowledge_sources.methods.pose.least_median import MIN_NOISE_PART
 from knowledge_sources.methods.verification.line_check import Agreement, compute_agreement, compute_p_false
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from experiments.generated.floors import Floor, generated_floor
 from knowledge_sources.plan.milestone_selector import choose_heading, predict_milestone
 from knowledge_sources.settings import DEFAULT
-from sim.body.building import Building
+from sim.body.simulated_building import SimulatedBuilding
 from sim.render.sensor import Occluder, SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
@@ -57,8 +57,8 @@ class Site:
 
     floor: Floor
     robot: RobotModel
-    bare: Building
-    buildings: tuple[Building, Building]
+    bare: SimulatedBuilding
+    buildings: tuple[SimulatedBuilding, SimulatedBuilding]
     is_symmetric: bool
 
 
@@ -101,9 +101,9 @@ def get_site(seed: int) -> Site:
     floor = generated_floor(seed, ROOMS, symmetric=symmetric, repeated=repeated)
     settings = CameraSettings()
     robot = RobotModel(floor.world, settings.camera, settings.mount, ActuatorModel())
-    whole = Building.of_faces(floor.building.faces)
-    lacking = Building.of_faces(floor.altered(MISSING_SHARE).faces)
-    return Site(floor, robot, Building.of_faces(floor.world.faces), (whole, lacking), symmetric)
+    whole = SimulatedBuilding.of_faces(floor.building.faces)
+    lacking = SimulatedBuilding.of_faces(floor.altered(MISSING_SHARE).faces)
+    return Site(floor, robot, SimulatedBuilding.of_faces(floor.world.faces), (whole, lacking), symmetric)
 
 
 def generate_cases(floor_seed: int, first: int, count: int) -> Iterator[Case]:
@@ -280,7 +280,7 @@ def _measure_difference(here: Site, believed: Pose2, there: Site, other: Pose2) 
 
 
 def _render_frame(
-    robot: RobotModel, building: Building, true: Pose2, rng: np.random.Generator
+    robot: RobotModel, building: SimulatedBuilding, true: Pose2, rng: np.random.Generator
 ) -> tuple[bytes, float, float]:
     """Render JPEG bytes; returned with the hidden share and the change of light (logarithm of its gain)."""
     radiance = building.renderer.radiance(robot.lens, robot.camera_from_world(true))

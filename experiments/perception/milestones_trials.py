@@ -21,7 +21,7 @@ from knowledge_sources.plan.matcher import Matcher
 from knowledge_sources.plan.med_r_and_t import MedRAndT
 from knowledge_sources.plan.milestone_judge import MilestoneJudge
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.percepts import PoseFix, Segments
 from world_models.entries.task import Certificate
 from world_models.frames import wrap_angle
@@ -88,8 +88,8 @@ def certify(site: Site, case: Case) -> View:
     """Judge a case; returned is the board with its certificate."""
     sources = [LineFinder(DEFAULT), Matcher(DEFAULT), MedRAndT(DEFAULT), MilestoneJudge(DEFAULT)]
     scheduler = build_scheduler(sources, site.floor.world, site.robot)
-    effects: list[Effect] = [Post(case.belief), Post(case.milestone), Post(Frame(case.jpeg, 0, 0.0, "milestone"))]
-    scheduler.tell([Post(case.alternative), *effects] if case.alternative else effects, "case")
+    effects: list[Effect] = [Post(case.belief), Post(case.milestone), Post(CameraPicture(case.jpeg, 0, 0.0, "milestone"))]
+    scheduler.post([Post(case.alternative), *effects] if case.alternative else effects, "case")
     while scheduler.view.latest(Certificate) is None:
         decision = scheduler.step()
         if decision is None or decision.refused:
@@ -107,7 +107,7 @@ def _judge_case(site: Site, floor: int, number: int, case: Case) -> JudgedCase:
         robot, lines, segments.value.segments_px, pose, covariance, case.belief.world_from_robot(robot.world),
         case.belief.covariance_world(robot.world), check_lines(
             robot, lines, segments.value.segments_px, pose, errors=case.milestone.errors),
-        check_colors(robot, pose, read_picture(case.jpeg).quarter, case.milestone.looks),
+        check_colors(robot, pose, read_picture(case.jpeg).quarter, case.milestone.face_colors),
     )
     sigma_m, sigma_rad = (math.sqrt(float(v)) for v in (np.linalg.eigvalsh(covariance[:2, :2])[-1], covariance[2, 2]))
     error_m = math.inf if case.is_elsewhere else pose.distance_to(case.true)

@@ -16,7 +16,7 @@ from harvey.campaign.campaign import Task
 from harvey.runner.ports import Body
 from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains
-from harvey.simulation.run import Around, resume_mission, run_mission
+from harvey.simulation.simulated_run import Around, resume_mission, run_mission
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
 from world_models.entries.body import BodyFault, MotionReport, MotorCommand

@@ -36,14 +36,14 @@ from knowledge_sources.methods.localization.visibility_map import get_visibility
 from knowledge_sources.methods.motion.routes import compute_free_space
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import DEFAULT
-from sim.body.building import Building
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
+from sim.body.simulated_building import SimulatedBuilding
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import BodyFault, Frame
-from world_models.entries.kinds import KINDS
+from world_models.entries.body import BodyFault, CameraPicture
+from world_models.entries.entry_kinds import KINDS
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.percepts import Panorama
 from world_models.frame_building import FrameBuilding
@@ -105,7 +105,7 @@ class Scene:
 
     floor: Floor
     robot: RobotModel
-    building: Building
+    building: SimulatedBuilding
 
 
 @lru_cache(maxsize=2)
@@ -123,7 +123,7 @@ def _scene(floor: Floor) -> Scene:
     camera = Camera.from_field_of_view(math.radians(65.0), 512, 512)
     robot = RobotModel(floor.world, camera, CameraMount(1.0, 0.1, 0.0), ActuatorModel())
     real = floor.building
-    building = Building.of_faces(real.faces, lambda pose: real.locale_at(pose.position) or "", 8)
+    building = SimulatedBuilding.of_faces(real.faces, lambda pose: real.locale_at(pose.position) or "", 8)
     frames = _frames_of(floor.world)
     for room in floor.world.rooms:
         get_visibility_map(frames, room, robot.mount.height_m)
@@ -169,7 +169,7 @@ class _TimedBody(FaultyBody):
         super().__init__(body)
         self.cpu_s = 0.0
 
-    def look(self, purpose: str) -> Frame | BodyFault:
+    def look(self, purpose: str) -> CameraPicture | BodyFault:
         began = time.process_time()
         try:
             return super().look(purpose)
@@ -186,7 +186,7 @@ def _build_lost_agent(scene: Scene, body: FaultyBody, belief: Place) -> Schedule
                       "milestone")
     bound_px = DEFAULT.plan.max_deviation_px
     doubt = Discrepancy(Level.GOAL, "the robot was kidnapped", None, (bound_px, bound_px), "px")
-    scheduler.tell([Post(held), Post(doubt)], "user")
+    scheduler.post([Post(held), Post(doubt)], "user")
     return scheduler
 
 

@@ -13,11 +13,11 @@ from tqdm import tqdm
 from experiments.report import Cell, Report
 from experiments.robustness.serial_line import BOUNDS, PROTOCOLS, Findings, Killed, Noise, NoisyLine
 from harvey.errors import BadInput
-from harvey.hardware.base import base_kinds, say_what_to_install
-from harvey.hardware.drivers.base import Base, BaseFault
+from harvey.hardware.bases import base_kinds, say_what_to_install
+from harvey.hardware.drivers.base_driver import Base, BaseFault
 from harvey.hardware.drivers.denning import DenningBase
 from sim.emulators.emulator import IdealGround
-from sim.emulators.registry import emulator_kinds
+from sim.emulators.emulator_registry import emulator_kinds
 from world_models.entries.body import MotionReport, MotorCommand
 
 

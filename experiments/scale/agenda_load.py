@@ -90,7 +90,7 @@ def measure(numbers_pending: Sequence[int], parts: int, seed: int) -> list[Speed
 
 
 def _fill(scheduler: Scheduler, tasks: int, rng: np.random.Generator) -> Scheduler:
-    scheduler.tell([Post(Task.of(int(draw))) for draw in rng.integers(1 << 31, size=tasks)], "user")
+    scheduler.post([Post(Task.of(int(draw))) for draw in rng.integers(1 << 31, size=tasks)], "user")
     scheduler.step()
     return scheduler
 

@@ -99,7 +99,7 @@ def long_run(cycles: int) -> Memory:
     """Run a number of cycles; the journal goes to the null device."""
     journal = JournalFile(Path(os.devnull))
     scheduler = Scheduler([Seer(), Corrector()], sinks=[journal])
-    scheduler.tell([Post(Picture(0, bytes(PIXELS)))], "user")
+    scheduler.post([Post(Picture(0, bytes(PIXELS)))], "user")
     early_bytes = 0
     while scheduler.cycle < cycles:
         scheduler.step()

@@ -17,12 +17,12 @@ from blackboard.effect import Effect
 from blackboard.journal import Decision
 from blackboard.knowledge_source import KnowledgeSource
 from experiments.report import Cell, Report
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario, with_settings
 from sim.stage import build_stage
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 
 SCENARIOS, QUICK_SCENARIOS = ("forty-foot-hallway", "lab-to-allens-office"), ("forty-foot-hallway",)
 DRIVES = 6
@@ -69,7 +69,7 @@ def _timed(source: KnowledgeSource, times: Times) -> KnowledgeSource:
 
 def _act(name: str, trigger: Change) -> str:
     """Name an act; the tracker also takes new landmarks, when no frame is tracked."""
-    return NEW_LANDMARKS if name == TRACK and not isinstance(trigger.entry.value, Frame) else name
+    return NEW_LANDMARKS if name == TRACK and not isinstance(trigger.entry.value, CameraPicture) else name
 
 
 def run(quick: bool, seed: int) -> Report:
@@ -128,7 +128,7 @@ def _time_pictures(scenario: str, seed: int) -> list[float]:
         return [_timed(ks, acts) for ks in knowledge_sources(settings)]
 
     def count(decision: Decision) -> None:
-        if any(isinstance(change.entry.value, Frame) for change in decision.observed):
+        if any(isinstance(change.entry.value, CameraPicture) for change in decision.observed):
             pictures.append(0.0)
         if pictures:
             pictures[-1] += sum(ms for times in acts.values() for ms in times)

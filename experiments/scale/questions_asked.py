@@ -22,7 +22,7 @@ from blackboard.journal import decision_record, plain
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler
 from harvey.agent import Agent, build_agent
-from harvey.replay.why_not import why_absent
+from harvey.replay.why_not_again import why_absent
 from harvey.runner.replay import open_originals, replay
 from logs.explain.phrases import describe_decision
 from logs.explain.why_not import Fate, in_cycle
@@ -34,7 +34,7 @@ from logs.timeline import Timeline
 KINDS = ("what next", "why", "why not", "what if", "since when", "rested on", "did not rest on")
 WOKEN = re.compile(r"woken by ([\w-]+\.\d+)")
 COULD = "could have acted"
-"""How :mod:`harvey.replay.why_not` says that a knowledge source would have acted."""
+"""How :mod:`harvey.replay.why_not_again` says that a knowledge source would have acted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ class _Asker:
             return None
 
         def withdrawn() -> bool:
-            self._scheduler.tell([Retract(entry)], WHAT_IF)
+            self._scheduler.post([Retract(entry)], WHAT_IF)
             now = self._scheduler.step()
             return now is None or now.chosen is None or then.chosen is None or (
                 (now.chosen.source.name, str(now.chosen.trigger.entry.ref)) != (then.chosen.source, woken[1]))

@@ -18,7 +18,7 @@ from typing import Any
 from experiments.report import Cell, Report
 from experiments.scale import watcher_clients
 from harvey.runner.page_kind import find_page
-from harvey.simulation.run import build_head, run_mission
+from harvey.simulation.simulated_run import build_head, run_mission
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
 

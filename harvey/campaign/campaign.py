@@ -142,7 +142,7 @@ def run_task(
     """Run one mission; ``follow`` makes a sink that shows what is counted. Raises BadInput for what the user gave."""
     stage = task.stage()
     from harvey.campaign.progress import Tally
-    from harvey.simulation.run import build_head, run_mission
+    from harvey.simulation.simulated_run import build_head, run_mission
 
     tally = Tally(stage)
     shown = (tally, follow(tally)) if follow else ()
@@ -168,7 +168,7 @@ def find_finished(task: Task, stage: Stage) -> MissionResult | None:
         return None
     from harvey.runner.result import MissionResult
     from harvey.runner.resume import find_remains
-    from harvey.simulation.run import build_head
+    from harvey.simulation.simulated_run import build_head
     from logs.run_head import RunHead
 
     run = RunDirectory(task.out)
@@ -186,7 +186,7 @@ def find_finished(task: Task, stage: Stage) -> MissionResult | None:
 def _keep_or_resume(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence[Sink], live: bool) -> MissionResult:
     """What was done of this mission already. Raises BadInput where another mission is there."""
     from harvey.runner.resume import find_remains
-    from harvey.simulation.run import resume_mission
+    from harvey.simulation.simulated_run import resume_mission
 
     found = find_finished(task, stage)
     return found or resume_mission(run, find_remains(run), sinks=sinks, live=live, stage=stage)
@@ -211,7 +211,7 @@ def drive_missions(
     from harvey.runner.result import MissionResult
 
     stage = tasks[0].stage()
-    from harvey.simulation.run import build_head
+    from harvey.simulation.simulated_run import build_head
 
     head = replace(build_head(stage, 0, tasks[0].body, tasks[0].agent_settings), code="", arithmetic="")
     by_seed = {task.seed: task for task in tasks}

@@ -51,7 +51,7 @@ def code_digest() -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class CaseAnswer:
     """What a worker found of a case.
 
     Attributes:
@@ -84,13 +84,13 @@ class Killed:
         return f"given up: the worker that had it was killed {self.kills} times, as when memory runs out"
 
 
-def answer_case(work: Callable[[Any], Any], case: Any) -> Answer:
+def answer_case(work: Callable[[Any], Any], case: Any) -> CaseAnswer:
     """Work on a case, in a worker."""
     began = time.perf_counter()
     value = work(case)
     seconds = time.perf_counter() - began
     return_memory()
-    return Answer(value, seconds, f"{socket.gethostname()}:{os.getpid()}", code_digest(), arithmetic())
+    return CaseAnswer(value, seconds, f"{socket.gethostname()}:{os.getpid()}", code_digest(), arithmetic())
 
 
 def return_memory() -> None:
@@ -101,7 +101,7 @@ def return_memory() -> None:
             ctypes.CDLL(None).malloc_trim(0)
 
 
-def check_origin(answer: Answer) -> None:
+def check_origin(answer: CaseAnswer) -> None:
     """Refuse what another program found, or another kind of processor. Raises BadInput."""
     for what, theirs, ours in (("code", answer.code, code_digest()),
                                ("arithmetic", answer.arithmetic, arithmetic())):
@@ -112,7 +112,7 @@ def check_origin(answer: Answer) -> None:
 
 def map_locally(
     work: Callable[[Any], Any], cases: Sequence[Any], number: int | None
-) -> Iterator[tuple[int, Answer | Killed]]:
+) -> Iterator[tuple[int, CaseAnswer | Killed]]:
     """(place in ``cases``, answer) as they are done, in whatever order; ``number`` of processes, None for all.
 
     When the caller stops, or is interrupted, the workers stop; each may close its files first. They also stop when the
@@ -121,7 +121,7 @@ def map_locally(
     most = min(number or count_processors(), len(cases))
     todo, kills = deque(range(len(cases))), Counter[int]()
     workers = [_Worker() for _ in range(most)]
-    under_way: dict[Future[Answer], tuple[_Worker, int]] = {}
+    under_way: dict[Future[CaseAnswer], tuple[_Worker, int]] = {}
 
     def give(worker: _Worker) -> None:
         if todo:
@@ -133,7 +133,7 @@ def map_locally(
             give(worker)
         while under_way:
             ready, _ = wait(under_way, return_when=FIRST_COMPLETED)
-            done: list[tuple[int, Answer | Killed]] = []
+            done: list[tuple[int, CaseAnswer | Killed]] = []
             for future in ready:
                 worker, place = under_way.pop(future)
                 try:
@@ -166,7 +166,7 @@ class _Worker:
     def __init__(self) -> None:
         self._executor: ProcessPoolExecutor | None = None
 
-    def submit(self, work: Callable[[Any], Any], case: Any) -> Future[Answer]:
+    def submit(self, work: Callable[[Any], Any], case: Any) -> Future[CaseAnswer]:
         """Give it a case; one that ended while it had none is replaced."""
         try:
             return self._process().submit(_work_in_worker, work, case)
@@ -207,7 +207,7 @@ def _end_with_parent() -> None:
         os._exit(TOLD_TO_STOP)
 
 
-def _work_in_worker(work: Callable[[Any], Any], case: Any) -> Answer:
+def _work_in_worker(work: Callable[[Any], Any], case: Any) -> CaseAnswer:
     """In a worker: one that is told to stop closes its files, and then takes nothing else."""
     try:
         return answer_case(work, case)

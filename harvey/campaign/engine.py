@@ -23,7 +23,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from harvey.campaign.case_work import Answer, Killed, check_origin, map_locally, origin
+from harvey.campaign.case_work import CaseAnswer, Killed, check_origin, map_locally, origin
 from harvey.campaign.workers import Workers, chosen_workers, find_cluster
 from harvey.errors import BadInput
 
@@ -189,7 +189,7 @@ class Campaign(Generic[T, R]):
 def map_cases(
     work: Callable[[T], R], cases: Sequence[T], workers: Workers | None = None,
     tell: Callable[[str], None] | None = None,
-) -> Iterator[tuple[int, Answer | Killed]]:
+) -> Iterator[tuple[int, CaseAnswer | Killed]]:
     """(place in ``cases``, answer) as they are done, in whatever order; kept nowhere. Raises BadInput.
 
     Args:
@@ -202,7 +202,7 @@ def map_cases(
     else:
         done = map_locally(work, cases, workers.number)
     for place, answer in done:
-        if isinstance(answer, Answer):
+        if isinstance(answer, CaseAnswer):
             check_origin(answer)
         yield place, answer
 

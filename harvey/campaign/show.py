@@ -37,7 +37,7 @@ SIZE_IN, DOTS = (7.0, 4.0), 130
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class CampaignProgress:
     """What the files of a campaign tell.
 
     Attributes:
@@ -88,7 +88,7 @@ def find_campaign(text: str) -> Path:
                    " harvey experiment make them under runs/)")
 
 
-def read_progress(folder: Path) -> Progress:
+def read_progress(folder: Path) -> CampaignProgress:
     """Read it; a campaign may be under way. Raises BadInput."""
     try:
         about = json.loads((folder / CAMPAIGN).read_text(encoding="utf-8"))
@@ -97,14 +97,14 @@ def read_progress(folder: Path) -> Progress:
     except ValueError as error:
         raise BadInput(f"{folder / CAMPAIGN}: expected JSON, got: {error}") from None
     _, records = read_results(folder / RESULTS)
-    return Progress(
+    return CampaignProgress(
         folder, about if isinstance(about, dict) else {},
         {case: record[RESULT] for case, record in records.items() if RESULT in record},
         {case: record[KILLED] for case, record in records.items() if RESULT not in record and KILLED in record},
         [record for record in read_times(folder) if isinstance(record.get("at"), float | int)])
 
 
-def format_progress(progress: Progress) -> str:
+def format_progress(progress: CampaignProgress) -> str:
     """For a terminal."""
     p, unit = progress, str(progress.about.get("unit", "case"))
     workers = sorted({str(record.get("worker")) for record in p.times})
@@ -147,7 +147,7 @@ def _kinds(results: Sequence[dict[str, Any]]) -> list[tuple[str, str, str, str]]
     return rows
 
 
-def draw_progress(progress: Progress) -> Path:
+def draw_progress(progress: CampaignProgress) -> Path:
     """Draw how many cases were done when, by outcome where they have one; returns the picture (PNG)."""
     from matplotlib.figure import Figure
 

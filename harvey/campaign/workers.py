@@ -14,7 +14,7 @@ from harvey.errors import BadInput
 from world_models.plugins import WORKERS_GROUP, list_absent, load_plugins
 
 if TYPE_CHECKING:
-    from harvey.campaign.case_work import Answer, Killed
+    from harvey.campaign.case_work import CaseAnswer, Killed
 
 DASK = "dask"
 """The name of the cluster's workers, as an entry point."""
@@ -45,7 +45,7 @@ class ClusterWorkers(Protocol):
     def map_on_cluster(
         self, work: Callable[[Any], Any], cases: Sequence[Any], cluster: str,
         tell: Callable[[str], None] | None = None,
-    ) -> Iterator[tuple[int, Answer | Killed]]:
+    ) -> Iterator[tuple[int, CaseAnswer | Killed]]:
         """(place in ``cases``, answer) as they are done, in whatever order.
 
         Args:

@@ -10,34 +10,34 @@ from argparse import Namespace
 from collections.abc import Mapping
 from dataclasses import replace
 
-from harvey.commands.command import Command
+from harvey.commands.command import CliCommand
 from harvey.errors import BadInput
 from world_models.plugins import COMMANDS_GROUP, list_absent, list_plugins, load_plugins
 
 MODULES: Mapping[str, str] = {
-    "list": "listing", "run": "run", "view": "view", "story": "explain", "why": "explain", "replay": "again",
-    "diff": "explain", "report": "report", "export": "report", "resume": "again", "repair": "again", "world": "world",
-    "settings": "listing", "experiment": "listing", "campaign": "run", "drive": "drive", "calibrate": "calibrate",
+    "list": "listing", "run": "run_command", "view": "view", "story": "explain", "why": "explain", "replay": "again",
+    "diff": "explain", "report": "report", "export": "report", "resume": "again", "repair": "again", "world": "world_command",
+    "settings": "listing", "experiment": "listing", "campaign": "run_command", "drive": "drive", "calibrate": "calibrate",
     "emulate": "emulate", "completion": "listing",
 }
 """The module of each command; there it stands under its name in capitals."""
 
 
-def find_commands(name: str | None = None) -> tuple[Command, ...]:
+def find_commands(name: str | None = None) -> tuple[CliCommand, ...]:
     """The command of this name alone; all of them, with those of other packages, where there is none of it here."""
     if name is not None and name in MODULES:
         return (_import(name),)
     return (*map(_import, MODULES), *find_added_commands())
 
 
-def find_added_commands(of: str = "") -> tuple[Command, ...]:
+def find_added_commands(of: str = "") -> tuple[CliCommand, ...]:
     """The commands that other packages add, or the verbs that they add to a command.
 
     In the place of one whose extra is absent stands one that says what to install.
     """
     prefix = f"{of}." if of else ""
     names = [name for name in list_plugins(COMMANDS_GROUP) if _is_of(name, prefix)]
-    present = load_plugins(COMMANDS_GROUP, Command, *names) if names else {}
+    present = load_plugins(COMMANDS_GROUP, CliCommand, *names) if names else {}
     return (*(replace(command, name=name.removeprefix(prefix)) for name, command in present.items()),
             *(_absent(name, needs) for name, needs in list_absent(COMMANDS_GROUP).items() if _is_of(name, prefix)))
 
@@ -46,14 +46,14 @@ def _is_of(name: str, prefix: str) -> bool:
     return name.startswith(prefix) and "." not in name.removeprefix(prefix)
 
 
-def _import(name: str) -> Command:
-    command: Command = getattr(importlib.import_module(f"{__name__}.{MODULES[name]}"), name.upper())
+def _import(name: str) -> CliCommand:
+    command: CliCommand = getattr(importlib.import_module(f"{__name__}.{MODULES[name]}"), name.upper())
     return command
 
 
-def _absent(name: str, needs: str) -> Command:
+def _absent(name: str, needs: str) -> CliCommand:
     def refuse(_: Namespace) -> int:
         raise BadInput(f"{name.replace('.', ' ')} needs {needs}")
 
-    return Command(name.rpartition(".")[2], f"needs {needs}", ((needs.partition(": ")[2], "adds it"),),
+    return CliCommand(name.rpartition(".")[2], f"needs {needs}", ((needs.partition(": ")[2], "adds it"),),
                    lambda _: None, refuse, open_ended=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harvey.campaign.campaign import parse_pairs
-from harvey.commands.command import Command
+from harvey.commands.command import CliCommand
 from harvey.errors import BadInput
 from logs.run_directory import RunDirectory, check_vacant, open_run
 from world_models.words import count
@@ -26,7 +26,7 @@ def _add_replay_arguments(parser: ArgumentParser) -> None:
     what_if = parser.add_argument_group("what would it have done")
     what_if.add_argument("--without", metavar="NAME", action="append", default=[],
                          help="without a knowledge source, a landmark or face of its model, or one segment, as"
-                              " 'Frame-9 segment 12'; may be repeated. Of a thing, as allens-office/desk, only the"
+                              " 'CameraPicture-9 segment 12'; may be repeated. Of a thing, as allens-office/desk, only the"
                               " landmark goes: nothing of it is expected to be seen, and it stays in the way")
     what_if.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
                          help="with a servo level off, as servo.plan=off, or another number of harvey settings, as"
@@ -122,13 +122,13 @@ def with_progress(decisions: Iterable[ReplayedDecision]) -> Iterator[ReplayedDec
     yield from tqdm(decisions, unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False)
 
 
-REPLAY = Command(
+REPLAY = CliCommand(
     "replay", "decide a recorded run again and compare, byte for byte",
     (
         ("harvey replay runs/lab-to-allens-office-0", "from its camera frames and odometry"),
         ("harvey replay runs/bump-0 --without plan_adjuster", "what it would have done without a knowledge source"),
         ("harvey replay runs/bump-0 --without fire-door", "without a landmark of its model"),
-        ("harvey replay runs/bump-0 --without 'Frame-9 segment 12'", "had it not found one segment"),
+        ("harvey replay runs/bump-0 --without 'CameraPicture-9 segment 12'", "had it not found one segment"),
         ("harvey replay runs/bump-0 --set servo.plan=off --out runs/bump-no-plan", "and keep it as a run"),
         ("harvey replay runs/bump-0 --set action.min_tolerance_px=8", "with another number of harvey settings"),
         ("harvey replay runs/bump-0 --set camera.tilt_deg=1", "had it believed its camera to be tilted"),
@@ -166,7 +166,7 @@ def _run_resume(args: Namespace) -> int:
     if moved:
         raise BadInput(f"--base and --camera: expected a run on hardware, and {run.path} is one of the simulator")
     _print_start(run, remains, head)
-    from harvey.simulation.run import resume_mission
+    from harvey.simulation.simulated_run import resume_mission
     from logs.explain.story import first_lines
 
     result = resume_mission(run, remains, live=args.live)
@@ -181,9 +181,9 @@ def _on_hardware(
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
     from harvey.agent import settings_of
     from harvey.commands.drive import follow, run_checks, summary, tell_how_to_stop
-    from harvey.hardware.mission import rebuild_mission
+    from harvey.hardware.hardware_mission import rebuild_mission
+    from harvey.hardware.hardware_run import resume, time_of_last_observation
     from harvey.hardware.preflight import Preflight
-    from harvey.hardware.run import resume, time_of_last_observation
     from harvey.replay.what_if import WhatIf
 
     mission, began_s = rebuild_mission(head, moved), time.monotonic() - time_of_last_observation(run)
@@ -210,7 +210,7 @@ def _print_start(run: RunDirectory, remains: Remains, head: RunHead) -> None:
     print(f"{run.path}: {told} replayed, then it goes on", file=sys.stderr, flush=True)
 
 
-RESUME = Command(
+RESUME = CliCommand(
     "resume", "go on with a run that was cut off",
     (
         ("harvey resume runs/lab-to-allens-office-3", "after a crash, kill -9, a power cut or a full disk"),
@@ -233,7 +233,7 @@ def _add_repair_arguments(parser: ArgumentParser) -> None:
 def _run_repair(args: Namespace) -> int:
     from tqdm import tqdm
 
-    from harvey.simulation.run import redraw
+    from harvey.simulation.simulated_run import redraw
 
     run = open_run(args.run)
     with tqdm(unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
@@ -242,7 +242,7 @@ def _run_repair(args: Namespace) -> int:
     return 0
 
 
-REPAIR = Command(
+REPAIR = CliCommand(
     "repair", "draw the recording of a run anew, where it is damaged or missing",
     (("harvey repair runs/lab-to-allens-office-0", "from its journal and its camera's pictures"),),
     _add_repair_arguments, _run_repair,

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harvey.commands.command import Command, whole
+from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
 
 if TYPE_CHECKING:
     from harvey.hardware.calibration import Grey, Mounted
-    from harvey.hardware.drivers.camera import VideoCamera
+    from harvey.hardware.drivers.video_camera import VideoCamera
     from knowledge_sources.methods.calibration.intrinsics import Calibration, Pattern
 
 PATTERN = re.compile(r"(\d{1,3})x(\d{1,3})", re.ASCII)
@@ -70,8 +70,8 @@ def _run(args: Namespace) -> int:
         grey_of,
         report,
     )
+    from knowledge_sources.methods.calibration.calibration_picture import draw_calibration
     from knowledge_sources.methods.calibration.intrinsics import Pattern
-    from knowledge_sources.methods.calibration.picture import draw_calibration
     from world_models.files.toml.camera_file import camera_text
 
     board = _check_options(args)
@@ -143,8 +143,8 @@ def _live_place(args: Namespace) -> Grey:
 
 
 def _open_camera(source: str) -> VideoCamera:
-    from harvey.hardware.drivers.camera import VideoCamera
     from harvey.hardware.drivers.capture import CameraFault
+    from harvey.hardware.drivers.video_camera import VideoCamera
 
     began_s = time.monotonic()
     try:
@@ -180,7 +180,7 @@ def _print_status(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-CALIBRATE = Command(
+CALIBRATE = CliCommand(
     "calibrate", "measure a camera: lens, distortion, mounting",
     (
         ("harvey calibrate photos/ --pattern 9x6 --square-mm 25", "from photographs of a board"),

@@ -9,7 +9,7 @@ from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class CliCommand:
     """One command.
 
     Attributes:
@@ -36,7 +36,7 @@ class Command:
         return "examples:\n" + "\n".join(f"  {command.ljust(width)}   {what}" for command, what in self.examples)
 
 
-def add_parser(commands: Any, command: Command) -> ArgumentParser:
+def add_parser(commands: Any, command: CliCommand) -> ArgumentParser:
     """The parser of a command, with its help and examples, among those of argparse's ``add_subparsers``."""
     parser: ArgumentParser = commands.add_parser(
         command.name, help=command.summary, epilog=command.epilog, formatter_class=RawDescriptionHelpFormatter,

@@ -11,14 +11,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harvey.commands.command import Command
+from harvey.commands.command import CliCommand
 from harvey.errors import BadInput
 from logs.run_directory import RUNS, check_vacant
 
 if TYPE_CHECKING:
     from blackboard.journal import Decision
     from harvey.agent_settings import Pairs
-    from harvey.hardware.mission import HardwareMission
+    from harvey.hardware.hardware_mission import HardwareMission
     from harvey.hardware.preflight import Check, Preflight
     from harvey.runner.page_kind import PageKind
     from harvey.runner.ports import Body
@@ -57,7 +57,7 @@ def _run(args: Namespace) -> int:
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
     from harvey.agent_settings import build_settings, split_settings
     from harvey.campaign.campaign import make_room, parse_pairs
-    from harvey.hardware.mission import FORMAT
+    from harvey.hardware.hardware_mission import FORMAT
     from harvey.hardware.preflight import Preflight
     from harvey.replay.what_if import WhatIf
     from harvey.runner.page_kind import find_page
@@ -91,7 +91,7 @@ def run_checks(dry: Preflight) -> bool:
 
 
 def _mission(args: Namespace, more: dict[str, Any]) -> HardwareMission:
-    from harvey.hardware.mission import load_mission
+    from harvey.hardware.hardware_mission import load_mission
     from world_models.files.packed import SUFFIXES
 
     given = {OPTIONS[name][0]: value for name in OPTIONS if (value := getattr(args, name)) is not None}
@@ -114,7 +114,7 @@ def _drive(
     mission: HardwareMission, dry: Preflight, clock: Callable[[], float], out: Path, args: Namespace, numbers: Pairs,
     page: PageKind | None,
 ) -> int:
-    from harvey.hardware.run import drive
+    from harvey.hardware.hardware_run import drive
 
     if dry.robot is None or dry.base is None or dry.camera is None:
         raise BadInput("expected a world, a base and a camera, and one of them is lacking")
@@ -131,7 +131,7 @@ def _drive(
 def _drive_served(start: Callable[..., MissionResult], mission: HardwareMission, robot: RobotModel, kind: PageKind,
                   port: int) -> MissionResult:
     """Drive, and show it on a page, which may pause and stop it."""
-    from harvey.hardware.body import HardwareBody
+    from harvey.hardware.hardware_body import HardwareBody
     from logs.run_head import load_known_world
 
     with kind.serve(port, load_known_world(mission.world), robot.lens, mission.name) as page:
@@ -179,7 +179,7 @@ def follow(decision: Decision) -> None:
             print(f"cycle {decision.cycle}: {said}", file=sys.stderr, flush=True)
 
 
-DRIVE = Command(
+DRIVE = CliCommand(
     "drive", "drive a mission on hardware",
     (
         ("harvey drive mission.toml --dry-run", "check world, plan, base, camera and disk; nothing moves"),

@@ -9,7 +9,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harvey.commands.command import Command, whole
+from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
 
 if TYPE_CHECKING:
@@ -94,9 +94,9 @@ def _base(args: Namespace) -> tuple[Emulator, Callable[[], tuple[float, str]], S
 
     With a scenario the line fails when the scenario's faults say so.
     """
-    from harvey.hardware.base import say_what_to_install
+    from harvey.hardware.bases import say_what_to_install
+    from sim.emulators.emulator_registry import emulator_kinds
     from sim.emulators.line import FaultyLine
-    from sim.emulators.registry import emulator_kinds
 
     kinds = emulator_kinds()
     if args.kind not in kinds:
@@ -161,7 +161,7 @@ class _Trace:
         return False
 
 
-EMULATE = Command(
+EMULATE = CliCommand(
     "emulate", "a robot base on a pseudo-terminal, for trying things out without one",
     (
         ("harvey emulate denning", "the documented line protocol; docs/protocol-denning.md"),
@@ -173,5 +173,5 @@ EMULATE = Command(
     _arguments, _run,
     "It prints the name of a serial port, as /dev/pts/7, and serves it until Ctrl-C. A driver that opens this port\n"
     "finds a base that answers byte by byte as the real one would. In another terminal, for one metre ahead:\n"
-    "  python -c \"from harvey.hardware.base import open_base; print(open_base('denning:/dev/pts/7').move(1))\"",
+    "  python -c \"from harvey.hardware.bases import open_base; print(open_base('denning:/dev/pts/7').move(1))\"",
 )

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from harvey.commands.command import Command, whole
+from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
 from logs.disk import is_being_written
 from logs.run_directory import RunDirectory, open_run
@@ -37,7 +37,7 @@ def _add_why_arguments(parser: ArgumentParser) -> None:
 
 
 def _run_why(args: Namespace) -> int:
-    from logs.explain.questions import is_question
+    from logs.explain.questions_in_words import is_question
     from logs.explain.story import opening
     from logs.timeline import Timeline
 
@@ -77,7 +77,7 @@ def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
 
 def _stories(run: RunDirectory, history: Timeline, args: Namespace) -> Iterator[Story]:
     from logs.explain.model import WorldFile
-    from logs.explain.questions import answers, is_question
+    from logs.explain.questions_in_words import answers, is_question
     from logs.explain.subjects import milestone_story, milestones, stories_of
 
     world = WorldFile(run)
@@ -131,13 +131,13 @@ def _print_check(history: Timeline, as_json: bool) -> int:
 
 
 def _print_not(run: RunDirectory, history: Timeline, args: Namespace) -> None:
-    from harvey.replay.why_not import answers
+    from harvey.replay.why_not_again import answers
 
     lines = list(answers(run, history, args.not_, args.at))
     print(json.dumps({"not": args.not_, "at": args.at, "because": lines}, indent=2) if args.json else "\n".join(lines))
 
 
-WHY = Command(
+WHY = CliCommand(
     "why", "why Harvey did what it did, in sentences; and why not something else",
     (
         ("harvey why runs/lab-to-allens-office-0", "what happened on the way, how the mission ended, and why"),
@@ -187,7 +187,7 @@ def _run_story(args: Namespace) -> int:
     return 0
 
 
-STORY = Command(
+STORY = CliCommand(
     "story",
     "a run told in a page of text: plans, lost and found, contacts, milestones, how it ended",
     (
@@ -242,7 +242,7 @@ def _title(run: RunDirectory) -> str:
     return ", ".join([str(run.path), *named])
 
 
-DIFF = Command(
+DIFF = CliCommand(
     "diff", "the first decision in which two runs differ, and why",
     (
         ("harvey diff runs/lab-to-allens-office-0 runs/lab-to-allens-office-1", "two seeds of one scenario"),

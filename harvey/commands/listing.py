@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments import EXPERIMENTS
 from harvey.campaign.workers import add_worker_arguments, choose_workers, parse_workers
-from harvey.commands.command import Command, whole
+from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def _item(name: str, text: str) -> str:
     return fill(text, 112, initial_indent=f"  {name:<22} ", subsequent_indent=" " * 25)
 
 
-LIST = Command(
+LIST = CliCommand(
     "list", "what there is to run: scenarios and experiments",
     (("harvey list", "names and descriptions"),), _add_list_arguments, _run_list,
 )
@@ -75,7 +75,7 @@ def select_rows(name: str | None) -> tuple[Row, ...]:
     """All settings, those of a room, or one. Raises BadInput where there is no such room or setting."""
     from harvey.agent_settings import find_key, list_robot_rows
     from knowledge_sources.settings import list_rows
-    from world_models.files.toml.settings import suggest_keys
+    from world_models.files.toml.settings_reader import suggest_keys
 
     rows, name = (*list_rows(), *list_robot_rows()), name and find_key(name)
     chosen = tuple(row for row in rows if name in (None, row.room, row.name))
@@ -134,7 +134,7 @@ def format_value(row: Row) -> str:
     return f"{row.value:.4g}{unit}" + (f" ({degrees(row.value):.3g} deg)" if row.unit == "rad" else "")
 
 
-SETTINGS = Command(
+SETTINGS = CliCommand(
     "settings", "every number of the methods: value, unit, meaning and source",
     (
         ("harvey settings", "all rooms"),
@@ -170,7 +170,7 @@ def _run_experiment(args: Namespace) -> int:
     return 0 if report.holds else 1
 
 
-EXPERIMENT = Command(
+EXPERIMENT = CliCommand(
     "experiment", "measure something and print the paper's figure, a peer's and ours",
     (
         ("harvey experiment levels --quick", "what the three servo levels do"),
@@ -237,7 +237,7 @@ def _list_actions(parser: ArgumentParser) -> Iterator[Action]:
             yield action
 
 
-COMPLETION = Command(
+COMPLETION = CliCommand(
     "completion", "print what bash or zsh needs to complete commands, options, scenarios and files",
     (
         ("source <(harvey completion bash)", "in this shell, and in every one from ~/.bashrc"),

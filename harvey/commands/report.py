@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harvey.commands.command import Command
+from harvey.commands.command import CliCommand
 from harvey.errors import BadInput
 from logs.run_directory import RunDirectory, open_run
 from world_models.words import count
 
 if TYPE_CHECKING:
-    from harvey.report.several import Mission
+    from harvey.report.several import MissionSummary
 
 def _add_report_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", nargs="+",
@@ -58,11 +58,11 @@ def _page_of(run: RunDirectory) -> str:
     return build_page(run, Timeline(run.journal))
 
 
-def _title(named: Sequence[str], missions: Sequence[Mission]) -> str:
+def _title(named: Sequence[str], missions: Sequence[MissionSummary]) -> str:
     return Path(named[0]).resolve().name if len(named) == 1 else f"{len(missions)} missions"
 
 
-def _write_each(missions: Sequence[Mission], out: Path) -> None:
+def _write_each(missions: Sequence[MissionSummary], out: Path) -> None:
     """The report of each run that was kept; one that cannot be read is named, and left out."""
     from tqdm import tqdm
 
@@ -88,7 +88,7 @@ def _write(out: Path, page: str, *, make_folder: bool = False) -> None:
         raise BadInput(f"--out {out}: expected a file to write to, got: {error.strerror}") from None
 
 
-REPORT = Command(
+REPORT = CliCommand(
     "report", "a run as one HTML file: plan, pictures, decisions, reasons, errors, story; or a campaign",
     (
         ("harvey report runs/hallway-kidnap-0", "hallway-kidnap-0.html, to be opened, kept or sent by mail"),
@@ -132,7 +132,7 @@ def _run_export(args: Namespace) -> int:
     return 0
 
 
-EXPORT = Command(
+EXPORT = CliCommand(
     "export", "a run as tables for other programs: decisions, poses, milestones, turning points",
     (
         ("harvey export runs/lab-to-allens-office-0 --csv tables", "decisions.csv, poses.csv, milestones.csv, ..."),

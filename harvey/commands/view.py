@@ -12,7 +12,7 @@ from argparse import ArgumentParser, Namespace
 from contextlib import suppress
 from pathlib import Path
 
-from harvey.commands.command import Command, whole
+from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
 from logs.run_directory import RunDirectory, find_directory, open_run
 
@@ -143,7 +143,7 @@ def find_viewer() -> str:
     return viewer
 
 
-VIEW = Command(
+VIEW = CliCommand(
     "view", "open the recording of a run, or an overview of several, in the rerun viewer",
     (
         ("harvey view runs/lab-to-allens-office-0", "building, camera, plan, knowledge sources and why"),

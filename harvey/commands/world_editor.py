@@ -108,7 +108,7 @@ class BuildingViewer:
 
     def show(self, world: World) -> None:
         """Write the world and give it to the viewer: the first call opens it. Raises RecordingError."""
-        from logs.recording.loggers.surroundings.building import record_building
+        from logs.recording.loggers.surroundings.model_building import record_building
 
         self._shown += 1
         record_building(world, self._recording, f"{world.name} {self._shown}")

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harvey.errors import BadInput
-from harvey.hardware.drivers.camera import VideoCamera
 from harvey.hardware.drivers.capture import CameraFault
+from harvey.hardware.drivers.video_camera import VideoCamera
 from knowledge_sources.methods.calibration.intrinsics import (
     PARAMETERS,
     BoardView,

@@ -13,11 +13,11 @@ from types import TracebackType
 from harvey.campaign.summary import summarize_dry_run
 from harvey.dry_run import MilestonePreview, Otherwise, dry_run, not_otherwise
 from harvey.errors import BadInput
-from harvey.hardware.base import kind_of, open_base
-from harvey.hardware.drivers.base import Base, BaseFault
-from harvey.hardware.drivers.camera import VideoCamera
+from harvey.hardware.bases import kind_of, open_base
+from harvey.hardware.drivers.base_driver import Base, BaseFault
 from harvey.hardware.drivers.capture import CameraFault
-from harvey.hardware.mission import HardwareMission
+from harvey.hardware.drivers.video_camera import VideoCamera
+from harvey.hardware.hardware_mission import HardwareMission
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.checks import check_world

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType, TracebackType
 
-from harvey.hardware.drivers.base import Base, BaseFault
+from harvey.hardware.drivers.base_driver import Base, BaseFault
 
 BEAT_S = 0.2
 """Period of the beats [s]."""

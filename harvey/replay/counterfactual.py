@@ -29,7 +29,7 @@ from harvey.runner.resume import RESUME
 from harvey.runner.run import Over, run_to_outcome
 from harvey.runner.teller import PAGE, USER
 from harvey.runner.world_port import WorldPort, tell_robot
-from harvey.simulation.run import SimulatedRun, rebuild_stage
+from harvey.simulation.simulated_run import SimulatedRun, rebuild_stage
 from logs.explain.diff import describe, differing_leaves
 from logs.explain.phrases import sentence
 from logs.records import WHAT_IF, DecisionRecord, EntryRecord, Originals, as_line, decision_of, effect_of, read_records
@@ -37,14 +37,14 @@ from logs.run_directory import RunDirectory
 from logs.run_head import SIMULATOR, RunHead
 from logs.run_recorder import RunRecorder
 from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.body import Frame, MotionReport, RideReport
+from world_models.entries.body import CameraPicture, MotionReport, RideReport
 from world_models.entries.task import Outcome
-from world_models.entries.told import Redirection, Told
+from world_models.entries.user_reports import Redirection, UserReport
 from world_models.words import count, listed
 
 
 @dataclass(frozen=True, slots=True)
-class Parting:
+class RequestParting:
     """Where the changed agent asked its body for something else; None where one of them asked for nothing any more.
 
     ``requests`` names the kinds of entries that ask the body for something.
@@ -75,7 +75,7 @@ class Answer:
     now: DecisionRecord | None
     revised: tuple[str, ...]
     answered: int
-    parting: Parting | None
+    parting: RequestParting | None
     outcome: Outcome
     result: MissionResult | None
 
@@ -91,7 +91,7 @@ def what_if(
     """Decide a run again with a changed agent.
 
     Args:
-        without: knowledge sources, landmarks, faces, or ``Frame-88 segment 12``, to be taken away.
+        without: knowledge sources, landmarks, faces, or ``CameraPicture-88 segment 12``, to be taken away.
         constants: (key, value) of servo levels and constants to be set.
         out: where what would have been is kept, as a run; an older one there goes once it is clear what is asked.
         go_on: in the simulator: go on where the record no longer answers.
@@ -137,7 +137,7 @@ def _run_changed(run: SimulatedRun, agent: Agent, player: _Player, go_on: bool) 
         return outcome
     run.recorded_port.closed = False
     for change in player.open:
-        run.scheduler.tell(run.recorded_port.answer(change), run.port.name)
+        run.scheduler.post(run.recorded_port.answer(change), run.port.name)
     return run.go_on(player.last)
 
 
@@ -164,7 +164,7 @@ class _Player:
         self._answered = 0
         self.last: Decision | None = None
         self.open: tuple[Change, ...] = ()
-        self.parting: Parting | None = None
+        self.parting: RequestParting | None = None
 
     def compare(self, decision: Decision) -> None:
         """Sink: compares with the record until the first difference."""
@@ -184,7 +184,7 @@ class _Player:
     ) -> Outcome:
         """Decide until the end, or until the record no longer answers."""
         tell_robot(scheduler, agent.robot)
-        scheduler.tell([Post(head.task())], "user")
+        scheduler.post([Post(head.task())], "user")
 
         def observe() -> None:
             self._answer(scheduler, recorder, live)
@@ -211,14 +211,14 @@ class _Player:
         if step is None or step.asked != tuple(as_line(plain(change.entry.value)) for change in made):
             self.open = made
             now = decision_of(decision_record(self.last)) if self.last else None
-            self.parting = Parting(None if step is None else step.decision, now, self._requests)
+            self.parting = RequestParting(None if step is None else step.decision, now, self._requests)
             raise _PartedError
         self._answered += 1
         live(made, step.answers)
         for record in step.answers:
             effect = effect_of(record, self.originals, scheduler.view, scheduler.kinds)
             recorder.record_picture(effect)
-            scheduler.tell([effect], record.author)
+            scheduler.post([effect], record.author)
 
 
 def is_body_request(change: Change) -> bool:
@@ -282,9 +282,9 @@ def _undo_changes(record: dict[str, Any]) -> dict[str, Any]:
     return {**record, "value": {**record["value"], "changes": changes}}
 
 
-TIMED: tuple[type[Any], ...] = (Frame, MotionReport, RideReport)
+TIMED: tuple[type[Any], ...] = (CameraPicture, MotionReport, RideReport)
 """Kinds of observations that have the body's time."""
-TOLD: tuple[type[Any], ...] = (Told, Redirection)
+TOLD: tuple[type[Any], ...] = (UserReport, Redirection)
 
 
 class Retelling:
@@ -308,7 +308,7 @@ class Retelling:
         while self._left and self._is_due(scheduler):
             _, _, entry = self._left.pop(0)
             effect = effect_of(entry, self._originals, scheduler.view, scheduler.kinds)
-            scheduler.tell([effect], entry.author)
+            scheduler.post([effect], entry.author)
 
     def _is_due(self, scheduler: Scheduler) -> bool:
         cycle, when_s, _ = self._left[0]
@@ -359,7 +359,7 @@ def _describe_requests(decision: DecisionRecord | None, requests: Sequence[type[
     return f"cycle {decision.cycle}: {asked}"
 
 
-def _leaves(parting: Parting) -> Iterator[str]:
+def _leaves(parting: RequestParting) -> Iterator[str]:
     """The values in which the requests differ, in full: what is rounded in words may look the same."""
     if parting.then is not None and parting.now is not None:
         then, now = ([entry.fields for entry in decision.made if entry.kind in parting.requests]

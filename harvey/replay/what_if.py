@@ -27,9 +27,9 @@ from logs.records import WHAT_IF, DecisionRecord
 from world_models.building.changes import element_names
 from world_models.building.locale_frame import FrameChange, FrameRequest, LocaleFrame
 from world_models.building.world import World
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.percepts import Segments
-from world_models.entries.robot import CameraState, Footprint, Wheels
+from world_models.entries.robot_state import CameraState, Footprint, Wheels
 from world_models.frame_store import FrameStore
 from world_models.frames import frozen
 from world_models.words import listed
@@ -62,7 +62,7 @@ class WhatIf:
         """Tell a scheduler what its board is to be revised by, if anything."""
         view = scheduler.view
         if effects := [*self._revise_robot(view), *self._revise_frames(view)]:
-            scheduler.tell(effects, WHAT_IF)
+            scheduler.post(effects, WHAT_IF)
 
     def _revise_robot(self, view: View) -> Iterator[Effect]:
         """The robot's entries as they were told at the start; what is learnt of them later stands."""
@@ -116,7 +116,7 @@ def _suggest(name: str, sources: Sequence[str], elements: Set[str]) -> str:
     meant = [text for text in known if name.lower() in text.lower()]
     meant = meant or get_close_matches(name, known, MAX_SUGGESTED, MIN_SIMILARITY)
     names = ", ".join(meant[:MAX_SUGGESTED]) or f"a knowledge source ({', '.join(sources)}), a landmark or a face"
-    return f"{names}, or as 'Frame-88 segment 12'"
+    return f"{names}, or as 'CameraPicture-88 segment 12'"
 
 
 SEGMENT = re.compile(r"frame[- ](\d{1,9})[ ,-]+segment[- ](\d{1,9})", re.IGNORECASE | re.ASCII)
@@ -125,7 +125,7 @@ MAX_LISTED = 12
 
 
 def is_segment(name: str) -> bool:
-    """Whether a name is of a segment, as ``Frame-88 segment 12``."""
+    """Whether a name is of a segment, as ``CameraPicture-88 segment 12``."""
     return SEGMENT.fullmatch(name) is not None
 
 
@@ -146,8 +146,8 @@ class SegmentHider(LineFinder):
     def name(self) -> str:
         return "line_finder"
 
-    def act(self, view: View, case: Entry[Frame]) -> Iterable[Effect]:
-        hidden = [segment for frame, segment in self._segments if case.id == f"Frame-{frame}"]
+    def act(self, view: View, case: Entry[CameraPicture]) -> Iterable[Effect]:
+        hidden = [segment for frame, segment in self._segments if case.id == f"CameraPicture-{frame}"]
         for effect in super().act(view, case):
             if isinstance(effect, Post) and isinstance(effect.value, Segments) and hidden:
                 yield Post(_hide(effect.value, hidden), effect.because)
@@ -159,16 +159,16 @@ def check_segments(records: Sequence[DecisionRecord], names: Sequence[str], hidd
     """Validate the names of segments against a run. Raises BadInput where it has no such frame or segment.
 
     Args:
-        names: as ``Frame-88 segment 12``; other names are passed over.
+        names: as ``CameraPicture-88 segment 12``; other names are passed over.
         hidden: what was taken from the run itself: segments keep the numbers that they have without that.
     """
     wanted = parse_segments(names)
     if not wanted:
         return
-    frames = [entry.id for decision in records for entry in decision.observed if entry.kind is Frame]
+    frames = [entry.id for decision in records for entry in decision.observed if entry.kind is CameraPicture]
     counts, already = _count_segments(records), parse_segments(hidden)
     for frame, segment in wanted:
-        name = f"Frame-{frame}"
+        name = f"CameraPicture-{frame}"
         where = f"--without {name} segment {segment}: expected"
         if name not in frames:
             raise BadInput(f"{where} a frame of the run, {_ends(frames)}, got {name}")

@@ -18,10 +18,10 @@ from logs.explain.phrases import sentence
 from logs.records import EntryRecord
 from logs.timeline import Timeline
 from world_models import words
-from world_models.building.plan_view import SCALE, Storey, draw_storeys, drawing_svg
+from world_models.building.plan_view import SCALE, DrawnStorey, draw_storeys, drawing_svg
 from world_models.building.world import World
 from world_models.camera import Camera
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Milestone
@@ -111,7 +111,7 @@ def read_pictures(
 ) -> Iterator[dict[str, Any]]:
     """The pictures that are kept, each since the cycle in which it was seen, with its lines."""
     lines = _lines(history, Lenses(camera))
-    frames = [record for record in history.of_kind(Frame) if not record.is_gone]
+    frames = [record for record in history.of_kind(CameraPicture) if not record.is_gone]
     for record in _chosen(frames, lines):
         number = record.fields.get("number")
         if number not in pictures:
@@ -197,7 +197,7 @@ def draw_blank_plans(world: World) -> list[dict[str, Any]]:
 
 
 def _draw_storey(
-    storey: Storey, beliefs: Sequence[Mapping[str, Any]], track: Sequence[tuple[int, float, float, float]]
+    storey: DrawnStorey, beliefs: Sequence[Mapping[str, Any]], track: Sequence[tuple[int, float, float, float]]
 ) -> dict[str, Any]:
     left, top = float(storey.origin[0]), float(storey.origin[1] + storey.drawing.size[1])
 

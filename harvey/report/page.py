@@ -15,7 +15,7 @@ from harvey.errors import BadInput
 from harvey.report import data
 from harvey.report.data import draw_plans, read_pictures
 from harvey.report.drawing import draw_errors
-from logs.explain.questions import read_errors
+from logs.explain.questions_in_words import read_errors
 from logs.explain.story import RunStory, run_name, tell_run
 from logs.pictures import open_pictures
 from logs.reader import read_true_track

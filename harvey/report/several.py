@@ -25,7 +25,7 @@ GIVEN_UP = "given up"
 
 
 @dataclass(frozen=True, slots=True)
-class Mission:
+class MissionSummary:
     """One mission, or one case of an experiment.
 
     Attributes:
@@ -55,9 +55,9 @@ def find_runs(text: str) -> Path | Sequence[RunDirectory]:
     return [RunDirectory(journal.parent) for journal in inner] or [open_run(text)]
 
 
-def read_missions(found: Sequence[Path | Sequence[RunDirectory]]) -> list[Mission]:
+def read_missions(found: Sequence[Path | Sequence[RunDirectory]]) -> list[MissionSummary]:
     """Each mission once. Raises BadInput where a result cannot be read, or where there is none."""
-    missions: dict[Path | tuple[Path, str], Mission] = {}
+    missions: dict[Path | tuple[Path, str], MissionSummary] = {}
     for one in found:
         for mission in _of_campaign(one) if isinstance(one, Path) else map(_of_run, one):
             key = mission.run.path.resolve() if mission.run is not None else (Path(str(one)).resolve(), mission.name)
@@ -68,7 +68,7 @@ def read_missions(found: Sequence[Path | Sequence[RunDirectory]]) -> list[Missio
     return list(missions.values())
 
 
-def _of_campaign(folder: Path) -> Iterator[Mission]:
+def _of_campaign(folder: Path) -> Iterator[MissionSummary]:
     progress = read_progress(folder)
     cases = progress.results | {case: {"outcome": GIVEN_UP} for case in progress.given_up}
     for case in sorted(cases):
@@ -77,11 +77,11 @@ def _of_campaign(folder: Path) -> Iterator[Mission]:
             raise BadInput(f"{folder / RESULTS}: case {case}: expected a JSON object as result, got {result!r}")
         scenario, seed = result.get("scenario"), result.get("seed")
         name = f"{scenario}, seed {seed}" if isinstance(scenario, str) and seed is not None else f"case {case}"
-        yield Mission(name, run if run.journal.is_file() else None, result)
+        yield MissionSummary(name, run if run.journal.is_file() else None, result)
 
 
-def _of_run(run: RunDirectory) -> Mission:
-    return Mission(run_name(run), run, {"outcome": UNFINISHED, **run.read_result()})
+def _of_run(run: RunDirectory) -> MissionSummary:
+    return MissionSummary(run_name(run), run, {"outcome": UNFINISHED, **run.read_result()})
 
 
 OWN = "{}-runs"
@@ -90,7 +90,7 @@ HEAD_BYTES = 4096
 """The title of a report stands within so many."""
 
 
-def build_page_of_several(missions: Sequence[Mission], title: str, out: Path) -> str:
+def build_page_of_several(missions: Sequence[MissionSummary], title: str, out: Path) -> str:
     """The whole file; ``out``: where it will be, as the links to the runs' own reports lead from there."""
     columns, same = read_fields([mission.result for mission in missions])
     links = [find_report(mission, out) for mission in missions]
@@ -109,13 +109,13 @@ def build_page_of_several(missions: Sequence[Mission], title: str, out: Path) ->
     return fill_in(read_part("several.html"), parts)
 
 
-def report_path(mission: Mission, out: Path) -> Path:
+def report_path(mission: MissionSummary, out: Path) -> Path:
     """Where the own report of a mission belongs beside the page: the same for the same name."""
     name = quote(mission.name.replace(", ", "-").replace(" ", "-"), safe="")
     return out.parent / OWN.format(out.stem) / f"{name}.html"
 
 
-def find_report(mission: Mission, out: Path) -> str | None:
+def find_report(mission: MissionSummary, out: Path) -> str | None:
     """The link to a run's own report, beside the page or by the name that ``harvey report`` gives; None without one."""
     places = [report_path(mission, out)]
     if mission.run is not None:
@@ -126,7 +126,7 @@ def find_report(mission: Mission, out: Path) -> str | None:
     return None
 
 
-def _is_report_of(mission: Mission, place: Path) -> bool:
+def _is_report_of(mission: MissionSummary, place: Path) -> bool:
     try:
         with place.open("rb") as file:
             return f"<title>{escape(mission.name)}</title>".encode() in file.read(HEAD_BYTES)
@@ -161,7 +161,7 @@ def _head(label: str) -> str:
     return f'<th scope="col"><button type="button">{escape(label)}</button></th>'
 
 
-def _name(mission: Mission, link: str | None) -> str:
+def _name(mission: MissionSummary, link: str | None) -> str:
     name = escape(mission.name)
     return f'<th scope="row">{name if link is None else f"""<a href="{escape(link)}">{name}</a>"""}</th>'
 

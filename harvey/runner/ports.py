@@ -11,11 +11,11 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from world_models.entries.body import (
     BodyFault,
+    CameraPicture,
     Course,
-    Frame,
-    Look,
     MotionReport,
     MotorCommand,
+    PictureRequest,
     Recovery,
     Ride,
     RideReport,
@@ -30,7 +30,7 @@ class Body(Protocol):
         """Carry out a command and report what the wheels claim."""
         ...
 
-    def steer(self, course: Course, /) -> tuple[MotionReport, Frame] | BodyFault:
+    def steer(self, course: Course, /) -> tuple[MotionReport, CameraPicture] | BodyFault:
         """Follow a course until the next picture, or stop, and report what the wheels claim since the last."""
         ...
 
@@ -46,7 +46,7 @@ class Body(Protocol):
         """What its range sensors measure now; None where it has none or they are not wanted."""
         ...
 
-    def look(self, purpose: str, /) -> Frame | BodyFault:
+    def look(self, purpose: str, /) -> CameraPicture | BodyFault:
         """Take a picture for a purpose."""
         ...
 
@@ -71,7 +71,7 @@ class BodyPort:
     """
 
     name = "body"
-    acts_on = (MotorCommand, Course, Look, Ride, Recovery)
+    acts_on = (MotorCommand, Course, PictureRequest, Ride, Recovery)
     """The requests that it answers; all of them are marked as such, so each is on the disk before it comes here."""
 
     def __init__(self, body: Body) -> None:
@@ -92,13 +92,13 @@ class BodyPort:
         elif not isinstance(change, Retracted) and isinstance(entry.value, Course):
             found = self._body.steer(entry.value)
             yield from self._answer_motion(entry, (found,) if isinstance(found, BodyFault) else found)
-        elif isinstance(change, Posted) and isinstance(entry.value, Look):
+        elif isinstance(change, Posted) and isinstance(entry.value, PictureRequest):
             yield from self._post_with_ranges(entry, self._body.look(entry.value.purpose))
         elif isinstance(change, Posted) and isinstance(entry.value, Ride):
             yield self._post(entry, self._body.ride(entry.value))
 
     def _answer_motion(
-        self, request: Entry[Any], found: Iterable[MotionReport | Frame | BodyFault]
+        self, request: Entry[Any], found: Iterable[MotionReport | CameraPicture | BodyFault]
     ) -> Iterable[Effect]:
         """What a motion touched, then how it ended; a fault in which something was touched rests on the contact too."""
         touched = self._take_contacts(request)
@@ -111,16 +111,16 @@ class BodyPort:
         return () if contact is None else (Post(contact, (request,)),)
 
     def _post_with_ranges(
-        self, request: Entry[Any], found: MotionReport | Frame | RideReport | BodyFault, why: tuple[Effect, ...] = ()
+        self, request: Entry[Any], found: MotionReport | CameraPicture | RideReport | BodyFault, why: tuple[Effect, ...] = ()
     ) -> Iterable[Effect]:
         """An answer; with a picture comes what range sensors measure at the same place and time."""
-        ranges = self._body.ranges() if isinstance(found, Frame) else None
+        ranges = self._body.ranges() if isinstance(found, CameraPicture) else None
         if ranges is not None:
             yield Post(ranges, (request,))
         yield self._post(request, found, why)
 
     def _post(
-        self, request: Entry[Any], found: MotionReport | Frame | RideReport | BodyFault, why: tuple[Effect, ...] = ()
+        self, request: Entry[Any], found: MotionReport | CameraPicture | RideReport | BodyFault, why: tuple[Effect, ...] = ()
     ) -> Effect:
         if isinstance(found, BodyFault):
             self._unanswered[request.id] = request
@@ -148,8 +148,8 @@ class BodyPort:
         yield from self._post_with_ranges(request, found)
 
     def _answer_again(
-        self, wanted: MotorCommand | Course | Look | Ride
-    ) -> MotionReport | Frame | RideReport | BodyFault:
+        self, wanted: MotorCommand | Course | PictureRequest | Ride
+    ) -> MotionReport | CameraPicture | RideReport | BodyFault:
         """The answer to a request now; a command is not carried out once more."""
         if isinstance(wanted, Ride):
             return self._body.ride(wanted)

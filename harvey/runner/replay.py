@@ -63,7 +63,7 @@ def replay(
     for recorded, line in zip(read_records(run.journal), _lines(run), strict=False):
         live(made, recorded.observed)
         for observation in recorded.observed:
-            scheduler.tell([effect_of(observation, originals, scheduler.view, scheduler.kinds)], observation.author)
+            scheduler.post([effect_of(observation, originals, scheduler.view, scheduler.kinds)], observation.author)
         before()
         decision = scheduler.step()
         made = () if decision is None else decision.made

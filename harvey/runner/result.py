@@ -11,9 +11,9 @@ from blackboard.change import Posted
 from blackboard.journal import Decision
 from logs.explain.turning_points import Collision, TurningPoint, TurningPointFinder
 from world_models.building.locale_frame import FrameRequest
-from world_models.entries.body import Frame, Look, MotionReport
+from world_models.entries.body import CameraPicture, MotionReport, PictureRequest
 from world_models.entries.location import Hypothesis
-from world_models.entries.robot import CameraLesson, CameraState, find_camera_lessons
+from world_models.entries.robot_state import CameraLesson, CameraState, find_camera_lessons
 from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch
 
 PARTS = ("contacts", "turning_points", "camera")
@@ -121,7 +121,7 @@ class RunCounts:
             if isinstance(value, MotionReport):
                 self.path_m += value.move_m
                 self.time_s = value.sim_time_s
-            self.frames += isinstance(value, Frame)
+            self.frames += isinstance(value, CameraPicture)
             if isinstance(value, CameraState):
                 self.told_camera = self.camera = value
         for change in decision.made:
@@ -130,7 +130,7 @@ class RunCounts:
                 self.camera = value
             if isinstance(value, Milestone) and value.status.replace(" ", "_") in self.milestones:
                 self.milestones[value.status.replace(" ", "_")] += 1
-            elif isinstance(value, Look):
+            elif isinstance(value, PictureRequest):
                 self.probes += value.purpose == PROBE and isinstance(change, Posted)
             elif isinstance(value, PlanSketch):
                 self.sketches += revision == 0

@@ -20,7 +20,7 @@ from blackboard.journal import Decision
 from harvey.errors import BadInput
 from harvey.runner.replay import Live, check_same, open_originals, replay
 from harvey.runner.run import Run
-from logs.camera_file import Pictures
+from logs.mjpeg_file import Pictures
 from logs.pictures import camera_bytes, open_pictures
 from logs.records import read_records
 from logs.run_directory import RunDirectory
@@ -116,7 +116,7 @@ def continue_run(files: RunDirectory, run: Run, body: ResumedBody) -> Outcome:
     for change in last.made:
         if not is_command(change):
             for port in run.ports:
-                run.scheduler.tell(port.answer(change), port.name)
+                run.scheduler.post(port.answer(change), port.name)
     return run.go_on(last)
 
 
@@ -124,11 +124,11 @@ def _report_crash(run: Run, body: ResumedBody, last: Decision) -> None:
     """Answer the commands that were cut off by what the body can tell of them."""
     cut_off = [change.entry for change in last.made if is_command(change)]
     refs = tuple(str(entry.ref) for entry in cut_off)
-    run.scheduler.tell([Post(Resumed(run.scheduler.cycle, refs), tuple(cut_off))], RESUME)
+    run.scheduler.post([Post(Resumed(run.scheduler.cycle, refs), tuple(cut_off))], RESUME)
     for entry in cut_off:
         for effect in body.report(entry):
             run.recorder.record_picture(effect)
-            run.scheduler.tell([effect], run.port.name)
+            run.scheduler.post([effect], run.port.name)
 
 
 def is_command(change: Change) -> bool:

@@ -21,13 +21,13 @@ from harvey.runner.result import UNFINISHED, MissionResult, RunCounts
 from harvey.runner.teller import Tell, Teller, tell_nothing
 from harvey.runner.world_port import WorldPort, tell_robot
 from logs.disk import CannotWriteError
-from logs.errors import RecordingError
 from logs.run_directory import RunDirectory
+from logs.run_errors import RecordingError
 from logs.run_head import RunHead
 from logs.run_recorder import RunRecorder
 from world_models.camera import CameraDeviation
 from world_models.entries.location import Hypothesis
-from world_models.entries.robot import CameraState
+from world_models.entries.robot_state import CameraState
 from world_models.entries.task import Goal, Outcome
 from world_models.files.toml.camera_file import camera_text
 from world_models.files.toml.mission import Limits, Telling
@@ -39,7 +39,7 @@ Over = Callable[[Scheduler], str | None]
 """Why a run has to end after this cycle, in words; None as long as it may go on."""
 
 
-class Referee(Protocol):
+class RunReferee(Protocol):
     """Knows the truth about a run; the board never hears of it."""
 
     def __call__(self, decision: Decision, /) -> None:
@@ -68,7 +68,7 @@ class Run:
 
     def __init__(
         self, head: RunHead, agent: Agent, body: Body, recorder: RunRecorder, *, limits: Limits,
-        clock: Callable[[], float], referee: Referee | None = None, sinks: Sequence[Sink] = (),
+        clock: Callable[[], float], referee: RunReferee | None = None, sinks: Sequence[Sink] = (),
         told: Sequence[Telling] = (), tell: Tell = tell_nothing, before_cycle: Callable[[], None] = lambda: None,
     ) -> None:
         """Put a run together.
@@ -96,7 +96,7 @@ class Run:
     def begin(self) -> Outcome:
         """From the command to the outcome."""
         tell_robot(self.scheduler, self._robot)
-        self.scheduler.tell([Post(self.head.task())], "user")
+        self.scheduler.post([Post(self.head.task())], "user")
         return self.go_on()
 
     def go_on(self, last: Decision | None = None) -> Outcome:
@@ -194,7 +194,7 @@ def run_to_outcome(
         elif quiet_since == scheduler.cycle:
             why = "the board fell still and nobody declared an outcome"
         else:
-            scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
+            scheduler.post([Post(Quiescence(scheduler.cycle))], "scheduler")
             quiet_since = scheduler.cycle + 1
     scheduler.step()  # the outcome itself is seen, so that it stands in the journal
     return declared.value
@@ -210,7 +210,7 @@ def _why_over(decision: Decision, scheduler: Scheduler, over: Over) -> str | Non
 def _declare(scheduler: Scheduler, reason: str) -> Outcome:
     """Declare failure where no knowledge source declared an outcome; it is posted, and so journalled."""
     outcome = Outcome("failed", reason)
-    scheduler.tell([Post(outcome, scheduler.view.all(Goal)[-1:])], "mission")
+    scheduler.post([Post(outcome, scheduler.view.all(Goal)[-1:])], "mission")
     scheduler.step()
     return outcome
 

@@ -7,7 +7,7 @@ from queue import Empty, SimpleQueue
 
 from blackboard.effect import Post
 from blackboard.scheduler import Scheduler
-from world_models.entries.told import Redirection, Told
+from world_models.entries.user_reports import Redirection, UserReport
 from world_models.files.toml.mission import Telling
 
 USER, PAGE = "user", "live page"
@@ -32,7 +32,7 @@ class Teller:
         for telling in self._told[_count_told(scheduler):]:
             if telling.at_s > self._clock():
                 return
-            scheduler.tell([Post(telling.entry)], USER)
+            scheduler.post([Post(telling.entry)], USER)
 
 
 class LiveTeller:
@@ -52,9 +52,9 @@ class LiveTeller:
                 said = self._said.get_nowait()
             except Empty:
                 return
-            scheduler.tell([Post(said)], PAGE)
+            scheduler.post([Post(said)], PAGE)
 
 
 def _count_told(scheduler: Scheduler) -> int:
     """How much of a mission's file the board was told."""
-    return len(scheduler.view.all(Told)) + len(scheduler.view.where(Redirection, lambda asked: asked.by == USER))
+    return len(scheduler.view.all(UserReport)) + len(scheduler.view.where(Redirection, lambda asked: asked.by == USER))

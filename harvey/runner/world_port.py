@@ -36,7 +36,7 @@ class WorldPort:
 
 def tell_robot(scheduler: Scheduler, robot: RobotModel) -> None:
     """Put what a robot knows of itself on the board: the first thing that it is told."""
-    scheduler.tell([Post(entry) for entry in robot.entries()], "robot")
+    scheduler.post([Post(entry) for entry in robot.entries()], "robot")
 
 
 def build_scheduler(

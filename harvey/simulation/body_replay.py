@@ -21,8 +21,8 @@ from blackboard.scheduler import Port
 from harvey.errors import BadInput
 from harvey.runner.replay import Live
 from logs.records import EntryRecord, as_line
-from sim.body.actuator import ActuatorParameters
 from sim.body.simulated_body import SimulatedBody
+from sim.body.wheel_errors import ActuatorParameters
 from world_models.entries.body import Course, MotorCommand
 from world_models.entries.task import Resumed
 

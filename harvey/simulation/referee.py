@@ -15,7 +15,7 @@ from world_models.building.world import World
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate, Goal, Leg
-from world_models.entries.told import Redirection
+from world_models.entries.user_reports import Redirection
 from world_models.frames import Pose2, wrap_angle
 
 MAX_TRUE_ERROR_M = 0.15

@@ -19,8 +19,8 @@ IN_PROCESS = "simulated"
 
 def body_kinds() -> tuple[str, ...]:
     """The kinds of base that have a driver and an emulator too."""
-    from harvey.hardware.base import base_kinds
-    from sim.emulators.registry import emulator_kinds
+    from harvey.hardware.bases import base_kinds
+    from sim.emulators.emulator_registry import emulator_kinds
 
     return tuple(name for name in base_kinds() if name in emulator_kinds())
 
@@ -30,7 +30,7 @@ def body_kind(text: str) -> str:
     head, _, kind = text.partition(":")
     if text == IN_PROCESS or (head == "serial" and kind in body_kinds()):
         return text if text == IN_PROCESS else kind
-    from harvey.hardware.base import say_what_to_install
+    from harvey.hardware.bases import say_what_to_install
 
     expected = ", ".join([IN_PROCESS, *(f"serial:{kind}" for kind in body_kinds())])
     raise BadInput(f"--body: expected one of {expected}, got {text!r}{say_what_to_install(kind)}")
@@ -43,10 +43,10 @@ def open_body(body: SimulatedBody, kind: str) -> Iterator[Body]:
         yield FaultyBody(body)
         return
     # Drivers and emulators are loaded when they are asked for: most missions have neither.
-    from harvey.hardware.base import base_kinds
-    from harvey.hardware.body import HardwareBody
+    from harvey.hardware.bases import base_kinds
+    from harvey.hardware.hardware_body import HardwareBody
+    from sim.emulators.emulator_registry import emulator_kinds
     from sim.emulators.line import FaultyLine, PseudoTerminalLink
-    from sim.emulators.registry import emulator_kinds
 
     emulator = emulator_kinds()[kind]
     clock = (lambda: body.truth.time_s) if emulator.keeps_time else None

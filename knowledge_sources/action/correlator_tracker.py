@@ -41,10 +41,10 @@ from knowledge_sources.questions import (
 )
 from knowledge_sources.robot_knowledge_source import OlderSource
 from knowledge_sources.tolerances import action_px
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis, covariance_tuple
 from world_models.entries.percepts import Anchor, Track, Tracks
-from world_models.entries.robot import Drift
+from world_models.entries.robot_state import Drift
 from world_models.visibility.lines_and_points import visible_lines
 
 MIN_LANDMARKS = 5  # with fewer tracked landmarks than this, new ones are always taken
@@ -80,20 +80,20 @@ class CorrelatorTracker(OlderSource):
     level = Level.ACTION
     closes = Level.ACTION
     on = (
-        Watch(Frame, (Posted,), lambda f: f.purpose == "track"),
+        Watch(CameraPicture, (Posted,), lambda f: f.purpose == "track"),
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in ("milestone", "relocalization")),
     )
     writes = (Tracks, Hypothesis, Drift, Discrepancy)
 
     def judge(self, view: View, trigger: Change) -> float | None:
-        if find_belief(view) is None or view.latest(Frame) is None or open_discrepancy(view, Level.GOAL) is not None:
+        if find_belief(view) is None or view.latest(CameraPicture) is None or open_discrepancy(view, Level.GOAL) is not None:
             return None
         if unmeasured_doubt(view) is not None:  # tracking failed: the plan level looks where the robot is
             return None
         return 0.9
 
     def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        frame, belief, old = view.latest(Frame), find_belief(view), view.latest(Tracks)
+        frame, belief, old = view.latest(CameraPicture), find_belief(view), view.latest(Tracks)
         if belief is None or frame is None:
             return
         if isinstance(trigger.entry.value, Hypothesis):
@@ -102,7 +102,7 @@ class CorrelatorTracker(OlderSource):
             yield from self._track(view, frame, belief, old)
 
     def _track(
-        self, view: View, frame: Entry[Frame], belief: Entry[Hypothesis], old: Entry[Tracks] | None
+        self, view: View, frame: Entry[CameraPicture], belief: Entry[Hypothesis], old: Entry[Tracks] | None
     ) -> Iterable[Effect]:
         """Follow the landmarks into a new frame; correct the belief, or post that tracking failed."""
         image = _read_picture(view, frame)
@@ -140,7 +140,7 @@ class CorrelatorTracker(OlderSource):
         return expected >= s.min_expected_landmarks and agreeing < s.min_agreeing_part * expected
 
     def _begin_anew(
-        self, view: View, frame: Entry[Frame], belief: Entry[Hypothesis], old: Entry[Tracks] | None
+        self, view: View, frame: Entry[CameraPicture], belief: Entry[Hypothesis], old: Entry[Tracks] | None
     ) -> Iterable[Effect]:
         """Take all landmarks anew after a milestone or a relocalization."""
         fresh = self._take_new(view, frame, _read_picture(view, frame), (), (), belief.value)
@@ -186,7 +186,7 @@ class CorrelatorTracker(OlderSource):
         return Corrected(hypothesis, agreeing)
 
     def _renew(
-        self, view: View, frame: Entry[Frame], image: Image, followed: list[TrackUpdate], belief: Hypothesis,
+        self, view: View, frame: Entry[CameraPicture], image: Image, followed: list[TrackUpdate], belief: Hypothesis,
         old: Entry[Tracks] | None,
     ) -> Renewed:
         """Keep the landmarks that still serve, and take new ones where too few are left."""
@@ -200,7 +200,7 @@ class CorrelatorTracker(OlderSource):
         return self._take_new(view, frame, image, kept, anchors, belief)
 
     def _take_new(
-        self, view: View, frame: Entry[Frame], image: Image, kept: tuple[Track, ...], anchors: tuple[Anchor, ...],
+        self, view: View, frame: Entry[CameraPicture], image: Image, kept: tuple[Track, ...], anchors: tuple[Anchor, ...],
         belief: Hypothesis,
     ) -> Renewed:
         """Take new landmarks beside those that are kept, once the belief is aligned with the model's edges."""
@@ -229,7 +229,7 @@ class CorrelatorTracker(OlderSource):
         return frozenset(a.frame for a in anchors if math.hypot(a.x_m - here.x_m, a.y_m - here.y_m) <= far_m)
 
     def _with_anchors(
-        self, view: View, items: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[Frame],
+        self, view: View, items: tuple[Track, ...], anchors: tuple[Anchor, ...], frame: Entry[CameraPicture],
         belief: Hypothesis, taken: int,
     ) -> Tracks:
         """The tracks, with what was believed where their templates were cut."""
@@ -248,11 +248,11 @@ class CorrelatorTracker(OlderSource):
         bounds = (action_px(find_robot(view), belief, points, self._settings), self._settings.plan.max_deviation_px)
         found = Discrepancy(Level.ACTION, what, magnitude_px, bounds, "px")
         last = open_discrepancy(view, Level.ACTION)
-        if last is None or not last.value.exceeds:  # one beyond its bound is the escalator's
+        if last is None or not last.value.exceeds:  # one beyond its bound is the discrepancy raiser's
             yield Post(found, because) if last is None else Revise(last, found, because)
 
 
-def _read_picture(view: View, frame: Entry[Frame]) -> Image:
+def _read_picture(view: View, frame: Entry[CameraPicture]) -> Image:
     """The rectified picture of a frame."""
     robot = find_robot(view)
     return read_picture(frame.value.jpeg).rectified(robot.lens, robot.camera)

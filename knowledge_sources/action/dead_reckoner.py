@@ -18,9 +18,9 @@ from knowledge_sources.questions import find_belief, find_contact, find_robot
 from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.actuator import ActuatorModel
 from world_models.camera import YAW
-from world_models.entries.body import BodyFault, Course, Look, MotionReport, MotorCommand
+from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand, PictureRequest
 from world_models.entries.location import Hypothesis, Travel, begin_travel
-from world_models.entries.robot import Drift
+from world_models.entries.robot_state import Drift
 from world_models.frames import Pose2
 
 MIN_CLAIMED_PART = 0.7  # if the wheels claim less than this part of a move, something stopped the robot
@@ -38,7 +38,7 @@ class DeadReckoner(OlderSource):
 
     level = Level.ACTION
     on = (Watch(MotionReport, (Posted,)),)
-    writes = (Hypothesis, Drift, Travel, Look, Discrepancy)
+    writes = (Hypothesis, Drift, Travel, PictureRequest, Discrepancy)
 
     def judge(self, view: View, trigger: Change) -> float | None:
         belief = find_belief(view)
@@ -82,7 +82,7 @@ class DeadReckoner(OlderSource):
         way = way.after_motion(before, pose, slip_m)
         yield Post(way, (trigger.entry,)) if travel is None else Revise(travel, way, (trigger.entry, travel))
         if not on_the_move or fault is not None:  # on the move a picture was taken
-            yield Post(Look("track"), (step,))
+            yield Post(PictureRequest("track"), (step,))
         if request is None or fault is not None:
             return
         contact = find_contact(view, request.id)

@@ -33,7 +33,7 @@ from knowledge_sources.questions import (
 )
 from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.door_state import DoorPicture, DoorState
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Milestone
@@ -50,19 +50,19 @@ class DoorWatcher(OlderSource):
 
     level = Level.ACTION
     on = (
-        Watch(Frame, (Posted,), lambda f: f.purpose == "track"),
+        Watch(CameraPicture, (Posted,), lambda f: f.purpose == "track"),
         Watch(Milestone, (Revised,), lambda m: m.status == "verified"),
     )
     writes = (DoorState, LocaleFrame)
 
     def judge(self, view: View, trigger: Change) -> float | None:
-        belief, frame = find_belief(view), view.latest(Frame)
+        belief, frame = find_belief(view), view.latest(CameraPicture)
         if belief is None or frame is None or not self._is_trusted(view, belief.value):
             return None
         return 0.8 if any(True for _ in list_doors_in_view(view, belief.value)) else None
 
     def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, frame = find_belief(view), view.latest(Frame)
+        belief, frame = find_belief(view), view.latest(CameraPicture)
         if belief is None or frame is None:
             return
         picture = read_picture(frame.value.jpeg)
@@ -76,7 +76,7 @@ class DoorWatcher(OlderSource):
         return belief.sigma_m <= MAX_SIGMA_M and belief.sigma_rad <= MAX_SIGMA_RAD
 
     def _watch(
-        self, view: View, watched: Watched, belief: Entry[Hypothesis], frame: Entry[Frame], image: Image
+        self, view: View, watched: Watched, belief: Entry[Hypothesis], frame: Entry[CameraPicture], image: Image
     ) -> Iterable[Effect]:
         """Weigh what a picture shows of a door, and revise what is believed of it."""
         door, locale = watched.doorway, belief.value.locale

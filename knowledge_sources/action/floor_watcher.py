@@ -20,7 +20,7 @@ from knowledge_sources.questions import (
     rolling_course,
 )
 from knowledge_sources.robot_knowledge_source import OlderSource
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor
 from world_models.entries.location import Hypothesis
 from world_models.frames import Pose2
@@ -46,13 +46,13 @@ class FloorWatcher(OlderSource):
 
     level = Level.ACTION
     on = (
-        Watch(Frame, (Posted,), lambda f: f.purpose not in ("milestone", "probe")),
+        Watch(CameraPicture, (Posted,), lambda f: f.purpose not in ("milestone", "probe")),
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in CORRECTED_BY),
     )
     writes = (FreeFloor, FloorAppearance, FloorView)
 
     def judge(self, view: View, trigger: Change) -> float | None:
-        frame, belief = view.latest(Frame), find_belief(view)
+        frame, belief = view.latest(CameraPicture), find_belief(view)
         if frame is None or belief is None or is_over(view) or is_in_doubt(view) or not is_up_to_date(view):
             return None
         if belief.value.sigma_m > MAX_FLOOR_SIGMA_M or belief.value.sigma_rad > MAX_FLOOR_SIGMA_RAD:
@@ -62,7 +62,7 @@ class FloorWatcher(OlderSource):
         return 0.8
 
     def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        frame, belief = view.latest(Frame), find_belief(view)
+        frame, belief = view.latest(CameraPicture), find_belief(view)
         if frame is None or belief is None:
             return
         robot, locale = find_robot(view), belief.value.locale
@@ -78,8 +78,8 @@ class FloorWatcher(OlderSource):
             [Seen(view[e.value.frame].value.jpeg, _pose_of(e.value)) for e in earlier],
             {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings,
             None if lit is None else lit.value.light)
-        told = (*earlier, *(known[name] for name in (locale,) if name in known), *(() if lit is None else (lit,)))
-        yield Post(seen, (frame, belief, *told))
+        reasons = (*earlier, *(known[name] for name in (locale,) if name in known), *(() if lit is None else (lit,)))
+        yield Post(seen, (frame, belief, *reasons))
         for appearance in learnt:
             old, because = known.get(appearance.locale), (frame, belief, *earlier)
             yield Post(appearance, because) if old is None else Revise(old, appearance, (*because, old))
@@ -104,7 +104,7 @@ class FloorWatcher(OlderSource):
         return math.hypot(last.value.x_m - eye.x_m, last.value.y_m - eye.y_m) < FLOOR_STEP_M
 
 
-def _is_seen(view: View, frame: Entry[Frame]) -> bool:
+def _is_seen(view: View, frame: Entry[CameraPicture]) -> bool:
     """Whether the floor was looked at in a picture already."""
     return any(frame.ref in seen.because for seen in view.newest_first(FreeFloor))
 

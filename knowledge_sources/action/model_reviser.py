@@ -13,7 +13,7 @@ from blackboard.level import Level
 from knowledge_sources.questions import find_building, find_frames
 from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
-from world_models.entries.told import DOOR_STATES, Told
+from world_models.entries.user_reports import DOOR_STATES, UserReport
 
 
 class ModelReviser(OlderSource):
@@ -24,14 +24,14 @@ class ModelReviser(OlderSource):
     """
 
     level = Level.ACTION
-    on = (Watch(Told, (Posted,)),)
-    writes = (LocaleFrame, Told)
+    on = (Watch(UserReport, (Posted,)),)
+    writes = (LocaleFrame, UserReport)
 
     def judge(self, view: View, trigger: Change) -> float | None:
         return 1.0
 
     def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        told: Entry[Told] = trigger.entry
+        told: Entry[UserReport] = trigger.entry
         try:
             frames = find_frames(view, find_building(view).find_elements(told.value.what))
             revised = [(frame, _revise(frame.value, told)) for frame in frames]
@@ -45,7 +45,7 @@ class ModelReviser(OlderSource):
             yield Revise(frame, value, (told, frame))
 
 
-def _revise(frame: LocaleFrame, told: Entry[Told]) -> LocaleFrame:
+def _revise(frame: LocaleFrame, told: Entry[UserReport]) -> LocaleFrame:
     """The frame as it is now known. Raises ValueError where it has nothing that could be so."""
     what, state = told.value.what, told.value.state
     if state == "gone" and any((change.what, change.name) == ("extra", what) for change in frame.changes):

@@ -39,7 +39,7 @@ from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import BodyFault, MotorCommand
 from world_models.entries.location import Hypothesis
-from world_models.entries.robot import Drift
+from world_models.entries.robot_state import Drift
 from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 
@@ -167,8 +167,8 @@ class Motor(OlderSource):
         here = belief.value.world_from_robot(find_building(view))
         look = floor.choose_look()
         if look is not None:
-            looking = replace(leg, looking_rad=look.heading_rad, looks=(
-                *leg.looks, (here.x_m, here.y_m, look.heading_rad)))
+            looking = replace(leg, looking_rad=look.heading_rad, looked_at=(
+                *leg.looked_at, (here.x_m, here.y_m, look.heading_rad)))
             turned = self._go_on_looking(looking, here, actuator)
             if turned is not None:
                 return looking, turned, floor.because

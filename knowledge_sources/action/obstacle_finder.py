@@ -540,7 +540,7 @@ def _place(world: Building, obstacle: Obstacle, shape: shapely.Geometry) -> Obst
 
 def _tell(thing: FloorThing, scan: Entry[FreeFloor]) -> str:
     """Which pixels of which picture tell of a thing."""
-    picture = next((ref.id for ref in scan.because if ref.id.startswith("Frame-")), scan.id)
+    picture = next((ref.id for ref in scan.because if ref.id.startswith("CameraPicture-")), scan.id)
     if scan.value.sense != "camera":
         return f"{scan.id}: {thing.evidence}"
     left, top, right, bottom = thing.box_px

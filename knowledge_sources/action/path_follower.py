@@ -38,7 +38,7 @@ from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import Course
 from world_models.entries.location import Hypothesis
-from world_models.entries.robot import Drift
+from world_models.entries.robot_state import Drift
 from world_models.entries.task import Leg, Milestone, PlanSketch
 from world_models.frames import Pose2
 
@@ -80,9 +80,9 @@ class PathFollower(OlderSource):
         if belief is None:
             return
         if course is not None and (driving is None or self._must_stop(view)):
-            told = () if driving is None else self._look_ahead(
+            reasons = () if driving is None else self._look_ahead(
                 view, driving[0].value, belief, find_robot(view).actuator)[1]
-            yield Revise(course, replace(course.value, speed_m_per_s=0.0), (course, belief, *_reasons(view), *told))
+            yield Revise(course, replace(course.value, speed_m_per_s=0.0), (course, belief, *_reasons(view), *reasons))
         elif driving is not None:
             yield from self._steer(view, course, driving[0], belief)
 
@@ -102,9 +102,9 @@ class PathFollower(OlderSource):
         yield step
         wanted = compute_curvature_to(point, here) - (0.0 if drift is None else drift.value.curvature_per_m)
         curvature = min(max(wanted, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
-        free_m, told = self._look_ahead(view, leg.value, belief, robot.actuator)
+        free_m, reasons = self._look_ahead(view, leg.value, belief, robot.actuator)
         new = Course(leg.id, self._choose_speed(free_m, robot.actuator), curvature)
-        because = (step, belief, *(() if drift is None else (drift,)), *told)
+        because = (step, belief, *(() if drift is None else (drift,)), *reasons)
         yield Post(new, because) if course is None else Revise(course, new, (course, *because))
 
     def _choose_speed(self, free_m: float, actuator: ActuatorModel) -> float:

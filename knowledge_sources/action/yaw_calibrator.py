@@ -20,7 +20,7 @@ from knowledge_sources.questions import find_belief, find_building, is_standing
 from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.camera import CAMERA_UNKNOWNS, YAW
 from world_models.entries.location import Hypothesis, Travel, begin_travel, turn_about_camera
-from world_models.entries.robot import CameraState, Drift
+from world_models.entries.robot_state import CameraState, Drift
 from world_models.entries.task import Milestone
 from world_models.frames import Pose2, wrap_angle
 
@@ -54,7 +54,7 @@ class YawCalibrator(OlderSource):
         if travel is None or belief is None or not is_standing(view):
             return None
         milestone = view.latest(Milestone)
-        if milestone is not None and milestone.value.modes:  # an inexact model bends the way more than the yaw does
+        if milestone is not None and milestone.value.displacement_modes:  # an inexact model bends the way more than the yaw does
             return None
         if self._is_spent(travel.value):
             return 1.0

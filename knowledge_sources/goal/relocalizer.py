@@ -17,20 +17,20 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.camera_knowledge import find_camera
 from knowledge_sources.methods.localization.global_localization import (
-    Candidate,
     LocalizationResult,
     LocalizationStatus,
+    PlaceCandidate,
     localize,
     make_alias_test,
 )
 from knowledge_sources.methods.localization.next_view import SensingAction, choose_far_action, make_view_predictor
-from knowledge_sources.methods.localization.place_odds import ToldPlace, compute_prior, weigh_told
+from knowledge_sources.methods.localization.place_odds import StatedPlace, compute_prior, weigh_told
 from knowledge_sources.methods.localization.views import CameraView, propagate_pose, update_obstruction
 from knowledge_sources.questions import (
     active_goal,
     find_belief,
     find_building,
-    find_building_without_finds,
+    find_building_as_filed,
     find_robot,
     is_over,
     is_standing,
@@ -40,11 +40,11 @@ from knowledge_sources.robot_knowledge_source import OlderSource
 from knowledge_sources.settings import LocalizationSettings
 from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
-from world_models.entries.body import Look, MotionReport, MotorCommand
+from world_models.entries.body import MotionReport, MotorCommand, PictureRequest
 from world_models.entries.location import Hypothesis, HypothesisStatus, Place, PlaceOdds, TwinOdds, covariance_tuple
 from world_models.entries.obstacle import Obstruction
 from world_models.entries.percepts import Glimpse, Panorama, Segments
-from world_models.entries.robot import CameraState
+from world_models.entries.robot_state import CameraState
 from world_models.entries.task import Certificate, Goal, PlanSketch
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
@@ -72,7 +72,7 @@ class Relocalizer(OlderSource):
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "odometry"),
         Watch(Segments, (Posted,), lambda s: s.milestone == ""),
     )
-    writes = (Look, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama, Obstruction, PlaceOdds, CameraState)
+    writes = (PictureRequest, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama, Obstruction, PlaceOdds, CameraState)
 
     def judge(self, view: View, trigger: Change) -> float | None:
         lost = open_discrepancy(view, Level.GOAL)
@@ -87,11 +87,11 @@ class Relocalizer(OlderSource):
         if lost is None or belief is None:
             return
         if not isinstance(trigger.entry.value, Segments):
-            yield Post(Look("probe"), (trigger.entry, lost))
+            yield Post(PictureRequest("probe"), (trigger.entry, lost))
             return
         if self._is_dark(trigger.entry.value):
             if len(_probes_since(view, lost)) < MAX_DARK_FRAMES:
-                yield Post(Look("probe"), (trigger.entry, lost))
+                yield Post(PictureRequest("probe"), (trigger.entry, lost))
             return
         yield from self._consider(view, trigger.entry, lost, belief)
 
@@ -118,7 +118,7 @@ class Relocalizer(OlderSource):
         building, rooms = find_building(view), self._list_rooms(view, belief.value)
         locale = belief.value.locale
         here = belief.value.world_from_robot(building)
-        told = ToldPlace(here, belief.value.covariance_world(building),
+        told = StatedPlace(here, belief.value.covariance_world(building),
                          _find_prior(view, tuning))
         followed = _list_moved_candidates(view, before, robot.actuator, building)
         tried = []
@@ -173,7 +173,7 @@ class Relocalizer(OlderSource):
         """The building as it is known; also without the things that it was found to have besides: if the place was not
         where it was believed, they may be put where the robot stands or where its view is.
         """
-        bare = find_building_without_finds(view)
+        bare = find_building_as_filed(view)
         return (find_building(view),) if bare is None else (find_building(view), bare)
 
     def _find_far_action(
@@ -210,7 +210,7 @@ class Relocalizer(OlderSource):
 
     def _adopt(
         self, view: View, seen: tuple[Entry[Segments] | Effect, ...], lost: Entry[Discrepancy],
-        belief: Entry[Hypothesis], candidate: Candidate,
+        belief: Entry[Hypothesis], candidate: PlaceCandidate,
     ) -> Iterable[Effect]:
         """The belief is corrected, and a new top-level goal takes the place of the old one (§2)."""
         building = find_building(view)
@@ -243,7 +243,7 @@ def _find_prior(view: View, settings: LocalizationSettings) -> float:
 
 
 def _odds_used(
-    view: View, by_pictures: LocalizationResult, result: LocalizationResult, told: ToldPlace
+    view: View, by_pictures: LocalizationResult, result: LocalizationResult, told: StatedPlace
 ) -> PlaceOdds | None:
     """The odds by which a place was found that the pictures alone had not found; None where they had."""
     if result.status is not LocalizationStatus.FOUND or by_pictures.status is LocalizationStatus.FOUND:
@@ -284,7 +284,7 @@ def _move(glimpse: Glimpse, report: MotionReport, actuator: ActuatorModel) -> Gl
 
 
 def _to_hypothesis(
-    building: Building, candidate: Candidate, belief: Hypothesis, status: HypothesisStatus, weight: float
+    building: Building, candidate: PlaceCandidate, belief: Hypothesis, status: HypothesisStatus, weight: float
 ) -> Hypothesis:
     return Hypothesis.of_world(
         building, candidate.room, candidate.world_from_robot, candidate.covariance, "relocalization",

@@ -15,7 +15,7 @@ from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.camera import YAW
 from world_models.entries.location import Travel, begin_travel
 from world_models.entries.percepts import PoseFix
-from world_models.entries.robot import CameraState
+from world_models.entries.robot_state import CameraState
 from world_models.entries.task import Certificate
 
 

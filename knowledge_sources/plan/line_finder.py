@@ -14,7 +14,7 @@ from knowledge_sources.methods.features.picture import compute_mean_and_deviatio
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_robot, open_milestone
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.percepts import Segments
 from world_models.frames import frozen
 
@@ -28,13 +28,13 @@ class LineFinder(RobotKnowledgeSource):
     """
 
     level, priority = Level.PLAN, Priority.SEE
-    on = (Watch(Frame, (Posted,), lambda f: f.purpose in ("milestone", "probe")),)
+    on = (Watch(CameraPicture, (Posted,), lambda f: f.purpose in ("milestone", "probe")),)
     writes = (Segments,)
 
-    def bind(self, view: View, trigger: Change) -> Entry[Frame]:
+    def bind(self, view: View, trigger: Change) -> Entry[CameraPicture]:
         return trigger.entry
 
-    def act(self, view: View, case: Entry[Frame]) -> Iterable[Effect]:
+    def act(self, view: View, case: Entry[CameraPicture]) -> Iterable[Effect]:
         frame, robot = case, find_robot(view)
         image = read_picture(frame.value.jpeg).rectified(robot.lens, robot.camera)
         found = find_lines(image, min_length_px=MIN_SEGMENT_LENGTH_PX,

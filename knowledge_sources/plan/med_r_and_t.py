@@ -59,7 +59,7 @@ class MedRAndT(OlderSource):
         if match.value.is_camera_open:
             opened = compute_knocked_covariance(camera, own)
             prior, known = add_yaw(prior, opened, known), opened
-        learnt = None if m.modes else self._learn(robot, match.value, here, prior, known)
+        learnt = None if m.displacement_modes else self._learn(robot, match.value, here, prior, known)
         moves = learnt is not None and (
             match.value.is_camera_open or not has_counted(camera, learnt.world_from_robot, own))
         if learnt is not None and moves:

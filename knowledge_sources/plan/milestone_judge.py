@@ -27,7 +27,7 @@ from knowledge_sources.methods.verification.pose_confidence import (
 )
 from knowledge_sources.questions import find_belief, find_robot, find_robot_in, has_followed, open_discrepancy
 from knowledge_sources.robot_knowledge_source import OlderSource
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Certificate, Milestone, MilestoneVerdict
@@ -137,7 +137,7 @@ class MilestoneJudge(OlderSource):
         s = self._settings
         match: LineMatch = view[fix.match].value
         segments: Segments = view[match.segments].value
-        frame: Frame = view[segments.frame].value
+        frame: CameraPicture = view[segments.frame].value
         pose, belief = fix.world_from_robot, find_belief(view)
         camera = find_camera(view).moved(fix.camera_step) if fix.camera_step else None
         robot = find_robot(view, camera) if belief is None else find_robot_in(view, belief.value.locale, camera)
@@ -148,9 +148,9 @@ class MilestoneJudge(OlderSource):
             covariance = add_yaw(covariance, np.array(fix.camera_covariance), known)
         lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
         agreed = check_lines(robot, lines, segments.segments_px, pose, s.verification, milestone.errors, s.pose)
-        plain_px = agreed.projected_px if not milestone.modes else check_lines(
+        plain_px = agreed.projected_px if not milestone.displacement_modes else check_lines(
             robot, lines, segments.segments_px, pose, s.verification).projected_px
-        faces = check_colors(robot, pose, read_picture(frame.jpeg).quarter, milestone.looks, s)
+        faces = check_colors(robot, pose, read_picture(frame.jpeg).quarter, milestone.face_colors, s)
         weight = compute_evidence(
             robot, lines, segments.segments_px, pose, fix.covariance, before, covariance, agreed, faces)
         p_false = POSE_CONFIDENCE.p_false(weight)
@@ -168,7 +168,7 @@ class MilestoneJudge(OlderSource):
             most_px = s.plan.max_deviation_px
             tolerance_px = most_px if in_doubt and not is_as_put_down else max(most_px, tolerance_px)
         p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed
-        p_wrong = _update(s.plan.p_wrong_in_doubt if in_doubt else p_wrong, milestone.told)
+        p_wrong = _update(s.plan.p_wrong_in_doubt if in_doubt else p_wrong, milestone.log_odds_so_far)
         return Weighed(
             robot=robot,
             room="" if belief is None else belief.value.locale,
@@ -183,7 +183,7 @@ class MilestoneJudge(OlderSource):
             shift_px=_median_shift(expected_px, plain_px),
             tolerance_px=tolerance_px if is_as_put_down or is_sure else min(tolerance_px, s.plan.max_deviation_px),
             is_weak=in_doubt or not followed,
-            is_inexact=bool(milestone.modes),
+            is_inexact=bool(milestone.displacement_modes),
             camera_chi2=fix.camera_chi2,
             is_camera_known=is_camera_known(robot, known, s),
         )
@@ -250,7 +250,7 @@ class MilestoneJudge(OlderSource):
     def _may_look_again(self, verdict: Verdict, milestone: Milestone) -> bool:
         """Whether another view may tell what this one could not."""
         s = self._settings.plan
-        most = s.max_inexact_looks if milestone.modes or milestone.told else s.max_looks
+        most = s.max_inexact_looks if milestone.displacement_modes or milestone.log_odds_so_far else s.max_looks
         return verdict.kind == "not testable" and len(milestone.tried) + 1 < most
 
 

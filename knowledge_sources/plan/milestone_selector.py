@@ -41,7 +41,7 @@ from knowledge_sources.robot_knowledge_source import OlderSource
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.building import Building
 from world_models.building.model_errors import pack_errors
-from world_models.entries.body import Look
+from world_models.entries.body import PictureRequest
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Obstruction
 from world_models.entries.task import Certificate, Milestone, PlanSketch, Subgoal
@@ -78,7 +78,7 @@ class MilestoneSelector(OlderSource):
         Watch(Milestone, (Revised,), lambda m: not m.is_open),
         Watch(Obstruction, (Posted, Revised)),
     )
-    writes = (Milestone, Look)
+    writes = (Milestone, PictureRequest)
 
     def judge(self, view: View, trigger: Change) -> float | None:
         if isinstance(trigger.entry.value, Obstruction):
@@ -133,7 +133,7 @@ class MilestoneSelector(OlderSource):
         headings = self._find_untried(self._turned_headings(pose), tried) or [pose.heading_rad]
         heading = choose_heading(robot, pose, headings, CHECK_TOLERANCE_M, settings=self._settings)
         turned = replace(check, look_heading_rad=heading)
-        yield Post(replace(turned, told=self._sum_told(view, turned)), (doubt, belief))
+        yield Post(replace(turned, log_odds_so_far=self._sum_told(view, turned)), (doubt, belief))
 
     def _expect_again(self, view: View, hidden: Entry[Obstruction], belief: Entry[Hypothesis]) -> Iterable[Effect]:
         """Predict a milestone again whose picture is taken, without what the obstruction hides."""
@@ -152,7 +152,7 @@ class MilestoneSelector(OlderSource):
         tried = _tried_headings(view, lambda m: (m.value.sketch, m.value.index) == (sketch.id, s.at))
         heading = self._choose_direction(robot, s, pose, tried)
         milestone = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}", heading, tried=tried)
-        milestone = replace(milestone, told=self._sum_told(view, milestone))
+        milestone = replace(milestone, log_odds_so_far=self._sum_told(view, milestone))
         if self._faces(view, belief.value, milestone):
             yield from self._look_for(view, None, milestone, sketch, belief, _car_of(sketch, s.at))
         else:
@@ -171,7 +171,7 @@ class MilestoneSelector(OlderSource):
         because = (task, belief, *frames) if hidden is None else (task, belief, hidden, *frames)
         wish = Post(expected, because) if old is None else Revise(old, expected, because)
         yield wish
-        yield Post(Look("milestone"), (wish,))
+        yield Post(PictureRequest("milestone"), (wish,))
 
     def _sum_told(self, view: View, milestone: Milestone) -> float:
         """The log odds of a wrong place by the looks for a milestone in other directions, of an inexact model.
@@ -183,12 +183,12 @@ class MilestoneSelector(OlderSource):
         if not milestone.tried or last is None or certificate is None or certificate.value.milestone != last.id:
             return 0.0
         c = certificate.value
-        if not last.value.modes or c.matched < self._settings.verification.min_matched_lines:
-            return last.value.told
+        if not last.value.displacement_modes or c.matched < self._settings.verification.min_matched_lines:
+            return last.value.log_odds_so_far
         p = min(max(c.p_false, 1e-9), 1.0 - 1e-9)
         apart = min(abs(wrap_angle(milestone.look_heading_rad - heading)) for heading in milestone.tried)
         said = min(max(math.log(p / (1.0 - p)), -s.max_told), s.max_told)
-        return last.value.told + min(1.0, apart / INDEPENDENT_LOOK_RAD) * said
+        return last.value.log_odds_so_far + min(1.0, apart / INDEPENDENT_LOOK_RAD) * said
 
     def _choose_direction(self, robot: RobotModel, sketch: PlanSketch, pose: Pose2, tried: Sequence[float]) -> float:
         before = sketch.subgoals[sketch.at - 1] if sketch.at else None
@@ -306,9 +306,9 @@ def predict_milestone(
         expected=_to_tuples(lines.lines_world),
         expected_px=_to_tuples(lines.segments_px),
         landmark_of=tuple(marks.index(int(i)) for i in lines.landmark),
-        looks=predict_face_colors(robot, pose),
-        modes=errors.modes,
-        shifts=pack_errors(errors),
+        face_colors=predict_face_colors(robot, pose),
+        displacement_modes=errors.displacement_modes,
+        displacements=pack_errors(errors),
         status="expected",
     )
 

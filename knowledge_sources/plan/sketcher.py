@@ -112,7 +112,7 @@ class Sketcher(OlderSource):
             again = self._look_again(view, goal, obstacles, looks)
             yield again or Post(Outcome("blocked", why), (*because, *obstacles))
         else:
-            drawn = PlanSketch(goal.id, (), "", subgoals, halts=halts, looks=looks)
+            drawn = PlanSketch(goal.id, (), "", subgoals, halts=halts, lookout_count=looks)
             yield Post(drawn, (*because, *find_frames(view, _list_locales(subgoals))))
 
     def _look_again(
@@ -136,7 +136,7 @@ class Sketcher(OlderSource):
             subgoal = planner.plan_look(belief.value, obstacle.value)
             if subgoal is not None:
                 frames = find_frames(view, {belief.value.locale})
-                drawn = PlanSketch(goal.id, (), "", (subgoal,), looks=looks + 1, is_look=True)
+                drawn = PlanSketch(goal.id, (), "", (subgoal,), lookout_count=looks + 1, is_look=True)
                 return Post(drawn, (goal, belief, obstacle, *frames))
         return None
 
@@ -155,7 +155,7 @@ class Sketcher(OlderSource):
         s, belief = sketch.value, find_belief(view)
         if belief is None:
             return
-        if s.at > 0 and self._is_off(view, belief.value, s.subgoals[s.at - 1], bool(milestone.value.modes)):
+        if s.at > 0 and self._is_off(view, belief.value, s.subgoals[s.at - 1], bool(milestone.value.displacement_modes)):
             yield from self._adjust(view, milestone, sketch, belief)
         elif s.at_end:
             yield Revise(sketch, replace(s, status="done", verified=True), (milestone, belief))
@@ -310,7 +310,7 @@ def _count_looks(view: View, goal: Entry[Goal], before: Entry[PlanSketch] | None
     """How often the robot went to look again at what left no way to a goal; ``before``: its last sketch, if it ended.
     """
     last = before or view.latest(PlanSketch, lambda s: s.is_active and not s.path and s.goal == goal.id)
-    return 0 if last is None else last.value.looks
+    return 0 if last is None else last.value.lookout_count
 
 
 def _find_first(plans: Iterable[tuple[Subgoal, ...] | None]) -> tuple[Subgoal, ...] | None:

@@ -10,13 +10,13 @@ from dataclasses import asdict, dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
-from logs.explain.phrases import STRANGE, sentence
+from logs.explain.phrases import UNREADABLE, sentence
 from logs.records import Candidate, DecisionRecord, EntryRecord, as_line
 from logs.run_directory import RunDirectory
 from logs.tables import table
 from logs.timeline import Timeline
 from world_models import words
-from world_models.entries.body import Frame, MotorCommand
+from world_models.entries.body import CameraPicture, MotorCommand
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, Milestone, PlanSketch
 from world_models.words import count, metres
@@ -265,7 +265,7 @@ def _tell_observation(ours: Timeline, theirs: Timeline, where: Parting) -> Itera
     cycle = _cycle(ours, theirs, where.observation)
     later = "" if not where.decision or cycle <= where.decision else ", after they had decided differently"
     yield from _tell_entry(ours, theirs, where.observation, "observation", later)
-    if all(one is not None and one.kind is Frame for one in (h.entry(where.observation) for h in (ours, theirs))):
+    if all(one is not None and one.kind is CameraPicture for one in (h.entry(where.observation) for h in (ours, theirs))):
         yield "  (the same picture was asked for, and another came: other noise, or the robot stood elsewhere)"
 
 
@@ -336,7 +336,7 @@ def _others(
 def apart(first: RunDirectory, second: RunDirectory, ours: Timeline, theirs: Timeline) -> str:
     """How the two runs went, side by side."""
     rows = [["decisions", str(len(ours.cycles)), str(len(theirs.cycles))]]
-    for kind in (MotorCommand, Frame, Milestone, PlanSketch, Goal):
+    for kind in (MotorCommand, CameraPicture, Milestone, PlanSketch, Goal):
         rows.append([kind.__name__, *(str(len(h.ids_of(kind))) for h in (ours, theirs))])
     a, b = first.read_result(), second.read_result()
     for key in ("outcome", "final_error_m", "sim_time_s", "path_length_m", "relocalizations", "collisions"):
@@ -345,7 +345,7 @@ def apart(first: RunDirectory, second: RunDirectory, ours: Timeline, theirs: Tim
             rows.append([key, *(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells)])
     try:
         far, at = _furthest(ours, theirs)
-    except STRANGE:
+    except UNREADABLE:
         far, at = 0.0, ""
     tail = f"\nthe two beliefs were furthest apart before {at}: {metres(far)}" if at else ""
     return table(["", "first", "second"], rows) + tail

@@ -10,10 +10,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from logs.errors import BadInput
 from logs.explain import phrases
 from logs.records import EntryRecord
 from logs.run_directory import RunDirectory
+from logs.run_errors import BadInput
 from logs.timeline import Timeline
 from world_models.building.locale_frame import FrameReference
 from world_models.entries.percepts import LineMatch

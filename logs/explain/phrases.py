@@ -16,8 +16,8 @@ import numpy as np
 
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from logs.errors import BadInput
 from logs.records import WHAT_IF, Candidate, EntryRecord
+from logs.run_errors import BadInput
 from logs.timeline import Timeline
 from world_models import words
 from world_models.building.locale_frame import FrameRequest
@@ -27,7 +27,7 @@ from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, T
 from world_models.entries.task import Certificate, Goal, Leg, Milestone, PlanSketch
 from world_models.words import count, degrees, landmark, listed, metres, point, quantity, size, turn
 
-STRANGE = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
+UNREADABLE = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
 """What reading a value raises that has other fields than this version writes."""
 MAX_LISTED = 4
 WIDTH = 120
@@ -272,7 +272,7 @@ def goal(value: Goal) -> str:
 
 
 def describe_segments(segments: Segments) -> str:
-    """``179 line segments in Frame-49 (contrast 41 of 255)``."""
+    """``179 line segments in CameraPicture-49 (contrast 41 of 255)``."""
     found = count(len(segments.segments_px), "line segment")
     return f"{found} in {segments.frame} (contrast {segments.contrast:.0f} of 255)"
 

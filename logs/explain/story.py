@@ -11,22 +11,22 @@ from typing import Any
 
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from logs.errors import BadInput
 from logs.explain import phrases
-from logs.explain.phrases import STRANGE, capital, named, plainly, sentence, wrap
+from logs.explain.phrases import UNREADABLE, capital, named, plainly, sentence, wrap
 from logs.explain.turning_points import TurningPoint, at, read_collisions, read_turning_points, turn_lines
 from logs.records import EntryRecord, is_a
 from logs.run_directory import RunDirectory
+from logs.run_errors import BadInput
 from logs.tables import table
 from logs.timeline import Timeline
 from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.body import Look
+from world_models.entries.body import PictureRequest
 from world_models.entries.door_state import DoorState
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Contact, Obstacle
-from world_models.entries.robot import CameraState, find_camera_lessons
+from world_models.entries.robot_state import CameraState, find_camera_lessons
 from world_models.entries.task import Certificate, Command, Goal, Milestone, Outcome, PlanSketch
-from world_models.entries.told import Redirection, Told
+from world_models.entries.user_reports import Redirection, UserReport
 from world_models.words import count, listed, metres
 
 WITHOUT: Mapping[str, str] = {
@@ -35,7 +35,7 @@ WITHOUT: Mapping[str, str] = {
     "goal": "a robot that is lost does not look for where it is",
 }
 """What it means that a level is off."""
-WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, Told, Redirection)
+WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, UserReport, Redirection)
 """What changes the knowledge of a locale."""
 PLANS: tuple[type[Any], ...] = (Goal, PlanSketch)
 MOST_PLACES = 4
@@ -170,7 +170,7 @@ def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
         yield f"{run_name(run)}: {'cut off' if outcome is None else outcome.value.kind} {when}."
         yield from levels_off(run)
         yield from turn_lines(history, run.read_result())
-    except STRANGE as error:
+    except UNREADABLE as error:
         raise _strange(history, error) from error
 
 
@@ -191,7 +191,7 @@ def tell_run(run: RunDirectory, history: Timeline) -> RunStory:
             tell_errand(history), tell_plans(history), tell_lost(history), tell_contacts(history, turns, result),
             tell_things(turns), tell_camera(history), tell_end(history, result))
         return RunStory(first, turns, sections, read_milestones(history))
-    except STRANGE as error:
+    except UNREADABLE as error:
         raise _strange(history, error) from error
 
 
@@ -207,7 +207,7 @@ def _said(history: Timeline, text: str, record: EntryRecord[Any], *others: Entry
 
 def tell_errand(history: Timeline) -> Section:
     """What was asked for, and what it was told on the way."""
-    told = [_said(history, plainly(r), r) for r in history.of_kind(Command, Told, Redirection) if r.observed]
+    told = [_said(history, plainly(r), r) for r in history.of_kind(Command, UserReport, Redirection) if r.observed]
     return Section("What it was to do", tuple(told))
 
 
@@ -284,7 +284,7 @@ def _tell_loss(
 
 def _tell_search(history: Timeline, lost: EntryRecord[Any], last: int) -> Iterator[Sentence]:
     """How many pictures it took to find itself, and which places came into question."""
-    looks = [record for record in history.of_kind(Look, until=last)
+    looks = [record for record in history.of_kind(PictureRequest, until=last)
              if record.cycle >= lost.cycle and record.value.purpose == "probe"]
     candidates = [record for record in history.of_kind(Hypothesis, until=last)
                   if record.cycle >= lost.cycle and record.is_new and record.field("status") == "candidate"]

@@ -8,17 +8,17 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from blackboard.servoing import Discrepancy
-from logs.errors import BadInput
 from logs.explain import phrases
 from logs.explain.model import MAX_LISTED, WorldFile, tell_changes, tell_model_lines, tell_source
-from logs.explain.phrases import STRANGE, capital, sentence
+from logs.explain.phrases import UNREADABLE, capital, sentence
 from logs.explain.web import find_refs
 from logs.explain.why import Step, Story, step, story_of, tell_stories
 from logs.records import WHAT_IF, EntryRecord
+from logs.run_errors import BadInput
 from logs.timeline import Timeline
 from world_models import words
 from world_models.building.locale_frame import FrameReference, FrameRequest
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Certificate, Milestone, PlanSketch
@@ -76,7 +76,7 @@ def milestone_story(history: Timeline, id: str, world: WorldFile | None = None) 
         head = f"{capital(phrases.milestone_name(last.value))}: {last.fields['status']}."
         return story_of(history, revisions[0] if revisions else last, head, _tell(history, revisions, last, world),
                         ref=last.ref)
-    except STRANGE as error:
+    except UNREADABLE as error:
         what = "expected a milestone and its evidence as this version writes them, got others"
         raise BadInput(f"{id}: {what} ({error!r})") from None
 
@@ -109,7 +109,7 @@ def _tell_verdict(history: Timeline, certificate: EntryRecord[Any], world: World
     if (fix := history.reason(certificate, PoseFix)) is not None:
         match = history.reason(fix, LineMatch)
         segments = None if match is None else history.reason(match, Segments)
-        frame = None if segments is None else history.reason(segments, Frame)
+        frame = None if segments is None else history.reason(segments, CameraPicture)
         yield step("seen", phrases.describe_line_match(history, fix), fix, match, segments, frame)
         yield from (Step("model", *told) for told in tell_model_lines(history, fix, world))
     said = phrases.verdict(certificate.value, history.because(certificate, Milestone))

@@ -16,10 +16,10 @@ from blackboard.entry import Entry
 from blackboard.journal import Decision
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from logs.errors import BadInput
 from logs.explain.phrases import wrap
 from logs.mirror import Mirror, find_belief
 from logs.records import EntryRecord, Opaque, is_a
+from logs.run_errors import BadInput
 from logs.timeline import Timeline
 from world_models import words
 from world_models.entries.body import BodyFault, Recovery
@@ -27,7 +27,7 @@ from world_models.entries.door_state import DoorState
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Contact, Obstacle
 from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch, Resumed
-from world_models.entries.told import Redirection, Told
+from world_models.entries.user_reports import Redirection, UserReport
 from world_models.words import count
 
 TOLD = ("refuted", "not testable", "lost", "found", "fault", "contact", "door", "thing", "resumed", "told")
@@ -38,7 +38,7 @@ REMEMBERED = 8
 """The newest entries of a type that are looked back for."""
 MARKS, NOT_VERIFIED = ("escalated", "relocalization"), ("refuted", "not testable")
 """A turning point has one of these words in its line of the journal, or is of one of these kinds."""
-TOLD_KINDS: tuple[type[Any], ...] = (BodyFault, Contact, DoorState, Obstacle, Resumed, Told, Redirection)
+TOLD_KINDS: tuple[type[Any], ...] = (BodyFault, Contact, DoorState, Obstacle, Resumed, UserReport, Redirection)
 KINDS: tuple[type[Any], ...] = (*TOLD_KINDS, Goal, PlanSketch, Certificate, Outcome)
 NOTHING = "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
 
@@ -167,8 +167,8 @@ def _turn(value: Any, is_new: bool, cycle: int, get: Get, believed: Believed, wa
         yield TurningPoint(cycle, "thing", words.brief(value))
     elif isinstance(value, Resumed):
         yield TurningPoint(cycle, "resumed", f"after cycle {value.after_cycle}, where the run was cut off")
-    elif isinstance(value, Told | Redirection) and value.answer:
-        said = f"{value.what} is {value.state}" if isinstance(value, Told) else f"to go elsewhere: {value.text}"
+    elif isinstance(value, UserReport | Redirection) and value.answer:
+        said = f"{value.what} is {value.state}" if isinstance(value, UserReport) else f"to go elsewhere: {value.text}"
         yield TurningPoint(cycle, "told", f"{said}; {value.answer}")
     elif isinstance(value, Outcome):
         yield TurningPoint(cycle, "the end", f"{value.kind}: {value.reason}")

@@ -14,25 +14,25 @@ from logs.explain.phrases import describe_decision, sentence, wrap
 from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of
 from logs.timeline import Timeline, ranked
 from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.body import Frame, Look, MotorCommand, Recovery
+from world_models.entries.body import CameraPicture, MotorCommand, PictureRequest, Recovery
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Tracks
-from world_models.entries.robot import CameraState, Footprint, Wheels
+from world_models.entries.robot_state import CameraState, Footprint, Wheels
 from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, Outcome, PlanSketch
-from world_models.entries.told import Redirection, Told
+from world_models.entries.user_reports import Redirection, UserReport
 from world_models.words import count
 
 DEEPEST_INDENT, FEW = 20, 2
 DEPTH = 5
 """How many steps down the walk goes unless told otherwise."""
-PRINCIPAL = (Outcome, MotorCommand, Goal, PlanSketch, Recovery, Hypothesis, Certificate, Milestone, Leg, Look)
+PRINCIPAL = (Outcome, MotorCommand, Goal, PlanSketch, Recovery, Hypothesis, Certificate, Milestone, Leg, PictureRequest)
 """Of what one act makes, the first of these is what it was done for."""
 GOAL, MODEL, SENSOR = "goal", "model", "sensor"
 KINDS = (GOAL, MODEL, SENSOR)
 """What an explanation may end in: what was asked for, what is known of building and robot, what the camera saw."""
 GROUNDS: Mapping[type[Any], str] = {
-    Command: GOAL, Goal: GOAL, Frame: SENSOR,
-    **dict.fromkeys((LocaleFrame, CameraState, Wheels, Footprint, Told, Redirection), MODEL)}
+    Command: GOAL, Goal: GOAL, CameraPicture: SENSOR,
+    **dict.fromkeys((LocaleFrame, CameraState, Wheels, Footprint, UserReport, Redirection), MODEL)}
 """The kinds of entries that are such an end themselves; what the robot is told of the model is a part of it."""
 NAMING: Mapping[type[Any], str] = {Milestone: "landmarks", Tracks: "items", PlanSketch: "subgoals"}
 """The fields by which others name what is in the model."""
@@ -267,7 +267,7 @@ def ground_names() -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class RestingCount:
     """How many decisions of a run rest on something.
 
     Attributes:
@@ -284,7 +284,7 @@ class Check:
     failing: tuple[Accounted, ...]
 
 
-def check(history: Timeline) -> Check:
+def check(history: Timeline) -> RestingCount:
     """Every decision of a run. Raises BadInput where a line of its journal is malformed."""
     decisions = acts = 0
     by_kind, failing = dict.fromkeys(KINDS, 0), list[Accounted]()
@@ -294,4 +294,4 @@ def check(history: Timeline) -> Check:
         for kind in sorted({kind for grounds in one.grounds.values() for kind in grounds.kinds}):
             by_kind[kind] += 1
         failing += [one] * (not one.holds)
-    return Check(decisions, acts, decisions - len(failing), by_kind, tuple(failing))
+    return RestingCount(decisions, acts, decisions - len(failing), by_kind, tuple(failing))

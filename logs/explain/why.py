@@ -13,21 +13,21 @@ from typing import Any
 
 from blackboard.change import Quiescence
 from blackboard.servoing import Discrepancy
-from logs.errors import BadInput
 from logs.explain import model, phrases
 from logs.explain.model import WorldFile, tell_source
-from logs.explain.phrases import STRANGE, capital, describe_decision, named, plainly, sentence, tell_answer, wrap
+from logs.explain.phrases import UNREADABLE, capital, describe_decision, named, plainly, sentence, tell_answer, wrap
 from logs.records import EntryRecord, is_a
+from logs.run_errors import BadInput
 from logs.timeline import Timeline
 from world_models import words
 from world_models.building.locale_frame import FrameRequest, LocaleFrame
 from world_models.entries.body import (
     BodyFault,
+    CameraPicture,
     Course,
-    Frame,
-    Look,
     MotionReport,
     MotorCommand,
+    PictureRequest,
     Recovery,
     Ride,
     RideReport,
@@ -37,9 +37,9 @@ from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor
 from world_models.entries.location import Hypothesis, Travel
 from world_models.entries.obstacle import Contact, Obstacle, Obstruction, Ranges
 from world_models.entries.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
-from world_models.entries.robot import CameraState, Drift, Footprint, Wheels
+from world_models.entries.robot_state import CameraState, Drift, Footprint, Wheels
 from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, Outcome, PlanSketch, Resumed
-from world_models.entries.told import Redirection, Told
+from world_models.entries.user_reports import Redirection, UserReport
 
 MOST, MOST_PLAIN, MOST_MET = 24, 12, 200
 """So many things are told at the most, of a run of another version, and so many entries come to."""
@@ -113,7 +113,7 @@ def story(history: Timeline, record: EntryRecord[Any], world: WorldFile | None =
     try:
         steps = [*teller.own(record), *teller.reasons(record), *teller.used(record), *teller.context(record)]
         head = phrases.in_one_sentence(history, record) or headline(record)
-    except STRANGE:
+    except UNREADABLE:
         below = itertools.islice(history.within(record), 1, MOST_PLAIN)
         steps, head = [step(label_of(one), plainly(one), one) for one in below], plainly(record)
     return story_of(history, record, head, steps)
@@ -128,9 +128,9 @@ def headline(record: EntryRecord[Any]) -> str:
     """What the entry is, as something that Harvey did where it is an act."""
     if record.kind in (MotorCommand, Course):
         return f"Harvey was told to {sentence(record)}."
-    if record.kind in (Told, Redirection):
+    if record.kind in (UserReport, Redirection):
         return f"It {sentence(record)}."
-    if is_a(record, Look):
+    if is_a(record, PictureRequest):
         return f"A picture was taken {words.purpose(record.value.purpose)}."
     if is_a(record, Hypothesis) and record.value.is_held:
         if record.value.basis == "relocalization":
@@ -186,7 +186,7 @@ class _Teller:
             found = self.history.nearest(record, kind)
             if found is not None and found.id != record.id:
                 key = found.id if kind in SEVERAL else found.type
-                yield from self._one(key, LABELS[kind], SAY[kind](self.history, found), found)
+                yield from self._one(key, LABELS[kind], SENTENCES[kind](self.history, found), found)
 
     def _below(self, record: EntryRecord[Any], kind: type[Any] | None = None) -> Iterator[EntryRecord[Any]]:
         """What an entry rests on beside itself, of a kind or of any."""
@@ -203,11 +203,11 @@ class _Teller:
         if key in self.told or record.ref in self.met or len(self.told) > MOST or len(self.met) > MOST_MET:
             return
         self.met.add(record.ref)
-        label, say, frame = label_of(record), SAY.get(record.kind, _plainly), None
+        label, say, frame = label_of(record), SENTENCES.get(record.kind, _plainly), None
         if perhaps:
             label, text = "thought", f"It may have stood at {phrases.pose(record.value)} ({record.value.weight:.0%})."
-        elif is_a(record, Segments) and above.kind in (MotorCommand, Look):
-            frame = self.history.reason(record, Frame)
+        elif is_a(record, Segments) and above.kind in (MotorCommand, PictureRequest):
+            frame = self.history.reason(record, CameraPicture)
             text = f"It saw {phrases.describe_segments(record.value)}; where it is did not yet follow from them."
         else:
             text = "" if record.kind in FOLDED else say(self.history, record)
@@ -230,7 +230,7 @@ class _Teller:
             if (tracks := history.tracks_of(record)) is not None:
                 moved = phrases.describe_belief_change(record.value, before.value) if before is not None else ""
                 text = f"{phrases.tracking(tracks.value)} {moved}".strip()
-                yield from self._one("Tracks", "seen", text, tracks, history.reason(record, Frame))
+                yield from self._one("Tracks", "seen", text, tracks, history.reason(record, CameraPicture))
             expected = before or record
         report = history.reason(expected, MotionReport) if expected.value.basis == "odometry" else None
         if report is not None:
@@ -247,7 +247,7 @@ class _Teller:
         begun, certificate = phrases.pose(anchor.value), self.history.reason(anchor, Certificate)
         if anchor.value.basis == "relocalization":
             segments, lost = self.history.reason(anchor, Segments), self.history.reason(anchor, Discrepancy)
-            frame = None if segments is None else self.history.reason(segments, Frame)
+            frame = None if segments is None else self.history.reason(segments, CameraPicture)
             found = f"; {anchor.value.evidence}" if anchor.value.evidence else ""
             picture = frame.id if frame is not None else "a picture"
             text = f"It found out anew where it was, in cycle {anchor.cycle}, from {picture}: at {begun}{found}."
@@ -287,26 +287,26 @@ def _line(history: Timeline, record: EntryRecord[Leg]) -> str:
     return phrases.line(record.value, sketch.value if sketch and sketch.id == record.value.sketch else None)
 
 
-SAY: Mapping[type[Any], Callable[[Timeline, EntryRecord[Any]], str]] = {
+SENTENCES: Mapping[type[Any], Callable[[Timeline, EntryRecord[Any]], str]] = {
     Leg: _line,
     Hypothesis: lambda _, r: phrases.believed(r.value),
     Milestone: lambda _, r: phrases.expectation(r.value),
     Discrepancy: lambda _, r: phrases.doubt(r.value),
     PlanSketch: lambda _, r: phrases.plan(r.value),
     Goal: lambda _, r: phrases.goal(r.value),
-    Told: lambda _, r: headline(r),
+    UserReport: lambda _, r: headline(r),
     Redirection: lambda _, r: headline(r),
     Command: lambda _, r: f"The user asked for it: {r.value.text}.",
 }
 LABELS: Mapping[type[Any], str] = {
     Leg: "driving", Hypothesis: "believed", Milestone: "looked for", Discrepancy: "doubted", PlanSketch: "plan",
-    Goal: "goal", Command: "command", Tracks: "seen", Frame: "picture", MotionReport: "wheels", MotorCommand: "motion",
+    Goal: "goal", Command: "command", Tracks: "seen", CameraPicture: "picture", MotionReport: "wheels", MotorCommand: "motion",
     Course: "motion",
-    Look: "look", Segments: "seen", Panorama: "thought", BodyFault: "fault", Recovery: "recovery",
+    PictureRequest: "look", Segments: "seen", Panorama: "thought", BodyFault: "fault", Recovery: "recovery",
     Ride: "ride", RideReport: "ride", Obstruction: "hidden", Quiescence: "stillness", Outcome: "the end",
     Resumed: "resumed", Drift: "wheels", Travel: "wheels", LocaleFrame: "known", FrameRequest: "asked",
     CameraState: "camera",
-    Wheels: "wheels", Footprint: "body", Contact: "touched", Ranges: "ranges", Told: "told",
+    Wheels: "wheels", Footprint: "body", Contact: "touched", Ranges: "ranges", UserReport: "told",
     Redirection: "told",
     FreeFloor: "floor", FloorView: "floor", FloorAppearance: "floor", Obstacle: "in the way",
     DoorState: "door",
@@ -326,19 +326,19 @@ FOLLOW: Mapping[type[Any], tuple[type[Any], ...]] = {
     Certificate: (Milestone,),
     PoseFix: (LineMatch,),
     LineMatch: (Segments, Milestone),
-    Segments: (Frame, Milestone),
-    Tracks: (Frame, Hypothesis),
+    Segments: (CameraPicture, Milestone),
+    Tracks: (CameraPicture, Hypothesis),
     Hypothesis: (BodyFault,),
     Discrepancy: (Discrepancy, BodyFault, Contact, Certificate, Hypothesis, MotionReport),
     Goal: (Redirection, PlanSketch, Hypothesis),
     PlanSketch: (Milestone, Leg, PlanSketch, Hypothesis),
-    Look: (Milestone, Discrepancy, Segments, Hypothesis),
-    Frame: (Look, Course),
+    PictureRequest: (Milestone, Discrepancy, Segments, Hypothesis),
+    CameraPicture: (PictureRequest, Course),
     MotionReport: (MotorCommand, Course),
     Contact: (MotorCommand, Course),
     Ride: (PlanSketch, Hypothesis),
     RideReport: (Ride,),
-    LocaleFrame: (Told, FrameRequest),
+    LocaleFrame: (UserReport, FrameRequest),
 }
 """Which reasons a story follows, in which order; of a type that is not named here, all."""
 

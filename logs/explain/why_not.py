@@ -1,7 +1,7 @@
 """Why not: what a knowledge source or an entry could have brought about and did not, and what decided.
 
 These answers are read from the journal. Whether a knowledge source that the journal does not name in a cycle could
-have acted is asked of the knowledge source itself (:mod:`harvey.replay.why_not`).
+have acted is asked of the knowledge source itself (:mod:`harvey.replay.why_not_again`).
 """
 
 from __future__ import annotations

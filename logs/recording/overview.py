@@ -15,7 +15,6 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from logs.errors import RecordingError
 from logs.reader import Series, read_series
 from logs.recording.logger import window
 from logs.recording.loggers.lanes import ACTIVITIES, GAP, style
@@ -36,6 +35,7 @@ from logs.recording.paths import (
     WORLD,
 )
 from logs.recording.stream import RecordingStream
+from logs.run_errors import RecordingError
 from world_models.words import metres
 
 FOUND = "found itself"

@@ -13,7 +13,7 @@ import numpy as np
 import rerun as rr
 from rerun.chunk import RrdReader
 
-from logs.errors import RecordingError
+from logs.run_errors import RecordingError
 
 APPLICATION = "harvey"
 

@@ -8,15 +8,15 @@ from importlib import import_module
 from pathlib import Path
 
 from blackboard.journal import Decision, decision_line
-from logs.errors import RecordingError
 from logs.recording import loggers as built_in
 from logs.recording.logger import Logger, Subject, blueprint
 from logs.recording.moment import Difference, Moments
 from logs.recording.stream import LIVE_PORT, RecordingStream
+from logs.run_errors import RecordingError
 from world_models.building.geometry.faces import Face
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import Frame, MotionReport
+from world_models.entries.body import CameraPicture, MotionReport
 from world_models.entries.location import Place
 from world_models.frames import Pose2
 from world_models.plugins import PluginError, load_plugin_classes
@@ -86,7 +86,7 @@ class RecordingWriter:
             RecordingError: the recording cannot be written any more.
         """
         moment = self._moments.after(decision)
-        times_s = [*(e.value.sim_time_s for e in moment.changed(Frame)),
+        times_s = [*(e.value.sim_time_s for e in moment.changed(CameraPicture)),
                    *(e.value.sim_time_s for e in moment.changed(MotionReport))]
         self._sim_time_s = max([self._sim_time_s, *times_s])
         self._stream.at(decision.cycle, self._sim_time_s)

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.body.actuator import ContinuousMotion
-from sim.body.building import Building
+from sim.body.simulated_building import SimulatedBuilding
+from sim.body.wheel_errors import ContinuousMotion
 from sim.render.light.auto_exposure import AutoExposure, vignette
 from sim.render.light.lighting import Lighting
 from sim.render.optics import Optics
 from sim.render.sensor import Occluder, SensorParameters, compress_jpeg, expose, skip_noise_draws
 from sim.truth import Truth
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.frames import Pose
 
 MOTION_BLUR_SAMPLES = 3
@@ -57,7 +57,7 @@ class BodyCamera:
         """Deliver these pictures (JPEG, by frame number) instead of rendering them; later noise is the same."""
         self._recorded = pictures
 
-    def take_frame(self, building: Building, truth: Truth, motion: ContinuousMotion, purpose: str) -> Frame:
+    def take_frame(self, building: SimulatedBuilding, truth: Truth, motion: ContinuousMotion, purpose: str) -> CameraPicture:
         """The next frame, numbered from 0, for the purpose of the request."""
         number, self.frames = self.frames, self.frames + 1
         jpeg = self._recorded.get(number)
@@ -70,9 +70,9 @@ class BodyCamera:
             skip_noise_draws(self._rng)
         if self._exposure is not None:
             self._exposure = self._exposure.after(jpeg, truth.time_s)
-        return Frame(jpeg=jpeg, number=number, sim_time_s=truth.time_s, purpose=purpose)
+        return CameraPicture(jpeg=jpeg, number=number, sim_time_s=truth.time_s, purpose=purpose)
 
-    def take_jpeg(self, building: Building, truth: Truth, motion: ContinuousMotion) -> bytes:
+    def take_jpeg(self, building: SimulatedBuilding, truth: Truth, motion: ContinuousMotion) -> bytes:
         """The JPEG bytes of a picture that is not counted as a frame."""
         radiance = self._radiance(building, truth, motion)
         for occluder in self._occluders:
@@ -86,7 +86,7 @@ class BodyCamera:
         image = expose(radiance, sensor, self._rng, lights_on=truth.lights_on)
         return compress_jpeg(image, self.sensor.jpeg_quality)
 
-    def _radiance(self, building: Building, truth: Truth, motion: ContinuousMotion) -> NDArray[np.float32]:
+    def _radiance(self, building: SimulatedBuilding, truth: Truth, motion: ContinuousMotion) -> NDArray[np.float32]:
         """(h, w, 3) light behind the lens; on the move, its mean over the exposure time."""
         here = truth.world_from_robot
         if not (motion.speed_m_per_s > 0.0 and self.sensor.exposure_s > 0.0):
@@ -97,5 +97,5 @@ class BodyCamera:
             total = total + self._radiance_from(building, (here @ earlier).lifted(building.floor_m))
         return np.asarray(total / MOTION_BLUR_SAMPLES, np.float32)
 
-    def _radiance_from(self, building: Building, world_from_robot: Pose) -> NDArray[np.float32]:
+    def _radiance_from(self, building: SimulatedBuilding, world_from_robot: Pose) -> NDArray[np.float32]:
         return self._optics.radiance(building.renderer, self._mount.camera_from_robot @ world_from_robot.inverse())

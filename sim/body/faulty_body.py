@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from sim.body.simulated_body import SimulatedBody
 from sim.faults.fault import DeviceFault
-from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Ride, RideReport
+from world_models.entries.body import BodyFault, CameraPicture, Course, MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.obstacle import Contact, Ranges
 
 
@@ -33,7 +33,7 @@ class FaultyBody:
             return self._answer(fault, self._done if fault.odometry_arrives else None)
         return replace(self._done, sim_time_s=self._body.truth.time_s)
 
-    def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
+    def steer(self, course: Course) -> tuple[MotionReport, CameraPicture] | BodyFault:
         """As the body does; with a fault of the base or the camera it comes to a stand."""
         fault = self._find_fault("base") or self._find_fault("camera")
         if fault is None:
@@ -60,7 +60,7 @@ class FaultyBody:
         """As the body does; none while the base cannot be read."""
         return self._body.ranges() if self._find_fault("base") is None else None
 
-    def look(self, purpose: str) -> Frame | BodyFault:
+    def look(self, purpose: str) -> CameraPicture | BodyFault:
         """A picture; with a fault of the camera none is taken."""
         fault = self._find_fault("camera")
         return self._body.look(purpose) if fault is None else self._answer(fault)

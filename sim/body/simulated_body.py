@@ -8,16 +8,33 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.body.actuator import STEP_M, ActuatorParameters, ContinuousMotion, Slip, Wheels, arc_displacement, arc_steps
 from sim.body.body_camera import BodyCamera
-from sim.body.building import Building
 from sim.body.senses import Bumper, RangeRing
+from sim.body.simulated_building import SimulatedBuilding
+from sim.body.wheel_errors import (
+    STEP_M,
+    ActuatorParameters,
+    ContinuousMotion,
+    SimulatedWheels,
+    Slip,
+    arc_displacement,
+    arc_steps,
+)
 from sim.faults.fault import DeviceFault, Fault, FaultSchedule
 from sim.render.light.lighting import Lighting
 from sim.render.sensor import Occluder, SensorParameters
 from sim.truth import Truth
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand, Odometry, Ride, RideReport
+from world_models.entries.body import (
+    BodyFault,
+    CameraPicture,
+    Course,
+    MotionReport,
+    MotorCommand,
+    Odometry,
+    Ride,
+    RideReport,
+)
 from world_models.entries.location import Place
 from world_models.entries.obstacle import Contact, Ranges
 from world_models.frames import Pose2
@@ -39,7 +56,7 @@ class SimulatedBody:
 
     def __init__(
         self,
-        building: Building,
+        building: SimulatedBuilding,
         start: Pose2,
         camera: Camera,
         mount: CameraMount,
@@ -60,7 +77,7 @@ class SimulatedBody:
         self._building = building
         self._camera = BodyCamera(camera, mount, sensor or SensorParameters(), pixel_rng, lighting)
         self._bumper, self._ring = bumper or Bumper(), ranges or RangeRing()
-        self._wheels = Wheels.draw(actuator or ActuatorParameters(), self._wheel_rng)
+        self._wheels = SimulatedWheels.draw(actuator or ActuatorParameters(), self._wheel_rng)
         self._schedule = FaultSchedule.of(faults)
         self._dark_until_s = 0.0
         self._missed: list[str] = []
@@ -102,7 +119,7 @@ class SimulatedBody:
         return self._camera.frames
 
     @property
-    def building(self) -> Building:
+    def building(self) -> SimulatedBuilding:
         """The building as it is at this moment. Not for knowledge sources."""
         return self._building
 
@@ -213,7 +230,7 @@ class SimulatedBody:
         self._add_odometry(turn_rad, move_m)
         return turn_rad, move_m
 
-    def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
+    def steer(self, course: Course) -> tuple[MotionReport, CameraPicture] | BodyFault:
         """Follow a course until the next picture, or come to a stand; the course holds from this picture on.
 
         Returns what the encoders counted since the last call, and the picture; it is taken on the move, in no time.
@@ -281,7 +298,7 @@ class SimulatedBody:
         """Deliver these pictures (JPEG, by frame number) instead of rendering them; all else goes on as it would."""
         self._camera.use_recorded(pictures)
 
-    def look(self, purpose: str = "") -> Frame:
+    def look(self, purpose: str = "") -> CameraPicture:
         """Take a picture, for the purpose of the request."""
         self._advance_time(FRAME_S)
         return self._take_frame(purpose)
@@ -290,7 +307,7 @@ class SimulatedBody:
         """The JPEG bytes of a picture at this moment; it takes no time and is not counted."""
         return self._camera.take_jpeg(self._building, self._truth, self._motion)
 
-    def _take_frame(self, purpose: str) -> Frame:
+    def _take_frame(self, purpose: str) -> CameraPicture:
         return self._camera.take_frame(self._building, self._truth, self._motion, purpose)
 
     def _turn(self, turn_rad: float) -> None:

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import Any
 
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.kinds import CameraUnplugged, DroppedFrames, LateFrames
+from sim.faults.built_in_faults import CameraUnplugged, DroppedFrames, LateFrames
 from world_models.frames import Pose2
 
 PATH = "/stream.mjpg"

@@ -13,7 +13,7 @@ import serial
 
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.emulator import Emulator
-from sim.faults.kinds import LinkLost, Nonsense
+from sim.faults.built_in_faults import LinkLost, Nonsense
 
 Trace = Callable[[str, bytes], None]
 """Called with the traffic: ``<`` for bytes from the host, ``>`` for bytes from the base."""

@@ -208,7 +208,7 @@ class Pinhole:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class MeshView:
     """The mesh as linear forms of the pixel (u, v, 1), for one camera pose.
 
     Attributes:
@@ -228,14 +228,14 @@ class View:
     reaches: NDArray[np.float64]
 
 
-def project_mesh(mesh: Mesh, lens: Pinhole, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> View:
+def project_mesh(mesh: Mesh, lens: Pinhole, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> MeshView:
     """Project the mesh for a camera at ``camera_from_world`` = (rotation (3, 3), translation (3,) [m])."""
     centre = -rotation.T @ translation
     normals, offsets = mesh.planes_world[:, :3], mesh.planes_world[:, 3]
     beyond = offsets - normals @ centre
     facing = beyond < -1e-6
     reach = np.where(facing, beyond, -1.0)
-    return View(
+    return MeshView(
         facing=facing,
         inverse_depths=_pixel_forms(normals @ rotation.T, lens) / reach[:, None],
         textures=_pixel_forms(mesh.axes_world @ rotation.T, lens),

@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sim.render.mesh import Mesh, Pinhole, View
+from sim.render.mesh import Mesh, MeshView, Pinhole
 
 NEAR_M = 0.02
 """Depth of the near clipping plane [m]."""
@@ -41,7 +41,7 @@ BACKGROUND = -1
 """The patch number where nothing is seen."""
 
 
-def find_visible_patches(mesh: Mesh, view: View, lens: Pinhole, samples: int) -> NDArray[np.int16]:
+def find_visible_patches(mesh: Mesh, view: MeshView, lens: Pinhole, samples: int) -> NDArray[np.int16]:
     """The number of the patch seen at every sample, (height, N, width); ``BACKGROUND`` where none is."""
     longest = int(np.diff(mesh.first).max(initial=0)) + 2
     boxes, edges, ends = _outlines(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.render.mesh import FaceLike, Mesh, Pinhole, View, build_mesh, join_meshes, project_mesh
+from sim.render.mesh import FaceLike, Mesh, MeshView, Pinhole, build_mesh, join_meshes, project_mesh
 from sim.render.noise_table import build_noise_table
 from sim.render.pieces import split_pieces
 from sim.render.rasterizer import find_visible_patches, sample_offsets
@@ -75,7 +75,7 @@ class Renderer:
         """The noiseless image (height, width, 3), RGB, uint8."""
         return (self.radiance(camera, camera_from_world) * 255.0 + 0.5).astype(np.uint8)
 
-    def _appearances(self, view: View) -> NDArray[np.float64]:
+    def _appearances(self, view: MeshView) -> NDArray[np.float64]:
         """(P, 17) the parameters of each patch for :func:`sim.render.textures.shade`."""
         mesh = self.mesh
         columns = (view.inverse_depths, view.textures.reshape(-1, 6), view.bases_m, 1.0 / mesh.scales_m[:, None],

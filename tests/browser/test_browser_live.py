@@ -15,9 +15,9 @@ pytest.importorskip("harvey_serve", reason="the extra harvey-serve is not instal
 
 from harvey.campaign.campaign import Task
 from harvey.runner.result import MissionResult
-from harvey.simulation.run import build_head, run_mission
-from harvey_serve.gate import Gate
-from harvey_serve.page import open_page as serve_page
+from harvey.simulation.simulated_run import build_head, run_mission
+from harvey_serve.live_page import open_page as serve_page
+from harvey_serve.run_gate import Gate
 from harvey_serve.server import bind
 
 

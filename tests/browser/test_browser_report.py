@@ -68,7 +68,7 @@ def test_a_certificate_opens_on_its_reasons_down_to_a_picture(report: Path, open
         page.wait_for_timeout(20)
         deep, chain = deep + 1, f"{chain}:first-of-type > details"
     text = page.locator("#why").inner_text()
-    assert deep >= 4 and "Certificate-1.0" in text and "Frame-" in text
+    assert deep >= 4 and "Certificate-1.0" in text and "CameraPicture-" in text
 
 
 def test_while_it_is_lost_its_candidates_are_listed(report: Path, data: Any, open_page: Callable[..., Any]) -> None:

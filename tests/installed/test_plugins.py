@@ -113,7 +113,7 @@ def test_a_foreign_fault_has_its_own_keys(installed: Path, tmp_path: Path) -> No
 
 
 def test_a_foreign_base_can_be_named(installed: Path) -> None:
-    code = "from harvey.hardware.base import kind_of; kind, url = kind_of('counting:/dev/null'); print(kind.name, url)"
+    code = "from harvey.hardware.bases import kind_of; kind, url = kind_of('counting:/dev/null'); print(kind.name, url)"
     assert python(installed, "-c", code).stdout == "counting /dev/null\n"
     assert "expected denning:PORT" in python(None, "-c", code).stderr
 

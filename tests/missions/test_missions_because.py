@@ -26,7 +26,7 @@ from blackboard.journal import plain
 from blackboard.kinds import kind_of
 from blackboard.knowledge_source import KnowledgeSource
 from experiments.generated.missions import OFFICE, fault
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources, load_kinds
 from knowledge_sources.settings import Settings
 from sim.scenario import parse_scenario

@@ -14,7 +14,7 @@ from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
 from world_models.camera import CAMERA_UNKNOWNS
 from world_models.entries.location import Hypothesis
-from world_models.entries.robot import CameraState
+from world_models.entries.robot_state import CameraState
 from world_models.frames import Pose2
 
 MOST = DEFAULT.localization.max_doubted_pictures
@@ -32,7 +32,7 @@ def test_a_camera_that_few_pictures_taught_wrongly_is_as_told_again(pictures: in
     assert told is not None and told.value.told_lens is None
     taught = replace(told.value.moved(WRONGLY), counted=tuple((0.1 * k, 0.0, 0.0) for k in range(pictures)))
     assert taught.lens != told.value.lens and taught.as_told() == told.value
-    scheduler.tell([Revise(told, taught)], "user")
+    scheduler.post([Revise(told, taught)], "user")
     run_to_outcome(scheduler, over=lambda s: "found" if _is_found(s) else None)
     camera, held = scheduler.view.latest(CameraState), scheduler.view.latest(Hypothesis, lambda h: h.is_held)
     assert camera is not None and held is not None

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from harvey.cli import main
-from sim.faults.kinds import CameraUnplugged, LinkLost
+from sim.faults.built_in_faults import CameraUnplugged, LinkLost
 from tests.emulated_robot import GOAL_M, INCH_M, emulated
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from harvey.runner.result import MissionResult
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 from towers import tower

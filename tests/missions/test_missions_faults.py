@@ -9,10 +9,10 @@ import pytest
 
 from blackboard.journal import Decision
 from harvey.runner.result import MissionResult
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
+from sim.faults.built_in_faults import CameraUnplugged, LinkLost, Stall
 from sim.faults.fault import DeviceFault
-from sim.faults.kinds import CameraUnplugged, LinkLost, Stall
-from sim.faults.registry import BUILT_IN
+from sim.faults.fault_registry import BUILT_IN
 from sim.stage import Stage
 from world_models.entries.body import BodyFault, MotionReport, MotorCommand, Recovery
 from world_models.entries.task import Milestone

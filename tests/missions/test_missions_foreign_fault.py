@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from experiments.generated.missions import OFFICE, fault
-from harvey.simulation.run import run_mission
-from sim.faults.registry import list_fault_kinds
+from harvey.simulation.simulated_run import run_mission
+from sim.faults.fault_registry import list_fault_kinds
 from sim.scenario import Scenario, ScenarioError, parse_scenario, scenario_from_tables
 from sim.stage import build_stage
 from world_models.frames import Pose2

@@ -18,13 +18,13 @@ from blackboard.kinds import inference
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from experiments.generated.missions import OFFICE
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources
 from knowledge_sources.settings import Settings
-from sim.body.building import Building as TrueBuilding
 from sim.body.simulated_body import SimulatedBody
-from sim.differences.changes import Change as Difference
-from sim.differences.table import Lasting, TrueCamera
+from sim.body.simulated_building import SimulatedBuilding as TrueBuilding
+from sim.ground_truth.table import Lasting, TrueCamera
+from sim.ground_truth.true_changes import TrueChange as Difference
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from sim.truth import Truth
@@ -32,7 +32,7 @@ from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotionReport
-from world_models.entries.robot import CameraState
+from world_models.entries.robot_state import CameraState
 from world_models.robot import RobotModel
 
 FROM_VIEW = Building | RobotModel | Camera | CameraMount | ActuatorModel | View
@@ -40,10 +40,10 @@ FROM_VIEW = Building | RobotModel | Camera | CameraMount | ActuatorModel | View
 OF_TRUTH = Truth | SimulatedBody | Stage | TrueBuilding | Lasting | TrueCamera | Difference
 """What belongs to the simulator."""
 NAMES = [source.__module__.rpartition(".")[2] for source in KNOWLEDGE_SOURCES]
-NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "escalator", "relocalizer", "fault_handler", "path_follower",
-              "elevator_rider", "obstruction_finder", "model_reviser", "redirector", "withdrawer", "obstacle_finder",
-              "door_watcher", "door_doubter", "range_watcher", "floor_watcher", "camera_calibrator",
-              "yaw_calibrator", "twin_watcher"}
+NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "discrepancy_raiser", "relocalizer", "fault_handler", "path_follower",
+              "elevator_rider", "obstruction_finder", "model_reviser", "goal_changer", "dependency_withdrawer", "obstacle_finder",
+              "door_watcher", "shut_door_explainer", "range_watcher", "floor_watcher", "camera_calibrator",
+              "yaw_calibrator", "alias_monitor"}
 """Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
 the move, ride in elevators, find what is before the camera or in the way, take up what somebody tells, or learn of the
 camera."""

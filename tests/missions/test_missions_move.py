@@ -10,7 +10,7 @@ import pytest
 from harvey.agent import build_agent
 from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains
-from harvey.simulation.run import resume_mission, run_mission
+from harvey.simulation.simulated_run import resume_mission, run_mission
 from logs.records import read_records
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
@@ -62,7 +62,7 @@ def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_a
     assert courses[0].change == "Posted" and len(courses) > 60
     assert len({e.fields["curvature_per_m"] for e in courses}) > 0.9 * (len(courses) - 2)
     taken = [e.fields["sim_time_s"] for r in records for e in r.observed
-             if e.type == "Frame" and e.because[0].startswith("Course-1.")]
+             if e.type == "CameraPicture" and e.because[0].startswith("Course-1.")]
     steps = [b - a for a, b in itertools.pairwise(taken)][:-1]
     assert all(abs(step - 1.0 / 30.0) < 1e-9 for step in steps)
     assert decided_again(run)

@@ -6,8 +6,8 @@ import numpy as np
 
 from blackboard.journal import Decision
 from experiments.generated.missions import HALLWAY, fault
-from harvey.simulation.run import run_mission
-from sim.faults.kinds import Occlusion
+from harvey.simulation.simulated_run import run_mission
+from sim.faults.built_in_faults import Occlusion
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from world_models.entries.obstacle import Obstruction

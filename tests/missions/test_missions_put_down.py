@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from knowledge_sources.settings import DEFAULT
 from logs.records import read_records
 from sim.scenario import load_scenario

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from elsewhere import ROOT, SEED, drive_elsewhere
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from sim.stage import Stage
 
 

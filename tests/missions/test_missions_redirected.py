@@ -16,14 +16,14 @@ from harvey.replay.counterfactual import what_if
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
 from harvey.runner.teller import PAGE, LiveTeller
-from harvey.simulation.run import resume_mission, run_mission
+from harvey.simulation.simulated_run import resume_mission, run_mission
 from logs.records import read_records
 from logs.run_directory import RunDirectory
 from sim.scenario import ScenarioError
 from sim.stage import Stage
 from two_doors import two_doors
 from world_models.entries.task import Goal, Milestone, PlanSketch
-from world_models.entries.told import Redirection
+from world_models.entries.user_reports import Redirection
 
 SEED = 3
 BACK = "(study (4,4,0))"
@@ -90,18 +90,18 @@ def test_by_the_missions_file_it_is_asked_at_its_time_and_once_after_a_crash(tmp
     assert result.outcome == "reached" and result.error_m < 0.0254
     whole, run = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "cut")
     told = [entry.fields for record in read_records(whole.journal) for entry in record.observed
-            if entry.type in ("Told", "Redirection")]
+            if entry.type in ("UserReport", "Redirection")]
     assert [one.get("text", one.get("what")) for one in told] == ["Go to the attic", "north-door", BACK]
     run.path.mkdir()
     cycles = [record.cycle for record in read_records(whole.journal)
-              if any(entry.type == "Told" for entry in record.observed)]
+              if any(entry.type == "UserReport" for entry in record.observed)]
     for name in ("run.json", "camera.mjpeg"):
         (run.path / name).write_bytes((whole.path / name).read_bytes())
     lines = whole.journal.read_bytes().splitlines(keepends=True)
     run.journal.write_bytes(b"".join(lines[:cycles[0] + 2]))
     assert resume_mission(run, find_remains(run), stage=stage).outcome == "reached"
     again = [entry.fields for record in read_records(run.journal) for entry in record.observed
-             if entry.type in ("Told", "Redirection")]
+             if entry.type in ("UserReport", "Redirection")]
     assert again == told
 
 

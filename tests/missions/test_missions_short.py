@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from harvey.runner.result import MissionResult
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from sim.stage import Stage
 
 INCH_M = 0.0254

@@ -17,7 +17,7 @@ from harvey.cli import main
 from harvey.runner.result import MissionResult
 from harvey.runner.teller import USER
 from harvey.runner.world_port import WorldPort, tell_robot
-from harvey.simulation.run import build_head, run_mission
+from harvey.simulation.simulated_run import build_head, run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario
@@ -26,7 +26,7 @@ from two_doors import two_doors
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.body import Course
 from world_models.entries.task import PlanSketch
-from world_models.entries.told import Told
+from world_models.entries.user_reports import UserReport
 
 SEED = 3
 SHUT = (3.0, "north-door", "shut")
@@ -37,7 +37,7 @@ def without_watchers(settings: Settings) -> Sequence[KnowledgeSource]:
 
     In these missions what is told is not so, or half of it; who looks sees that.
     """
-    watchers = ("floor_watcher", "door_watcher", "door_doubter")
+    watchers = ("floor_watcher", "door_watcher", "shut_door_explainer")
     blind = replace(settings, action=replace(settings.action, keeps_to_seen_floor=False))
     return [source for source in knowledge_sources(blind) if source.name not in watchers]
 
@@ -59,7 +59,7 @@ def routes(decisions: Sequence[Decision]) -> list[list[str]]:
 
 
 def answers(decisions: Sequence[Decision]) -> list[str]:
-    return [entry.value.answer for entry in made(decisions, Told)]
+    return [entry.value.answer for entry in made(decisions, UserReport)]
 
 
 def test_told_that_a_door_is_shut_it_goes_by_the_other() -> None:
@@ -120,15 +120,15 @@ def test_told_while_it_rolls_it_stops_and_goes_another_way(tmp_path: Path) -> No
 
 def test_told_of_what_is_not_there_it_says_so_and_revises_nothing(tmp_path: Path) -> None:
     """A file cannot say so, but somebody can: the mission goes on as if nothing had been said."""
-    tellings = [Told("study/sofa-1", "gone"), Told("study/table-1", "shut"), Told("nowhere/door", "shut"),
-                Told("north-door", "gone"), Told("north-door", "open")]
+    tellings = [UserReport("study/sofa-1", "gone"), UserReport("study/table-1", "shut"), UserReport("nowhere/door", "shut"),
+                UserReport("north-door", "gone"), UserReport("north-door", "open")]
     decisions: list[Decision] = []
     agent = build_agent(build_head(stage := two_doors(tmp_path), SEED))
     scheduler = agent.scheduler(ports=[WorldPort(agent.store)], sinks=[decisions.append])
     tell_robot(scheduler, agent.robot)
-    scheduler.tell([Post(build_head(stage, SEED).task())], USER)
+    scheduler.post([Post(build_head(stage, SEED).task())], USER)
     for telling in tellings:
-        scheduler.tell([Post(telling)], USER)
+        scheduler.post([Post(telling)], USER)
         while scheduler.step() is not None:
             pass
     assert made(decisions, LocaleFrame) == [] and not any(d.refused for d in decisions)
@@ -145,8 +145,8 @@ def test_told_nonsense_of_a_room_it_still_asks_for_that_room(tmp_path: Path) -> 
     agent = build_agent(head)
     scheduler = agent.scheduler(ports=[WorldPort(agent.store)], sinks=[decisions.append])
     tell_robot(scheduler, agent.robot)
-    for said in (Told("parlour", "shut"), head.task()):
-        scheduler.tell([Post(said)], USER)
+    for said in (UserReport("parlour", "shut"), head.task()):
+        scheduler.post([Post(said)], USER)
         while scheduler.step() is not None:
             pass
     assert not any(decision.refused for decision in decisions)

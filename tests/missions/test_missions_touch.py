@@ -14,7 +14,7 @@ from experiments.generated.missions import OFFICE
 from harvey.cli import main
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
-from harvey.simulation.run import build_head, resume_mission, run_mission
+from harvey.simulation.simulated_run import build_head, resume_mission, run_mission
 from logs.explain.turning_points import read_turning_points
 from logs.explain.why import tell_stories
 from logs.recording.paths import CONTACTS, RANGES
@@ -66,7 +66,7 @@ def test_each_collision_is_felt_once_by_its_motion_and_nothing_else_is(touched: 
 
 def test_ranges_come_with_each_picture(touched: tuple[MissionResult, Path]) -> None:
     _, out = touched
-    frames, ranges = observed(out, "Frame"), observed(out, "Ranges")
+    frames, ranges = observed(out, "CameraPicture"), observed(out, "Ranges")
     assert [frame.because for frame in frames] == [reading.because for reading in ranges]
     nearest_m = min(d for reading in ranges for d in reading.fields["distances_m"] if d is not None)
     assert nearest_m == pytest.approx(0.35, abs=0.08)  # the radius: it touches something

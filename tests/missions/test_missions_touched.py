@@ -17,7 +17,7 @@ from blackboard.change import Revised
 from blackboard.effect import Post, Revise
 from blackboard.journal import Decision
 from blackboard.knowledge_source import KnowledgeSource
-from harvey.simulation.run import build_robot_model, run_mission
+from harvey.simulation.simulated_run import build_robot_model, run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.action.obstacle_finder import ObstacleFinder
 from knowledge_sources.settings import Settings
@@ -66,7 +66,7 @@ def test_a_carton_that_the_model_lacks_is_seen_and_driven_round(tmp_path: Path) 
     assert {e.value.name for e in found} == {"north-hall/obstacle-1"}
     assert found[0].value.by == "camera" and found[0].value.x_m == pytest.approx(14 * 0.3048, abs=0.25)
     assert found[0].because[0].id.startswith("FreeFloor-")
-    assert any(ref.id.startswith("Frame-") for e in made if e.ref == found[0].because[0] for ref in e.because)
+    assert any(ref.id.startswith("CameraPicture-") for e in made if e.ref == found[0].because[0] for ref in e.because)
 
 
 def test_a_carton_that_the_camera_misses_is_touched_once_and_driven_round(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from rerun.chunk import RrdReader
 
 from experiments.generated.missions import OFFICE
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 

@@ -36,24 +36,24 @@ class LineErrors:
     """The errors of n model lines.
 
     Attributes:
-        modes: k names, of walls, doors and things.
-        shifts: (k, n, 3) by how much one standard deviation of each mode displaces each line [m, world].
+        displacement_modes: k names, of walls, doors and things.
+        displacements: (k, n, 3) by how much one standard deviation of each mode displaces each line [m, world].
     """
 
-    modes: tuple[str, ...]
-    shifts: Floats
+    displacement_modes: tuple[str, ...]
+    displacements: Floats
 
     @property
     def is_exact(self) -> bool:
-        return not self.modes
+        return not self.displacement_modes
 
     def take(self, lines: Sequence[int] | NDArray[np.int64]) -> LineErrors:
         """Those of some of the lines, which may be repeated."""
-        return LineErrors(self.modes, self.shifts[:, np.asarray(lines, np.int64)])
+        return LineErrors(self.displacement_modes, self.displacements[:, np.asarray(lines, np.int64)])
 
     def displace(self, lines_world: Floats, amplitudes: Floats) -> Floats:
         """The lines (n, 2, 3) displaced by the modes with amplitudes (k,), in standard deviations."""
-        return np.asarray(lines_world + np.tensordot(amplitudes, self.shifts, axes=1)[:, None])
+        return np.asarray(lines_world + np.tensordot(amplitudes, self.displacements, axes=1)[:, None])
 
 
 def exact(count: int) -> LineErrors:
@@ -63,8 +63,8 @@ def exact(count: int) -> LineErrors:
 
 def pack_errors(errors: LineErrors) -> tuple[tuple[float, ...], ...]:
     """The shifts that are not zero, as (mode, line, x, y, z)."""
-    return tuple((float(k), float(i), *errors.shifts[k, i].tolist())
-                 for k, i in np.argwhere(np.any(errors.shifts != 0.0, axis=2)).tolist())
+    return tuple((float(k), float(i), *errors.displacements[k, i].tolist())
+                 for k, i in np.argwhere(np.any(errors.displacements != 0.0, axis=2)).tolist())
 
 
 def unpack_errors(modes: tuple[str, ...], packed: Sequence[Sequence[float]], count: int) -> LineErrors:

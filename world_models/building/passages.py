@@ -138,7 +138,7 @@ def _number_components(nodes: list[Numbered], edges: list[PassageEdge]) -> dict[
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class PassageTaken:
     """A passage, taken from room ``origin`` into room ``destination``."""
 
     passage: Doorway | Link
@@ -156,7 +156,7 @@ class Route:
     """
 
     container: str
-    steps: tuple[Step, ...]
+    steps: tuple[PassageTaken, ...]
 
 
 def find_route(
@@ -180,10 +180,10 @@ def find_route(
     return None
 
 
-def _build_step(frames: Mapping[str, LocaleFrame], edge: PassageEdge, side: int) -> Step:
+def _build_step(frames: Mapping[str, LocaleFrame], edge: PassageEdge, side: int) -> PassageTaken:
     room = edge.rooms[side]
     passages: tuple[Doorway | Link, ...] = (*frames[room].doorways, *frames[room].links)
-    return Step(next(p for p in passages if p.name == edge.passage), room, edge.rooms[1 - side])
+    return PassageTaken(next(p for p in passages if p.name == edge.passage), room, edge.rooms[1 - side])
 
 
 def _shortest_path(edges: Iterable[OpenEdge], start: Component, goal: Component) -> list[tuple[PassageEdge, int]]:

@@ -49,7 +49,7 @@ class Drawing:
 
 
 @dataclass(frozen=True, eq=False)
-class Storey:
+class DrawnStorey:
     """A storey as it is drawn by itself.
 
     Attributes:
@@ -63,7 +63,7 @@ class Storey:
     drawing: Drawing
 
 
-def draw_storeys(world: World) -> list[Storey]:
+def draw_storeys(world: World) -> list[DrawnStorey]:
     """Each storey by itself, from the lowest."""
     storeys = find_storeys(world)
     return [_draw_panel(world, floor_m, rooms, len(storeys) > 1) for floor_m, rooms in storeys]
@@ -88,7 +88,7 @@ def build_drawing(world: World) -> Drawing:
     return Drawing(np.array([width, math.fsum(heights)]), tuple(shapes))
 
 
-def _draw_panel(world: World, floor_m: float, rooms: list[str], titled: bool) -> Storey:
+def _draw_panel(world: World, floor_m: float, rooms: list[str], titled: bool) -> DrawnStorey:
     """One storey, its south-west corner at 0, 0."""
     corners = np.concatenate([world.outline(name) for name in rooms])
     low, high = corners.min(axis=0) - MARGIN_M, corners.max(axis=0) + MARGIN_M
@@ -98,7 +98,7 @@ def _draw_panel(world: World, floor_m: float, rooms: list[str], titled: bool) ->
         text = f"{_title_of(world, rooms)}, floor at {floor_m:.2f} m"
         shapes.append(Shape("title", np.array([[width / 2, height + TITLE_M / 3]]), text))
     size = np.array([width, height + (TITLE_M if titled else 0.0)])
-    return Storey(tuple(rooms), low, Drawing(size, tuple(shapes)))
+    return DrawnStorey(tuple(rooms), low, Drawing(size, tuple(shapes)))
 
 
 def find_storeys(world: World) -> list[tuple[float, list[str]]]:

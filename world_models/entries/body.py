@@ -143,7 +143,7 @@ class RideReport:
 
 @request(keep=LAST_REQUESTS)
 @dataclass(frozen=True, slots=True)
-class Look:
+class PictureRequest:
     """A request for a picture.
 
     Attributes:
@@ -158,14 +158,14 @@ class Look:
 
 @observation(keep=2)
 @dataclass(frozen=True, slots=True)
-class Frame:
+class CameraPicture:
     """A picture as the camera delivers it: compressed.
 
     Attributes:
         jpeg: the bytes; everything perceives what these decode to.
         number: counts the frames of a run from 0.
         sim_time_s: when it was taken.
-        purpose: that of the :class:`Look` it answers.
+        purpose: that of the :class:`PictureRequest` it answers.
     """
 
     jpeg: bytes

@@ -19,7 +19,7 @@ from world_models.frames import Pose, Pose2, flattened, wrap_angle
 HypothesisStatus = Literal["held", "candidate", "doubted"]
 
 
-class Frames(Protocol):
+class LocalePoses(Protocol):
     """What is needed of a world: the frames of its locales."""
 
     def world_from_locale(self, name: str, /) -> Pose: ...
@@ -51,12 +51,12 @@ class Place:
     y_m: float
     heading_rad: float | None = None
 
-    def in_world(self, world: Frames) -> Pose2:
+    def in_world(self, world: LocalePoses) -> Pose2:
         """The pose of a robot there, in the world frame; heading 0 of the locale where none is said."""
         return flattened(world.world_from_locale(self.locale)) @ Pose2(self.x_m, self.y_m, self.heading_rad or 0.0)
 
     @staticmethod
-    def of_world(world: Frames, locale: str, x_m: float, y_m: float, heading_rad: float | None = None) -> Place:
+    def of_world(world: LocalePoses, locale: str, x_m: float, y_m: float, heading_rad: float | None = None) -> Place:
         """The place in a locale's frame of a point (and heading) of the world frame."""
         own = flattened(world.world_from_locale(locale)).inverse() @ Pose2(x_m, y_m, heading_rad or 0.0)
         return Place(locale, own.x_m, own.y_m, None if heading_rad is None else own.heading_rad)
@@ -108,17 +108,17 @@ class Hypothesis:
         """Standard deviation of the heading [rad]."""
         return math.sqrt(max(0.0, self.covariance[2][2]))
 
-    def world_from_robot(self, world: Frames) -> Pose2:
+    def world_from_robot(self, world: LocalePoses) -> Pose2:
         return flattened(world.world_from_locale(self.locale)) @ self.locale_from_robot
 
-    def covariance_world(self, world: Frames) -> NDArray[np.float64]:
+    def covariance_world(self, world: LocalePoses) -> NDArray[np.float64]:
         """(3, 3) over (x, y, heading) in the world frame."""
         turn = _turn(flattened(world.world_from_locale(self.locale)).heading_rad)
         return np.asarray(turn @ np.array(self.covariance) @ turn.T)
 
     @staticmethod
     def of_world(
-        world: Frames, locale: str, world_from_robot: Pose2, covariance_world: Any, basis: str,
+        world: LocalePoses, locale: str, world_from_robot: Pose2, covariance_world: Any, basis: str,
         *, status: HypothesisStatus = "held", weight: float = 1.0, motion: str = "", evidence: str = "",
     ) -> Hypothesis:
         """From a pose and covariance in the world frame."""

@@ -113,7 +113,7 @@ class PlanSketch:
         at: the subgoal that is next or under way; n at the end.
         verified: whether milestone ``at`` holds.
         status: active, done or superseded.
-        looks: so often the robot went somewhere to look again at what left no way.
+        lookout_count: so often the robot went somewhere to look again at what left no way.
         is_look: whether it leads there, and not to the goal.
         halts: so often in a row a leg was halted and the sketch drawn anew for it.
         adjustments: how often plan-level servoing changed it.
@@ -128,7 +128,7 @@ class PlanSketch:
     status: SketchStatus = "active"
     halts: int = 0
     adjustments: int = 0
-    looks: int = 0
+    lookout_count: int = 0
     is_look: bool = False
 
     @property
@@ -180,7 +180,7 @@ class Leg:
             the last increment was decided; None before the first.
         aim_rad: how far to the left of its heading the point lay that it then steered at [rad].
         looking_rad: the heading that the robot turns to, to see floor that it will need [rad, world]; None on the way.
-        looks: x, y and heading of each such look on this leg.
+        looked_at: x, y and heading of each such look on this leg.
     """
 
     sketch: str
@@ -197,7 +197,7 @@ class Leg:
     left_m: float | None = None
     aim_rad: float | None = None
     looking_rad: float | None = None
-    looks: tuple[tuple[float, float, float], ...] = ()
+    looked_at: tuple[tuple[float, float, float], ...] = ()
 
     def sentence(self) -> str:
         length_m = math.hypot(self.x1_m - self.x0_m, self.y1_m - self.y0_m)
@@ -226,11 +226,11 @@ class Milestone:
         expected: the visible model lines, ((x0, y0, z0), (x1, y1, z1)) [m, world].
         expected_px: their expected projection, ((u0, v0), (u1, v1)).
         landmark_of: for each line, its index in ``landmarks``.
-        looks: the faces that should be seen, each as its colour (red, green, blue; 0..1) and points of it [m, world].
+        face_colors: the faces that should be seen, each as its colour (red, green, blue; 0..1) and points of it [m, world].
         tried: headings from which it was looked for before, and could not be told [rad, world].
-        modes: what of the model may be displaced as one: walls, doors, things; none where it is exact.
-        shifts: by how much a standard deviation of a mode displaces a line: (mode, line, x, y, z [m, world]).
-        told: log odds of a wrong place by the looks in other directions, where the model is inexact.
+        displacement_modes: what of the model may be displaced as one: walls, doors, things; none where it is exact.
+        displacements: by how much a standard deviation of a mode displaces a line: (mode, line, x, y, z [m, world]).
+        log_odds_so_far: log odds of a wrong place by the looks in other directions, where the model is inexact.
         status: turning (not yet looking there), expected, verified, refuted, not testable, or withdrawn (what is
             known of the building has changed, and it rested on that).
     """
@@ -243,11 +243,11 @@ class Milestone:
     expected: tuple[tuple[tuple[float, ...], ...], ...] = ()
     expected_px: tuple[tuple[tuple[float, ...], ...], ...] = ()
     landmark_of: tuple[int, ...] = ()
-    looks: tuple[tuple[tuple[float, ...], tuple[tuple[float, ...], ...]], ...] = ()
+    face_colors: tuple[tuple[tuple[float, ...], tuple[tuple[float, ...], ...]], ...] = ()
     tried: tuple[float, ...] = ()
-    modes: tuple[str, ...] = ()
-    shifts: tuple[tuple[float, ...], ...] = ()
-    told: float = 0.0
+    displacement_modes: tuple[str, ...] = ()
+    displacements: tuple[tuple[float, ...], ...] = ()
+    log_odds_so_far: float = 0.0
     status: MilestoneStatus = "turning"
 
     @property
@@ -257,7 +257,7 @@ class Milestone:
     @property
     def errors(self) -> LineErrors:
         """How well the model knows its lines."""
-        return unpack_errors(self.modes, self.shifts, len(self.expected))
+        return unpack_errors(self.displacement_modes, self.displacements, len(self.expected))
 
     def name(self) -> str:
         """``M1 of the route``, or ``check of the belief``; without the reason for a check."""

@@ -13,7 +13,7 @@ from world_models.files.construction.builder import build_world
 from world_models.files.construction.specs import WorldSpec
 from world_models.files.packed import SUFFIXES, PackedFrames, PackedWorld, compile_world
 from world_models.files.toml.other_files import compute_digest
-from world_models.files.toml.settings import suggest_keys
+from world_models.files.toml.settings_reader import suggest_keys
 from world_models.files.toml.source import WORLDS, Source, WorldError
 from world_models.files.toml.world_reader import WorldReader
 

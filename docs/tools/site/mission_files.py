@@ -8,14 +8,14 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from docs.tools.site.markdown import describe_fields, summary, table
-from harvey.hardware.mission import FORMAT as ON_HARDWARE
-from sim.body.building import Helper
-from sim.differences.table import ExtraThing, TrueDoor, TrueThing, TrueWall
-from sim.differences.things import MovedThing
-from sim.faults.registry import BUILT_IN
+from harvey.hardware.hardware_mission import FORMAT as ON_HARDWARE
+from sim.body.simulated_building import Helper
+from sim.faults.fault_registry import BUILT_IN
+from sim.ground_truth.table import ExtraThing, TrueDoor, TrueThing, TrueWall
+from sim.ground_truth.things import MovedThing
 from sim.scenario import FORMAT as SIMULATED
 from world_models.files.toml.mission import TABLES, Telling
-from world_models.files.toml.settings import spellings
+from world_models.files.toml.settings_reader import spellings
 
 LISTED: Mapping[str, type[Any]] = {
     "moved": MovedThing, "rides": Helper, "truth.doors": TrueDoor, "truth.things": TrueThing, "truth.walls": TrueWall,

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from harvey.hardware.drivers.base import BaseKind, Driver
+from harvey.hardware.drivers.base_driver import BaseKind, Driver
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
 from world_models.frames import Pose2
 

@@ -20,7 +20,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from harvey.hardware.drivers.base import LOOK_S, BaseKind, Driver, FaultKind, Link
+from harvey.hardware.drivers.base_driver import LOOK_S, BaseKind, BytePipe, Driver, FaultKind
 from harvey_bases.counters import step
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
 from world_models.entries.obstacle import Contact, Ranges
@@ -100,7 +100,7 @@ def safe() -> bytes:
     return PAD + bytes([SAFE])
 
 
-class Decoder:
+class CreateDecoder:
     """Reports out of whatever bytes come; what is none is passed over, byte by byte, and counted.
 
     Attributes:
@@ -194,7 +194,7 @@ def build_ranges(lights: Sequence[int], when_s: float) -> Ranges:
     return Ranges(directions, distances, LIGHT_SIGMA_M, LIGHT_HALF_BEAM_RAD, LIGHT_REACH_M, when_s)
 
 
-class Guard:
+class Watchdog:
     """A watchdog for a base that has none: says stop when it is armed and no sign of life came for a while.
 
     It lives in our process and speaks over our line. It helps when the driving thread hangs; where the whole process
@@ -285,7 +285,7 @@ Wheels = tuple[float, float]
 """How far the right and the left wheel have gone [m]."""
 
 
-class _Way:
+class _MotionProgress:
     """What has been done of a command, by the wheels' counts.
 
     Attributes:
@@ -337,10 +337,10 @@ class _Way:
 class Create2Base(Driver):
     """A base over the Open Interface."""
 
-    def __init__(self, link: Link, *, guarded: bool = False) -> None:
+    def __init__(self, link: BytePipe, *, guarded: bool = False) -> None:
         """``guarded``: a thread stops the base when the driving thread hangs."""
         super().__init__(link)
-        self._decoder = Decoder()
+        self._decoder = CreateDecoder()
         self._last: Report | None = None
         self._doubts = 0
         self._heard_s = self._said_s = -math.inf
@@ -348,7 +348,7 @@ class Create2Base(Driver):
         self._lights_wanted = False
         self._wheels: Wheels = (0.0, 0.0)
         self._pose = Pose2(0.0, 0.0, 0.0)
-        self.guard = Guard(lambda: link.write(drive(0, 0)), link.now, WATCHDOG_S)
+        self.guard = Watchdog(lambda: link.write(drive(0, 0)), link.now, WATCHDOG_S)
         if guarded:
             self.guard.start()
 
@@ -361,7 +361,7 @@ class Create2Base(Driver):
         if self._stop_asked.is_set():
             raise self._fault("stopped", "a stop was asked for", stopped=True)
         self._halt()
-        way = _Way(self._wheels, self._link.now())
+        way = _MotionProgress(self._wheels, self._link.now())
         self._so_far = way.go_on(self._wheels, self._link.now())
         half_axle = AXLE_M / 2.0
         sign = math.copysign(1.0, command.turn_rad)
@@ -426,7 +426,7 @@ class Create2Base(Driver):
     def _after_reopening(self) -> None:
         self._decoder.clear()
 
-    def _go(self, way: _Way, goal_m: float, sign: float, speeds: tuple[int, int], *, turning: bool) -> None:
+    def _go(self, way: _MotionProgress, goal_m: float, sign: float, speeds: tuple[int, int], *, turning: bool) -> None:
         """The wheels go this far, against each other or together, fast and at last slowly, and stand."""
         fast, slow = speeds
         ends_s = self._link.now() + 2.0 * goal_m / (slow / 1000.0) + 2.0
@@ -454,7 +454,7 @@ class Create2Base(Driver):
             self._wanted = wanted
             self._send(drive(*wanted))
 
-    def _check(self, way: _Way, report: Report, goal_m: float) -> None:
+    def _check(self, way: _MotionProgress, report: Report, goal_m: float) -> None:
         """See that the base does what it was told to, and can."""
         self._so_far = way.go_on(self._wheels, self._link.now())
         if report.mode != SAFE_MODE:

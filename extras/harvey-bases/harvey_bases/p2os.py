@@ -21,7 +21,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from harvey.hardware.drivers.base import LOOK_S, BaseKind, Driver, Link
+from harvey.hardware.drivers.base_driver import LOOK_S, BaseKind, BytePipe, Driver
 from harvey_bases.counters import step
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
 from world_models.entries.obstacle import Contact, Ranges
@@ -108,7 +108,7 @@ def _packet(content: bytes) -> bytes:
     return HEADER + bytes([len(content) + 2]) + content + checksum(content).to_bytes(2, "big")
 
 
-class Decoder:
+class P2osDecoder:
     """Packets out of whatever bytes come; what is none is passed over, byte by byte, and counted.
 
     Attributes:
@@ -253,7 +253,7 @@ MAX_OFF_M, MAX_OFF_RAD = 0.01, math.radians(0.9)
 """Good enough: what was really done is reported anyway. Headings are whole degrees."""
 
 
-class _Way:
+class _MotionProgress:
     """What has been done of a command, by the base's odometry.
 
     Attributes:
@@ -306,12 +306,12 @@ class P2osBase(Driver):
     """A base over P2OS."""
 
     def __init__(
-        self, link: Link, *, mm_per_unit: float | None = None, speed_m_per_s: float = 0.3,
+        self, link: BytePipe, *, mm_per_unit: float | None = None, speed_m_per_s: float = 0.3,
         turn_speed_rad_per_s: float = math.radians(40.0),
     ) -> None:
         """``mm_per_unit`` is what the base's odometry counts in; by default what is known of its subclass."""
         super().__init__(link)
-        self._decoder = Decoder()
+        self._decoder = P2osDecoder()
         self._mm = mm_per_unit
         self._speed, self._turn_speed = speed_m_per_s, turn_speed_rad_per_s
         self._names: tuple[str, ...] = ()
@@ -327,7 +327,7 @@ class P2osBase(Driver):
         self._halt()
         speed = self._speed if command.speed_m_per_s is None else min(self._speed, command.speed_m_per_s)
         self._prepare(speed)
-        way = _Way(self._pose, self._link.now())
+        way = _MotionProgress(self._pose, self._link.now())
         self._so_far = way.done(self._pose, self._link.now())
         for part in _parts(command.turn_rad, TURN_PART_RAD):
             self._turn_by(way, part)
@@ -383,7 +383,7 @@ class P2osBase(Driver):
                 return
         raise self._fault("refused", "its motors cannot be enabled; is the emergency button pressed?", stopped=True)
 
-    def _turn_by(self, way: _Way, turn_rad: float) -> None:
+    def _turn_by(self, way: _MotionProgress, turn_rad: float) -> None:
         """To an absolute heading, said again and again until it is there."""
         last = self._last
         offset_rad = self._pose.heading_rad - (UNIT_RAD * last.heading if last is not None else 0.0)
@@ -401,7 +401,7 @@ class P2osBase(Driver):
                 return
         self._gave_up("turn")
 
-    def _move_by(self, way: _Way, move_m: float, speed_m_per_s: float) -> None:
+    def _move_by(self, way: _MotionProgress, move_m: float, speed_m_per_s: float) -> None:
         """What is left of the move is asked for again whenever the base stands short of its end."""
         goal_m, before_m, tries = way.gone_m + move_m, way.gone_m, 0
         ends_s = self._link.now() + 2.0 * move_m / speed_m_per_s + 6.0
@@ -428,7 +428,7 @@ class P2osBase(Driver):
         raise self._fault("stalled", f"the {what} came to nothing" + (": a motor is held" if stalled else ""),
                           stopped=True)
 
-    def _watch(self, way: _Way, status: Status, *, turning: float = 0.0, moving: float = 0.0) -> None:
+    def _watch(self, way: _MotionProgress, status: Status, *, turning: float = 0.0, moving: float = 0.0) -> None:
         """Take note of a status, and see that the motion is the one that was asked for."""
         if way.is_held(status):
             self._gave_up("turn" if turning else "move")

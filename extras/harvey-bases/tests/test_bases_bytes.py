@@ -43,19 +43,19 @@ STATUSES = st.fixed_dictionaries({
 
 @given(STATUSES)
 def test_the_driver_reads_what_the_pioneer_tells(told: dict[str, int]) -> None:
-    (heard,) = p2os.Decoder().feed(p2os_emulator.build_status(**told))
+    (heard,) = p2os.P2osDecoder().feed(p2os_emulator.build_status(**told))
     assert heard == p2os.Status(**told)
 
 
 @given(st.integers(-2**31, 2**31 - 1), st.integers(-2**31, 2**31 - 1))
 def test_the_driver_reads_encoder_packets(left: int, right: int) -> None:
     packet = p2os_emulator.build_encoder_counts(left, right)
-    assert list(p2os.Decoder().feed(packet)) == [p2os.Counts(left, right)]
+    assert list(p2os.P2osDecoder().feed(packet)) == [p2os.Counts(left, right)]
 
 
 @given(NOISE, STATUSES)
 def test_the_pioneer_decoder_goes_on_after_noise(noise: bytes, told: dict[str, int]) -> None:
-    decoder = p2os.Decoder()
+    decoder = p2os.P2osDecoder()
     list(decoder.feed(noise))
     heard = [m for _ in range(12) for m in decoder.feed(p2os_emulator.build_status(**told))]
     assert p2os.Status(**told) in heard
@@ -68,7 +68,7 @@ def test_a_create_obeys_a_speed_whatever_was_left_open_before_it(right: int, lef
     robot.receive(bytes([create2.DRIVE_DIRECT]) + cut)
     robot.receive(create2.drive(right, left))
     robot.advance(0.016)
-    (*_, report) = create2.Decoder().feed(robot.take())
+    (*_, report) = create2.CreateDecoder().feed(robot.take())
     assert (report.right_wanted, report.left_wanted, report.mode) == (right, left, create2.SAFE_MODE)
 
 
@@ -82,7 +82,7 @@ def test_the_stream_decoder_goes_on_after_noise(noise: bytes, count: int) -> Non
     robot = Create2Emulator(IdealGround(), count=count)
     robot.receive(create2.wake())
     robot.advance(0.1)
-    decoder = create2.Decoder()
+    decoder = create2.CreateDecoder()
     list(decoder.feed(noise))
     (*_, report) = decoder.feed(robot.take())
     assert (report.left_count, report.right_count) == (count, count)
@@ -91,7 +91,7 @@ def test_the_stream_decoder_goes_on_after_noise(noise: bytes, count: int) -> Non
 @given(NOISE, st.integers(1, 8))
 def test_bytes_of_any_kind_raise_nothing_at_either_end(noise: bytes, size: int) -> None:
     pieces = [noise[i:i + size] for i in range(0, len(noise), size)]
-    for decoder in (p2os.Decoder(), create2.Decoder()):
+    for decoder in (p2os.P2osDecoder(), create2.CreateDecoder()):
         for piece in pieces:
             list(decoder.feed(piece))
     for base in (P2osEmulator(IdealGround()), Create2Emulator(IdealGround())):
@@ -124,7 +124,7 @@ WITH_SENSES = st.fixed_dictionaries({
 
 @given(WITH_SENSES)
 def test_the_driver_reads_the_pioneers_bumpers_and_sonars(told: dict[str, Any]) -> None:
-    (heard,) = p2os.Decoder().feed(p2os_emulator.build_status(**told))
+    (heard,) = p2os.P2osDecoder().feed(p2os_emulator.build_status(**told))
     assert heard == p2os.Status(**told)
     contact = p2os.find_contact(heard, 1.0, turning=True)
     assert (contact is None) == (not (told["front"] or told["rear"] or told["stalled"]))
@@ -148,7 +148,7 @@ def test_the_light_bumper_tells_how_near_a_wall_is(wall_m: float, with_lights: b
     robot = Create2Emulator(floor)
     robot.receive(create2.wake(with_lights=with_lights))
     robot.advance(0.016)
-    (*_, report) = create2.Decoder().feed(robot.take())
+    (*_, report) = create2.CreateDecoder().feed(robot.take())
     assert len(report.lights) == (6 if with_lights else 0)
     for distance in create2.build_ranges(report.lights, 0.0).distances_m if with_lights else ():
         near = wall_m < create2.LIGHT_REACH_M - 0.002
@@ -160,7 +160,7 @@ def test_both_streams_are_found_again_after_noise(noise: bytes, with_lights: boo
     robot = Create2Emulator(IdealGround(), count=7)
     robot.receive(create2.wake(with_lights=with_lights))
     robot.advance(0.15)
-    decoder = create2.Decoder()
+    decoder = create2.CreateDecoder()
     list(decoder.feed(noise))
     (*_, report) = decoder.feed(robot.take())
     assert (report.left_count, len(report.lights)) == (7, 6 if with_lights else 0)

@@ -7,17 +7,17 @@ from collections.abc import Callable
 import pytest
 
 from experiments.generated.scenes import box_room
-from harvey.hardware.base import base_kinds
+from harvey.hardware.bases import base_kinds
 from harvey_bases import p2os_emulator
-from harvey_bases.create2 import Create2Base, Guard
+from harvey_bases.create2 import Create2Base, Watchdog
 from harvey_bases.create2_emulator import PASSIVE, Create2Emulator
 from harvey_bases.p2os import P2osBase, encode
 from harvey_bases.p2os_emulator import P2osEmulator
-from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
+from sim.body.simulated_building import SimulatedBuilding
 from sim.emulators.emulator import IdealGround
+from sim.emulators.emulator_registry import emulator_kinds
 from sim.emulators.line import PseudoTerminalLink
-from sim.emulators.registry import emulator_kinds
 from tests.serial_bench import (
     NEAR_M,
     OF_SENSES,
@@ -120,7 +120,7 @@ def test_a_pioneer_of_an_unknown_kind_is_refused_until_its_units_are_told(monkey
 
 def test_the_guard_stops_a_base_whose_driver_hangs_and_only_then() -> None:
     now, stops = [0.0], []
-    guard = Guard(lambda: stops.append(now[0]), lambda: now[0], 0.5)
+    guard = Watchdog(lambda: stops.append(now[0]), lambda: now[0], 0.5)
     guard.check()
     guard.arm()
     now[0] = 0.4
@@ -136,7 +136,7 @@ def test_the_guard_stops_a_base_whose_driver_hangs_and_only_then() -> None:
 
 
 def simulated() -> SimulatedBody:
-    return SimulatedBody(Building.of_faces(box_room()), Pose2(1.0, 2.0, 0.0), Camera.from_field_of_view(1.1, 64, 64),
+    return SimulatedBody(SimulatedBuilding.of_faces(box_room()), Pose2(1.0, 2.0, 0.0), Camera.from_field_of_view(1.1, 64, 64),
                          CameraMount(1.0, 0.1, 0.0), seed=3)
 
 

@@ -12,9 +12,9 @@ import pytest
 from blackboard.journal import Decision
 from experiments.generated.missions import OFFICE
 from harvey.runner.result import MissionResult
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.registry import find_fault_class
+from sim.faults.fault_registry import find_fault_class
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from world_models.entries.body import BodyFault, MotorCommand, Recovery

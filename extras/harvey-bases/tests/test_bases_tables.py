@@ -68,7 +68,7 @@ def test_each_field_of_a_pioneers_status_is_where_the_manual_says(
 ) -> None:
     """Bytes: 0 kind, 1 x, 3 y, 5 heading, 7 left, 9 right, 11 battery, 12 rear, 13 front, 16 flags, 19 sonar count."""
     content = bytearray([0x33 if moving else 0x32]) + rest[:18] + bytes([count]) + sonars[:3 * count] + rest[-4:]
-    (heard,) = p2os.Decoder().feed(packet(bytes(content)))
+    (heard,) = p2os.P2osDecoder().feed(packet(bytes(content)))
     assert isinstance(heard, p2os.Status)
     words = np.frombuffer(bytes(content[1:11]), "<u2")
     assert (heard.moving, heard.x, heard.y) == (moving, words[0] % 32768, words[1] % 32768)
@@ -82,7 +82,7 @@ def test_each_field_of_a_pioneers_status_is_where_the_manual_says(
 @pytest.mark.parametrize(("size", "heard"), [(1, 1), (197, 1), (198, 1), (199, 0), (200, 0)])
 def test_a_packet_has_at_most_200_bytes(size: int, heard: int) -> None:
     """COUNT is of the content and its checksum; here an answer to SYNC2 with a long name."""
-    decoder = p2os.Decoder()
+    decoder = p2os.P2osDecoder()
     found = list(decoder.feed(packet(b"\2" + b"a" * (size - 1)) + packet(b"\0")))
     assert len(found) == heard + 1 and decoder.rejected == 1 - heard
 
@@ -93,11 +93,11 @@ def test_packets_too_short_or_of_other_kinds_mean_nothing() -> None:
     assert p2os.understood(b"\x90" + bytes(8)) == p2os.Counts(0, 0)
     assert p2os.understood(b"\0\0") is None and p2os.understood(b"\1") == p2os.Echo(1)
     assert p2os.understood(b"\2R\0P\0p3dx\0more") == p2os.Echo(2, ("R", "P", "p3dx"))
-    assert p2os.Decoder().rejected == 0
+    assert p2os.P2osDecoder().rejected == 0
 
 
 def test_garbage_is_counted_once_for_each_header() -> None:
-    decoder = p2os.Decoder()
+    decoder = p2os.P2osDecoder()
     bad = bytearray(packet(b"\0"))
     bad[-1] ^= 1
     assert list(decoder.feed(b"noise" + bytes(bad) + b"\xfa\xfb\x02" + packet(b"\1"))) == [p2os.Echo(1)]
@@ -216,7 +216,7 @@ def test_a_changed_byte_of_the_stream_is_noticed(at: int, change: int, with_ligh
 
 def test_the_creates_decoder_goes_on_behind_each_frame_and_counts_what_is_none() -> None:
     good, lit = stream((1, 2, 3, 4), 2, 0, ()), stream((5, 6, 7, 8), 2, 0, (9,) * 6)
-    decoder = create2.Decoder()
+    decoder = create2.CreateDecoder()
     bad = good[:-1] + bytes([good[-1] ^ 1])
     pieces = (good[:7], good[7:] + lit + b"\x13\x05", bad, lit[:3])
     heard = [report.right_wanted for piece in pieces for report in decoder.feed(piece)]

@@ -12,7 +12,7 @@ from hand_made_create import M_PER_COUNT, STREAMED, HandMadeCreate, connect
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.hardware.drivers.base import BaseFault
+from harvey.hardware.drivers.base_driver import BaseFault
 from harvey_bases.create2 import Create2Base
 from world_models.entries.body import MotorCommand
 from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD

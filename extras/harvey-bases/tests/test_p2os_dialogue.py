@@ -11,7 +11,7 @@ from hand_made_pioneer import NAMES, HandMadePioneer, connect, from_now_on
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.hardware.drivers.base import BaseFault
+from harvey.hardware.drivers.base_driver import BaseFault
 from harvey_bases.p2os import P2osBase
 from world_models.entries.body import MotionReport, MotorCommand
 from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD

@@ -14,7 +14,7 @@ from hand_made_pioneer import HandMadePioneer, connect
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.hardware.drivers.base import BaseFault
+from harvey.hardware.drivers.base_driver import BaseFault
 from harvey_bases.p2os import P2osBase
 
 TURN = 4096

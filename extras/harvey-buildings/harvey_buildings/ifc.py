@@ -14,7 +14,7 @@ import numpy as np
 
 from harvey_buildings.building_plan import BuildingError, BuildingPlan
 from harvey_buildings.ifc_elements import FURNITURE, Contents, Passages, Spaces
-from harvey_buildings.ifc_file import ELEMENT_S, READ_ERRORS, Body, IfcFile, Progress, first_line
+from harvey_buildings.ifc_file import ELEMENT_S, READ_ERRORS, ElementShape, IfcFile, ReadingProgress, first_line
 
 TAIL_BYTES = 65536
 """How much of a file's start and end is searched for its first and last line."""
@@ -53,8 +53,8 @@ def await_answer(path: Path, answers: Connection) -> BuildingPlan | str:
     """The plan or the error text that the reading process sends, each step within the time limit that it announced."""
     limit_s, doing = START_S, "starting to read"
     while answers.poll(limit_s):
-        message: Progress | BuildingPlan | str = answers.recv()
-        if not isinstance(message, Progress):
+        message: ReadingProgress | BuildingPlan | str = answers.recv()
+        if not isinstance(message, ReadingProgress):
             return message
         limit_s, doing = message.limit_s, message.doing
     return (f"{path.name}: expected an IFC file, got one that ifcopenshell does not get done with: {doing} was given up"
@@ -69,12 +69,12 @@ def _serve(path: Path, sender: Connection) -> None:
         sender.send(str(error))
 
 
-def _read(path: Path, send: Callable[[Progress], None]) -> BuildingPlan:
+def _read(path: Path, send: Callable[[ReadingProgress], None]) -> BuildingPlan:
     import ifcopenshell
     import ifcopenshell.geom
 
     try:
-        send(Progress("opening it", OPEN_S + OPEN_S_PER_MB * path.stat().st_size / 1e6))
+        send(ReadingProgress("opening it", OPEN_S + OPEN_S_PER_MB * path.stat().st_size / 1e6))
         if _is_truncated(path):
             raise ValueError("one that is cut off: END-ISO-10303-21; is missing")
         plain = path.read_bytes().isascii()
@@ -109,7 +109,7 @@ def _to_ascii(path: Path) -> str:
     return re.sub(r"[^\x00-\x7f]+", lambda found: f"\\X4\\{found[0].encode('utf-32-be').hex().upper()}\\X0\\", text)
 
 
-def _build_shape_reader() -> Callable[[Any, bool], Body]:
+def _build_shape_reader() -> Callable[[Any, bool], ElementShape]:
     """A function for the shape of an element; with ``roughly`` also from its bounding box or its lines on the plan."""
     import ifcopenshell.geom
 
@@ -118,7 +118,7 @@ def _build_shape_reader() -> Callable[[Any, bool], Body]:
     rough.set("keep-bounding-boxes", True)
     rough.set("dimensionality", ifcopenshell.ifcopenshell_wrapper.CURVES_SURFACES_AND_SOLIDS)
 
-    def shape(element: Any, roughly: bool) -> Body:
+    def shape(element: Any, roughly: bool) -> ElementShape:
         try:
             made = geometry.create_shape(rough if roughly else settings, element)
         except RuntimeError:
@@ -128,7 +128,7 @@ def _build_shape_reader() -> Callable[[Any, bool], Body]:
         frame = np.array(made.transformation.matrix, float).reshape(4, 4).T[:3]
         if not len(points) or not np.isfinite(points).all() or not np.isfinite(frame).all():
             raise ValueError("it has no shape")
-        return Body(points, np.array(made.geometry.faces, int).reshape(-1, 3), frame,
+        return ElementShape(points, np.array(made.geometry.faces, int).reshape(-1, 3), frame,
                     np.array(made.geometry.edges, int).reshape(-1, 2))
 
     return shape
@@ -167,7 +167,7 @@ def _read_unit_m(model: Any) -> float:
 
 def read_plan(file: IfcFile) -> BuildingPlan:
     """Everything that is used of the file. Raises BuildingError where it has no usable space."""
-    file.send(Progress("reading its storeys", ELEMENT_S))
+    file.send(ReadingProgress("reading its storeys", ELEMENT_S))
     spaces, contents = Spaces(file), Contents(file)
     spaces.read()
     Passages(file, spaces).read()

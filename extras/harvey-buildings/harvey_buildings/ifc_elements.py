@@ -17,7 +17,7 @@ from harvey_buildings.building_plan import BuildingError, RoomLink, Space, Store
 from harvey_buildings.ifc_file import (
     MAX_LISTED,
     READ_ERRORS,
-    Body,
+    ElementShape,
     IfcFile,
     WallHole,
     build_box,
@@ -86,7 +86,7 @@ class Spaces:
         return (below or self._plan.storeys)[-1 if below else 0].name
 
     def _read_spaces(self) -> None:
-        bodies: dict[int, Body] = {}
+        bodies: dict[int, ElementShape] = {}
 
         def read_shape(element: Any) -> None:
             try:
@@ -118,7 +118,7 @@ class Spaces:
             raise BuildingError(f"{source}: expected rooms up to {MAX_HEIGHT_M:.0f} m high, got half of them higher "
                                 f"than {usual:.0f} m: is its unit of length, {self._file.unit_m:g} m, right?")
 
-    def _read_space(self, element: Any, raw: Body | None) -> None:
+    def _read_space(self, element: Any, raw: ElementShape | None) -> None:
         if raw is None:
             return
         body, name = self._file.origin.place_on_plan(raw), name_of(element)
@@ -248,7 +248,7 @@ class Passages:
         self._plan.without_wall |= neighbours_without_wall(spaces, names, self._plan.barriers[storey])
 
     @staticmethod
-    def _stands_on(element: Any, body: Body, spaces: list[Space]) -> bool:
+    def _stands_on(element: Any, body: ElementShape, spaces: list[Space]) -> bool:
         """Whether an element stops a robot on the floor of these spaces; a railing of stairs does not."""
         low, high = float(body.world[:, 2].min()), float(body.world[:, 2].max())
         if element.is_a("IfcRailing") and high - low > MAX_RAILING_M:
@@ -393,7 +393,7 @@ class Contents:
                 return name
         return None
 
-    def _find_room_below(self, body: Body) -> str | None:
+    def _find_room_below(self, body: ElementShape) -> str | None:
         """The space with the middle of a thing above its floor; the smallest, where spaces lie in each other."""
         low, high = body.world.min(axis=0), body.world.max(axis=0)
         middle = (low + high) / 2

@@ -55,7 +55,7 @@ MIN_DOOR_WIDTH_M = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class ElementShape:
     """The shape of an element.
 
     Attributes:
@@ -88,7 +88,7 @@ class PlanOrigin:
     zero: Floats
     turn_rad: float
 
-    def place_on_plan(self, body: Body) -> Body:
+    def place_on_plan(self, body: ElementShape) -> ElementShape:
         """The body in the plan's frame."""
         if not self.zero.any() and self.turn_rad == 0.0:
             return body
@@ -96,10 +96,10 @@ class PlanOrigin:
         frame = body.frame.copy()
         frame[:2, 3] -= self.zero
         frame[:2] = np.array([[c, s], [-s, c]]) @ frame[:2]
-        return Body(body.points, body.triangles, frame, body.edges)
+        return ElementShape(body.points, body.triangles, frame, body.edges)
 
 
-def find_plan_origin(bodies: Iterable[Body]) -> PlanOrigin:
+def find_plan_origin(bodies: Iterable[ElementShape]) -> PlanOrigin:
     """A plan origin near these rooms, turned so that most of their walls run along x and y."""
     worlds = [(body.world, body.triangles) for body in bodies]
     if not worlds:
@@ -138,7 +138,7 @@ def _unite_triangles(corners: Floats) -> shapely.Geometry:
     return shapely.union_all(shapes).buffer(-1e-4, join_style="mitre") if shapes else shapely.Polygon()
 
 
-def find_ring(body: Body) -> shapely.Polygon | None:
+def find_ring(body: ElementShape) -> shapely.Polygon | None:
     """The largest polygon that the edges of a body enclose; None where they enclose none."""
     world = np.round(body.world[:, :2], 4)
     lines = [shapely.LineString(world[list(edge)]) for edge in body.edges if (world[edge[0]] != world[edge[1]]).any()]
@@ -157,7 +157,7 @@ class WallHole:
 
 
 def find_hole(
-    own: Body | None, opening: Body | None, wall: Callable[[], Body | None], stated_m: float | None
+    own: ElementShape | None, opening: ElementShape | None, wall: Callable[[], ElementShape | None], stated_m: float | None
 ) -> WallHole:
     """The wall hole of an element; its opening counts first, as a door's frame is wider, or its leaf is drawn open.
 
@@ -183,7 +183,7 @@ def find_hole(
     return WallHole(centre, along, width, low, high - low)
 
 
-def _find_direction(own: Body, shape: Body, wall: Callable[[], Body | None], stated_m: float | None) -> Floats:
+def _find_direction(own: ElementShape, shape: ElementShape, wall: Callable[[], ElementShape | None], stated_m: float | None) -> Floats:
     """(2,) direction of the wall: the element's x axis, as in the standard, unless stated width or wall contradict."""
     axes = [axis[:2] / np.linalg.norm(axis[:2]) for axis in own.frame[:, :2].T if np.linalg.norm(axis[:2]) > 0.9]
     axes.append(_longer_side(own))
@@ -198,7 +198,7 @@ def _find_direction(own: Body, shape: Body, wall: Callable[[], Body | None], sta
     return np.asarray(max(axes, key=lambda axis: round(abs(float(axis @ wanted)), 3)))
 
 
-def _longer_side(body: Body) -> Floats:
+def _longer_side(body: ElementShape) -> Floats:
     """(2,) direction of the longer side of the minimum rotated rectangle of a body's corners on the plan."""
     box = shapely.MultiPoint(body.world[:, :2]).minimum_rotated_rectangle
     if box.geom_type != "Polygon":
@@ -218,7 +218,7 @@ MAX_LISTED = 3
 """More elements that are left out for the same reason are reported together."""
 
 
-class Progress(NamedTuple):
+class ReadingProgress(NamedTuple):
     """What the reading process does next, and its time limit."""
 
     doing: str
@@ -249,9 +249,9 @@ class IfcFile:
     stem: str
     source: str
     model: Any
-    shape: Callable[[Any, bool], Body]
+    shape: Callable[[Any, bool], ElementShape]
     height: Callable[[Any], float | None]
-    send: Callable[[Progress], None]
+    send: Callable[[ReadingProgress], None]
     unit_m: float = 1.0
     plan: BuildingPlan = field(init=False)
     names: Names = field(init=False)
@@ -291,13 +291,13 @@ class IfcFile:
 
     def report_progress(self, element: Any) -> None:
         """Report that an element is read now, which starts its time limit."""
-        self.send(Progress(f"reading {element.is_a()} #{element.id()}", ELEMENT_S))
+        self.send(ReadingProgress(f"reading {element.is_a()} #{element.id()}", ELEMENT_S))
 
-    def body(self, element: Any) -> Body:
+    def body(self, element: Any) -> ElementShape:
         """Shape of an element on the plan. Raises ValueError, or what ifcopenshell raises, where it has none."""
         return self.origin.place_on_plan(self.shape(element, False))
 
-    def body_of(self, element: Any) -> Body | None:
+    def body_of(self, element: Any) -> ElementShape | None:
         """Shape of an element on the plan; None where it has none."""
         try:
             return self.body(element)
@@ -317,7 +317,7 @@ MAX_RAIL_M = 1.3
 """How far the shape of stairs, with its railing, may reach above the upper floor."""
 
 
-def build_box(name: str, kind: str, room: str, body: Body) -> Furnishing:
+def build_box(name: str, kind: str, room: str, body: ElementShape) -> Furnishing:
     """A thing as its bounding box in its own frame."""
     turn = math.atan2(body.frame[1, 0], body.frame[0, 0])
     c, s = math.cos(turn), math.sin(turn)
@@ -332,12 +332,12 @@ def build_column(name: str, space: Space, hole: shapely.Polygon) -> Furnishing:
     """A column from floor to ceiling in a hole of a floor."""
     corners = shapely.get_coordinates(hole.minimum_rotated_rectangle)[:-1]
     arm = corners[1] - corners[0]
-    body = Body(np.array([(x, y, z) for x, y in corners for z in (space.floor_m, space.floor_m + space.height_m)]), (),
+    body = ElementShape(np.array([(x, y, z) for x, y in corners for z in (space.floor_m, space.floor_m + space.height_m)]), (),
                 np.eye(4)[:3])
     turn = math.atan2(arm[1], arm[0])
     c, s = math.cos(turn), math.sin(turn)
     frame = np.array([[c, -s, 0.0, 0.0], [s, c, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
-    return build_box(name, "column", space.name, Body(body.points @ frame[:, :3], (), frame))
+    return build_box(name, "column", space.name, ElementShape(body.points @ frame[:, :3], (), frame))
 
 
 def build_stairs(name: str, room: str, points: Floats) -> Furnishing:

@@ -283,8 +283,8 @@ def test_a_navigation_graph_has_lengths_in_metres_and_a_node_for_each_room(tmp_p
 
 @pytest.mark.parametrize(("x", "y"), [(3.0e5, -4.0e4), (-7.0e5, 12.0), (8.0, 6.0e6)])
 def test_the_origin_of_a_far_house_is_near_its_rooms_in_both_directions(x: float, y: float) -> None:
-    from harvey_buildings.ifc_file import Body, find_plan_origin
+    from harvey_buildings.ifc_file import ElementShape, find_plan_origin
 
     corners = np.array([[x + u, y + v, z] for u in (-2.0, 2.0) for v in (-1.0, 1.0) for z in (0.0, 2.5)])
-    origin = find_plan_origin([Body(corners, (), np.eye(4)[:3])])
+    origin = find_plan_origin([ElementShape(corners, (), np.eye(4)[:3])])
     assert origin.zero == pytest.approx([x, y], abs=0.51)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from experiments.robustness.malformed_texts import GML, IFC
 from harvey_buildings import BuildingError, import_building
-from harvey_buildings.ifc import Progress, await_answer
+from harvey_buildings.ifc import ReadingProgress, await_answer
 from world_models.building.checks import check_world
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
@@ -81,6 +81,6 @@ def test_a_file_that_ends_the_library_is_an_error(tmp_path: Path) -> None:
 
 def test_a_file_that_the_library_does_not_get_done_with_is_given_up() -> None:
     answers, sender = multiprocessing.Pipe(duplex=False)
-    sender.send(Progress("reading IfcSpace #109", 0.01))
+    sender.send(ReadingProgress("reading IfcSpace #109", 0.01))
     told = await_answer(Path("a.ifc"), answers)
     assert isinstance(told, str) and "a.ifc" in told and "IfcSpace #109 was given up" in told

@@ -18,7 +18,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from harvey.campaign.case_work import MOST_KILLS, Answer, Killed, answer_case
+from harvey.campaign.case_work import MOST_KILLS, CaseAnswer, Killed, answer_case
 from harvey.errors import BadInput
 
 dask: Any = import_module("dask")  # annotated only in part
@@ -42,7 +42,7 @@ class DaskWorkers:
     def map_on_cluster(
         self, work: Callable[[Any], Any], cases: Sequence[Any], cluster: str,
         tell: Callable[[str], None] | None = None,
-    ) -> Iterator[tuple[int, Answer | Killed]]:
+    ) -> Iterator[tuple[int, CaseAnswer | Killed]]:
         """``cluster`` is ``local:N``, the address of a scheduler, or its file. Raises BadInput."""
         with _connect(cluster) as client:
             if tell is not None:
@@ -70,7 +70,7 @@ DASK = DaskWorkers()
 
 def _map(
     client: Any, work: Callable[[Any], Any], cases: Sequence[Any], places: Sequence[int], *, alone: bool
-) -> Iterator[tuple[int, Answer | Killed]]:
+) -> Iterator[tuple[int, CaseAnswer | Killed]]:
     """Keep as many cases under way as the workers can take, or one at a time."""
     todo = deque(places)
     done: Any = distributed.as_completed(loop=client.loop)

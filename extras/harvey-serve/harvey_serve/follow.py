@@ -14,7 +14,7 @@ from harvey_serve.live_state import LiveState, Shown
 from logs.records import DecisionRecord, EntryRecord, decision_of, entry_of, kinds_for, refs_of
 from logs.run_directory import RunDirectory
 from world_models import words
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 
 PERIOD_S = 0.2
 """The files are looked at again after this time."""
@@ -62,7 +62,7 @@ class Follower:
 
     def _change(self, record: EntryRecord[Any]) -> Change:
         entry = entry_of(record, kinds_for(record.type))
-        if isinstance(entry.value, Frame):
+        if isinstance(entry.value, CameraPicture):
             size = record.fields["jpeg"]["bytes"]
             with self._run.camera.open("rb") as file:
                 file.seek(self._pictures)

@@ -14,7 +14,7 @@ from harvey.report.data import Lenses, placed, shrink
 from world_models import words
 from world_models.building.world import World
 from world_models.camera import Camera
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Milestone
@@ -54,7 +54,7 @@ class LiveState:
         self._believed: dict[str, Hypothesis] = {}
         self._belief: tuple[str, Hypothesis] | None = None
         self._picture: dict[str, Any] | None = None
-        self._frame: Entry[Frame] | None = None
+        self._frame: Entry[CameraPicture] | None = None
         self._segments: Entry[Segments] | None = None
         self._match: Entry[LineMatch] | None = None
         self._lines: dict[str, Any] = {}
@@ -126,7 +126,7 @@ class LiveState:
             self._milestones[entry.id] = value
             while len(self._milestones) > MILESTONES:
                 del self._milestones[next(iter(self._milestones))]
-        elif isinstance(value, Frame):
+        elif isinstance(value, CameraPicture):
             self._frame = entry
             self._lines = {}
         elif isinstance(value, Segments):

@@ -19,9 +19,9 @@ from harvey.cli import main
 from harvey.errors import BadInput
 from harvey.runner.teller import LiveTeller
 from harvey_serve.app import MOST_WORDS, build_app
-from harvey_serve.gate import WHY, Gate, GatedBody
+from harvey_serve.live_page import LivePage
 from harvey_serve.live_state import LiveState
-from harvey_serve.page import LivePage
+from harvey_serve.run_gate import WHY, Gate, GatedBody
 from harvey_serve.server import bind
 from scripted_turns import decisions
 from world_models.camera import Camera

@@ -16,11 +16,11 @@ import pytest
 
 from harvey.campaign.campaign import Task
 from harvey.cli import main
-from harvey.simulation.run import build_head, run_mission
+from harvey.simulation.simulated_run import build_head, run_mission
 from harvey_serve.app import build_app
 from harvey_serve.follow import Follower
-from harvey_serve.gate import Gate, GatedBody
 from harvey_serve.live_state import LiveState
+from harvey_serve.run_gate import Gate, GatedBody
 from harvey_serve.server import bind, serving
 from logs.run_directory import RunDirectory
 

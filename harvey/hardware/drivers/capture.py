@@ -68,7 +68,7 @@ Opener = Callable[[str], Capture]
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class CapturedPicture:
     """One picture: its JPEG bytes, size [px], and whether it is black."""
 
     jpeg: bytes
@@ -145,7 +145,7 @@ def prepare(capture: Capture, source: str, size: tuple[int, int] | None) -> Capt
     return capture
 
 
-def picture_of(retrieved: Any) -> Picture | None:
+def picture_of(retrieved: Any) -> CapturedPicture | None:
     """What a capture retrieves, JPEG bytes or an image (h, w[, 3]) uint8, as a picture; None where it is not whole."""
     image = np.asarray(retrieved)
     if image.dtype != np.uint8 or not image.size:
@@ -158,18 +158,18 @@ def picture_of(retrieved: Any) -> Picture | None:
         return None
 
 
-def _of_bytes(data: bytes) -> Picture | None:
+def _of_bytes(data: bytes) -> CapturedPicture | None:
     # A picture that breaks off is filled up with grey by the decoder without a word: look for the end mark.
     if not data.startswith(b"\xff\xd8") or b"\xff\xd9" not in data[-64:]:
         return None
     grey = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE)
-    return None if grey is None else Picture(data, grey.shape[::-1], _is_black(grey))
+    return None if grey is None else CapturedPicture(data, grey.shape[::-1], _is_black(grey))
 
 
-def _of_image(image: NDArray[np.uint8]) -> Picture | None:
+def _of_image(image: NDArray[np.uint8]) -> CapturedPicture | None:
     done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     height, width = image.shape[:2]
-    return Picture(data.tobytes(), (width, height), _is_black(image)) if done else None
+    return CapturedPicture(data.tobytes(), (width, height), _is_black(image)) if done else None
 
 
 def _is_black(pixels: NDArray[Any]) -> bool:

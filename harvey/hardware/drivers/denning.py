@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import get_args
 
-from harvey.hardware.drivers.base import LOOK_S, BaseFault, BaseKind, Driver, Link
+from harvey.hardware.drivers.base_driver import LOOK_S, BaseFault, BaseKind, BytePipe, Driver
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
 from world_models.entries.obstacle import Contact, Ranges, Sense
 
@@ -31,7 +31,7 @@ _NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class Packet:
     """One frame.
 
     Attributes:
@@ -55,22 +55,22 @@ class Frame:
         return values if all(math.isfinite(value) for value in values) else None
 
 
-def encode(frame: Frame) -> bytes:
+def encode(frame: Packet) -> bytes:
     """The line of a frame."""
     body = " ".join((frame.token, str(frame.seq), frame.verb, *frame.words)).encode("ascii")
     return b"#%b*%08X\n" % (body, zlib.crc32(body))
 
 
-def decode(line: bytes) -> Frame | None:
+def decode(line: bytes) -> Packet | None:
     """The frame of a line without its end; None where it is none, or was garbled."""
     match = _LINE.fullmatch(line)
     if match is None or zlib.crc32(match[1]) != int(match[2], 16):
         return None
     token, seq, verb, *words = match[1].decode("ascii").split(" ")
-    return Frame(token, int(seq), verb, tuple(words))
+    return Packet(token, int(seq), verb, tuple(words))
 
 
-class Decoder:
+class PacketDecoder:
     """Frames out of whatever bytes come; what is no frame is passed over and counted.
 
     Attributes:
@@ -81,7 +81,7 @@ class Decoder:
         self._rest = b""
         self.rejected = 0
 
-    def feed(self, data: bytes) -> Iterator[Frame]:
+    def feed(self, data: bytes) -> Iterator[Packet]:
         """The frames that are complete with these bytes."""
         *lines, self._rest = (self._rest + data).split(b"\n")
         self._rest = self._rest[-LONGEST:]
@@ -97,7 +97,7 @@ class Decoder:
         self._rest = b""
 
 
-def parse_contact(frame: Frame) -> Contact | None:
+def parse_contact(frame: Packet) -> Contact | None:
     """The contact of a ``FELT``; None where nothing was touched, or it is none."""
     values, sense = frame.numbers(1, 3), next((s for s in get_args(Sense) if frame.words[:1] == (s,)), None)
     if values is None or sense is None or not (abs(values[0]) <= math.pi and values[1] > 0.0):
@@ -140,10 +140,10 @@ SHORT_M = 0.0015
 class DenningBase(Driver):
     """A base over the Denning-style protocol."""
 
-    def __init__(self, link: Link, *, nonce: str | None = None) -> None:
+    def __init__(self, link: BytePipe, *, nonce: str | None = None) -> None:
         """``nonce`` (eight hexadecimal digits) tells the answer to our greeting from one to an older greeting."""
         super().__init__(link)
-        self._decoder = Decoder()
+        self._decoder = PacketDecoder()
         self._nonce = nonce or secrets.token_hex(4).upper()
         self._token = NOBODY
         self._seq = self._asked = 0
@@ -157,7 +157,7 @@ class DenningBase(Driver):
         self._unresolved = True
         slowly = () if command.speed_m_per_s is None else (number(min(command.speed_m_per_s, self._speeds[1])),)
         words = (number(command.turn_rad), number(command.move_m), *slowly)
-        frame = Frame(self._token, self._seq, "GO", words)
+        frame = Packet(self._token, self._seq, "GO", words)
         ends_s = self._link.now() + self._longest_s(command)
         for answer in self._answers(frame, ends_s):
             if answer.verb == "DONE":
@@ -174,7 +174,7 @@ class DenningBase(Driver):
     def _read_odometry(self) -> Odometry:
         self._ready()
         self._asked += 1
-        frame = Frame(self._token, self._seq, "BEAT", (str(self._asked),))
+        frame = Packet(self._token, self._seq, "BEAT", (str(self._asked),))
         for answer in self._answers(frame, self._link.now() + 2 * PATIENCE_S):
             values = answer.numbers(1, 4)
             if answer.verb == "HERE" and answer.words[0] == str(self._asked) and values is not None:
@@ -185,12 +185,12 @@ class DenningBase(Driver):
         self._ready()
         self._asked += 1
         question = str(self._asked)
-        for answer in self._ask_more(Frame(self._token, self._seq, "RANGES", (question,))):
+        for answer in self._ask_more(Packet(self._token, self._seq, "RANGES", (question,))):
             if answer.verb == "ECHOES" and answer.words[:1] == (question,):
                 return parse_ranges(answer.words[1:], self._link.now())
         return None
 
-    def _feel(self, done: Frame, command: MotorCommand) -> None:
+    def _feel(self, done: Packet, command: MotorCommand) -> None:
         """Ask what was touched, where the motion came to less than was asked for."""
         stalled = done.words[:1] == ("stalled",)
         moved_m = command.move_m if self._so_far is None else self._so_far.move_m
@@ -198,12 +198,12 @@ class DenningBase(Driver):
             return
         if stalled:
             self._contact = Contact.of_stall(self._link.now(), turning=moved_m == 0.0 and command.turn_rad != 0.0)
-        for answer in self._ask_more(Frame(self._token, self._seq, "TOUCH")):
+        for answer in self._ask_more(Packet(self._token, self._seq, "TOUCH")):
             if answer.verb == "FELT":
                 self._contact = parse_contact(answer) or self._contact
                 return
 
-    def _ask_more(self, frame: Frame) -> Iterator[Frame]:
+    def _ask_more(self, frame: Packet) -> Iterator[Packet]:
         """The answers to a question that a base need not understand; none of one that does not, or is silent."""
         if self._has_senses:
             try:
@@ -227,7 +227,7 @@ class DenningBase(Driver):
 
     def _greet(self) -> None:
         """Begin a session. A base that was moving in another one stops when it hears the first frame of this one."""
-        hello = Frame(NOBODY, 0, "HELLO", (self._nonce,))
+        hello = Packet(NOBODY, 0, "HELLO", (self._nonce,))
         for answer in self._answers(hello, self._link.now() + 2 * PATIENCE_S):
             values = answer.numbers(1, 3)
             if answer.verb == "HI" and answer.words[0] == self._nonce and values is not None and min(values) > 0:
@@ -238,13 +238,13 @@ class DenningBase(Driver):
 
     def _cancel(self) -> None:
         """The command of the present number is over, or never will begin; the base says which, and stands."""
-        for answer in self._answers(Frame(self._token, self._seq, "STOP"), self._link.now() + 2 * PATIENCE_S):
+        for answer in self._answers(Packet(self._token, self._seq, "STOP"), self._link.now() + 2 * PATIENCE_S):
             if answer.verb == "DONE":
                 self._unresolved = False
                 return
         raise self._fault("silent", "no answer to a stop")
 
-    def _answers(self, frame: Frame, ends_s: float) -> Iterator[Frame]:
+    def _answers(self, frame: Packet, ends_s: float) -> Iterator[Packet]:
         """Say it, and again, and give what the base answers to it, until the caller has heard enough or time is up."""
         heard_s = self._link.now()
         while self._link.now() < ends_s:
@@ -264,14 +264,14 @@ class DenningBase(Driver):
             if self._link.now() - heard_s > PATIENCE_S:
                 self._give_up(frame)
 
-    def _give_up(self, frame: Frame) -> None:
+    def _give_up(self, frame: Packet) -> None:
         """Nothing is heard. Perhaps we still are: say stop, and then nothing more, so that the watchdog strikes."""
         if frame.verb == "GO":
-            self._link.write(encode(Frame(self._token, self._seq, "STOP")))
+            self._link.write(encode(Packet(self._token, self._seq, "STOP")))
         noise = f", only noise ({self._decoder.rejected} lines so far)" if self._decoder.rejected else ""
         raise self._fault("silent", f"nothing heard for {PATIENCE_S:g} s{noise}")
 
-    def _raise_refusal(self, answer: Frame) -> None:
+    def _raise_refusal(self, answer: Packet) -> None:
         why = " ".join(answer.words)
         if answer.words[:1] == ("session",):
             self._token, self._unresolved = NOBODY, False
@@ -281,13 +281,13 @@ class DenningBase(Driver):
             self._seq -= 1
         raise self._fault("refused", why, stopped=answer.words[:1] == ("range",))
 
-    def _note(self, answer: Frame) -> None:
+    def _note(self, answer: Packet) -> None:
         """Keep what a frame says of the motion so far."""
         values = answer.numbers(1 if answer.verb == "DONE" else 0, 4)
         if answer.verb in ("RUN", "DONE") and values is not None:
             self._so_far = MotionReport(*values)
 
-    def _report(self, answer: Frame) -> MotionReport:
+    def _report(self, answer: Packet) -> MotionReport:
         self._unresolved = False
         if self._so_far is None or not answer.words:
             told = " ".join(answer.words)
@@ -307,7 +307,7 @@ class DenningBase(Driver):
         return 2.0 * (abs(command.turn_rad) / turn_rate + command.move_m / speed) + 5.0
 
     @staticmethod
-    def _is_about(answer: Frame, frame: Frame) -> bool:
+    def _is_about(answer: Packet, frame: Packet) -> bool:
         return answer.token == frame.token and answer.seq == frame.seq
 
 

@@ -41,7 +41,7 @@ OWN_SURFACE_M = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Opening:
+class SeenOpening:
     """The part of a picture that shows what is beyond a doorway, or its leaf, wherever in the wall that hangs.
 
     Attributes:
@@ -84,7 +84,7 @@ def is_in_view(
 
 def predict_opening(
     robot: RobotModel, pose: Pose2, covariance: Floats, doorway: Doorway, locale: str, beyond: Building,
-) -> Opening | None:
+) -> SeenOpening | None:
     """What should be seen of a doorway from a pose in one of its rooms; None where too little of it is in view.
 
     Args:
@@ -123,7 +123,7 @@ def predict_opening(
     look = np.vstack([np.column_stack([colors, normals]), np.full((1, 6), np.nan)])[surface].reshape(-1, RAYS, 6)
     is_whole = np.all(np.abs(look - look[:, :1]) < 1e-4, axis=(1, 2))
     frame = beside[mine] & clear & is_whole & (depth[mine] < first_m[mine] + OWN_SURFACE_M)
-    return Opening(box, distance_m, pixels[free, 0], across[mine][free], height_m[mine][free], known[mine][free],
+    return SeenOpening(box, distance_m, pixels[free, 0], across[mine][free], height_m[mine][free], known[mine][free],
                    is_whole[free], pixels[frame, 0], known[mine][frame])
 
 
@@ -262,7 +262,7 @@ WEIGHTS = (4.04, 1.33, -3.65, -7.24, -1.59, 2.18, -1.03, 4.79)
 
 
 def measure_opening(
-    robot: RobotModel, opening: Opening, image: Image
+    robot: RobotModel, opening: SeenOpening, image: Image
 ) -> LeafEvidence | None:
     """Measure an opening in a picture (h, w, 3), as the lens made it, maybe reduced; None where it is too dark or too
     bright: all that is overexposed has one color.

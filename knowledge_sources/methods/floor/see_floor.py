@@ -30,9 +30,9 @@ from knowledge_sources.methods.floor.model_floor import (
     predict_model_floor,
 )
 from knowledge_sources.methods.floor.seen_floor import MAX_HIDDEN_M
-from knowledge_sources.methods.floor.things import (
+from knowledge_sources.methods.floor.standing_regions import (
     FOOT_PART_STEP,
-    Region,
+    StandingRegion,
     compute_parallax_odds,
     find_footprint,
     find_regions,
@@ -205,7 +205,7 @@ class _Scan(NamedTuple):
 
 
 def _scan(
-    grid: FloorGrid, model: ModelFloor, tells: NDArray[np.bool_], things: Sequence[tuple[Region, FloorThing, float]],
+    grid: FloorGrid, model: ModelFloor, tells: NDArray[np.bool_], things: Sequence[tuple[StandingRegion, FloorThing, float]],
     fy: float, settings: FloorSettings,
 ) -> _Scan:
     """From the lower border up: as far as the model has floor, its looks are known, and no thing is in the way."""
@@ -250,7 +250,7 @@ def _first(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def _build_thing(
-    region: Region, grid: FloorGrid, robot: RobotModel, pose: Pose2, covariance: Floats,
+    region: StandingRegion, grid: FloorGrid, robot: RobotModel, pose: Pose2, covariance: Floats,
     picture: NDArray[np.uint8], earlier: Sequence[Seen], settings: FloorSettings,
 ) -> tuple[FloorThing, float] | None:
     """What stands where a region is, and the part of its seeming distance; None where it is lower than what is rolled

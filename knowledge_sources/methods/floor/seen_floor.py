@@ -250,7 +250,7 @@ class Costs(NamedTuple):
         return 2.0 * abs(turn_rad) / self.turn_rad_per_s + pictures * self.picture_s
 
 
-class Look(NamedTuple):
+class Lookout(NamedTuple):
     """A look round from where the robot stands.
 
     Attributes:
@@ -265,7 +265,7 @@ class Look(NamedTuple):
 def choose_look(
     robot: RobotModel, floor: shapely.Geometry, here: Pose2, ahead: Sequence[Pose2], unseen: Sweep, costs: Costs,
     max_hidden_m: float,
-) -> Look | None:
+) -> Lookout | None:
     """The look from here that is worth its time; None where there is none, or a better one from a place ahead.
 
     Args:
@@ -290,9 +290,9 @@ def choose_look(
 def _find_best(
     robot: RobotModel, floor: shapely.Geometry, pose: Pose2, unseen: Sweep, blind_m: float, costs: Costs,
     max_hidden_m: float,
-) -> Look | None:
+) -> Lookout | None:
     """The look from a pose that saves the most time."""
-    best: Look | None = None
+    best: Lookout | None = None
     for k in range(HEADINGS):
         heading = wrap_angle(pose.heading_rad + 2.0 * math.pi * k / HEADINGS)
         cost_s = costs.look_s(wrap_angle(heading - pose.heading_rad))
@@ -303,5 +303,5 @@ def _find_best(
             continue
         gain_s = (blind_m - measure_blind_m(unseen.only(~seen))) * costs.creep_s_per_m - cost_s
         if gain_s > (0.0 if best is None else best.gain_s):
-            best = Look(heading, gain_s)
+            best = Lookout(heading, gain_s)
     return best

@@ -50,7 +50,7 @@ LookAlike = Callable[[Pose2, Pose2], bool]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
+class PlaceCandidate:
     """A place where the robot may be now.
 
     Attributes:
@@ -93,7 +93,7 @@ class LocalizationResult:
     """
 
     status: LocalizationStatus
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[PlaceCandidate, ...]
     next_action: SensingAction | None = None
 
 
@@ -123,7 +123,7 @@ def localize(
 def find_candidates(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT,
     guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (),
-) -> tuple[Candidate, ...]:
+) -> tuple[PlaceCandidate, ...]:
     """Find the places in these rooms that explain all views (with aligned headings), the likeliest first.
 
     A place to which ``guess`` leads is tried first, and kept if it is not refuted. After many views places are followed
@@ -132,7 +132,7 @@ def find_candidates(
     """
     look_alike, tuning = make_alias_test(robot, [view.now_from_then for view in views], settings), settings.localization
     found = _build_distinct(robot, views, [] if guess is None else [guess], settings)
-    known: list[Candidate] = []
+    known: list[PlaceCandidate] = []
     if len(views) > tuning.max_searched_views:
         known = _build_distinct(robot, views, followed, settings, found)
     if sum(bool(c.is_accepted) for c in (*found, *known)) >= 2:
@@ -157,10 +157,10 @@ def find_candidates(
 
 def _build_distinct(
     robot: RobotModel, views: Sequence[CameraView], rough: Iterable[tuple[str, Pose2]], settings: Settings,
-    known: Sequence[Candidate] = (),
-) -> list[Candidate]:
+    known: Sequence[PlaceCandidate] = (),
+) -> list[PlaceCandidate]:
     """Candidates from rough poses in rooms, refined, that are none of those that are known, each once."""
-    found: list[Candidate] = []
+    found: list[PlaceCandidate] = []
     for room, pose in rough:
         refined = RefinedPose(room, *refine_pose(robot, views, pose, settings))
         if all(are_distinct(refined.world_from_robot, c.world_from_robot)
@@ -169,14 +169,14 @@ def _build_distinct(
     return found
 
 
-def _keep_likelier(found: list[Candidate], new: Candidate) -> None:
+def _keep_likelier(found: list[PlaceCandidate], new: PlaceCandidate) -> None:
     """Add a candidate; of those that are one place the likeliest is kept, as refining may end beside the right pose."""
     near = [c for c in found if not are_distinct(new.world_from_robot, c.world_from_robot)]
     if all(new.likelihood.log_likelihood > c.likelihood.log_likelihood for c in near):
         found[:] = [*(c for c in found if c not in near), new]
 
 
-def _list_repetitions(robot: RobotModel, candidate: Candidate, rooms: Sequence[str]) -> Iterator[tuple[str, Pose2]]:
+def _list_repetitions(robot: RobotModel, candidate: PlaceCandidate, rooms: Sequence[str]) -> Iterator[tuple[str, Pose2]]:
     """Where the plan repeats the candidate's place; what is in the rooms may differ, which the pictures tell."""
     room = _find_room(robot, rooms[0], candidate.world_from_robot)
     return find_repetitions(robot.world, room, candidate.world_from_robot, rooms)
@@ -220,9 +220,9 @@ def make_alias_test(robot: RobotModel, looked: Sequence[Pose2], settings: Settin
 
 
 def rank_candidates(
-    found: Sequence[Candidate], look_alike: LookAlike, looks: int, settings: Settings = DEFAULT,
-    first: Candidate | None = None,
-) -> tuple[Candidate, ...]:
+    found: Sequence[PlaceCandidate], look_alike: LookAlike, looks: int, settings: Settings = DEFAULT,
+    first: PlaceCandidate | None = None,
+) -> tuple[PlaceCandidate, ...]:
     """Keep the likely candidates that the likeliest does not refute, with their weights, the likeliest first.
 
     The likeliest refutes a candidate by the log likelihood ratio (Bayes factor). One that would look the same by the
@@ -245,7 +245,7 @@ def rank_candidates(
 
 
 def decide(
-    robot: RobotModel, candidates: Sequence[Candidate], looked: Sequence[Pose2], settings: Settings = DEFAULT
+    robot: RobotModel, candidates: Sequence[PlaceCandidate], looked: Sequence[Pose2], settings: Settings = DEFAULT
 ) -> LocalizationResult:
     """Decide whether the robot is found, cannot be found, or needs another look, and which."""
     kept, enough = tuple(candidates), len(looked) >= settings.localization.min_views
@@ -279,12 +279,12 @@ def _find_refined(
 
 def _build_candidate(
     robot: RobotModel, views: Sequence[CameraView], found: RefinedPose, settings: Settings
-) -> Candidate:
+) -> PlaceCandidate:
     room, pose, covariance = found
     refined = refine_view_motions(robot, views, pose, covariance, settings)
     likelihood = compute_pose_likelihood(robot, refined, pose, settings)
     is_accepted = likelihood.is_sufficient(settings.localization)
-    return Candidate(_find_room(robot, room, pose), pose, covariance, likelihood, is_accepted)
+    return PlaceCandidate(_find_room(robot, room, pose), pose, covariance, likelihood, is_accepted)
 
 
 def _find_room(robot: RobotModel, room: str, pose: Pose2) -> str:

@@ -15,17 +15,17 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.localization.global_localization import (
-    Candidate,
     LocalizationResult,
     LocalizationStatus,
     LookAlike,
+    PlaceCandidate,
 )
 from knowledge_sources.settings import DEFAULT, LocalizationSettings
 from world_models.frames import Pose2, wrap_angle
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ToldPlace:
+class StatedPlace:
     """Where the robot was told to be, or was tracked to, before it was lost.
 
     Attributes:
@@ -37,14 +37,14 @@ class ToldPlace:
     covariance: Floats
     p_told: float
 
-    def includes(self, candidate: Candidate, settings: LocalizationSettings = DEFAULT.localization) -> bool:
+    def includes(self, candidate: PlaceCandidate, settings: LocalizationSettings = DEFAULT.localization) -> bool:
         """Whether a candidate is this place."""
         return is_within_reach(candidate.world_from_robot, candidate.covariance, self.world_from_robot,
                                self.covariance, settings)
 
 
 def weigh_told(
-    result: LocalizationResult, told: ToldPlace, look_alike: LookAlike, looks: int,
+    result: LocalizationResult, told: StatedPlace, look_alike: LookAlike, looks: int,
     settings: LocalizationSettings = DEFAULT.localization,
 ) -> LocalizationResult:
     """Weigh the candidates by what was told and by the pictures, the likeliest first.

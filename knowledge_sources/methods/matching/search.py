@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
-from knowledge_sources.methods.matching.kernels import (
+from knowledge_sources.methods.matching.matching_kernels import (
     RIGID,
     SCALED,
     STEP,

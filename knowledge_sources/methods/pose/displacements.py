@@ -88,9 +88,9 @@ def compute_sigmas_px(
     projected, _ = camera.project_segments(np.array(lines_world, float), Pose(rotation, translation))
     sigmas = np.zeros(len(lines_world))
     seen = np.flatnonzero(np.isfinite(projected).all(axis=(1, 2)))
-    if len(seen) and len(errors.modes):
+    if len(seen) and len(errors.displacement_modes):
         lines = build_line_set(lines_world[seen], projected[seen], camera, 1.0)
-        _, _, by_mode = compute_displaced_jacobian(lines, errors.shifts[:, seen], _to_state(pose), camera_from_robot)
+        _, _, by_mode = compute_displaced_jacobian(lines, errors.displacements[:, seen], _to_state(pose), camera_from_robot)
         sigmas[seen] = np.sqrt(np.sum(by_mode**2, axis=2)).max(axis=1)
     return sigmas
 
@@ -117,11 +117,11 @@ def fit_displacements(
     lines, segments = np.asarray(lines_world, float), np.asarray(segments_px, float).reshape(-1, 2, 2)
     state, start = _to_state(pose), _to_state(pose)
     which, data = _find_candidates(lines, errors, segments, camera, camera_from_robot, state, covariance, settings)
-    amplitudes = np.zeros(len(errors.modes))
+    amplitudes = np.zeros(len(errors.displacement_modes))
     if not len(which):
         return DisplacedFit(state, amplitudes, lines, np.zeros((0, 2), np.int64))
     observed = build_line_set(lines[which], segments[data], camera, 1.0)
-    shifts, free = errors.shifts[:, which], 0 if covariance is None else 3
+    shifts, free = errors.displacements[:, which], 0 if covariance is None else 3
     information = np.eye(free + len(amplitudes))
     if covariance is not None:
         information[:3, :3] = np.linalg.inv(covariance)
@@ -178,7 +178,7 @@ def _find_candidates(
     if not len(which):
         return which, data
     observed = build_line_set(lines[which], segments[data], camera, 1.0)
-    distances, by_pose, by_mode = compute_displaced_jacobian(observed, errors.shifts[:, which], state, mount)
+    distances, by_pose, by_mode = compute_displaced_jacobian(observed, errors.displacements[:, which], state, mount)
     variances = np.sum(by_mode**2, axis=2)
     if covariance is not None:
         variances = variances + np.einsum("nei,ij,nej->ne", by_pose, covariance, by_pose)

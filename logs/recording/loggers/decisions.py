@@ -21,7 +21,7 @@ from logs.recording.stream import TROUBLE, RecordingStream
 from world_models import words
 from world_models.building.locale_frame import FrameRequest, LocaleFrame, has_answer
 from world_models.entries.location import Hypothesis
-from world_models.entries.robot import Drift
+from world_models.entries.robot_state import Drift
 from world_models.entries.task import Leg, Milestone
 
 TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "doubted", "halted")

@@ -38,7 +38,7 @@ from logs.recording.paths import REJECTED as REJECTED_PATH
 from logs.recording.paths import SEGMENTS as SEGMENTS_PATH
 from logs.recording.stream import RecordingStream
 from world_models.camera import clip_segments
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.door_state import DoorState
 from world_models.entries.floor import FloorEnd, FloorThing, FreeFloor
 from world_models.entries.obstacle import Obstruction
@@ -94,7 +94,7 @@ class Frames(Logger):
         stream.fix(IMAGE, rr.EncodedImage.from_fields(media_type="image/jpeg"))
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
-        for entry in moment.changed(Frame):
+        for entry in moment.changed(CameraPicture):
             frame = entry.value
             stream.log(IMAGE, Delivered, blob=[frame.jpeg], **{NUMBER: [frame.number]}, purpose=[frame.purpose],
                        entry=[str(entry.ref)])
@@ -123,10 +123,10 @@ class Overlays(Logger):
             stream.fix(path, rr.Boxes2D.from_fields(radii=thin, show_labels=True))
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
-        if not self._waits and not moment.mirror.all(Frame):
+        if not self._waits and not moment.mirror.all(CameraPicture):
             self._waits = True
             stream.log(WAITING, rr.Points2D, positions=np.divide(self._size, 2)[None], labels=["no picture yet"])
-        if moment.touched(Frame):
+        if moment.touched(CameraPicture):
             if self._waits:
                 self._waits = False
                 stream.log(WAITING, rr.Points2D, positions=NO_POINTS, labels=())

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sim.render.light.light_map import LightMap
 from sim.render.light.lit_shading import NO_MIRROR, shade_lit
 from sim.render.light.mirror import before_plane, mirror_camera
-from sim.render.mesh import Pinhole, View, project_mesh
+from sim.render.mesh import MeshView, Pinhole, project_mesh
 from sim.render.pieces import Pieces, split_pieces
 from sim.render.rasterizer import find_visible_patches, sample_offsets
 from sim.render.renderer import HAZE_PER_M, Renderer
@@ -62,7 +62,7 @@ class LitRenderer(Renderer):
         mirrors = [self._mirrored(plane, lens, rotation, translation) for plane in drawn]
         return self._shade(view, pieces, lens, drawn, mirrors)
 
-    def _pieces(self, view: View, lens: Pinhole) -> Pieces:
+    def _pieces(self, view: MeshView, lens: Pinhole) -> Pieces:
         seen = find_visible_patches(self.mesh, view, lens, self.samples)
         return split_pieces(seen, sample_offsets(self.samples), len(self.mesh))
 
@@ -85,7 +85,7 @@ class LitRenderer(Renderer):
         image = self._shade(view, self._pieces(view, lens), lens, [], [])[::-1]
         return np.asarray(cv2.GaussianBlur(np.ascontiguousarray(image), (0, 0), MIRROR_BLUR_PX), np.float32)
 
-    def _shade(self, view: View, pieces: Pieces, lens: Pinhole, drawn: Sequence[int],
+    def _shade(self, view: MeshView, pieces: Pieces, lens: Pinhole, drawn: Sequence[int],
                mirrors: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
         baked = self.baked
         appearances = self._appearances(view)

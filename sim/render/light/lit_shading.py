@@ -25,7 +25,7 @@ def shade_lit(pieces: Any, colours: Any, forms: Any, grid: Any, first: Any, ligh
     Args:
         pieces: :class:`sim.render.pieces.Pieces`.
         colours: (n, 3) of their pixels in full light, patch by patch (:func:`sim.render.textures.shade_pieces`).
-        forms: (P, 11) of 1/z, s / z, t / z (9) and bases (2) [m] (:class:`sim.render.mesh.View`).
+        forms: (P, 11) of 1/z, s / z, t / z (9) and bases (2) [m] (:class:`sim.render.mesh.MeshView`).
         grid, first: (P, 6), (P,) of the light map, with corners in the coordinates of ``forms``.
         light: (T, 3) factor on the colour at each place, as seen.
         glossy: (P,) the mirror image for each patch, or -1.

@@ -19,7 +19,15 @@ from harvey.runner.ports import BodyPort
 from knowledge_sources.action.fault_handler import FaultHandler
 from knowledge_sources.settings import DEFAULT
 from strategies import Note, Scripted
-from world_models.entries.body import STOP_KEY, BodyFault, Frame, Look, MotionReport, MotorCommand, Recovery
+from world_models.entries.body import (
+    STOP_KEY,
+    BodyFault,
+    CameraPicture,
+    MotionReport,
+    MotorCommand,
+    PictureRequest,
+    Recovery,
+)
 from world_models.entries.task import Outcome
 
 S = DEFAULT.action
@@ -46,8 +54,8 @@ class ScriptedBody:
     def ranges(self) -> None:
         return None
 
-    def look(self, purpose: str) -> Frame | BodyFault:
-        return self._fault("camera") or Frame(b"", 0, self.now_s, purpose)
+    def look(self, purpose: str) -> CameraPicture | BodyFault:
+        return self._fault("camera") or CameraPicture(b"", 0, self.now_s, purpose)
 
     def wait(self, duration_s: float) -> float:
         self.waits.append(duration_s)
@@ -63,7 +71,7 @@ class ScriptedBody:
 
 
 def asking(_view: View, trigger: Change) -> Iterable[Effect]:
-    value = MotorCommand(0.1, 0.5) if trigger.entry.value.text == "move" else Look("track")
+    value = MotorCommand(0.1, 0.5) if trigger.entry.value.text == "move" else PictureRequest("track")
     yield Post(value, (trigger.entry,))
 
 
@@ -75,11 +83,11 @@ def drive(requests: list[str], body: ScriptedBody) -> tuple[Scheduler, list[Any]
         told.extend(change.entry for change in (*decision.observed, *decision.made))
 
     scheduler = Scheduler(
-        [FaultHandler(), Scripted("asker", Note, asking, writes=(MotorCommand, Look))],
+        [FaultHandler(), Scripted("asker", Note, asking, writes=(MotorCommand, PictureRequest))],
         ports=(BodyPort(body),), sinks=(listen,),
     )
     for request in requests:
-        scheduler.tell([Post(Note(request))], "user")
+        scheduler.post([Post(Note(request))], "user")
         while scheduler.step() is not None:
             assert scheduler.cycle < MOST_CYCLES
         if scheduler.view.latest(Outcome) is not None:
@@ -97,8 +105,8 @@ def test_each_request_is_answered_once_or_the_mission_ends_declared(
 ) -> None:
     scheduler, told = drive(asked, ScriptedBody(script, ever_after))
     view, outcome = scheduler.view, scheduler.view.latest(Outcome)
-    posted = [e for e in told if e.revision == 0 and isinstance(e.value, MotorCommand | Look)]
-    replies = [e for e in told if isinstance(e.value, MotionReport | Frame)]
+    posted = [e for e in told if e.revision == 0 and isinstance(e.value, MotorCommand | PictureRequest)]
+    replies = [e for e in told if isinstance(e.value, MotionReport | CameraPicture)]
     assert len({r.because for r in replies}) == len(replies)
     assert {r.because for r in replies} <= {(e.ref,) for e in posted}
     if outcome is None:

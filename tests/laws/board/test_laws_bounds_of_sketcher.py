@@ -12,7 +12,7 @@ from blackboard.change import Change
 from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from harvey.simulation.run import build_robot_model
+from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.plan.sketcher import Sketcher
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario

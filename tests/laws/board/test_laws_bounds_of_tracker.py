@@ -20,7 +20,7 @@ from blackboard.change import Change
 from blackboard.effect import Effect, Post, Retract
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from harvey.simulation.run import build_robot_model
+from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.action.correlator_tracker import CorrelatorTracker
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.tracking.template_tracking import select_landmarks
@@ -29,7 +29,7 @@ from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis, covariance_tuple, diagonal
 from world_models.entries.percepts import Anchor, Track, Tracks
 from world_models.frame_store import FrameStore
@@ -76,7 +76,7 @@ def setting() -> Setting:
         start = Pose2(x_m, y_m, rng.uniform(-3.0, 3.0))
         end = Pose2(start.x_m, start.y_m, start.heading_rad + TURN_RAD)
         before = picture(start)
-        found = select_landmarks(robot, (), "Frame-1", read_picture(before).grey, start, DEFAULT)
+        found = select_landmarks(robot, (), "CameraPicture-1", read_picture(before).grey, start, DEFAULT)
         half = robot.camera.width / 2
         inside = tuple(track for track in found if abs(place_px(robot, end, track)[0] - half) < half - 60)
         if len(inside) >= 2 * ACTION.min_expected_landmarks:
@@ -111,10 +111,10 @@ def follow(found: int, hidden: int = 0, misses: int = 0) -> list[Effect]:
     containers = [name for name in world.path_of(ROOM) if name != ROOM]
     apply(*map(Post, robot.entries()), *(Post(store.frame(name)) for name in dict.fromkeys(["", *containers, *near])),
           Post(Hypothesis.of_world(world, ROOM, believed, np.array(TURNED), "odometry")),
-          Post(Frame(seen.before, 0, 0.0)))
-    anchor = Anchor("Frame-1", seen.start.x_m, seen.start.y_m, covariance_tuple(np.array(SURE)))
-    apply(Post(Tracks("Frame-1", DEFAULT.tracking.template_half_px, tuple(tracks), (anchor,), len(tracks))))
-    (taken,) = apply(Post(Frame(compress_jpeg(image, 95), 1, 1.0, "track")))
+          Post(CameraPicture(seen.before, 0, 0.0)))
+    anchor = Anchor("CameraPicture-1", seen.start.x_m, seen.start.y_m, covariance_tuple(np.array(SURE)))
+    apply(Post(Tracks("CameraPicture-1", DEFAULT.tracking.template_half_px, tuple(tracks), (anchor,), len(tracks))))
+    (taken,) = apply(Post(CameraPicture(compress_jpeg(image, 95), 1, 1.0, "track")))
     effects = answer(CorrelatorTracker(NO_EDGES), board.view, taken)
     assert effects is not None
     return list(effects)
@@ -162,5 +162,5 @@ def test_a_landmark_is_dropped_when_it_was_missed_so_often_in_a_row() -> None:
     for misses in (ACTION.max_misses - 2, ACTION.max_misses - 1):
         effects = follow(2, hidden, misses)
         (tracks,) = (value for value in written(effects) if isinstance(value, Tracks))
-        kept = [track for track in tracks.items if track.template_frame == "Frame-1"]
+        kept = [track for track in tracks.items if track.template_frame == "CameraPicture-1"]
         assert len(kept) == 2 + (misses + 1 < ACTION.max_misses)

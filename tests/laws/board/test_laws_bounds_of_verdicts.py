@@ -23,7 +23,7 @@ from blackboard.entry_store import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
 from experiments.generated.missions import OFFICE
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.plan.milestone_judge import MilestoneJudge, Verdict, Weighed, _update
@@ -47,7 +47,7 @@ def weigh(**changed: Any) -> Any:
     matched = changed.pop("matched", 20)
     agreement = SimpleNamespace(matched=matched, visible=20, chance=0.2)
     plain = {
-        "segments": Segments("Frame-1", "Milestone-1", NO_LINES, np.zeros(0), contrast), "expected": 20,
+        "segments": Segments("CameraPicture-1", "Milestone-1", NO_LINES, np.zeros(0), contrast), "expected": 20,
         "lines": SimpleNamespace(agreement=agreement, coverage=0.9), "faces": changed.pop("faces", NO_FACES),
         "p_false": 0.5 * POSE_CONFIDENCE.accept, "is_enough": True, "shift_px": 3.0, "tolerance_px": 10.0,
         "is_weak": False, "is_inexact": False, "camera_chi2": 0.0, "is_camera_known": True,
@@ -88,7 +88,7 @@ def test_the_verdict_just_below_and_just_above_each_bound(changed: dict[str, Any
 def test_it_looks_again_as_often_as_it_may(modes: tuple[str, ...], told: float, most: int) -> None:
     judge = MilestoneJudge()
     for tried in range(most + 2):
-        milestone: Any = SimpleNamespace(modes=modes, told=told, tried=(0.0,) * tried)
+        milestone: Any = SimpleNamespace(displacement_modes=modes, log_odds_so_far=told, tried=(0.0,) * tried)
         assert judge._may_look_again(Verdict("not testable", "", 0.1), milestone) is (tried + 1 < most)
         assert not judge._may_look_again(Verdict("refuted", "", 0.1), milestone)
 
@@ -125,8 +125,8 @@ class StateView(TracedView):
         self._belief = held
         doubt = Discrepancy(Level.PLAN, "a milestone is elsewhere", 9.0, (0.0, 30.0), "px")
         self._doubt = Entry("Discrepancy-999", 0, doubt, "test", 0, ()) if in_doubt else None
-        track = Track("a", (0.0, 0.0, 0.0), "Frame-1", (0.0, 0.0), 1.0, (0.0, 0.0), (1.0, 1.0), 1.0, 0.3)
-        self._tracks = Entry("Tracks-999", 0, Tracks("Frame-1", 10, (track,) * followed), "test", 0, ())
+        track = Track("a", (0.0, 0.0, 0.0), "CameraPicture-1", (0.0, 0.0), 1.0, (0.0, 0.0), (1.0, 1.0), 1.0, 0.3)
+        self._tracks = Entry("Tracks-999", 0, Tracks("CameraPicture-1", 10, (track,) * followed), "test", 0, ())
 
     def newest(self, index: Index[T], key: Hashable) -> Entry[T] | None:
         doubt: Any = self._doubt

@@ -51,10 +51,10 @@ def drive(world: World, origin: str, destination: str) -> tuple[list[object], Ou
     robot = RobotModel(world, CAMERA, MOUNT, ActuatorModel())
     scheduler = build_dry_run(world, robot, sinks=(note,))
     goal = f"(ptrans ({origin} (12,4.5,0)) ({destination} (14,4.2,0)))"
-    scheduler.tell([Post(Command(goal, 0.5, None, diagonal(0.003, 0.001)))], "user")
+    scheduler.post([Post(Command(goal, 0.5, None, diagonal(0.003, 0.001)))], "user")
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < 4_000:
         if scheduler.step() is None:
-            scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
+            scheduler.post([Post(Quiescence(scheduler.cycle))], "scheduler")
     outcome = scheduler.view.latest(Outcome)
     return made, outcome.value if outcome else Outcome("failed", "no end")
 

@@ -145,7 +145,7 @@ def decisions() -> list[Decision]:
             yield Retract(trigger.entry)
 
     scheduler = Scheduler([Scripted("worker", act=work), Scripted("slow", rate=0.1)])
-    scheduler.tell([Post(Note(text)) for text in ("post", "raise", "größer ☃\n")], "user")
+    scheduler.post([Post(Note(text)) for text in ("post", "raise", "größer ☃\n")], "user")
     return run(scheduler)
 
 
@@ -171,7 +171,7 @@ def test_a_retraction_says_what_it_rests_on() -> None:
         yield Retract(view["Note-1"], (trigger.entry,))
 
     scheduler = Scheduler([Scripted("doubter", act=doubt, where=lambda note: note.text == "no")])
-    scheduler.tell([Post(Note("yes")), Post(Note("no"))], "user")
+    scheduler.post([Post(Note("yes")), Post(Note("no"))], "user")
     (record,) = (c for d in run(scheduler) for c in json.loads(decision_line(d))["made"])
     assert (record["entry"], record["because"], record["retracted_because"]) == ("Note-1.0", [], ["Note-2.0"])
 

@@ -24,7 +24,7 @@ from harvey.wiring import knowledge_sources
 from logs import disk
 from logs.journal_file import JournalFile, read_journal
 from strategies import Note, Scripted
-from world_models.entries.kinds import KINDS
+from world_models.entries.entry_kinds import KINDS
 from world_models.words import sentence
 
 ALL = (*KINDS, Discrepancy, Quiescence)
@@ -93,7 +93,7 @@ def test_no_request_reaches_a_port_before_it_is_on_the_disk(kinds: list[type[Any
         journal, gripper = JournalFile(path), Gripper(path, forced)
         source = Scripted("asker", Note, act, where=lambda note: note.text.isdigit(), writes=(*REQUESTS, Note))
         scheduler = Scheduler([source], ports=[gripper], sinks=[journal], kinds=(GripperReport,))
-        scheduler.tell([Post(Note("0"))], "user")
+        scheduler.post([Post(Note("0"))], "user")
         while scheduler.step() is not None:
             pass
         journal.close()
@@ -117,7 +117,7 @@ def test_what_a_knowledge_source_writes_from_outside_is_an_observation_or_a_requ
     """Nobody on the board makes up what a port alone can know; it may close a fault, correct a frame, learn of the
     camera, take up what was told.
     """
-    only_revised = {"BodyFault", "CameraState", "LocaleFrame", "Told", "Redirection"}
+    only_revised = {"BodyFault", "CameraState", "LocaleFrame", "UserReport", "Redirection"}
     sources = knowledge_sources()
     written = {kind for source in sources for kind in source.writes}
     posted_by_ports = {kind for kind in ALL if kind_of(kind).role is Role.OBSERVATION}

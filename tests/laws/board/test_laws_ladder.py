@@ -24,7 +24,7 @@ from blackboard.journal import Decision
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from harvey.runner.world_port import build_scheduler
-from harvey.simulation.run import build_robot_model
+from harvey.simulation.simulated_run import build_robot_model
 from harvey.wiring import KNOWLEDGE_SOURCES
 from knowledge_sources.questions import (
     active_goal,
@@ -39,8 +39,8 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario, with_settings
 from world_models.building.world import World
-from world_models.entries.body import Course, Frame, Look, MotionReport, MotorCommand
-from world_models.entries.kinds import KINDS
+from world_models.entries.body import CameraPicture, Course, MotionReport, MotorCommand, PictureRequest
+from world_models.entries.entry_kinds import KINDS
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch
@@ -49,7 +49,7 @@ from world_models.robot import RobotModel
 
 ACTION_PX, PLAN_PX = 6.0, DEFAULT.plan.max_deviation_px
 PERCEIVERS = {"correlator_tracker", "line_finder", "matcher", "med_r_and_t", "milestone_judge", "relocalizer",
-              "floor_watcher", "door_watcher", "door_doubter"}
+              "floor_watcher", "door_watcher", "shut_door_explainer"}
 SURE = diagonal(0.002, 0.001)
 
 
@@ -57,7 +57,7 @@ UNTOLD = -1.0
 """What a picture says of a milestone where it cannot be told."""
 
 
-def figure(frame: Entry[Frame]) -> float:
+def figure(frame: Entry[CameraPicture]) -> float:
     """What a picture says: how far things are from where they are expected [px], or UNTOLD."""
     return float(frame.value.jpeg)
 
@@ -66,7 +66,7 @@ class ScriptedTracker(RobotKnowledgeSource):
     """Posts what the action level measures, and corrects the belief where it may."""
 
     level, closes, priority = Level.ACTION, Level.ACTION, 0.9
-    on = (Watch(Frame, (Posted,), lambda f: f.purpose == "track"),)
+    on = (Watch(CameraPicture, (Posted,), lambda f: f.purpose == "track"),)
     writes = (Hypothesis, Discrepancy)
 
     def bind(self, view: View, trigger: Change) -> Change | None:
@@ -88,7 +88,7 @@ class ScriptedJudge(RobotKnowledgeSource):
     """Posts what the plan level measures of the milestone that is looked for, and its verdict."""
 
     level, priority = Level.PLAN, 0.8
-    on = (Watch(Frame, (Posted,), lambda f: f.purpose == "milestone"),)
+    on = (Watch(CameraPicture, (Posted,), lambda f: f.purpose == "milestone"),)
     writes = (PoseFix, Certificate, Milestone, Discrepancy)
 
     def bind(self, view: View, trigger: Change) -> Change | None:
@@ -122,8 +122,8 @@ class ScriptedRelocalizer(RobotKnowledgeSource):
 
     level, closes, priority = Level.GOAL, Level.GOAL, 0.7
     on = (Watch(Discrepancy, (Posted,), lambda d: d.is_open and d.level is Level.GOAL),
-          Watch(Frame, (Posted,), lambda f: f.purpose == "probe"))
-    writes = (Look, Hypothesis, Goal, Discrepancy)
+          Watch(CameraPicture, (Posted,), lambda f: f.purpose == "probe"))
+    writes = (PictureRequest, Hypothesis, Goal, Discrepancy)
 
     def bind(self, view: View, trigger: Change) -> Change | None:
         return trigger if open_discrepancy(view, Level.GOAL) is not None and find_belief(view) is not None else None
@@ -132,7 +132,7 @@ class ScriptedRelocalizer(RobotKnowledgeSource):
         belief, lost, goal = find_belief(view), open_discrepancy(view, Level.GOAL), active_goal(view)
         assert belief is not None and lost is not None
         if isinstance(trigger.entry.value, Discrepancy):
-            yield Post(Look("probe"), (lost,))
+            yield Post(PictureRequest("probe"), (lost,))
         elif goal is not None and figure(trigger.entry) <= PLAN_PX:
             here = Revise(belief, replace(belief.value, basis="relocalization"), (trigger.entry, lost))
             yield here
@@ -161,12 +161,12 @@ class ScriptedBody:
         elif isinstance(value, Course):
             yield Post(MotionReport(0.0, value.speed_m_per_s / 4.0, 0.25, 0.0), (entry,))
             yield self._picture(entry, "track")
-        elif isinstance(value, Look) and isinstance(change, Posted):
+        elif isinstance(value, PictureRequest) and isinstance(change, Posted):
             yield self._picture(entry, value.purpose)
 
     def _picture(self, entry: Entry[object], purpose: str) -> Effect:
         self._number += 1
-        return Post(Frame(str(self.says[purpose]).encode(), self._number, 0.0, purpose), (entry,))
+        return Post(CameraPicture(str(self.says[purpose]).encode(), self._number, 0.0, purpose), (entry,))
 
 
 @cache
@@ -193,7 +193,7 @@ class Ladder:
             kinds=KINDS)
         task = with_settings(load_scenario("lab-to-allens-office"), {
             "goal": "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))"}).command
-        self.scheduler.tell([Post(task)], "user")
+        self.scheduler.post([Post(task)], "user")
 
     @property
     def view(self) -> View:
@@ -218,7 +218,7 @@ class Ladder:
             elif still:
                 return
             else:
-                self.scheduler.tell([Post(Quiescence(self.scheduler.cycle))], "scheduler")
+                self.scheduler.post([Post(Quiescence(self.scheduler.cycle))], "scheduler")
                 still = True
 
     def is_lawful(self, decision: Decision, above: list[Level]) -> None:
@@ -253,12 +253,12 @@ class Ladder:
     def climbs_lawfully(self, change: Change) -> None:
         """One level at a time, from what its level measured beyond the bound that it states."""
         value: Discrepancy = change.entry.value
-        if change.entry.author == "escalator" and isinstance(change, Posted):
+        if change.entry.author == "discrepancy_raiser" and isinstance(change, Posted):
             below = self.seen[change.entry.because[0]]
             assert below.status == "escalated" and below.magnitude is not None and below.magnitude > below.bound
             assert value.level == below.level + 1 and value.magnitude is None
         elif value.level is Level.GOAL and isinstance(change, Posted):
-            raise AssertionError("only the escalator raises anything to the goal level")
+            raise AssertionError("only the discrepancy raiser raises anything to the goal level")
         if value.status == "escalated":
             assert value.magnitude is not None and value.magnitude > value.bound
         if value.status == "corrected" and change.entry.author in ("motor", "path_follower"):

@@ -107,10 +107,10 @@ def read_notes(
     """Every decision; pages of the letters ``there`` are on the board before the first note."""
     scheduler = Scheduler([reader.source(number) for number, reader in enumerate(team)], ports=[Library()],
                           kinds=(Page,), retention=retention)
-    scheduler.tell([Post(ON_SHELVES[letter]) for letter in there], "library")
+    scheduler.post([Post(ON_SHELVES[letter]) for letter in there], "library")
     decisions = run(scheduler)
     for text in texts:
-        scheduler.tell([Post(Note(text))], "user")
+        scheduler.post([Post(Note(text))], "user")
         decisions += run(scheduler)
     return decisions
 
@@ -204,7 +204,7 @@ def test_what_came_while_an_act_waited_leaves_later_and_comes_back_when_asked_fo
 def test_what_nobody_answers_is_not_asked_twice_and_the_act_is_refused(team: list[Reader], text: str) -> None:
     scheduler = Scheduler([reader.source(number) for number, reader in enumerate(team)], ports=[Library({})],
                           kinds=(Page,))
-    scheduler.tell([Post(Note(text))], "user")
+    scheduler.post([Post(Note(text))], "user")
     decisions = run(scheduler)
     orders = [order.value for order in scheduler.view.all(Order)]
     assert len(set(orders)) == len(orders)
@@ -225,7 +225,7 @@ def test_a_source_that_may_not_write_the_request_is_refused() -> None:
         return ()
 
     scheduler = Scheduler([Scripted("reader", Note, act)], ports=[Library()], kinds=(Page, Order))
-    scheduler.tell([Post(Note(""))], "user")
+    scheduler.post([Post(Note(""))], "user")
     assert [d.refused for d in run(scheduler)] == ["reader may not write Order"]
     assert scheduler.view.all(Order) == () and scheduler.view.all(Page) == ()
 
@@ -245,7 +245,7 @@ def test_a_source_that_lacks_something_to_rate_comes_first_and_is_asked_again(
     unsure = Scripted("unsure", Note, act, rate=rate, writes=(Tally, Order))
     team = [*(Scripted(f"other_{number}", Note, rate=rating) for number, rating in enumerate(others)), unsure]
     scheduler = Scheduler(team, ports=[Library()], kinds=(Page,))
-    scheduler.tell([Post(Note("ab"))], "user")
+    scheduler.post([Post(Note("ab"))], "user")
     first, *rest = run(scheduler)
     assert first.chosen is not None and first.chosen.source is unsure and first.chosen.rating == MISSING_RATING
     assert is_wait(first) and not any(is_wait(decision) for decision in rest)
@@ -268,8 +268,8 @@ def test_a_decision_names_exactly_the_traced_revisions_that_the_act_read(
     for text, revised in steps:
         page = scheduler.view.newest(PAGE_OF, revised)
         if page is not None:
-            scheduler.tell([Revise(page, replace(page.value, text=page.value.text + "!"))], "user")
-        scheduler.tell([Post(Note(text))], "user")
+            scheduler.post([Revise(page, replace(page.value, text=page.value.text + "!"))], "user")
+        scheduler.post([Post(Note(text))], "user")
         while True:
             pages = scheduler.view.all(Page)
             decision = scheduler.step()

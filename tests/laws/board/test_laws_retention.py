@@ -71,7 +71,7 @@ def run_board(program: list[Rule], retention: Mapping[type[Any], Kind]) -> tuple
         sinks=[lambda d: lines.append(decision_line(d))],
     )
     for text in "abc":
-        scheduler.tell([Post(Note(text)), Post(Tally(len(text)))], "user")
+        scheduler.post([Post(Note(text)), Post(Tally(len(text)))], "user")
         run(scheduler, MOST_CYCLES // 3)
     return lines, scheduler
 
@@ -109,7 +109,7 @@ def test_a_decision_tells_what_left_memory_and_the_journal_does_not(
         retention={Note: keeping(notes_kept), Tally: keeping(tallies_kept)},
     )
     for text in "abc":
-        scheduler.tell([Post(Note(text)), Post(Tally(len(text)))], "user")
+        scheduler.post([Post(Note(text)), Post(Tally(len(text)))], "user")
         run(scheduler, MOST_CYCLES // 3)
         assert set(on_board.values()) == {entry.ref for kind in (Note, Tally) for entry in scheduler.view.all(kind)}
     assert all(decision_line(d) == decision_line(d._replace(left=())) for d in decisions)
@@ -131,7 +131,7 @@ def chatter(retention: Mapping[type[Any], Kind], cycles: int, *, patient: bool =
     if patient:
         sources.append(Scripted("patient", Note, rate=0.1))
     scheduler = Scheduler(sources, retention=retention)
-    scheduler.tell([Post(Note("waits")), Post(Tally(0))], "user")
+    scheduler.post([Post(Note("waits")), Post(Tally(0))], "user")
     run(scheduler, cycles)
     return scheduler
 
@@ -158,11 +158,11 @@ def test_what_a_pending_activation_was_triggered_by_stays() -> None:
 
     patient = Scripted("patient", Note, rate=0.1)
     scheduler = Scheduler([Scripted("counter", Tally, post_notes, rate=0.9), patient], retention={Note: keeping(1)})
-    scheduler.tell([Post(Tally(0))], "user")
+    scheduler.post([Post(Tally(0))], "user")
     decisions = run(scheduler, 100)
     assert [d.chosen.source.name for d in decisions if d.chosen].count("patient") == 20
     assert not any(o.activation.source is patient for d in decisions for o in d.obviated)
-    scheduler.tell([Post(Note("last")), Post(Note("very last"))], "user")
+    scheduler.post([Post(Note("last")), Post(Note("very last"))], "user")
     run(scheduler, 10)
     assert len(scheduler.view.all(Note)) < 20
 
@@ -178,7 +178,7 @@ def test_what_another_entry_needs_stays_as_long_as_that_one() -> None:
 
     needing = Kind(Role.INFERENCE, needs=lambda note: (note.text,))
     scheduler = Scheduler([Scripted("counter", Tally, count_on)], retention={Tally: keeping(1), Note: needing})
-    scheduler.tell([Post(Tally(0))], "user")
+    scheduler.post([Post(Tally(0))], "user")
     run(scheduler)
     counts = [entry.value.count for entry in scheduler.view.all(Tally)]
     assert counts[:5] == [0, 4, 8, 12, 16] and len(counts) < 12
@@ -207,7 +207,7 @@ def test_every_revision_can_be_read_back_from_the_journal(program: list[Rule]) -
 
         scheduler = Scheduler([source_of(i, r) for i, r in enumerate(program)], sinks=[journal, remember],
                               retention={Note: keeping(1), Tally: keeping(1)})
-        scheduler.tell([Post(Note("a")), Post(Tally(1))], "user")
+        scheduler.post([Post(Note("a")), Post(Tally(1))], "user")
         run(scheduler, 24)
         journal.close()
         history = Timeline(path)

@@ -36,7 +36,7 @@ class Port:
 
 
 def post(scheduler: Scheduler, *values: Any) -> list[Entry[Any]]:
-    return [change.entry for change in scheduler.tell([Post(value) for value in values], "user")]
+    return [change.entry for change in scheduler.post([Post(value) for value in values], "user")]
 
 
 def names(activations: Iterable[Any]) -> list[str]:
@@ -142,7 +142,7 @@ def test_a_retraction_triggers_its_watchers() -> None:
     mourner = Scripted("mourner", Note, post_tally, kinds=(Retracted,))
     scheduler = Scheduler([mourner])
     (note,) = post(scheduler, Note("a"))
-    scheduler.tell([Retract(note)], "user")
+    scheduler.post([Retract(note)], "user")
     assert names([run(scheduler)[0].chosen]) == ["mourner"]
 
 
@@ -241,7 +241,7 @@ def test_a_stale_act_is_refused() -> None:
     slow = Scripted("slow", Tally, lambda v, t: [Post(Tally(2)), Revise(old, Note("c"))], kinds=(Posted,))
     scheduler = Scheduler([slow])
     (entry,) = post(scheduler, Note("a"))
-    scheduler.tell([Revise(entry, Note("b")), Post(Tally(1))], "user")
+    scheduler.post([Revise(entry, Note("b")), Post(Tally(1))], "user")
     decision = run(scheduler)[0]
     assert decision.refused == "stale: Note-1.0 is now Note-1.1" and decision.made == ()
     assert len(scheduler.view) == 2

@@ -18,7 +18,7 @@ from blackboard.journal import Decision
 from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
-from knowledge_sources.plan.escalator import Escalator
+from knowledge_sources.plan.discrepancy_raiser import DiscrepancyRaiser
 from strategies import Note, Scripted, levels, magnitudes, run
 
 bounds = st.tuples(st.floats(0.0, 5.0), st.floats(0.0, 8.0))
@@ -94,17 +94,17 @@ class ServoMachine(RuleBasedStateMachine):
         self.decisions: list[Decision] = []
         self.found: dict[Ref, Discrepancy] = {}
         self.scheduler = Scheduler(
-            [*map(worker, Level), *map(corrector, Level), *map(measurer, (Level.PLAN, Level.GOAL)), Escalator()],
+            [*map(worker, Level), *map(corrector, Level), *map(measurer, (Level.PLAN, Level.GOAL)), DiscrepancyRaiser()],
             sinks=[self.decisions.append],
         )
 
     @rule(level=st.sampled_from((Level.ACTION, Level.PLAN)), first=magnitudes, then=magnitudes, both=bounds)
     def deviate(self, level: Level, first: float, then: float, both: tuple[float, float]) -> None:
-        self.scheduler.tell([Post(Discrepancy(level, str(then), first, both, "px"))], "user")
+        self.scheduler.post([Post(Discrepancy(level, str(then), first, both, "px"))], "user")
 
     @rule(level=levels)
     def give_work(self, level: Level) -> None:
-        self.scheduler.tell([Post(Note(str(level)))], "user")
+        self.scheduler.post([Post(Note(str(level)))], "user")
 
     @rule()
     def go_on(self) -> None:
@@ -132,7 +132,7 @@ class ServoMachine(RuleBasedStateMachine):
             assert not isinstance(change, Retracted)
             self.found[change.entry.ref] = change.entry.value
         for change in decision.made:
-            if change.entry.author == "escalator" and isinstance(change, Posted) and isinstance(
+            if change.entry.author == "discrepancy_raiser" and isinstance(change, Posted) and isinstance(
                 change.entry.value, Discrepancy
             ):
                 (reason,) = change.entry.because
@@ -151,7 +151,7 @@ class ServoMachine(RuleBasedStateMachine):
         run(self.scheduler, 400)
         assert self.open_levels() == []
         if self.decisions:
-            self.scheduler.tell([Post(Note("action"))], "user")
+            self.scheduler.post([Post(Note("action"))], "user")
             last = self.scheduler.step()
             assert last.focus is Level.ACTION and last.chosen.source.name == "action_worker"
 
@@ -164,19 +164,19 @@ def test_action_work_goes_before_plan_work_while_only_action_discrepancies_are_o
     plan = Scripted("planner", Note, level=Level.PLAN, rate=1.0)
     act = Scripted("driver", Discrepancy, correct, level=Level.ACTION, rate=0.1, writes=(Discrepancy,),
                  where=lambda d: d.is_open)
-    scheduler = Scheduler([plan, act, Escalator()])
+    scheduler = Scheduler([plan, act, DiscrepancyRaiser()])
     small = Discrepancy(Level.ACTION, "slightly off", 1.0, (2.0, 3.0), "px")
-    scheduler.tell([Post(Note("a")), Post(small)], "user")
+    scheduler.post([Post(Note("a")), Post(small)], "user")
     decisions = run(scheduler)
     assert [d.focus for d in decisions[:2]] == [Level.ACTION] * 2
     assert [d.chosen.source.name for d in decisions[:2]] == ["driver", "planner"]
 
 
 def test_an_action_discrepancy_beyond_its_bound_brings_the_plan_level_into_focus_once_it_is_raised() -> None:
-    scheduler = Scheduler([corrector(Level.PLAN), measurer(Level.PLAN), Escalator()])
-    scheduler.tell([Post(Discrepancy(Level.ACTION, "2.5", 2.5, (2.0, 3.0), "px"))], "user")
+    scheduler = Scheduler([corrector(Level.PLAN), measurer(Level.PLAN), DiscrepancyRaiser()])
+    scheduler.post([Post(Discrepancy(Level.ACTION, "2.5", 2.5, (2.0, 3.0), "px"))], "user")
     decisions = run(scheduler)
     assert [(str(d.focus), d.chosen and d.chosen.source.name) for d in decisions] == [
-        ("action", "escalator"), ("plan", "plan_measurer"), ("plan", "plan_corrector"), ("action", None),
+        ("action", "discrepancy_raiser"), ("plan", "plan_measurer"), ("plan", "plan_corrector"), ("action", None),
     ]
     assert [e.value.status for e in scheduler.view.all(Discrepancy)] == ["escalated", "corrected"]

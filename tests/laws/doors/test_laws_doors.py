@@ -23,9 +23,9 @@ from knowledge_sources.methods.doors.leaf import (
     weigh_leaf,
 )
 from knowledge_sources.methods.features.picture import read_picture
-from sim.body.building import Building
-from sim.differences.changes import build_leaf
-from sim.differences.table import TrueDoor
+from sim.body.simulated_building import SimulatedBuilding
+from sim.ground_truth.table import TrueDoor
+from sim.ground_truth.true_changes import build_leaf
 from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
@@ -58,12 +58,12 @@ def doorway(world: World) -> Doorway:
 
 
 @pytest.fixture(scope="module")
-def buildings(world: World, doorway: Doorway) -> dict[str, Building]:
+def buildings(world: World, doorway: Doorway) -> dict[str, SimulatedBuilding]:
     leaf = build_leaf(TrueDoor(name=DOOR), doorway, world.floor_m(HALL))
-    return {"open": Building.of_faces(world.faces), "shut": Building.of_faces([*world.faces, *leaf])}
+    return {"open": SimulatedBuilding.of_faces(world.faces), "shut": SimulatedBuilding.of_faces([*world.faces, *leaf])}
 
 
-def weigh(robot: RobotModel, doorway: Doorway, building: Building, pose: Pose2, gain: float = 1.0) -> float | None:
+def weigh(robot: RobotModel, doorway: Doorway, building: SimulatedBuilding, pose: Pose2, gain: float = 1.0) -> float | None:
     """What a picture of the door says."""
     opening = predict_opening(robot, pose, SURE, doorway, HALL, robot.world)
     if opening is None:
@@ -85,7 +85,7 @@ def before_door(doorway: Doorway, away_m: float, aside_m: float) -> Pose2:
 @pytest.mark.parametrize("gain", [0.5, 1.0])
 @pytest.mark.parametrize(("away_m", "aside_m"), [(1.6, 0.2), (2.5, -0.3), (4.0, 0.4), (5.5, 0.0)])
 def test_a_leaf_is_told_from_what_is_beyond_in_any_light(
-    robot: RobotModel, doorway: Doorway, buildings: dict[str, Building], away_m: float, aside_m: float, gain: float
+    robot: RobotModel, doorway: Doorway, buildings: dict[str, SimulatedBuilding], away_m: float, aside_m: float, gain: float
 ) -> None:
     pose = before_door(doorway, away_m, aside_m)
     shut, opened = (weigh(robot, doorway, buildings[state], pose, gain) for state in ("shut", "open"))
@@ -94,7 +94,7 @@ def test_a_leaf_is_told_from_what_is_beyond_in_any_light(
 
 
 def test_a_wall_where_the_door_should_be_is_no_leaf(
-    robot: RobotModel, doorway: Doorway, buildings: dict[str, Building]
+    robot: RobotModel, doorway: Doorway, buildings: dict[str, SimulatedBuilding]
 ) -> None:
     """A robot that is elsewhere sees no frame where it expects it."""
     pose = before_door(doorway, 2.5, 0.0)
@@ -140,7 +140,7 @@ def test_one_picture_says_no_more_than_it_may_and_nothing_for_a_leaf_without_a_f
 
 
 def picture(ratio: float, x_m: float = 0.0) -> DoorPicture:
-    return DoorPicture("Frame-1", (0.0, 0.0, 9.0, 9.0), x_m, 0.0, 0.0, ratio, "something")
+    return DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), x_m, 0.0, 0.0, ratio, "something")
 
 
 def look(ratios: list[tuple[float, float]], *, is_shut: bool = False) -> list[DoorState | None]:
@@ -190,6 +190,6 @@ def test_a_state_says_what_is_seen() -> None:
 
 @pytest.mark.parametrize("state", ["open", "shut"])
 def test_an_overexposed_opening_says_nothing(
-    robot: RobotModel, doorway: Doorway, buildings: dict[str, Building], state: str
+    robot: RobotModel, doorway: Doorway, buildings: dict[str, SimulatedBuilding], state: str
 ) -> None:
     assert weigh(robot, doorway, buildings[state], before_door(doorway, 2.0, 0.0), gain=9.0) is None

@@ -11,7 +11,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.simulation.run import build_robot_model
+from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.motion.routes import compute_free_space

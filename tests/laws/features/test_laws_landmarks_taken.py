@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
 
-from harvey.simulation.run import build_robot_model
+from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.tracking.template_tracking import _compute_anchor_covariance, select_landmarks
 from knowledge_sources.settings import DEFAULT
@@ -45,21 +45,21 @@ def test_new_landmarks_are_apart_from_each_other_and_from_those_kept(seed: int, 
     pose = Pose2(*rng.uniform(corners.min(axis=0) + 1.0, corners.max(axis=0) - 1.0), rng.uniform(-math.pi, math.pi))
     radiance = Optics.of(s.camera.camera).radiance(stage().building.renderer, robot().camera_from_world(pose))
     image = read_picture(compress_jpeg(expose(radiance, s.sensor, rng, lights_on=True), s.sensor.jpeg_quality)).grey
-    first = select_landmarks(robot(), (), "Frame-1", image, pose)
+    first = select_landmarks(robot(), (), "CameraPicture-1", image, pose)
     assume(len(first) >= 2)
     kept = tuple(replace(track, found_px=None) if rng.random() < 0.3 else track
                  for track in first if rng.random() < part)
     few = replace(DEFAULT, tracking=replace(TUNING, max_tracks=most))
     for taken, tuned in (((), DEFAULT), (kept, DEFAULT), (kept, few)):
         limit = tuned.tracking.max_tracks
-        new = select_landmarks(robot(), taken, "Frame-2", image, pose, tuned)
+        new = select_landmarks(robot(), taken, "CameraPicture-2", image, pose, tuned)
         assert len(new) <= max(0, limit - len(taken))
         at = [track.found_px or track.predicted_px for track in (*taken, *new)]
         for i, here in enumerate(at[len(taken):], len(taken)):
             assert all(math.dist(here, other) >= TUNING.min_spacing_px for other in at[:i])
         for track in new:
             point = robot().camera_from_world(pose).apply(np.array(track.point_world))
-            assert track.found_px is not None and track.template_frame == "Frame-2"
+            assert track.found_px is not None and track.template_frame == "CameraPicture-2"
             np.testing.assert_allclose(robot().camera.project(point), track.found_px, atol=1e-6)
             assert math.isclose(track.template_depth_m, point[2], rel_tol=1e-9)
             assert track.template_depth_m <= 1.001 * TUNING.max_landmark_distance_m
@@ -81,10 +81,10 @@ def test_a_pose_is_no_surer_than_the_beliefs_at_which_templates_were_cut(seed: i
             return np.array([there.x_m, there.y_m, there.heading_rad])
 
         lever = approx_fprime(np.zeros(3), move, 1e-6)
-        anchors.append(Anchor(f"Frame-{k}", at.x_m, at.y_m, tuple(map(tuple, covariance))))
+        anchors.append(Anchor(f"CameraPicture-{k}", at.x_m, at.y_m, tuple(map(tuple, covariance))))
         parts.append(lever @ covariance @ lever.T)
     which = rng.integers(0, count, 8)
     at_px = (0.0, 0.0)
-    seen = [Track("mark", (0.0, 0.0, 1.0), f"Frame-{k}", at_px, 1.0, at_px, at_px, 1.0, 0.5) for k in which]
+    seen = [Track("mark", (0.0, 0.0, 1.0), f"CameraPicture-{k}", at_px, 1.0, at_px, at_px, 1.0, 0.5) for k in which]
     np.testing.assert_allclose(
         _compute_anchor_covariance(pose, seen, tuple(anchors)), np.mean([parts[k] for k in which], axis=0), atol=1e-5)

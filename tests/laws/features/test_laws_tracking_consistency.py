@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from consistency import assert_consistent, compute_error, compute_nees
-from harvey.simulation.run import build_robot_model
+from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.tracking.template_tracking import correct_pose
 from knowledge_sources.questions import NOWHERE
 from knowledge_sources.settings import DEFAULT

@@ -15,7 +15,7 @@ from experiments.generated.scenes import Patch, PatchFace, box_faces
 from knowledge_sources.methods.floor.appearance import compute_looks, default_covariance, find_floor_in_shade
 from knowledge_sources.methods.floor.model_floor import STEP_PX, ModelFloor, build_floor_grid
 from knowledge_sources.methods.floor.see_floor import GREY, find_unlike
-from knowledge_sources.methods.floor.things import compute_parallax_odds, find_regions
+from knowledge_sources.methods.floor.standing_regions import compute_parallax_odds, find_regions
 from sim.render.light.lamps import Room
 from sim.render.light.lighting import Lighting
 from sim.render.light.lights import Lights

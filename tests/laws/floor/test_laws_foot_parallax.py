@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.model_floor import STEP_PX, build_floor_grid
-from knowledge_sources.methods.floor.things import FOOT_PART_STEP, find_footprint, find_regions, measure_foot_part
+from knowledge_sources.methods.floor.standing_regions import (
+    FOOT_PART_STEP,
+    find_footprint,
+    find_regions,
+    measure_foot_part,
+)
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 

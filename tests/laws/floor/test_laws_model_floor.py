@@ -10,7 +10,7 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from harvey.simulation.run import build_robot_model
+from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.floor.model_floor import STEP_PX, ModelFloor, build_floor_grid, predict_model_floor
 from sim.scenario import load_scenario
 from world_models.camera import Camera

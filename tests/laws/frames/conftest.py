@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from experiments.generated.missions import OFFICE, fault
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from logs.run_directory import RunDirectory
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage

@@ -23,7 +23,7 @@ from experiments.generated.missions import HALLWAY
 from harvey.agent import build_agent
 from harvey.runner.replay import open_originals
 from harvey.runner.world_port import WorldPort
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import load_kinds
 from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.questions import find_building, find_frames
@@ -37,9 +37,9 @@ from strategies import Note
 from without_frames import list_decided
 from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
-from world_models.entries.kinds import KINDS
+from world_models.entries.entry_kinds import KINDS
 from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.told import Told
+from world_models.entries.user_reports import UserReport
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frame_store import FrameStore
@@ -90,7 +90,7 @@ def test_the_order_in_which_frames_arrive_does_not_change_decisions(lost_run: Ru
         frames = [i for i, entry in enumerate(record.observed) if entry.type == LocaleFrame.__name__]
         most = max(most, len(frames))
         for entry in _shuffled(record.observed, random):
-            scheduler.tell([effect_of(entry, originals, scheduler.view, scheduler.kinds)], entry.author)
+            scheduler.post([effect_of(entry, originals, scheduler.view, scheduler.kinds)], entry.author)
         decision = scheduler.step()
         assert decision is not None
         decided.append(decision_record(decision))
@@ -189,25 +189,25 @@ def chain() -> World:
 rooms = st.integers(0, ROOMS - 1)
 visits = st.one_of(
     rooms.map(lambda i: Note(f"r{i}")),
-    st.builds(Told, rooms.map(lambda i: f"r{i}/picture-1"), st.sampled_from(("gone", "there"))),
+    st.builds(UserReport, rooms.map(lambda i: f"r{i}/picture-1"), st.sampled_from(("gone", "there"))),
 )
 
 
 @given(st.lists(visits, min_size=10, max_size=60))
 @settings(max_examples=30)
-def test_what_nobody_needs_leaves_and_what_is_believed_otherwise_stays(chain: World, steps: list[Note | Told]) -> None:
+def test_what_nobody_needs_leaves_and_what_is_believed_otherwise_stays(chain: World, steps: list[Note | UserReport]) -> None:
     """However many rooms the robot visits, the board holds those that it is in, those that changed, and a few more."""
     sources = (Visitor(), ModelReviser())
     scheduler = Scheduler(sources, ports=[WorldPort(FrameStore(chain))], kinds=KINDS,
                           retention=_marks_with(load_kinds(), FEW))
     gone = set[str]()
     for step in steps:
-        scheduler.tell([Post(step)], "test")
+        scheduler.post([Post(step)], "test")
         while (decision := scheduler.step()) is not None:
             assert not decision.refused
         frames = {entry.value.name: entry.value for entry in scheduler.view.all(LocaleFrame)}
         assert len(frames) == len(scheduler.view.all(LocaleFrame))
-        if isinstance(step, Told):
+        if isinstance(step, UserReport):
             gone = gone | {step.what} if step.state == "gone" else gone - {step.what}
         assert {change.name for frame in frames.values() for change in frame.changes} == gone
         assert len([frame for frame in frames.values() if not frame.changes]) <= FEW + 2 * 3 + 2

@@ -15,13 +15,13 @@ from blackboard.board import View
 from blackboard.change import Change, Watch
 from blackboard.effect import Effect
 from blackboard.level import Level
-from harvey.simulation.run import build_robot_model
+from harvey.simulation.simulated_run import build_robot_model
 from harvey.wiring import KNOWLEDGE_SOURCES, build, foreign_sources
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.building.world import World
-from world_models.entries.told import Told
+from world_models.entries.user_reports import UserReport
 from world_models.frame_store import FrameStore
 
 PLAIN = (type(None), bool, int, float, complex, str, bytes, Enum, type, types.ModuleType)
@@ -100,8 +100,8 @@ class Hoarder(RobotKnowledgeSource):
     """Holds something, in its own way."""
 
     level = Level.ACTION
-    on = (Watch(Told),)
-    writes = (Told,)
+    on = (Watch(UserReport),)
+    writes = (UserReport,)
 
     def act(self, view: View, trigger: Change) -> Iterable[Effect]:
         return ()
@@ -135,7 +135,7 @@ def _by_default(thing: object) -> Hoarder:
 
 
 def _in_watch(thing: object) -> Hoarder:
-    return type("InWatch", (Hoarder,), {"on": (Watch(Told, where=lambda _told: thing is not None),)})()
+    return type("InWatch", (Hoarder,), {"on": (Watch(UserReport, where=lambda _told: thing is not None),)})()
 
 
 WAYS: Mapping[str, Callable[[Any], Hoarder]] = {

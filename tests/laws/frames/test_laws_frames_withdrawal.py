@@ -16,14 +16,14 @@ from blackboard.scheduler import RAISED, Scheduler
 from harvey.agent import build_agent
 from harvey.replay.what_if import WhatIf
 from harvey.runner.world_port import tell_robot
-from harvey.simulation.run import SimulatedRun, build_head
+from harvey.simulation.simulated_run import SimulatedRun, build_head
 from logs.run_recorder import RunRecorder
 from sim.stage import Stage
 from two_doors import two_doors
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.percepts import Tracks
 from world_models.entries.task import Milestone, Outcome, PlanSketch
-from world_models.entries.told import Told
+from world_models.entries.user_reports import UserReport
 
 DOORS = ("north-door", "south-door")
 THINGS = ("study/table-1", "study/bookshelf-1", "study/picture-1", "study/notice-board-1", "study/picture-2",
@@ -32,8 +32,8 @@ LANDMARKS = (*THINGS, "north-door", "study/north-wall", "study/east-wall", "parl
 CYCLES = 130
 
 tellings = st.one_of(
-    st.builds(Told, st.sampled_from(DOORS), st.sampled_from(("shut", "open"))),
-    st.builds(Told, st.sampled_from(THINGS), st.sampled_from(("gone", "there"))),
+    st.builds(UserReport, st.sampled_from(DOORS), st.sampled_from(("shut", "open"))),
+    st.builds(UserReport, st.sampled_from(THINGS), st.sampled_from(("gone", "there"))),
     st.sampled_from(LANDMARKS),
 )
 """What is told, or the name of a landmark that is removed."""
@@ -48,10 +48,10 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Stage:
 
 @given(plans)
 @example({30: "parlour/notice-board-1"})  # a milestone waits that expects it
-@example({44: "parlour/picture-1", 70: Told("parlour/rack-1", "gone")})  # one was verified by it; it is followed
-@example({47: Told("north-door", "shut")})
+@example({44: "parlour/picture-1", 70: UserReport("parlour/rack-1", "gone")})  # one was verified by it; it is followed
+@example({47: UserReport("north-door", "shut")})
 @settings(max_examples=5, phases=(Phase.explicit, Phase.generate))
-def test_nothing_rests_on_what_is_gone(stage: Stage, plan: Mapping[int, Told | str]) -> None:
+def test_nothing_rests_on_what_is_gone(stage: Stage, plan: Mapping[int, UserReport | str]) -> None:
     """A mission of which somebody revises the building at random cycles; looked at whenever nothing is to withdraw."""
     head = build_head(stage, 3)
     agent = build_agent(head)
@@ -59,7 +59,7 @@ def test_nothing_rests_on_what_is_gone(stage: Stage, plan: Mapping[int, Told | s
     with SimulatedRun(stage, head, agent, recorder) as run:
         scheduler = run.scheduler
         tell_robot(scheduler, agent.robot)
-        scheduler.tell([Post(head.task())], "user")
+        scheduler.post([Post(head.task())], "user")
         for cycle in range(1, CYCLES):
             _tell(scheduler, plan.get(cycle))
             decision = scheduler.step()
@@ -72,18 +72,18 @@ def test_nothing_rests_on_what_is_gone(stage: Stage, plan: Mapping[int, Told | s
             event(f"withdrawn {milestone.value.name()}")
 
 
-def _tell(scheduler: Scheduler, what: Told | str | None) -> None:
-    if isinstance(what, Told):
-        scheduler.tell([Post(what)], "user")
+def _tell(scheduler: Scheduler, what: UserReport | str | None) -> None:
+    if isinstance(what, UserReport):
+        scheduler.post([Post(what)], "user")
     elif what is not None:
         WhatIf((what,))(scheduler)
 
 
 def _is_quiet(scheduler: Scheduler) -> bool:
     """Whether every telling was taken up, and every revision of a frame was answered."""
-    concerned = (*scheduler.view.all(Told), *scheduler.view.all(LocaleFrame))
+    concerned = (*scheduler.view.all(UserReport), *scheduler.view.all(LocaleFrame))
     unseen = {change.entry.id for change in scheduler._unseen}
-    return not any(entry.id in unseen or any(a.source.name in ("model_reviser", "withdrawer")
+    return not any(entry.id in unseen or any(a.source.name in ("model_reviser", "dependency_withdrawer")
                                              for a in scheduler._agenda.triggered_by(entry.id)) for entry in concerned)
 
 

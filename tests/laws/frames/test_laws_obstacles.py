@@ -17,11 +17,11 @@ from blackboard.change import Change, Posted
 from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from harvey.simulation.run import build_robot_model
+from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.action.obstacle_finder import FREE_FLOOR_ODDS, ObstacleFinder
 from knowledge_sources.floor_ahead import PUT_DOWN_FREE_M, list_free_discs
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.questions import find_building_without_finds
+from knowledge_sources.questions import find_building_as_filed
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.building.locale_frame import FRAME_OF, LocaleFrame
@@ -262,10 +262,10 @@ def test_what_was_touched_is_not_taken_back(hall: Hall) -> None:
 
 
 def test_without_what_was_found_the_building_is_as_before_and_what_is_known_of_both_is_kept(hall: Hall) -> None:
-    assert find_building_without_finds(hall.board.view) is None
+    assert find_building_as_filed(hall.board.view) is None
     before = FrameBuilding(hall.board.view).obstacles(HALL)
     hall.see(carton(), seen_s=1.0)
-    known, bare = FrameBuilding(hall.board.view), find_building_without_finds(hall.board.view)
+    known, bare = FrameBuilding(hall.board.view), find_building_as_filed(hall.board.view)
     assert bare is not None
     assert len(known.obstacles(HALL)) == len(before) + 1 and len(bare.obstacles(HALL)) == len(before)
     computed: list[str] = []
@@ -278,7 +278,7 @@ def test_without_what_was_found_the_building_is_as_before_and_what_is_known_of_b
         return building.cached("things", 4, HALL, compute)
 
     for _ in range(3):
-        again = find_building_without_finds(hall.board.view)
+        again = find_building_as_filed(hall.board.view)
         assert again is not None
         assert (count(FrameBuilding(hall.board.view)), count(again)) == (len(before) + 1, len(before))
     assert len(computed) == 2

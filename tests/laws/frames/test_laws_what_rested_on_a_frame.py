@@ -13,7 +13,7 @@ from blackboard.board import Blackboard, View
 from blackboard.change import Revised
 from blackboard.effect import Post, Revise
 from blackboard.entry import Entry
-from knowledge_sources.action.withdrawer import Withdrawer
+from knowledge_sources.action.dependency_withdrawer import DependencyWithdrawer
 from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.entries.task import Milestone, MilestoneStatus, PlanSketch
 
@@ -68,7 +68,7 @@ def test_what_rested_on_a_frame_is_withdrawn_and_nothing_else(
             expected.add(entry.id)
             is_unverified |= status == "verified" and is_active and is_verified and index == 1
     trigger = Revised(frame)
-    answered = answer(Withdrawer(), View(board), trigger)
+    answered = answer(DependencyWithdrawer(), View(board), trigger)
     assert (answered is not None) == bool(expected)
     effects: list[Any] = list(answered or ())
     assert {e.entry.id for e in effects if e.value.__class__ is Milestone} == expected

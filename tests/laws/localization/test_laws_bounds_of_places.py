@@ -16,15 +16,15 @@ import pytest
 from experiments.generated.floors import generated_floor
 from knowledge_sources.goal.relocalizer import Relocalizer, _find_prior, _prefer_reachable
 from knowledge_sources.methods.localization.global_localization import (
-    Candidate,
     LocalizationResult,
     LocalizationStatus,
+    PlaceCandidate,
     decide,
     rank_candidates,
 )
 from knowledge_sources.methods.localization.next_view import SensingAction
 from knowledge_sources.methods.localization.place_odds import (
-    ToldPlace,
+    StatedPlace,
     compute_place_odds,
     compute_prior,
     is_within_reach,
@@ -46,9 +46,9 @@ ROBOT = RobotModel(generated_floor(11, 4, symmetric=True).world, Camera.from_fie
                    ActuatorModel())
 
 
-def place(x_m: float = 2.0, log: float = 40.0, accepted: bool = True, room: str = "corridor-0") -> Candidate:
+def place(x_m: float = 2.0, log: float = 40.0, accepted: bool = True, room: str = "corridor-0") -> PlaceCandidate:
     likelihood = PoseLikelihood(20, 20, log, 1.0, 1.0)
-    return Candidate(room, Pose2(x_m, 2.0, 0.0), np.diag([1e-4, 1e-4, 1e-5]), likelihood, accepted)
+    return PlaceCandidate(room, Pose2(x_m, 2.0, 0.0), np.diag([1e-4, 1e-4, 1e-5]), likelihood, accepted)
 
 
 @pytest.mark.parametrize(("places", "looks", "status"), [
@@ -62,7 +62,7 @@ def place(x_m: float = 2.0, log: float = 40.0, accepted: bool = True, room: str 
     ((place(2.0), place(6.0, accepted=False)), S.min_views, PROBE),
 ])
 def test_one_accepted_place_is_found_after_enough_looks(
-    places: tuple[Candidate, ...], looks: int, status: LocalizationStatus
+    places: tuple[PlaceCandidate, ...], looks: int, status: LocalizationStatus
 ) -> None:
     assert S.min_views > 1
     assert decide(ROBOT, places, LOOKS[:looks]).status is status
@@ -111,7 +111,7 @@ def test_unlikely_places_are_dropped_and_refuted_ones_unless_they_look_alike() -
     assert rank(*many) == many[:S.max_hypotheses]
 
 
-HERE = ToldPlace(Pose2(2.0, 2.0, 0.0), np.diag([1e-4, 1e-4, 1e-5]), 0.5)
+HERE = StatedPlace(Pose2(2.0, 2.0, 0.0), np.diag([1e-4, 1e-4, 1e-5]), 0.5)
 
 
 def find_told_probability(p_told: float, logs: tuple[float, float]) -> float:
@@ -172,7 +172,7 @@ class Reach:
     ((), (place(room="a"), place(room="b")), AMBIGUOUS, ""),
 ])
 def test_the_only_place_within_reach_is_believed_if_it_stands_by_itself(
-    reach: tuple[str, ...], places: tuple[Candidate, ...], status: LocalizationStatus, room: str
+    reach: tuple[str, ...], places: tuple[PlaceCandidate, ...], status: LocalizationStatus, room: str
 ) -> None:
     building: Any = Reach(*reach)
     found = _prefer_reachable(building, LocalizationResult(AMBIGUOUS, places), "here")
@@ -185,7 +185,7 @@ def test_a_dark_frame_is_dark_by_contrast_and_brightness_together() -> None:
 
     def is_dark(contrast: float, brightness: float) -> bool:
         empty = np.zeros((0, 2, 2))
-        return Relocalizer()._is_dark(Segments("Frame-1", "", empty, np.zeros(0), contrast, brightness))
+        return Relocalizer()._is_dark(Segments("CameraPicture-1", "", empty, np.zeros(0), contrast, brightness))
 
     assert is_dark(g.min_contrast - SMALL, g.min_brightness - SMALL)
     assert not is_dark(g.min_contrast + SMALL, g.min_brightness - SMALL)

@@ -18,7 +18,7 @@ from knowledge_sources.methods.motion.pure_pursuit import (
 )
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel, arc
-from world_models.entries.robot import Drift
+from world_models.entries.robot_state import Drift
 from world_models.entries.task import Leg
 from world_models.frames import Pose2
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching import Peak, match_lines
-from knowledge_sources.methods.matching.kernels import RIGID, SCALED
+from knowledge_sources.methods.matching.matching_kernels import RIGID, SCALED
 from knowledge_sources.methods.matching.search import (
     POSE_STEP,
     Fitting,

@@ -65,7 +65,7 @@ def solve(seed: int, sigma_m: float = 0.05) -> tuple[Array, Array]:
     """Error (3,) and stated covariance (3, 3) where the true building is drawn from the model's errors."""
     rng = np.random.default_rng(seed)
     model, errors = build_hall(sigma_m)
-    segments, visible = observe(errors.displace(model, rng.normal(size=len(errors.modes))), rng)
+    segments, visible = observe(errors.displace(model, rng.normal(size=len(errors.displacement_modes))), rng)
     away = rng.multivariate_normal(np.zeros(3), PRIOR)
     found = planar_from_lines(
         model[visible], segments[visible], CAMERA, MOUNT, Pose2(*away), prior_covariance=PRIOR, sigma_px=SIGMA_PX,
@@ -79,7 +79,7 @@ def solve(seed: int, sigma_m: float = 0.05) -> tuple[Array, Array]:
 def test_an_exact_model_is_solved_as_before_to_the_bit(seed: int) -> None:
     rng = np.random.default_rng(seed)
     model, errors = build_hall()
-    segments, visible = observe(errors.displace(model, rng.normal(size=len(errors.modes))), rng)
+    segments, visible = observe(errors.displace(model, rng.normal(size=len(errors.displacement_modes))), rng)
     args: tuple[Any, ...] = (model[visible], segments[visible], CAMERA, MOUNT, Pose2(0.1, 0.05, 0.02))
     one = planar_from_lines(*args, prior_covariance=PRIOR, sigma_px=SIGMA_PX)
     other = planar_from_lines(*args, prior_covariance=PRIOR, sigma_px=SIGMA_PX, errors=exact(len(args[0])))
@@ -93,13 +93,13 @@ def test_derivatives_by_the_modes_are_those_of_displaced_lines(seed: int) -> Non
     model, errors = build_hall()
     segments, visible = observe(model, rng)
     kept = errors.take(np.flatnonzero(visible))
-    amplitudes = rng.normal(size=len(kept.modes))
+    amplitudes = rng.normal(size=len(kept.displacement_modes))
     _, _, by_mode = compute_displaced_jacobian(
-        build_line_set(model[visible], segments[visible], CAMERA, 1.0), kept.shifts, STATE, MOUNT)
+        build_line_set(model[visible], segments[visible], CAMERA, 1.0), kept.displacements, STATE, MOUNT)
     step = 1e-4
     there, back = (compute_displaced_jacobian(
         build_line_set(kept.displace(model[visible], sign * step * amplitudes), segments[visible], CAMERA, 1.0),
-        kept.shifts, STATE, MOUNT)[0] for sign in (1.0, -1.0))
+        kept.displacements, STATE, MOUNT)[0] for sign in (1.0, -1.0))
     np.testing.assert_allclose(by_mode @ amplitudes, (there - back) / (2.0 * step), rtol=1e-4, atol=1e-4)
 
 
@@ -136,7 +136,7 @@ def test_a_worse_model_never_states_a_smaller_covariance(seed: int, sigma_m: flo
 def test_displacements_are_found_among_clutter(seed: int) -> None:
     rng = np.random.default_rng(seed)
     model, errors = build_hall(0.03)
-    amplitudes = np.clip(rng.normal(size=len(errors.modes)), -2.0, 2.0)
+    amplitudes = np.clip(rng.normal(size=len(errors.displacement_modes)), -2.0, 2.0)
     true = errors.displace(model, amplitudes)
     segments, visible = observe(true, rng)
     at = np.flatnonzero(visible)

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from experiments.generated.scenes import box_room
 from harvey.simulation.body_replay import part_of
-from sim.body.actuator import ActuatorParameters
-from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
+from sim.body.simulated_building import SimulatedBuilding
+from sim.body.wheel_errors import ActuatorParameters
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import Frame, MotorCommand
+from world_models.entries.body import CameraPicture, MotorCommand
 from world_models.frames import Pose2
 
-BUILDING = Building.of_faces(box_room(), samples=1)
+BUILDING = SimulatedBuilding.of_faces(box_room(), samples=1)
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
 PARTS = st.floats(0.0, 1.0)
 COMMANDS = st.builds(MotorCommand, st.floats(-3.0, 3.0), st.floats(0.0, 2.0))
@@ -49,11 +49,11 @@ def test_known_pictures_change_nothing_but_who_makes_them(
     """None is a look. The first pictures are known from the first body, the others are made."""
     first, second = body(seed), body(seed)
     answers = [first.look() if act is None else first.execute(act) for act in acts]
-    pictures = {a.number: a.jpeg for a in answers if isinstance(a, Frame) and a.number < known}
+    pictures = {a.number: a.jpeg for a in answers if isinstance(a, CameraPicture) and a.number < known}
     second.use_recorded({number: jpeg[:-2] + b"!!" for number, jpeg in pictures.items()})
     again = [second.look() if act is None else second.execute(act) for act in acts]
     for one, other in zip(answers, again, strict=True):
-        if isinstance(one, Frame) and isinstance(other, Frame) and one.number < known:
+        if isinstance(one, CameraPicture) and isinstance(other, CameraPicture) and one.number < known:
             assert other.jpeg == one.jpeg[:-2] + b"!!"  # it is the picture that was handed over
             assert (other.number, other.sim_time_s) == (one.number, one.sim_time_s)
         else:

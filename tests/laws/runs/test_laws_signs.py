@@ -50,7 +50,7 @@ def refuted(sink: Sink) -> None:
                              Post(PlanSketch("Goal-1", (), ODD, (Subgoal(place, place, True, ODD),) * 4))]
     effects += [Post(Milestone("PlanSketch-1", number, f"M{number} of {ODD}", 0.0, (ODD,), status=status))
                 for number, status in enumerate(("turning", "expected", "verified", "refuted", "not testable"))]
-    effects += [Post(BodyFault("camera", ODD, ODD, "Look-1", 1.0)), Post(Outcome("lost", ODD)),
+    effects += [Post(BodyFault("camera", ODD, ODD, "PictureRequest-1", 1.0)), Post(Outcome("lost", ODD)),
                 Post(Discrepancy(Level.PLAN, ODD, None, (1.0, 2.0), "px"))]
     made = board.apply(effects, author="sketcher", cycle=1)
     sink(Decision(1, (), made, Level.ACTION, (), (), None, None, 0, (), ""))

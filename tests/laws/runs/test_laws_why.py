@@ -63,7 +63,7 @@ def journals(draw: st.DrawFn) -> list[str]:
     choices = draw(st.lists(st.integers(0, 60), min_size=1, max_size=120))
     second = Scripted("second", Tally, lambda view, trigger: [Post(Note("seen"), (trigger.entry,))], rate=0.4)
     scheduler = Scheduler([wilful(choices), second], sinks=(decisions.append,))
-    scheduler.tell([Post(Note("first")), Post(Tally(1))], "user")
+    scheduler.post([Post(Note("first")), Post(Tally(1))], "user")
     for _ in range(40):
         if scheduler.step() is None:
             break

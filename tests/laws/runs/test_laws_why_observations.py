@@ -22,9 +22,9 @@ from logs.records import EntryRecord, Originals, effect_of, original_of
 from scripted_mission import HOUSE
 from world_models.actuator import ActuatorModel
 from world_models.building.locale_frame import FrameAnswer, FrameChange, FrameRequest, LocaleFrame
-from world_models.entries.body import Frame, MotionReport, RideReport
-from world_models.entries.kinds import KINDS
-from world_models.entries.robot import Footprint, Wheels
+from world_models.entries.body import CameraPicture, MotionReport, RideReport
+from world_models.entries.entry_kinds import KINDS
+from world_models.entries.robot_state import Footprint, Wheels
 from world_models.entries.task import Command, Outcome
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
@@ -50,7 +50,7 @@ def locale_frames(draw: st.DrawFn) -> LocaleFrame:
 observations = st.one_of(
     st.builds(MotionReport, numbers, numbers, numbers, numbers),
     st.builds(RideReport, st.text(max_size=5), st.text(max_size=5), numbers, numbers),
-    st.builds(Frame, st.binary(max_size=20), st.integers(0, 9), numbers, st.text(max_size=5)),
+    st.builds(CameraPicture, st.binary(max_size=20), st.integers(0, 9), numbers, st.text(max_size=5)),
     st.builds(Command, st.text(max_size=9), headings, st.none() | headings, covariances),
     st.builds(Quiescence, st.integers(0, 10**6)),
     st.builds(Outcome, st.text(max_size=9), st.text(max_size=9)),
@@ -70,12 +70,12 @@ def recorded(value: Any) -> EntryRecord:
                        data["value"], 5, True)
 
 
-def originals(*frames: Frame) -> Originals:
+def originals(*frames: CameraPicture) -> Originals:
     return Originals({frame.number: frame.jpeg for frame in frames}, HOUSE_STORE)
 
 
 def originals_of(value: Any) -> Originals:
-    return originals(value) if isinstance(value, Frame) else originals()
+    return originals(value) if isinstance(value, CameraPicture) else originals()
 
 
 @settings(deadline=None, max_examples=200)
@@ -103,11 +103,11 @@ def test_a_value_of_other_fields_is_refused(value: Any, data: st.DataObject) -> 
 
 @given(st.binary(max_size=9), st.binary(max_size=9))
 def test_a_picture_must_be_the_one_that_was_seen(seen: bytes, kept: bytes) -> None:
-    record = recorded(Frame(seen, 7, 0.5))
+    record = recorded(CameraPicture(seen, 7, 0.5))
     if hashlib.sha256(seen).digest() == hashlib.sha256(kept).digest():
-        assert original_of(record, originals(Frame(kept, 7, 0.5)), KNOWN).jpeg == seen
+        assert original_of(record, originals(CameraPicture(kept, 7, 0.5)), KNOWN).jpeg == seen
         return
     with pytest.raises(BadInput, match="another one"):
-        original_of(record, originals(Frame(kept, 7, 0.5)), KNOWN)
+        original_of(record, originals(CameraPicture(kept, 7, 0.5)), KNOWN)
     with pytest.raises(BadInput, match="picture 7"):
-        original_of(record, originals(Frame(seen, 8, 0.5)), KNOWN)
+        original_of(record, originals(CameraPicture(seen, 8, 0.5)), KNOWN)

@@ -13,16 +13,16 @@ from typing import Any
 import pytest
 
 from experiments.generated.scenes import box_room
-from sim.body.building import Building, Helper
 from sim.body.simulated_body import SimulatedBody
-from sim.differences.things import MovedThing
+from sim.body.simulated_building import Helper, SimulatedBuilding
+from sim.faults.built_in_faults import Bump, Kidnap, LightsOff, Occlusion
 from sim.faults.fault import DeviceFault, Fault, FaultSchedule
-from sim.faults.kinds import Bump, Kidnap, LightsOff, Occlusion
-from sim.faults.registry import BUILT_IN
+from sim.faults.fault_registry import BUILT_IN
+from sim.ground_truth.things import MovedThing
 from sim.scenario import FORMAT
 from world_models.camera import Camera, CameraMount
 from world_models.entries.location import Place
-from world_models.files.toml.settings import known_keys, read_settings
+from world_models.files.toml.settings_reader import known_keys, read_settings
 from world_models.files.toml.source import Source, WorldError
 from world_models.frames import Pose2
 
@@ -32,7 +32,7 @@ UNITS = {"m": {"cm": 0.01, "ft": 0.3048, "in": 0.0254}, "rad": {"deg": math.pi /
 """What may be written for a unit, and how much of it that is; not taken from the code."""
 NEEDED = {"moved": {"thing": "a"}}
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
-BUILDING = Building.of_faces(box_room(), samples=1)
+BUILDING = SimulatedBuilding.of_faces(box_room(), samples=1)
 START = Pose2(1.0, 2.0, 0.5)
 
 

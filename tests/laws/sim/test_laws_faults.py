@@ -8,24 +8,24 @@ from dataclasses import fields, replace
 import pytest
 
 from experiments.generated.scenes import box_room
-from sim.body.building import Building
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
+from sim.body.simulated_building import SimulatedBuilding
+from sim.faults.built_in_faults import Kidnap
 from sim.faults.fault import DeviceFault, Fault
-from sim.faults.kinds import Kidnap
-from sim.faults.registry import BUILT_IN, find_fault_class
+from sim.faults.fault_registry import BUILT_IN, find_fault_class
 from sim.scenario import ScenarioError, parse_scenario
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import BodyFault, Course, Frame, MotionReport, MotorCommand
+from world_models.entries.body import BodyFault, CameraPicture, Course, MotionReport, MotorCommand
 from world_models.entries.location import Place
-from world_models.files.toml.settings import known_keys
+from world_models.files.toml.settings_reader import known_keys
 from world_models.frames import Pose2
 
 HEAD = 'world = "w"\ngoal = "(ptrans (a (1,2,0)) (b (3.5,-4,0)))"\n[[faults]]\n'
 KEYS = sorted({key for fault_class in BUILT_IN for key in known_keys(fault_class)})
 DEVICE_FAULTS = [fault_class for fault_class in BUILT_IN if issubclass(fault_class, DeviceFault)]
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
-BUILDING = Building.of_faces(box_room(), samples=1)
+BUILDING = SimulatedBuilding.of_faces(box_room(), samples=1)
 
 
 def body(*faults: Fault) -> SimulatedBody:
@@ -81,12 +81,12 @@ def test_a_device_fault_answers_in_place_of_the_device_for_its_duration(fault_cl
     faulty = answers[0] if fault_class.part == "base" else answers[1]
     assert isinstance(faulty, BodyFault) and (faulty.part, faulty.what) == (fault_class.part, fault_class.what)
     other = answers[1] if fault_class.part == "base" else answers[0]
-    assert isinstance(other, Frame | MotionReport)
+    assert isinstance(other, CameraPicture | MotionReport)
     assert set(robot.device_faults) == {fault_class.kind}
     reached.wait(2.0)
     assert not robot.device_faults
     assert isinstance(reached.execute(MotorCommand(0.0, 0.1)), MotionReport)
-    assert isinstance(reached.look("track"), Frame)
+    assert isinstance(reached.look("track"), CameraPicture)
 
 
 @pytest.mark.parametrize("fault_class", DEVICE_FAULTS)

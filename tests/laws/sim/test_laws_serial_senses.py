@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harvey.hardware.drivers import denning
-from harvey.hardware.drivers.base import BaseFault
+from harvey.hardware.drivers.base_driver import BaseFault
 from harvey.hardware.drivers.denning import DenningBase
-from sim.emulators.denning import ConstantSpeedMotion, DenningEmulator, InstantMotion
+from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator, InstantMotion
 from sim.emulators.emulator import IdealGround
 from tests.serial_bench import put_on_noisy_line
 from world_models.entries.body import MotionReport, MotorCommand
@@ -86,14 +86,14 @@ def test_a_base_without_sensors_measures_nothing() -> None:
 @given(st.integers(0, 999_999_999), DISTANCES)
 def test_the_longest_ring_fits_on_a_line(seq: int, distances: list[float | None]) -> None:
     words = ("999999999", "999", "999", "99999", *("-" if d is None else str(round(1000 * d)) for d in distances))
-    frame = denning.Frame("FFFFFFFF", seq, "ECHOES", words)
+    frame = denning.Packet("FFFFFFFF", seq, "ECHOES", words)
     line = denning.encode(frame)
     assert len(line) <= denning.LONGEST and denning.decode(line.rstrip(b"\n")) == frame
 
 
 @given(WORDS)
 def test_what_is_no_contact_and_no_reading_is_none(words: tuple[str, ...]) -> None:
-    contact = denning.parse_contact(denning.Frame("00000000", 1, "FELT", words))
+    contact = denning.parse_contact(denning.Packet("00000000", 1, "FELT", words))
     assert contact is None or contact.by == words[0]
     ranges = denning.parse_ranges(words, 1.0)
     assert ranges is None or len(ranges.distances_m) == len(words) - 3

@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.generated.scenes import box_room
-from sim.body.actuator import ActuatorParameters, arc_displacement, arc_steps
-from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
+from sim.body.simulated_building import SimulatedBuilding
+from sim.body.wheel_errors import ActuatorParameters, arc_displacement, arc_steps
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotorCommand
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
-BUILDING = Building.of_faces(box_room(), samples=1)
+BUILDING = SimulatedBuilding.of_faces(box_room(), samples=1)
 COMMANDS = st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(0.0, 2.0)), max_size=12)
 SPEED_M_PER_S = ActuatorParameters().speed_m_per_s
 

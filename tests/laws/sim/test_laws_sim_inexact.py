@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.generated.floors import generated_floor
-from sim.differences.inexact import MAX_SIGMAS, TrueInexact, displace
+from sim.ground_truth.inexact import MAX_SIGMAS, TrueInexact, displace
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 from world_models.files.construction.builder import build_world

@@ -14,18 +14,18 @@ from blackboard.change import Posted
 from blackboard.effect import Post
 from experiments.generated.scenes import box_room
 from harvey.runner.ports import BodyPort
-from sim.body.building import Building
 from sim.body.collision import ROBOT_RADIUS_M
 from sim.body.faulty_body import FaultyBody
 from sim.body.senses import RangeRing, find_echo
 from sim.body.simulated_body import SimulatedBody
+from sim.body.simulated_building import SimulatedBuilding
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import Course, Frame, Look, MotorCommand
+from world_models.entries.body import CameraPicture, Course, MotorCommand, PictureRequest
 from world_models.entries.obstacle import Ranges
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
-BUILDING = Building.of_faces(box_room(), samples=1)
+BUILDING = SimulatedBuilding.of_faces(box_room(), samples=1)
 PLACES = st.builds(Pose2, st.floats(0.6, 3.4), st.floats(0.6, 3.4), st.floats(-math.pi, math.pi))
 POINTS = st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
 SEGMENTS = st.lists(st.tuples(POINTS, POINTS), min_size=1, max_size=6).map(lambda found: np.array(found, float))
@@ -98,11 +98,11 @@ def test_ranges_come_with_each_picture_and_with_nothing_else(seed: int, sensors:
     robot = SimulatedBody(BUILDING, Pose2(2.0, 2.2, 0.3), CAMERA, CameraMount(1.0, 0.1), seed=seed,
                           ranges=RangeRing(sensors))
     port, board = BodyPort(FaultyBody(robot)), Blackboard()
-    for request in (Look("track"), MotorCommand(0.3, 0.2), Course("Leg-1", 0.2, 0.0), Look("probe")):
+    for request in (PictureRequest("track"), MotorCommand(0.3, 0.2), Course("Leg-1", 0.2, 0.0), PictureRequest("probe")):
         (asked,) = board.apply([Post(request)], author="motor", cycle=1)
         entries = [change.entry for change in board.apply(port.answer(Posted(asked.entry)), author="body", cycle=1)]
         ranges = [entry for entry in entries if isinstance(entry.value, Ranges)]
-        frames = [entry for entry in entries if isinstance(entry.value, Frame)]
+        frames = [entry for entry in entries if isinstance(entry.value, CameraPicture)]
         assert len(ranges) == (len(frames) if sensors else 0)
         for entry, frame in zip(ranges, frames, strict=False):
             assert entry.because == frame.because and entry.value.when_s == frame.value.sim_time_s

@@ -17,18 +17,18 @@ from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from experiments.generated.scenes import box_room
 from harvey.runner.ports import BodyPort
-from sim.body.actuator import ActuatorParameters
-from sim.body.building import Building
 from sim.body.faulty_body import FaultyBody
 from sim.body.senses import Bumper
 from sim.body.simulated_body import SimulatedBody
+from sim.body.simulated_building import SimulatedBuilding
+from sim.body.wheel_errors import ActuatorParameters
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
 from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD, Contact
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
-BUILDING = Building.of_faces(box_room(), samples=1)
+BUILDING = SimulatedBuilding.of_faces(box_room(), samples=1)
 COMMANDS = st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(0.0, 2.0)), max_size=12)
 SECTORS = st.integers(1, 36)
 ANGLES = st.floats(-math.pi, math.pi)

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.differences.changes import Change, find_active
-from sim.differences.table import Lasting
-from sim.differences.things import SHAPES
+from sim.body.simulated_building import SimulatedBuilding
+from sim.ground_truth.table import Lasting
+from sim.ground_truth.things import SHAPES
+from sim.ground_truth.true_changes import TrueChange, find_active
 from sim.scenario import load_scenario, parse_scenario
 from sim.stage import Stage, build_stage
 from world_models.camera import Camera, CameraMount
@@ -38,11 +38,11 @@ def extra(kind: str, x_m: float, y_m: float, heading_rad: float, at_s: float = 0
             f"heading_rad = {heading_rad}\nat_s = {at_s}\nuntil_s = {until_s}\n")
 
 
-def see(building: Building, pose: Pose2) -> NDArray[np.float32]:
+def see(building: SimulatedBuilding, pose: Pose2) -> NDArray[np.float32]:
     return building.renderer.radiance(CAMERA, MOUNT.camera_from_robot @ pose.lifted().inverse())
 
 
-def outline_px(building: Building, pose: Pose2, margin_px: float = 1.0) -> NDArray[np.bool_]:
+def outline_px(building: SimulatedBuilding, pose: Pose2, margin_px: float = 1.0) -> NDArray[np.bool_]:
     """Where the camera may see what was added: the box round each of its faces before the camera."""
     shown = np.zeros((CAMERA.height, CAMERA.width), bool)
     camera_from_world = MOUNT.camera_from_robot @ pose.lifted().inverse()
@@ -165,7 +165,7 @@ def test_what_differs_in_nothing_gives_the_same_picture_to_the_byte() -> None:
 def test_of_changes_about_the_same_one_holds_at_most_and_only_while_it_is_due(
     spans: list[tuple[str, float, float]], time_s: float
 ) -> None:
-    changes = [Change(Lasting(at_s=at, until_s=at + lasts), about) for about, at, lasts in spans]
+    changes = [TrueChange(Lasting(at_s=at, until_s=at + lasts), about) for about, at, lasts in spans]
     active = find_active(changes, time_s)
     assert len({changes[i].about for i in active}) == len(active)
     due = [i for i, change in enumerate(changes) if change.lasting.at_s <= time_s < change.lasting.until_s]

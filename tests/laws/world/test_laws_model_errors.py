@@ -22,7 +22,7 @@ def test_an_unstated_model_is_exact() -> None:
     marks = [mark for mark in world.landmarks for _ in mark.lines_world]
     numbers = [i for mark in world.landmarks for i in range(len(mark.lines_world))]
     errors = find_line_errors(world, marks, numbers)
-    assert errors.is_exact and errors.shifts.shape == (0, len(marks), 3)
+    assert errors.is_exact and errors.displacements.shape == (0, len(marks), 3)
     assert pack_errors(errors) == ()
 
 
@@ -34,16 +34,16 @@ def test_stated_errors_are_shared_by_a_wall_and_by_a_thing() -> None:
     numbers = [i for mark in own for i in range(len(mark.lines_world))]
     errors = find_line_errors(world, marks, numbers)
     assert find_sigma_m(world, room) == 0.05
-    sizes = np.linalg.norm(errors.shifts, axis=2)
+    sizes = np.linalg.norm(errors.displacements, axis=2)
     assert np.allclose(sizes[sizes > 0.0], 0.05)
     things = {thing.name for thing in world.things_of(room)}
     for mark in own:
         rows = [i for i, of in enumerate(marks) if of is mark]
         assert np.any(sizes[:, rows] > 0.0)
         if mark.name in things:  # all its lines are displaced as one
-            assert np.ptp(errors.shifts[:, rows], axis=1).max() == 0.0
-    again = unpack_errors(errors.modes, pack_errors(errors), len(marks))
-    assert np.array_equal(again.shifts, errors.shifts)
+            assert np.ptp(errors.displacements[:, rows], axis=1).max() == 0.0
+    again = unpack_errors(errors.displacement_modes, pack_errors(errors), len(marks))
+    assert np.array_equal(again.displacements, errors.displacements)
 
 
 def test_a_part_may_be_known_better_than_the_rest() -> None:

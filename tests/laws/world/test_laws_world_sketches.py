@@ -39,10 +39,10 @@ def plan_sketches(world: World) -> tuple[list[PlanSketch], Outcome]:
             for name, part in ((world.rooms[0], 0.35), (world.rooms[-1], 0.35))]
     first, last = (f"({room} ({x:.2f},{y:.2f},0))" for room, (x, y) in
                    zip((world.rooms[0], world.rooms[-1]), ends, strict=True))
-    scheduler.tell([Post(Command(f"(ptrans {first} {last})", 0.5, None, diagonal(0.003, 0.001)))], "user")
+    scheduler.post([Post(Command(f"(ptrans {first} {last})", 0.5, None, diagonal(0.003, 0.001)))], "user")
     while scheduler.view.latest(Outcome) is None and scheduler.cycle < 4_000:
         if scheduler.step() is None:
-            scheduler.tell([Post(Quiescence(scheduler.cycle))], "scheduler")
+            scheduler.post([Post(Quiescence(scheduler.cycle))], "scheduler")
     outcome = scheduler.view.latest(Outcome)
     return sketches, outcome.value if outcome else Outcome("failed", "no end")
 

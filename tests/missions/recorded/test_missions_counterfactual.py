@@ -11,7 +11,7 @@ import pytest
 from harvey.cli import main
 from harvey.errors import BadInput
 from harvey.replay.counterfactual import what_if
-from harvey.simulation.run import build_head, run_mission
+from harvey.simulation.simulated_run import build_head, run_mission
 from knowledge_sources.settings import list_rows
 from logs.records import DecisionRecord, read_records
 from logs.run_directory import RunDirectory
@@ -105,7 +105,7 @@ def test_without_an_expert_the_simulated_robot_goes_on_by_itself(
 
 
 def test_without_a_segment(run: RunDirectory) -> None:
-    answer = what_if(run, ["Frame-1 segment 3"], (), go_on=False)
+    answer = what_if(run, ["CameraPicture-1 segment 3"], (), go_on=False)
     assert answer.then is not None and answer.now is not None
     then, now = (next(e.fields for e in d.made if e.type == "Segments") for d in (answer.then, answer.now))
     assert now["segments_px"] == [s for n, s in enumerate(then["segments_px"]) if n != 3]
@@ -114,12 +114,12 @@ def test_without_a_segment(run: RunDirectory) -> None:
 def test_a_segment_has_the_number_that_it_had_before_another_was_taken(run: RunDirectory, tmp_path: Path) -> None:
     """Segments are told apart by their numbers in the run as it was, also in a run that tells what would have been."""
     fewer = RunDirectory(tmp_path / "fewer")
-    answer = what_if(run, ["Frame-1 segment 3"], (), out=fewer, go_on=False)
+    answer = what_if(run, ["CameraPicture-1 segment 3"], (), out=fewer, go_on=False)
     assert answer.then is not None
     last = len(next(e.fields for e in answer.then.made if e.type == "Segments")["segments_px"]) - 1
-    assert what_if(fewer, [f"Frame-1 segment {last}"], (), go_on=False).agreed == answer.agreed
+    assert what_if(fewer, [f"CameraPicture-1 segment {last}"], (), go_on=False).agreed == answer.agreed
     with pytest.raises(BadInput, match=f"0 to {last}, got {last + 1}"):
-        what_if(fewer, [f"Frame-1 segment {last + 1}"], (), go_on=False)
+        what_if(fewer, [f"CameraPicture-1 segment {last + 1}"], (), go_on=False)
 
 
 def test_nothing_is_lost_where_the_question_cannot_be_answered(
@@ -128,7 +128,7 @@ def test_nothing_is_lost_where_the_question_cannot_be_answered(
     """Neither an older run at --out, nor, where that is its own place, the run itself."""
     shutil.copytree(run.path, tmp_path / "older")
     before = {path.name: path.read_bytes() for path in run.path.iterdir()}
-    for out, without, told in (("older", "Frame-999 segment 3", "expected a frame"),
+    for out, without, told in (("older", "CameraPicture-999 segment 3", "expected a frame"),
                                ("older", "desk-that-is-not", "expected"),
                                (str(run.path), "plan_adjuster", "expected another directory")):
         argv = ["replay", str(run.path), "--without", without, "--out", str(tmp_path / out)]
@@ -152,11 +152,11 @@ def test_where_it_parts_the_record_no_longer_answers(run: RunDirectory) -> None:
     ([], [("action.lookahead_m", "far")], "expected a number"),
     ([], [("servo.plan", "3")], "expected on or off"),
     ([], [("servo.plans", "on")], "plan"),
-    (["Frame-999 segment 3"], (),
-     r"Frame-999 segment 3: expected a frame of the run, Frame-1 to Frame-\d+, got Frame-999"),
-    (["line_finder", "Frame-1 segment 9999"], (), r"expected a segment of Frame-1, 0 to \d+, got 9999"),
-    (["Frame-2 segment 0"], (),
-     r"expected a frame in which segments were looked for, Frame-1 and Frame-\d+, got Frame-2"),
+    (["CameraPicture-999 segment 3"], (),
+     r"CameraPicture-999 segment 3: expected a frame of the run, CameraPicture-1 to CameraPicture-\d+, got CameraPicture-999"),
+    (["line_finder", "CameraPicture-1 segment 9999"], (), r"expected a segment of CameraPicture-1, 0 to \d+, got 9999"),
+    (["CameraPicture-2 segment 0"], (),
+     r"expected a frame in which segments were looked for, CameraPicture-1 and CameraPicture-\d+, got CameraPicture-2"),
 ])
 def test_what_is_not_there_is_answered_with_what_is(
     run: RunDirectory, without: list[str], settings: list[tuple[str, str]], word: str

@@ -14,7 +14,7 @@ from harvey.report.page import build_page
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline
 from report_contents import read_contents
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_it_holds_the_run(page: str, run: RunDirectory) -> None:
     assert [one["cycle"] for one in data["cycles"]] == list(history.cycles)
     assert data["entries"].keys() == set(history.refs)
     assert all(set(entry["because"]) <= data["entries"].keys() for entry in data["entries"].values())
-    assert len(data["pictures"]) == len([*history.of_kind(Frame)])
+    assert len(data["pictures"]) == len([*history.of_kind(CameraPicture)])
     judged = [one for one in data["pictures"] if "expected" in one]
     assert judged and all(len(line) == 4 for one in judged for line in (*one["expected"], *one["agreed"]))
     assert data["candidates"] and data["track"] and data["plans"][0]["rooms"]

@@ -18,7 +18,7 @@ from harvey.cli import main
 from harvey.runner.replay import open_originals, replay
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
-from harvey.simulation.run import redraw, resume_mission, run_mission
+from harvey.simulation.simulated_run import redraw, resume_mission, run_mission
 from logs import disk
 from logs.pictures import open_pictures
 from logs.reader import damage_of, read_decisions, read_frames
@@ -75,7 +75,7 @@ def test_where_no_motion_was_broken_off_it_is_as_if_nothing_had_been(
     whole: RunDirectory, short_stage: Stage, tmp_path: Path
 ) -> None:
     records = list(read_records(whole.journal))
-    before = made_by(records, "Look", 2)
+    before = made_by(records, "PictureRequest", 2)
     run = cut(whole, tmp_path / "run", before)
     assert go_on(run, short_stage).outcome == "reached"
     first, second = ([r.data for r in read_records(d.journal)] for d in (whole, run))

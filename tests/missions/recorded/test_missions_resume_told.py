@@ -10,7 +10,7 @@ import pytest
 from harvey.agent import build_agent
 from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains
-from harvey.simulation.run import resume_mission, run_mission
+from harvey.simulation.simulated_run import resume_mission, run_mission
 from logs.records import DecisionRecord, read_records
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
@@ -38,7 +38,7 @@ def records_of(run: RunDirectory) -> list[DecisionRecord]:
 
 def told_in(records: list[DecisionRecord]) -> list[tuple[int, str]]:
     return [(record.cycle, entry.fields["what"]) for record in records for entry in record.observed
-            if entry.type == "Told"]
+            if entry.type == "UserReport"]
 
 
 def is_decided_again(run: RunDirectory) -> bool:

@@ -8,10 +8,10 @@ import pytest
 
 from blackboard.journal import Decision
 from blackboard.kinds import Registry
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from logs.timeline import Timeline
 from sim.stage import Stage
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 
 
 def test_the_decisions_are_the_same_with_it_and_without(
@@ -23,6 +23,6 @@ def test_the_decisions_are_the_same_with_it_and_without(
     monkeypatch.setattr(Registry, "marks", lambda _self: {})
     run_mission(short_stage, 3, out=without)
     assert (with_it / "journal.jsonl").read_bytes() == (without / "journal.jsonl").read_bytes()
-    first = next(c.entry for d in decisions for c in d.observed if isinstance(c.entry.value, Frame))
+    first = next(c.entry for d in decisions for c in d.observed if isinstance(c.entry.value, CameraPicture))
     record = Timeline(with_it / "journal.jsonl").entry(str(first.ref))  # out of memory for long, and still there
-    assert record is not None and record.fields["number"] == 0 and record.type == "Frame"
+    assert record is not None and record.fields["number"] == 0 and record.type == "CameraPicture"

@@ -18,8 +18,7 @@ from harvey.agent import build_agent
 from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
 from harvey.runner.replay import replay
-from logs.errors import RecordingError
-from logs.explain.questions import error_at, read_errors
+from logs.explain.questions_in_words import error_at, read_errors
 from logs.explain.story import RunStory, story_lines, tell_run
 from logs.explain.turning_points import read_turning_points
 from logs.pictures import open_pictures
@@ -27,6 +26,7 @@ from logs.reader import read_series
 from logs.recording.paths import POSITION
 from logs.records import Originals, decision_of
 from logs.run_directory import RunDirectory
+from logs.run_errors import RecordingError
 from logs.run_head import RunHead
 from logs.timeline import Timeline
 from memory_timeline import MemoryTimeline

@@ -11,7 +11,7 @@ import pytest
 from harvey.cli import main
 from harvey.replay.counterfactual import Answer, what_if
 from harvey.runner.resume import find_remains
-from harvey.simulation.run import build_head, resume_mission, run_mission
+from harvey.simulation.simulated_run import build_head, resume_mission, run_mission
 from logs.records import EntryRecord, read_records
 from logs.run_directory import RunDirectory
 from sim.stage import Stage
@@ -83,7 +83,7 @@ def test_it_is_resumed(
     whole, cut = without[0], RunDirectory(tmp_path / "cut")
     cut.path.mkdir()
     pictures = sum(entry.fields["jpeg"]["bytes"] for record in list(read_records(whole.journal))[:decisions]
-                   for entry in record.observed if entry.type == "Frame")
+                   for entry in record.observed if entry.type == "CameraPicture")
     (cut.path / "run.json").write_bytes((whole.path / "run.json").read_bytes())
     (cut.path / "camera.mjpeg").write_bytes((whole.path / "camera.mjpeg").read_bytes()[:pictures])
     cut.journal.write_bytes(b"".join(whole.journal.read_bytes().splitlines(keepends=True)[:decisions]))

@@ -20,7 +20,7 @@ from experiments.scale.explanations import write_hour
 from harvey.agent import Agent, build_agent
 from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
-from harvey.replay.why_not import AskedView, board_at, changes, why_absent
+from harvey.replay.why_not_again import AskedView, board_at, changes, why_absent
 from logs.explain.diff import grounds, parting, same
 from logs.explain.phrases import describe_decision
 from logs.explain.subjects import milestone_story, milestones
@@ -29,15 +29,15 @@ from logs.explain.why import lines_of, story
 from logs.explain.why_not import in_cycle
 from logs.run_head import RunHead
 from logs.timeline import Timeline
-from world_models.entries.kinds import KINDS
+from world_models.entries.entry_kinds import KINDS
 from world_models.entries.location import Hypothesis
 
 BUMPED = OFFICE + fault("bump", "allens-office", 3.0, left_m=0.3, turn_deg=10.0)
 KNOWN = registry_of((), KINDS)
 MOTION = re.compile(
     r"Harvey was told to .+ because the line to follow lay .+ (left|right) of where it believed that it faced,"
-    r" because in Frame-\d+ .+ px (left|right|above|below).* its prediction at .+ \(Tracks-1\.\d+\),"
-    r" made from pose Hypothesis-1\.\d+, made from match LineMatch-\d+ of segments? [\d, and]+.* in Frame-\d+"
+    r" because in CameraPicture-\d+ .+ px (left|right|above|below).* its prediction at .+ \(Tracks-1\.\d+\),"
+    r" made from pose Hypothesis-1\.\d+, made from match LineMatch-\d+ of segments? [\d, and]+.* in CameraPicture-\d+"
     r" against .+\.$"
 )
 
@@ -97,7 +97,7 @@ def test_the_time_that_is_told_is_the_newest_that_was_observed(history: Timeline
     """Also where a decision rests on an older picture than the last."""
     now, told = None, 0
     for decision in history.decisions():
-        times = [r.fields["sim_time_s"] for r in decision.observed if r.type in ("Frame", "MotionReport")]
+        times = [r.fields["sim_time_s"] for r in decision.observed if r.type in ("CameraPicture", "MotionReport")]
         now = times[-1] if times else now
         for made in decision.made if now is not None else ():
             assert f", {now:.1f} s into the run," in describe_decision(history, made)

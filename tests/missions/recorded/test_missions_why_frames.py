@@ -131,7 +131,7 @@ def test_a_sketch_drawn_anew_goes_back_to_what_was_told(run: RunDirectory, histo
     for ref in (superseded, "PlanSketch-3.0"):
         found = told(history, ref, run)
         assert f"{DOOR} is shut (user)" in step(found, "changed").text
-        assert step(found, "told").refs == ("Told-1.0",)
+        assert step(found, "told").refs == ("UserReport-1.0",)
     assert main(["why", str(run.path)]) == 0
 
 
@@ -155,7 +155,7 @@ def test_a_door_a_landmark_and_a_room_are_answered_by_name(
 
     door = said(DOOR)
     assert f"{DOOR} is described in world_models/worlds/two_ways.toml:" in door
-    assert f"the model reviser wrote: {DOOR} is shut (user). [LocaleFrame-2.1, Told-1.0, LocaleFrame-2.0]" in door
+    assert f"the model reviser wrote: {DOOR} is shut (user). [LocaleFrame-2.1, UserReport-1.0, LocaleFrame-2.0]" in door
     assert "LocaleFrame-4.1" in door and "PlanSketch-1.0" in door
     milestone = history.entry("Milestone-1.0")
     assert milestone is not None

@@ -10,7 +10,7 @@ import pytest
 
 from harvey.campaign import campaign as missions
 from harvey.campaign.campaign import Task
-from harvey.campaign.case_work import Answer, check_origin, code_digest
+from harvey.campaign.case_work import CaseAnswer, check_origin, code_digest
 from harvey.campaign.engine import open_results
 from harvey.campaign.show import read_progress
 from harvey.campaign.workers import Workers, choose_workers, chosen_workers
@@ -95,7 +95,7 @@ def test_who_works_is_chosen_for_a_while() -> None:
 
 @pytest.mark.parametrize(("code", "calculated"), [("other", None), (None, "abacus")])
 def test_a_worker_that_computes_otherwise_is_refused(code: str | None, calculated: str | None) -> None:
-    answer = Answer(1, 0.1, "host:1", code or code_digest(), calculated or arithmetic())
+    answer = CaseAnswer(1, 0.1, "host:1", code or code_digest(), calculated or arithmetic())
     with pytest.raises(BadInput, match="worker host:1: expected the"):
         check_origin(answer)
 

@@ -11,7 +11,7 @@ import pytest
 from experiments.generated.missions import OFFICE
 from harvey.campaign.campaign import Task
 from harvey.errors import BadInput
-from harvey.simulation.run import build_head
+from harvey.simulation.simulated_run import build_head
 from world_models.files.world_files import WORLDS
 
 

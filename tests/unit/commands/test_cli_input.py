@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from harvey.cli import main
 from harvey.commands import MODULES
-from harvey.commands.world import VERBS
+from harvey.commands.world_command import VERBS
 from logs.run_directory import prepare_directory
 from sim.scenario import SCENARIOS
 from world_models.entries.task import Outcome

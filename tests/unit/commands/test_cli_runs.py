@@ -72,7 +72,7 @@ def test_why_goes_down_to_the_command(run: Path, capsys: pytest.CaptureFixture[s
     assert "made from match LineMatch-" in out
     assert "MotorCommand-1.0: turn" in out
     assert "the user asked for (ptrans (robot-laboratory (16,2,0))" in out
-    assert "Frame-1.0: picture of 0.1 s into the run; to verify a milestone" in out
+    assert "CameraPicture-1.0: picture of 0.1 s into the run; to verify a milestone" in out
 
 
 def test_why_without_an_entry_tells_the_outcome(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -168,7 +168,7 @@ def test_a_run_that_was_cut_off_says_so_first(run: Path, tmp_path: Path, capsys:
     told = capsys.readouterr()
     assert "cut off in cycle 20" in told.err
     assert json.loads(told.out)[0]["entry"]
-    for asked in ([str(run)], [cut, "Frame-1"], [cut, "--at", "3"]):
+    for asked in ([str(run)], [cut, "CameraPicture-1"], [cut, "--at", "3"]):
         assert main(["why", *asked]) == 0
         assert "cut off" not in "".join(capsys.readouterr())
 
@@ -280,7 +280,7 @@ def test_diff_names_the_first_decision_that_differs(
     assert main(["diff", str(run), str(both[0] / "1")]) == 1
     out = capsys.readouterr().out
     assert "agree for 8 decisions." in out
-    assert "The first observation that differs is Frame-1.0" in out
+    assert "The first observation that differs is CameraPicture-1.0" in out
     assert "seed: 0 against 1" in out
     assert main(["diff", str(run), str(both[0] / "1"), "--fields"]) == 1
     assert "jpeg.sha256" in capsys.readouterr().out
@@ -341,7 +341,7 @@ def test_being_stopped_is_told_in_a_line(
         raise raised
 
     here = Pose2(0.0, 0.0, 0.0)
-    monkeypatch.setattr("harvey.simulation.run.run_mission", stopped)
+    monkeypatch.setattr("harvey.simulation.simulated_run.run_mission", stopped)
     monkeypatch.setattr("sim.stage.build_stage", lambda scenario: SimpleNamespace(
         scenario=scenario, world=None, start_world=here, goal_world=here))
     assert main(["run", "bump", "--out", str(tmp_path / "run")]) == code

@@ -30,7 +30,7 @@ from world_models.entries.task import Leg, Outcome
 from world_models.frames import Pose2
 from world_models.words import degrees, metres, turn
 
-FOUND = Track("door-frame", (1.0, 2.0, 3.0), "Frame-3", (10.0, 20.0), 2.5, (100.0, 80.0), (95.8, 81.5), 0.97, 0.1)
+FOUND = Track("door-frame", (1.0, 2.0, 3.0), "CameraPicture-3", (10.0, 20.0), 2.5, (100.0, 80.0), (95.8, 81.5), 0.97, 0.1)
 
 
 @pytest.mark.parametrize(("error_m", "text"), [
@@ -50,8 +50,8 @@ def say(value: Any) -> str:
     (MotorCommand(-0.1, 0.0), "turn 5.7 degrees right"),
     (MotorCommand(0.0, 0.05), "move 50 mm ahead"),
     (MotorCommand(0.0, 0.0), "stand still"),
-    (Tracks("Frame-4", 7, (FOUND,)),
-     "1 of 1 landmark found again; in Frame-4; door-frame 4.2 px left and 1.5 px below its prediction"
+    (Tracks("CameraPicture-4", 7, (FOUND,)),
+     "1 of 1 landmark found again; in CameraPicture-4; door-frame 4.2 px left and 1.5 px below its prediction"
      " (correlation 0.97)"),
     (Hypothesis("hallway", Pose2(1.0, 2.0, math.pi / 2), diagonal(0.02, 0.01), "tracks"),
      "held: in hallway at (1.00, 2.00) m, heading 90.0 degrees; sigma 20 mm, 0.6 degrees, by tracks"),

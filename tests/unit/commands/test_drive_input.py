@@ -14,16 +14,16 @@ import pytest
 
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey.hardware import base as hardware_base
-from harvey.hardware.base import open_base
-from harvey.hardware.mission import load_mission
+from harvey.hardware import bases as hardware_base
+from harvey.hardware.bases import open_base
+from harvey.hardware.hardware_mission import load_mission
 from harvey.hardware.preflight import Preflight
 from harvey.hardware.stopping import stop_key
 from harvey.simulation.serial_body import body_kind
-from sim.emulators.denning import ConstantSpeedMotion, DenningEmulator
+from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator
 from sim.emulators.emulator import IdealGround
+from sim.emulators.emulator_registry import emulator_kinds
 from sim.emulators.line import PseudoTerminal
-from sim.emulators.registry import emulator_kinds
 from world_models import plugins
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.camera_file import camera_text

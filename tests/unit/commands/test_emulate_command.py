@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from harvey.cli import main
-from harvey.hardware.base import base_kinds, open_base
+from harvey.hardware.bases import base_kinds, open_base
 
 
 @pytest.mark.parametrize("kind", tuple(base_kinds()))

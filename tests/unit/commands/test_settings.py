@@ -114,7 +114,7 @@ def test_mistakes_are_named(key: str, value: str, word: str) -> None:
 
 def test_no_setting_is_called_as_a_key_of_a_mission() -> None:
     """So --set knows which is meant."""
-    from harvey.hardware.mission import FORMAT as HARDWARE
+    from harvey.hardware.hardware_mission import FORMAT as HARDWARE
     from sim.scenario import FORMAT as SCENARIO
 
     assert not {*SCENARIO.keys(), *HARDWARE.keys()} & set(names())

@@ -13,7 +13,7 @@ from blackboard.journal import Decision, decision_line
 from blackboard.level import Level
 from harvey.cli import main
 from harvey.errors import BadInput
-from logs.explain.questions import answers
+from logs.explain.questions_in_words import answers
 from logs.explain.story import MOST_ROWS, MilestoneRow, milestone_lines, story_lines, tell_lost, tell_run
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline

@@ -61,7 +61,7 @@ def test_read_back_from_the_journal_they_are_the_same() -> None:
 
 def test_a_door_and_a_thing_are_told_when_they_change_and_not_each_time_that_they_are_seen() -> None:
     box = Obstacle("hallway/obstacle-1", "hallway", (), 0.05, 0.2, 0.3, 0.5, status="suspected")
-    picture = DoorPicture("Frame-3", (10.0, 20.0, 30.0, 40.0), 0.0, 0.0, 0.0, 3.0, "a leaf")
+    picture = DoorPicture("CameraPicture-3", (10.0, 20.0, 30.0, 40.0), 0.0, 0.0, 0.0, 3.0, "a leaf")
     door = DoorState("library-door", ("hallway", "library"), "unknown", 0.6, 1.0, 1, picture, 5.0)
     board, found, finder = Blackboard(), list[TurningPoint](), TurningPointFinder()
     states = (("suspected", "unknown"), ("there", "shut"), ("there", "shut"), ("gone", "open"), ("gone", "open"))
@@ -112,8 +112,8 @@ def test_a_collision_that_is_none_is_one_error(contact: Any) -> None:
 
 
 def test_the_time_of_a_decision_is_in_the_clock_of_the_run_also_while_a_fault_lasts() -> None:
-    fault = BodyFault("camera", "camera unplugged", "no such device", "Look-1", 7.0)
-    recovery = Recovery("BodyFault-1", "Look-1", 7.0, 2.0, tries=9, waited_s=31.8, status="in vain")
+    fault = BodyFault("camera", "camera unplugged", "no such device", "PictureRequest-1", 7.0)
+    recovery = Recovery("BodyFault-1", "PictureRequest-1", 7.0, 2.0, tries=9, waited_s=31.8, status="in vain")
     board = Blackboard()
     seen = board.apply([Post(fault), Post(recovery)], author="body", cycle=1)
     made = board.apply([Post(Outcome("failed", "camera unplugged"))], author="fault_handler", cycle=1)

@@ -28,7 +28,7 @@ def test_what_its_locale_has_is_found_without_reading_the_others(
 
 
 @pytest.mark.parametrize(("name", "word"), [
-    ("desk", "expected allens-office/desk, .* or as 'Frame-88 segment 12', got 'desk'"),
+    ("desk", "expected allens-office/desk, .* or as 'CameraPicture-88 segment 12', got 'desk'"),
     ("allens-office/deks", "allens-office/desk"),
     ("plan_adjustor", "expected plan_adjuster"),
     ("hallway", "hallway/"),

@@ -16,9 +16,9 @@ from logs.explain.why_not import Fate, in_run
 from logs.records import Candidate, DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
 from world_models.building.locale_frame import FrameChange, FrameReference, FrameRequest
-from world_models.entries.robot import Footprint
+from world_models.entries.robot_state import Footprint
 from world_models.entries.task import Milestone
-from world_models.entries.told import Told
+from world_models.entries.user_reports import UserReport
 
 SHUT = FrameChange("shut", "library-door", "user")
 
@@ -37,7 +37,7 @@ def frame(ref: str, locale: str, *changes: FrameChange, because: tuple[str, ...]
 
 
 def act(number: int, source: str) -> Candidate:
-    return Candidate(number, source, "plan", "Told-1.0", "Posted", 0.5, 1)
+    return Candidate(number, source, "plan", "UserReport-1.0", "Posted", 0.5, 1)
 
 
 def decision(
@@ -81,17 +81,17 @@ def test_equal_changes_of_two_frames_are_told_once() -> None:
 
 
 def test_a_withdrawn_milestone_says_what_it_rested_on() -> None:
-    said = entry("Told-1.0", Told("library-door", "shut"), author="user")
+    said = entry("UserReport-1.0", UserReport("library-door", "shut"), author="user")
     known = frame("LocaleFrame-1.0", "hallway")
     value = Milestone("", 0, "M1 of hallway", 0.0, ("hallway/pillar-1",), status="expected")
     expected = entry("Milestone-1.0", value, (known.ref,))
     revised = frame("LocaleFrame-1.1", "hallway", SHUT, because=(said.ref, known.ref), cycle=2)
-    gone = entry("Milestone-1.1", {**plain(value), "status": "withdrawn"}, (revised.ref,), author="withdrawer", cycle=3)
+    gone = entry("Milestone-1.1", {**plain(value), "status": "withdrawn"}, (revised.ref,), author="dependency_withdrawer", cycle=3)
     history = MemoryTimeline([
         decision(expected, observed=(said, known)), decision(revised, cycle=2), decision(gone, cycle=3)])
     told = milestone_story(history, "Milestone-1")
     assert [step.label for step in told.steps] == ["expected", "withdrawn", "changed"]
-    assert told.steps[1].text == "The withdrawer withdrew it in cycle 3."
+    assert told.steps[1].text == "The dependency withdrawer withdrew it in cycle 3."
     assert told.steps[2].refs == ("LocaleFrame-1.1",)
     texts = {step.label: step.text for step in story(history, gone).steps}
     assert texts["told"] == "It was told that library-door is shut."
@@ -114,6 +114,6 @@ def test_an_act_that_asked_is_pending_until_it_acts() -> None:
 
 
 def test_what_is_known_and_told_is_a_ground() -> None:
-    for ref in ("LocaleFrame-1.0", "CameraState-1.0", "Wheels-1.0", "Footprint-1.0", "Told-1.0"):
+    for ref in ("LocaleFrame-1.0", "CameraState-1.0", "Wheels-1.0", "Footprint-1.0", "UserReport-1.0"):
         assert kind_of(entry(ref, 0)) == MODEL
     assert kind_of(entry("FrameRequest-1.0", 0)) is None

@@ -9,20 +9,20 @@ import pytest
 
 from blackboard.journal import plain
 from harvey.errors import BadInput
-from logs.explain.questions import answers, is_question
+from logs.explain.questions_in_words import answers, is_question
 from logs.records import DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
 from world_models.building.locale_frame import FrameChange, FrameReference
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.door_state import DoorPicture, DoorState
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Outcome, PlanSketch
 
 SQUARE = ((0.0, 0.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5))
 BOX = Obstacle("hallway/obstacle-1", "hallway", SQUARE, 0.05, 0.25, 0.25, 0.5, certainty=0.7, by="camera",
-               evidence="Frame-3, pixels (10, 20) to (30, 40): it does not look like the floor", status="suspected")
+               evidence="CameraPicture-3, pixels (10, 20) to (30, 40): it does not look like the floor", status="suspected")
 THERE = replace(BOX, status="there", certainty=0.99)
-PICTURE = DoorPicture("Frame-3", (10.0, 20.0, 30.0, 40.0), 0.0, 0.0, 0.0, 3.0, "a leaf")
+PICTURE = DoorPicture("CameraPicture-3", (10.0, 20.0, 30.0, 40.0), 0.0, 0.0, 0.0, 3.0, "a leaf")
 DOOR = DoorState("library-door", ("hallway", "library"), "shut", 0.99, 4.0, 2, PICTURE, 5.0)
 EXTRA = FrameChange("extra", "hallway/obstacle-1", "obstacle_finder", SQUARE)
 
@@ -39,11 +39,11 @@ def history(*records: EntryRecord) -> MemoryTimeline:
 
 SKETCH = PlanSketch("Goal-1", (), "hallway", (), status="superseded")
 RUN = history(
-    entry("Frame-3.0", Frame(b"", 3, 1.0), (), 1),
-    entry("Obstacle-1.0", BOX, ("Frame-3.0",), 2),
-    entry("Obstacle-1.1", THERE, ("Frame-3.0",), 3),
+    entry("CameraPicture-3.0", CameraPicture(b"", 3, 1.0), (), 1),
+    entry("Obstacle-1.0", BOX, ("CameraPicture-3.0",), 2),
+    entry("Obstacle-1.1", THERE, ("CameraPicture-3.0",), 3),
     entry("LocaleFrame-1.1", FrameReference("0123", "hallway", (EXTRA,)), ("Obstacle-1.1",), 4),
-    entry("DoorState-1.0", DOOR, ("Frame-3.0",), 6),
+    entry("DoorState-1.0", DOOR, ("CameraPicture-3.0",), 6),
     entry("Outcome-1.0", Outcome("blocked", "library-door is shut"), ("DoorState-1.0",), 7))
 
 
@@ -58,7 +58,7 @@ def test_what_is_in_the_way_is_told_down_to_pixels() -> None:
     texts = [step.text for step in story.steps]
     assert any("pixels (10, 20) to (30, 40)" in text for text in texts)
     assert "What is known of hallway had it from cycle 4 on." in texts
-    assert any("Frame-3.0" in step.refs for step in story.steps)
+    assert any("CameraPicture-3.0" in step.refs for step in story.steps)
 
 
 def test_with_a_cycle_it_is_told_as_it_was_known_then() -> None:
@@ -71,7 +71,7 @@ def test_with_a_cycle_it_is_told_as_it_was_known_then() -> None:
 def test_a_shut_door_is_told_with_its_pictures() -> None:
     (story,) = answers(RUN, "is the door shut?")
     assert story.headline.startswith("Library-door is shut")
-    assert "Frame-3, pixels (10, 20) to (30, 40), showed a leaf" in story.steps[0].text
+    assert "CameraPicture-3, pixels (10, 20) to (30, 40), showed a leaf" in story.steps[0].text
 
 
 def test_a_stop_is_told_with_the_door_that_it_is_for() -> None:

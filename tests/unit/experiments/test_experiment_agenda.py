@@ -13,7 +13,7 @@ from experiments.scale.agenda_load import PART_CYCLES, Speed, Task, Worker, meas
 
 def test_the_load_wakes_one_a_cycle_and_each_comes_to_its_end() -> None:
     scheduler = Scheduler([Worker()])
-    scheduler.tell([Post(Task.of(int(draw))) for draw in np.random.default_rng(1).integers(1 << 31, size=20)], "user")
+    scheduler.post([Post(Task.of(int(draw))) for draw in np.random.default_rng(1).integers(1 << 31, size=20)], "user")
     first = scheduler.step()
     decisions = [scheduler.step() for _ in range(500)]
     assert all(d.chosen and not d.refused and len(d.activated) == 1 for d in decisions)

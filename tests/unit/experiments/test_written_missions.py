@@ -21,7 +21,7 @@ from experiments.generated.missions import (
     write_inexact_mission,
     write_twin_mission,
 )
-from sim.differences.inexact import TrueInexact
+from sim.ground_truth.inexact import TrueInexact
 from sim.render.light.lighting import Lighting
 from sim.scenario import Scenario, load_scenario
 from sim.stage import Stage, build_stage

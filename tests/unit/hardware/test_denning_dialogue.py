@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from harvey.hardware.drivers.base import BaseFault
+from harvey.hardware.drivers.base_driver import BaseFault
 from harvey.hardware.drivers.denning import DenningBase
 from world_models.entries.body import MotorCommand
 from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD

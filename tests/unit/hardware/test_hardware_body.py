@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from harvey.hardware.body import BASE_WORDS, CAMERA_WORDS, HardwareBody, Watching
-from harvey.hardware.drivers.base import BaseFault, FaultKind
-from harvey.hardware.drivers.camera import Health, VideoCamera
+from harvey.hardware.drivers.base_driver import BaseFault, FaultKind
 from harvey.hardware.drivers.capture import CameraFault, CameraFaultKind
-from harvey.hardware.mission import load_mission
+from harvey.hardware.drivers.video_camera import Health, VideoCamera
+from harvey.hardware.hardware_body import BASE_WORDS, CAMERA_WORDS, HardwareBody, WatchedCamera
+from harvey.hardware.hardware_mission import load_mission
 from harvey.hardware.stopping import Heartbeat
-from world_models.entries.body import STOP_KEY, BodyFault, Frame, MotionReport, MotorCommand, Odometry
+from world_models.entries.body import STOP_KEY, BodyFault, CameraPicture, MotionReport, MotorCommand, Odometry
 from world_models.entries.obstacle import Ranges
 from world_models.files.toml.mission import ROOT
 
@@ -93,8 +93,8 @@ class FakeBase:
 class Open:
     """An eye that is open."""
 
-    def look(self, purpose: str) -> Frame | BodyFault:
-        return Frame(b"", 0, 0.0, purpose)
+    def look(self, purpose: str) -> CameraPicture | BodyFault:
+        return CameraPicture(b"", 0, 0.0, purpose)
 
 
 def robot(clock: Clock | None = None) -> tuple[HardwareBody, FakeBase, Clock]:
@@ -173,23 +173,23 @@ class FakeCamera(VideoCamera):
     def health(self) -> Health:
         return Health(1, 0, self.rate_hz, 0.0, "")
 
-    def look(self, purpose: str = "") -> Frame:
+    def look(self, purpose: str = "") -> CameraPicture:
         if self.fails is not None:
             raise CameraFault(self.fails, "as it was told to")
-        return Frame(b"", 0, 0.0, purpose)
+        return CameraPicture(b"", 0, 0.0, purpose)
 
 
 @pytest.mark.parametrize("kind", CAMERA_WORDS)
 def test_every_fault_of_a_camera_is_a_value(kind: CameraFaultKind) -> None:
     camera = FakeCamera()
     camera.fails = kind
-    fault = Watching(camera, Clock()).look("track")
+    fault = WatchedCamera(camera, Clock()).look("track")
     assert isinstance(fault, BodyFault) and (fault.part, fault.what) == ("camera", CAMERA_WORDS[kind])
 
 
 def test_too_few_pictures_a_second_are_told_whenever_that_begins_and_looks_go_on() -> None:
     camera = FakeCamera()
-    eye = Watching(camera, Clock(), rate_hz=5.0)
+    eye = WatchedCamera(camera, Clock(), rate_hz=5.0)
 
     def told(rate_hz: float | None) -> bool:
         camera.rate_hz = rate_hz

@@ -12,9 +12,9 @@ import pytest
 from harvey.campaign.summary import summarize_dry_run
 from harvey.cli import main, parser
 from harvey.dry_run import dry_run
-from harvey.hardware.body import BASE_WORDS, CAMERA_WORDS
-from harvey.hardware.mission import load_mission
-from harvey.simulation.run import build_robot_model
+from harvey.hardware.hardware_body import BASE_WORDS, CAMERA_WORDS
+from harvey.hardware.hardware_mission import load_mission
+from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.actuator import ActuatorModel

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from harvey.errors import BadInput
-from harvey.hardware.run import count_pictures, time_of_last_observation
-from harvey.simulation.run import run_mission
+from harvey.hardware.hardware_run import count_pictures, time_of_last_observation
+from harvey.simulation.simulated_run import run_mission
 from logs.run_directory import RunDirectory
 from sim.stage import Stage
 

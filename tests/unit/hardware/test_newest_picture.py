@@ -18,8 +18,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harvey.hardware.drivers import capture as captures
-from harvey.hardware.drivers.camera import Health, Newest, VideoCamera, _Pace, _Video
-from harvey.hardware.drivers.capture import CameraFault, Picture, is_file, open_in_time, picture_of, prepare
+from harvey.hardware.drivers.capture import CameraFault, CapturedPicture, is_file, open_in_time, picture_of, prepare
+from harvey.hardware.drivers.video_camera import Health, LatestPictureThread, VideoCamera, _Pace, _Video
 from harvey.hardware.drivers.video_file import write_video
 
 MAIN = threading.main_thread()
@@ -40,7 +40,7 @@ class Bench:
         self.let_go = threading.Event()
         self.waits: list[float] = []
         self.reopened: Callable[[], Any] = lambda: self
-        self.newest = Newest(self, lambda: self.reopened(), self.clock)
+        self.newest = LatestPictureThread(self, lambda: self.reopened(), self.clock)
         self.newest._arrived.wait = lambda timeout=None: bool(self.waits.append(timeout or 0.0))  # type: ignore[method-assign]
 
     def clock(self) -> float:
@@ -185,7 +185,7 @@ class Told:
         self.asked: list[tuple[float, float]] = []
         self._picture = picture_of(np.frombuffer(jpeg(level), np.uint8))
 
-    def picture(self, since_s: float, until_s: float) -> tuple[Picture, float]:
+    def picture(self, since_s: float, until_s: float) -> tuple[CapturedPicture, float]:
         self.asked.append((since_s, until_s))
         assert self._picture is not None
         return self._picture, since_s + 0.125
@@ -241,7 +241,7 @@ def test_a_picture_is_black_where_less_than_a_thousandth_is_bright(bright: int, 
 def test_images_are_compressed_with_quality_95_and_keep_their_size() -> None:
     image = np.random.default_rng(0).integers(0, 256, (30, 50, 3), np.uint8)
     picture = picture_of(image)
-    assert picture == Picture(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes(), (50, 30), False)
+    assert picture == CapturedPicture(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes(), (50, 30), False)
 
 
 @pytest.mark.parametrize(("behind", "is_whole"), [(0, True), (62, True), (63, False)])

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from experiments.generated.scenes import box_room
-from harvey.hardware.drivers.base import Base, BaseFault, SerialLink
+from harvey.hardware.drivers.base_driver import Base, BaseFault, SerialLink
 from harvey.hardware.drivers.denning import BAUD, DenningBase
-from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.emulators.denning import ConstantSpeedMotion, DenningEmulator, InstantMotion
+from sim.body.simulated_building import SimulatedBuilding
+from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator, InstantMotion
 from sim.emulators.emulator import IdealGround
 from sim.emulators.line import PseudoTerminal, PseudoTerminalLink
 from tests.serial_bench import (
@@ -135,7 +135,7 @@ def test_a_fault_has_one_of_the_known_kinds(kind: Any) -> None:
 
 
 def simulated() -> SimulatedBody:
-    return SimulatedBody(Building.of_faces(box_room()), Pose2(1.0, 2.0, 0.0), Camera.from_field_of_view(1.1, 64, 64),
+    return SimulatedBody(SimulatedBuilding.of_faces(box_room()), Pose2(1.0, 2.0, 0.0), Camera.from_field_of_view(1.1, 64, 64),
                          CameraMount(1.0, 0.1, 0.0), seed=3)
 
 

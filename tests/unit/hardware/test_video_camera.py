@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 import pytest
 
-from harvey.hardware.drivers.camera import Newest, VideoCamera, _Pace
 from harvey.hardware.drivers.capture import CameraFault, open_capture, picture_of
+from harvey.hardware.drivers.video_camera import LatestPictureThread, VideoCamera, _Pace
 from harvey.hardware.drivers.video_file import write_video
 
 SIZE = (64, 48)
@@ -157,7 +157,7 @@ def test_faults_of_pictures(live: Callable[..., VideoCamera], picture: bytes, ki
 
 
 def test_an_unplugged_camera_is_found_again(live: Callable[..., VideoCamera], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("harvey.hardware.drivers.camera.REOPEN_S", 0.0)
+    monkeypatch.setattr("harvey.hardware.drivers.video_camera.REOPEN_S", 0.0)
     gone = FakeCapture([jpeg(50), jpeg(50)], endless=False)
     camera = live(gone, FakeCapture([], opened=False), FakeCapture([jpeg(77)]))
     seen = b""
@@ -186,7 +186,7 @@ class Hanging(FakeCapture):
 def test_a_camera_that_hangs_is_late() -> None:
     hanging = Hanging()
     ticks = itertools.count()
-    newest = Newest(hanging, lambda: hanging, lambda: 0.01 * next(ticks))
+    newest = LatestPictureThread(hanging, lambda: hanging, lambda: 0.01 * next(ticks))
     try:
         with pytest.raises(CameraFault, match=r"late: no picture for 0\.10 s"):
             newest.picture(0.0, 0.1)

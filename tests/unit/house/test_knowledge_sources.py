@@ -20,7 +20,7 @@ from blackboard.journal import plain
 from blackboard.kinds import Role
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from harvey.simulation.run import run_mission
+from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources, load_kinds
 from sim.scenario import load_scenario
 from sim.stage import build_stage

@@ -13,11 +13,11 @@ from blackboard.board import Blackboard
 from blackboard.effect import Post
 from blackboard.journal import Decision
 from blackboard.level import Level
-from logs.errors import RecordingError
 from logs.reader import read_series
 from logs.recording.logger import Subject, blueprint
 from logs.recording.paths import TABLE
 from logs.recording.writer import RecordingWriter, logger_classes
+from logs.run_errors import RecordingError
 from scripted_mission import CAMERA, MOUNT, house, play
 
 MODULE = '''

@@ -14,10 +14,10 @@ from rerun.chunk import RrdReader
 
 import docs.tools.look as looking
 from docs.tools.look import look
-from logs.errors import RecordingError
 from logs.recording.logger import Subject, blueprint
 from logs.recording.paths import BELIEVED_BODY, FAULTS, IMAGE
 from logs.recording.writer import RecordingWriter, logger_classes
+from logs.run_errors import RecordingError
 from scripted_mission import CAMERA, MOUNT, house, play
 from world_models.frames import Pose2
 

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logs import disk
-from logs.camera_file import CameraFile, Pictures
 from logs.disk import Appended, CannotWriteError
+from logs.mjpeg_file import MjpegFile, Pictures
 
 
 @given(st.lists(st.binary(max_size=40), max_size=8), st.integers(0, 120))
@@ -67,7 +67,7 @@ def test_one_process_writes_at_a_time(tmp_path: Path) -> None:
 def test_pictures_come_back_by_their_numbers(jpegs: list[bytes], first: int) -> None:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "camera.mjpeg"
-        file = CameraFile(path)
+        file = MjpegFile(path)
         for jpeg in jpegs:
             file.add(jpeg)
         file.close()

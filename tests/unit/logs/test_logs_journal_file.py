@@ -9,7 +9,7 @@ from blackboard.journal import Decision, decision_line, decision_record
 from logs import disk
 from logs.journal_file import HELD_LINES, JournalError, JournalFile, is_acted_on, read_journal
 from scripted_mission import play
-from world_models.entries.body import Look, MotorCommand
+from world_models.entries.body import MotorCommand, PictureRequest
 
 
 def play_to(path: Path, *, forced: bool = False) -> list[Decision]:
@@ -100,7 +100,7 @@ def test_what_a_port_will_act_on_is_on_the_disk_before_it_does(
     def sink(decision: Decision) -> None:
         before = len(forced)
         journal(decision)
-        assert (len(forced) > before) == any(isinstance(c.entry.value, MotorCommand | Look) for c in decision.made)
+        assert (len(forced) > before) == any(isinstance(c.entry.value, MotorCommand | PictureRequest) for c in decision.made)
         decisions.append(decision)
 
     play([sink])

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from logs.errors import RecordingError
 from logs.reader import read_decisions, read_frames
 from logs.recording.writer import RecordingWriter
+from logs.run_errors import RecordingError
 from scripted_mission import CAMERA, MOUNT, house, play
 
 PATIENCE_S = 300.0

@@ -34,7 +34,7 @@ from two_doors import WORLD
 from world_models.actuator import ActuatorModel
 from world_models.building.locale_frame import FRAME_OF, FrameChange, FrameRequest, LocaleFrame
 from world_models.building.world import World
-from world_models.entries.robot import CameraState, Footprint, Wheels
+from world_models.entries.robot_state import CameraState, Footprint, Wheels
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frame_store import FrameStore

@@ -8,11 +8,11 @@ import pytest
 from rerun.chunk import RrdReader
 
 from docs.tools.look import look
-from logs.errors import RecordingError
 from logs.recording.loggers.lanes import GAP
 from logs.recording.overview import FOUND, RunFiles, _marks, read_series, summary, write_overview
 from logs.recording.paths import BUILDING, FLEET, HARVEY, MILESTONES, MOODS_OF, OFF, TRUE_ROBOT
 from logs.recording.writer import RecordingWriter
+from logs.run_errors import RecordingError
 from scripted_mission import CAMERA, MOUNT, house, play
 from world_models.frames import Pose2
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from rerun.chunk import RrdReader
 
-from logs.errors import RecordingError
 from logs.journal_file import JournalFile, read_journal
 from logs.reader import read_decisions, read_frames
 from logs.recording.writer import RecordingWriter
+from logs.run_errors import RecordingError
 from scripted_mission import CAMERA, MOUNT, house, picture, play
 from world_models.frames import Pose2
 

@@ -9,7 +9,7 @@ from logs.mirror import Mirror
 from logs.recording.loggers.decisions import COLUMNS, Messages, log_level, row, sentence
 from logs.recording.loggers.lanes import activity
 from logs.recording.loggers.plan import NO_SKETCH, outline
-from logs.recording.loggers.why import thoughts
+from logs.recording.loggers.why_panel import thoughts
 from scripted_mission import play
 from world_models.entries.body import BodyFault, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis
@@ -64,8 +64,8 @@ def test_a_change_is_told_by_the_first_clause_of_the_entrys_own_sentence() -> No
 
 def faulty(status: str) -> Mirror:
     mirror, board = play_to("MotorCommand-1.0")[1], Blackboard()
-    fault = BodyFault("camera", "camera unplugged", "no picture for 2.0 s", "Look-3", 12.0, status=status)
-    for change in board.apply([Post(fault), Post(Recovery("BodyFault-1", "Look-3", 12.0, 0.5, tries=1))],
+    fault = BodyFault("camera", "camera unplugged", "no picture for 2.0 s", "PictureRequest-3", 12.0, status=status)
+    for change in board.apply([Post(fault), Post(Recovery("BodyFault-1", "PictureRequest-3", 12.0, 0.5, tries=1))],
                               author="body", cycle=20):
         mirror.take(change)
     return mirror
@@ -75,7 +75,7 @@ def test_a_fault_of_the_body_is_the_headline() -> None:
     told = thoughts(faulty("open"))
     assert told.startswith("### Trouble: camera unplugged")
     assert "**Trouble:** the camera is at fault since 12.0 s into the run: camera unplugged" in told
-    assert "It waits 0.50 s and tries again; to have Look-3 answered, 1 try so far." in told
+    assert "It waits 0.50 s and tries again; to have PictureRequest-3 answered, 1 try so far." in told
     assert activity(faulty("open"))[0] == "is in trouble"
     assert "Trouble" not in thoughts(faulty("over"))
 

@@ -75,7 +75,7 @@ def solve_inexact(settings: PoseSettings) -> list[Array]:
         rng = np.random.default_rng(seed)
         lines = build_hall()
         errors = build_errors(lines)
-        true = errors.displace(lines, rng.normal(size=len(errors.modes)))
+        true = errors.displace(lines, rng.normal(size=len(errors.displacement_modes)))
         segments, seen = CAMERA.project_segments(true, MOUNT @ TRUTH.lifted().inverse())
         segments = segments[seen] + rng.normal(0.0, SIGMA_PX, segments[seen].shape)
         lines, errors = lines[seen], errors.take(np.flatnonzero(seen))

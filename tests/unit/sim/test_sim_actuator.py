@@ -7,16 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from sim.body.actuator import ActuatorParameters, Wheels, arc_displacement
+from sim.body.wheel_errors import ActuatorParameters, SimulatedWheels, arc_displacement
 from world_models.frames import Pose2
 
 INCH_M = 0.0254
 
 
-def open_loop_run(seed: int, increments: int = 10) -> tuple[Wheels, Pose2]:
+def open_loop_run(seed: int, increments: int = 10) -> tuple[SimulatedWheels, Pose2]:
     """One run of two-foot increments along x without servoing."""
     rng = np.random.default_rng(seed)
-    wheels = Wheels.draw(ActuatorParameters(), rng)
+    wheels = SimulatedWheels.draw(ActuatorParameters(), rng)
     pose = Pose2(0.0, 0.0, 0.0)
     for _ in range(increments):
         pose = pose @ arc_displacement(*wheels.sample_arc(24 * INCH_M, rng))
@@ -38,7 +38,7 @@ def test_moves_fall_short_by_a_factor_that_is_constant_within_a_run() -> None:
     ratios = []
     for seed in range(200):
         rng = np.random.default_rng(seed)
-        wheels = Wheels.draw(ActuatorParameters(), rng)
+        wheels = SimulatedWheels.draw(ActuatorParameters(), rng)
         lengths = [wheels.sample_arc(24 * INCH_M, rng)[0] / (24 * INCH_M) for _ in range(10)]
         assert np.std(lengths) < 0.01
         ratios.append(np.mean(lengths))
@@ -48,7 +48,7 @@ def test_moves_fall_short_by_a_factor_that_is_constant_within_a_run() -> None:
 
 def test_turns_skitter_by_millimetres_and_err_by_about_two_percent() -> None:
     rng = np.random.default_rng(1)
-    wheels = Wheels.draw(ActuatorParameters(), rng)
+    wheels = SimulatedWheels.draw(ActuatorParameters(), rng)
     turns = [wheels.sample_turn(math.pi / 2.0, rng) for _ in range(500)]
     assert 0.002 < np.std([t.x_m for t in turns]) < 0.004
     assert 0.002 < np.std([t.y_m for t in turns]) < 0.004
@@ -57,7 +57,7 @@ def test_turns_skitter_by_millimetres_and_err_by_about_two_percent() -> None:
 
 
 def test_the_encoders_claim_what_was_commanded_to_their_resolution() -> None:
-    wheels = Wheels.draw(ActuatorParameters(encoder_step_m=0.002, encoder_step_rad=0.001), np.random.default_rng(0))
+    wheels = SimulatedWheels.draw(ActuatorParameters(encoder_step_m=0.002, encoder_step_rad=0.001), np.random.default_rng(0))
     turn, move = wheels.quantize(0.12345, -0.5031)
     assert (turn, move) == pytest.approx((0.123, -0.504), abs=1e-12)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from harvey.runner.ports import BodyPort
-from sim.body.building import Helper
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
+from sim.body.simulated_building import Helper
 from sim.scenario import ScenarioError, parse_scenario, scenario_from_tables
 from sim.stage import Stage, build_stage
 from towers import tower

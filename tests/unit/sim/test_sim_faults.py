@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from experiments.generated.scenes import box_room
-from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
+from sim.body.simulated_building import SimulatedBuilding
+from sim.faults.built_in_faults import Bump, Kidnap, LightsOff, Stall
 from sim.faults.fault import Fault, FaultSchedule
-from sim.faults.kinds import Bump, Kidnap, LightsOff, Stall
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotorCommand
 from world_models.frames import Pose2
@@ -23,7 +23,7 @@ def locale_at(pose: Pose2) -> str:
     return "east" if pose.x_m > 2.0 else "west"
 
 
-BUILDING = Building.of_faces(box_room(), locale_at, samples=1)
+BUILDING = SimulatedBuilding.of_faces(box_room(), locale_at, samples=1)
 
 
 def body(*faults: Fault) -> SimulatedBody:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from experiments.generated.scenes import box_room
-from sim.body.building import Building
 from sim.body.collision import Obstacles
 from sim.body.simulated_body import SimulatedBody
+from sim.body.simulated_building import SimulatedBuilding
 from sim.render.light.lamps import Room
 from sim.render.light.lighting import Lighting
 from sim.render.light.lights import Lights
@@ -26,7 +26,7 @@ ROOM = Room(np.array([(0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0)]), 0.0, 2.6
 
 
 def lit_body() -> SimulatedBody:
-    building = Building(Lights(LIGHTING, (ROOM,)).renderer(box_room(), 4), Obstacles.of_faces(box_room()))
+    building = SimulatedBuilding(Lights(LIGHTING, (ROOM,)).renderer(box_room(), 4), Obstacles.of_faces(box_room()))
     return SimulatedBody(building, Pose2(1.5, 2.0, 0.0), Camera.from_field_of_view(math.radians(65.0), 128, 128),
                          CameraMount(1.0, 0.1), seed=3, lighting=LIGHTING)
 

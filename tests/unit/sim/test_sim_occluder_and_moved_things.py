@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.generated.scenes import box_room
-from sim.body.building import Building
 from sim.body.simulated_body import SimulatedBody
-from sim.differences.things import MovedThing, move_things
+from sim.body.simulated_building import SimulatedBuilding
+from sim.faults.built_in_faults import Occlusion
 from sim.faults.fault import Fault
-from sim.faults.kinds import Occlusion
+from sim.ground_truth.things import MovedThing, move_things
 from sim.render.sensor import Occluder
 from sim.scenario import SCENARIOS, ScenarioError, load_scenario, parse_scenario
 from sim.stage import build_stage
@@ -23,7 +23,7 @@ from world_models.files.world_files import load_world
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
-BUILDING = Building.of_faces(box_room(), samples=1)
+BUILDING = SimulatedBuilding.of_faces(box_room(), samples=1)
 ROUGH = (SCENARIOS / "rough-day.toml").read_text(encoding="utf-8")
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.faults.kinds import Kidnap, LightsOff
+from sim.faults.built_in_faults import Kidnap, LightsOff
 from sim.render.sensor import SensorParameters, expose
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
 from sim.scenario_names import list_scenarios

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sim.body.simulated_body import SimulatedBody
-from sim.faults.kinds import Bump, Kidnap
+from sim.faults.built_in_faults import Bump, Kidnap
 from sim.render.mesh import Pinhole, project_mesh
 from sim.render.rasterizer import find_visible_patches
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from sim.differences.table import NO_DIFFERENCES, TrueCamera
-from sim.differences.things import SHAPES
+from sim.ground_truth.table import NO_DIFFERENCES, TrueCamera
+from sim.ground_truth.things import SHAPES
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
 from sim.stage import build_stage
 from world_models.files.world_files import load_world

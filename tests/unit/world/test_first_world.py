@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from harvey.cli import main
 from harvey.dry_run import dry_run
-from harvey.simulation.run import build_robot_model
+from harvey.simulation.simulated_run import build_robot_model
 from sim.scenario import load_scenario
 from world_models.building.checks import check_world
 from world_models.files.first_world import first_world_text

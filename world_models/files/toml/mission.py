@@ -16,9 +16,9 @@ from world_models.building.world import World
 from world_models.commands import check_command, check_destination, parse_destination
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command
-from world_models.entries.told import DOOR_STATES, Redirection, Told, ToldState
+from world_models.entries.user_reports import DOOR_STATES, Redirection, ReportedState, UserReport
 from world_models.files.packed import SUFFIXES
-from world_models.files.toml.settings import (
+from world_models.files.toml.settings_reader import (
     MAX_NUMBER,
     known_keys,
     parse_value,
@@ -100,16 +100,16 @@ class Telling:
             return
         if not self.what:
             raise ValueError("expected what = the name of a door or thing, got none")
-        if self.state not in get_args(ToldState):
-            raise ValueError(f"expected state = one of {', '.join(get_args(ToldState))}, got {self.state!r}")
+        if self.state not in get_args(ReportedState):
+            raise ValueError(f"expected state = one of {', '.join(get_args(ReportedState))}, got {self.state!r}")
 
     @property
-    def entry(self) -> Told | Redirection:
+    def entry(self) -> UserReport | Redirection:
         """What comes to the board."""
         if self.goal:
             return Redirection(self.goal)
-        state: ToldState = next(state for state in get_args(ToldState) if state == self.state)
-        return Told(self.what, state)
+        state: ReportedState = next(state for state in get_args(ReportedState) if state == self.state)
+        return UserReport(self.what, state)
 
     def find_fault(self, world: World) -> str:
         """What is wrong where a world has no such door, thing or room, in words; "" where it has."""

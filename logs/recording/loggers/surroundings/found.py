@@ -10,7 +10,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from logs.recording.logger import Logger, Subject
-from logs.recording.loggers.surroundings.building import Strip, across, strip
+from logs.recording.loggers.surroundings.model_building import Strip, across, strip
 from logs.recording.moment import Moment
 from logs.recording.palette import BELIEVED, EXPECTED, FREE, MATCHED, REJECTED, Colour, faint
 from logs.recording.paths import CONTACTS, DOORS, OBSTACLES, RANGES, SEEN_FLOOR
@@ -19,7 +19,7 @@ from world_models import words
 from world_models.entries.door_state import DoorCondition, DoorState
 from world_models.entries.floor import FreeFloor
 from world_models.entries.obstacle import Contact, Obstacle, Ranges
-from world_models.entries.robot import Footprint
+from world_models.entries.robot_state import Footprint
 
 Points = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ class Felt(Logger):
             stream.log(RANGES, rr.LineStrips3D, strips=np.array(strips, np.float32).reshape(-1, 2, 3))
 
 
-class SeenFloor(Logger):
+class FloorSeenFree(Logger):
     """Logs the free floor of each picture and of each reading of range sensors, in place of the last one."""
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
@@ -91,7 +91,7 @@ def _outline(floor: FreeFloor, bearings: Points, near: Points, far: Points) -> P
     return np.concatenate([points, points[:1]])
 
 
-class Obstacles(Logger):
+class ObstacleEdges(Logger):
     """Logs the edges of all that stands in the way, whenever one comes, is seen better, or goes."""
 
     def begin(self, stream: RecordingStream) -> None:
@@ -147,4 +147,4 @@ class DoorStates(Logger):
         return strip(across(self._doors[state.door]), height_m)
 
 
-LOGGERS = (Felt, SeenFloor, Obstacles, DoorStates)
+LOGGERS = (Felt, FloorSeenFree, ObstacleEdges, DoorStates)

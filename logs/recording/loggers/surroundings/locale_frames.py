@@ -12,14 +12,14 @@ import rerun.blueprint as rrb
 from blackboard.change import Change, Retracted
 from blackboard.entry import Entry
 from logs.recording.logger import Logger, Panel, Subject
-from logs.recording.loggers.surroundings.building import Strip, across, strip
+from logs.recording.loggers.surroundings.model_building import Strip, across, strip
 from logs.recording.moment import Moment
 from logs.recording.palette import KNOWN, REVISED
 from logs.recording.paths import FRAME_LIST, FRAMES
 from logs.recording.stream import RecordingStream, viewable
 from world_models import words
 from world_models.building.locale_frame import FrameRequest, LocaleFrame
-from world_models.entries.robot import CameraState, Footprint, Wheels
+from world_models.entries.robot_state import CameraState, Footprint, Wheels
 
 ROBOT_KINDS = (CameraState, Wheels, Footprint)
 MAX_LISTED = 40

@@ -5,8 +5,8 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from harvey.commands.command import Command, whole
-from harvey.commands.world import add_file_arguments, load_file, print_check
+from harvey.commands.command import CliCommand, whole
+from harvey.commands.world_command import add_file_arguments, load_file, print_check
 from harvey.errors import BadInput
 
 MIN_WALL_M, MAX_WALL_M = 1.0, 20.0
@@ -63,7 +63,7 @@ def _export(args: Namespace) -> int:
     return 0
 
 
-IMPORT = Command(
+IMPORT = CliCommand(
     "import", "import a building from IFC, IndoorGML, GeoJSON or a ROS map",
     (("harvey world import house.ifc --out house.toml", "what was used of a building, guessed and left out"),
      ("harvey world import campus.gml --out campus.toml", "IndoorGML 1.0, 1.1 and the core of 2.0"),
@@ -72,7 +72,7 @@ IMPORT = Command(
     _import_arguments, lambda args: _import(args.file, args.out, args.wall_height),
     "Then checks it, as harvey world check does.",
 )
-EXPORT = Command(
+EXPORT = CliCommand(
     "export", "write a world for other programs: a ROS map, SVG, GeoJSON or glTF",
     (("harvey world export research_center --to map.yaml --resolution 0.05", "a ROS map: map.yaml and map.pgm"),
      ("harvey world export campus --to upstairs.yaml --storey 2 --empty", "the second storey, without furniture"),

@@ -1,4 +1,4 @@
-"""Escalator (§2, Figure 2): passes a discrepancy beyond its bound to the level above, a limited number of times."""
+"""Discrepancy raiser (§2, Figure 2): passes a discrepancy beyond its bound to the level above, a limited number of times."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ GIVEN_UP: Mapping[Level, tuple[str, str]] = {
 """The outcome when a level was asked too often, and its reason."""
 
 
-class Escalator(OlderSource):
+class DiscrepancyRaiser(OlderSource):
     """Closes a discrepancy beyond its bound and posts it one level up; after too many, it ends the mission.
 
     The level above measures it by its own means. As each level is asked only so often, the same failure is not answered

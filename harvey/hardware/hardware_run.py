@@ -19,10 +19,10 @@ from blackboard.journal import Sink
 from harvey.agent import build_agent
 from harvey.agent_settings import Pairs
 from harvey.errors import BadInput
-from harvey.hardware.body import Eye, HardwareBody, Watching
-from harvey.hardware.drivers.base import Base
-from harvey.hardware.drivers.camera import VideoCamera
-from harvey.hardware.mission import HardwareMission
+from harvey.hardware.drivers.base_driver import Base
+from harvey.hardware.drivers.video_camera import VideoCamera
+from harvey.hardware.hardware_body import CameraPort, HardwareBody, WatchedCamera
+from harvey.hardware.hardware_mission import HardwareMission
 from harvey.hardware.stopping import Heartbeat, stop_key
 from harvey.runner.ports import Body
 from harvey.runner.replay import Live, ignore
@@ -34,7 +34,7 @@ from logs.records import EntryRecord, read_records
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import Extent, RunRecorder
-from world_models.entries.body import BodyFault, Frame
+from world_models.entries.body import BodyFault, CameraPicture
 from world_models.robot import RobotModel
 
 Around = Callable[[HardwareBody, Callable[[], None]], Body]
@@ -61,7 +61,7 @@ def drive(
     head = RunHead.of(HARDWARE, mission.name, 0, mission.world, robot, mission.servo, mission.command,
                       scenario=mission.source.data, folder=str(mission.folder.resolve()), constants=settings)
     files = RunDirectory(out)
-    eye = Watching(camera, clock, mission.camera.rate_hz)
+    eye = WatchedCamera(camera, clock, mission.camera.rate_hz)
     with _hardware_run(mission, head, base, eye, clock, files, sinks, live, around=around, tell=tell) as run:
         return run.drive(files)
 
@@ -78,7 +78,7 @@ def resume(
     Raises:
         BadInput: it cannot be replayed as it was.
     """
-    eye = NumberingCamera(Watching(camera, clock, mission.camera.rate_hz), count_pictures(files))
+    eye = NumberingCamera(WatchedCamera(camera, clock, mission.camera.rate_hz), count_pictures(files))
     head = RunHead.read(files.path)
     with _hardware_run(mission, head, base, eye, clock, files, sinks, live, remains.extent) as run:
         return run.drive(files, lambda: continue_run(files, run, UnknownMotion(run, clock)))
@@ -86,7 +86,7 @@ def resume(
 
 @contextmanager
 def _hardware_run(
-    mission: HardwareMission, head: RunHead, base: Base, eye: Eye, clock: Callable[[], float], files: RunDirectory,
+    mission: HardwareMission, head: RunHead, base: Base, eye: CameraPort, clock: Callable[[], float], files: RunDirectory,
     sinks: Sequence[Sink], live: bool, whole: Extent | None = None, *, around: Around = unchanged,
     tell: Tell = tell_nothing,
 ) -> Iterator[Run]:
@@ -109,20 +109,20 @@ def time_of_last_observation(files: RunDirectory) -> float:
 
 def count_pictures(files: RunDirectory) -> int:
     """How many pictures of a run were numbered. Raises BadInput."""
-    frames = (seen for seen in _observations(files) if seen.kind is Frame)
+    frames = (seen for seen in _observations(files) if seen.kind is CameraPicture)
     return max((_number(files, frame) + 1 for frame in frames), default=0)
 
 
 class NumberingCamera:
     """A camera whose pictures are numbered on from those of the process before."""
 
-    def __init__(self, eye: Eye, first: int) -> None:
+    def __init__(self, eye: CameraPort, first: int) -> None:
         self._eye, self._first = eye, first
 
-    def look(self, purpose: str) -> Frame | BodyFault:
+    def look(self, purpose: str) -> CameraPicture | BodyFault:
         """A picture, or what was wrong."""
         seen = self._eye.look(purpose)
-        return replace(seen, number=self._first + seen.number) if isinstance(seen, Frame) else seen
+        return replace(seen, number=self._first + seen.number) if isinstance(seen, CameraPicture) else seen
 
 
 class UnknownMotion:

@@ -88,7 +88,7 @@ class ActuatorParameters:
 
 
 @dataclass(frozen=True, slots=True)
-class Wheels:
+class SimulatedWheels:
     """The wheels of one run: the parameters, and the errors that are constant over the run.
 
     Attributes:
@@ -101,11 +101,11 @@ class Wheels:
     curvature_per_m: float
 
     @staticmethod
-    def draw(parameters: ActuatorParameters, rng: np.random.Generator) -> Wheels:
+    def draw(parameters: ActuatorParameters, rng: np.random.Generator) -> SimulatedWheels:
         """The wheels of one run. Always takes three numbers from ``rng``."""
         shortfall = rng.uniform(parameters.shortfall_low, parameters.shortfall_high)
         curvature = rng.uniform(parameters.curvature_low_per_m, parameters.curvature_high_per_m)
-        return Wheels(parameters, 1.0 - float(shortfall), float(curvature) * (1.0 if rng.random() < 0.5 else -1.0))
+        return SimulatedWheels(parameters, 1.0 - float(shortfall), float(curvature) * (1.0 if rng.random() < 0.5 else -1.0))
 
     def sample_turn(self, turn_rad: float, rng: np.random.Generator) -> Pose2:
         """What a TURN does, as a displacement in the robot's frame; a turn of 0 does nothing. Four random numbers."""
@@ -240,7 +240,7 @@ class ContinuousMotion:
             turned_rad=self.turned_rad + way * self.curvature_per_m,
         )
 
-    def read_encoders(self, wheels: Wheels) -> tuple[float, float]:
+    def read_encoders(self, wheels: SimulatedWheels) -> tuple[float, float]:
         """What the encoders counted since the last report: (turn [rad], move [m])."""
         turned, moved = wheels.quantize(self.turned_rad, self.moved_m)
         return turned - self.reported_rad, moved - self.reported_m

@@ -31,7 +31,7 @@ CUT_PART = 0.72
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class StandingRegion:
     """A connected part of the picture that does not look like the floor.
 
     Attributes:
@@ -51,7 +51,7 @@ class Region:
 
 def find_regions(
     unlike: NDArray[np.bool_], tells: NDArray[np.bool_], grid: FloorGrid
-) -> tuple[Region, ...]:
+) -> tuple[StandingRegion, ...]:
     """The regions of unlike pixels, the largest first.
 
     Args:
@@ -76,7 +76,7 @@ def find_regions(
 
 def _describe_region(
     mask: NDArray[np.bool_], tells: NDArray[np.bool_], grid: FloorGrid
-) -> Region | None:
+) -> StandingRegion | None:
     columns = np.flatnonzero(mask.any(axis=0))
     lowest = mask.shape[0] - 1 - np.argmax(mask[::-1, columns], axis=0)
     last = mask.shape[0] - 1
@@ -95,7 +95,7 @@ def _describe_region(
     above = max(0, int(highest[k]) - 2)
     is_clipped = bool(highest[k] <= 1 or not tells[above, columns[k]])
     feet = np.stack([lowest[is_foot], columns[is_foot]], axis=1)
-    return Region(mask, feet, bool(cut[is_foot].any()), is_clipped, (int(highest[k]), int(columns[k])))
+    return StandingRegion(mask, feet, bool(cut[is_foot].any()), is_clipped, (int(highest[k]), int(columns[k])))
 
 
 def _find_feet(
@@ -128,7 +128,7 @@ def _drop_slivers(seen: NDArray[np.bool_], tells: NDArray[np.bool_]) -> NDArray[
     return np.asarray(seen & ((thick > 0) | ~above))
 
 
-def find_footprint(region: Region, grid: FloorGrid, part: float = 1.0) -> Floats:
+def find_footprint(region: StandingRegion, grid: FloorGrid, part: float = 1.0) -> Floats:
     """(k, 2) corners, counter-clockwise, robot's frame, of what a region takes of the floor [m].
 
     It is the hull of its feet, and of the same points further off by the depth that is assumed. What hangs over the
@@ -150,7 +150,7 @@ def find_footprint(region: Region, grid: FloorGrid, part: float = 1.0) -> Floats
     return np.asarray(orient(slim if isinstance(slim, shapely.Polygon) else hull).exterior.coords)[:-1, :2]
 
 
-def measure_height(region: Region, grid: FloorGrid, part: float = 1.0) -> tuple[float, float]:
+def measure_height(region: StandingRegion, grid: FloorGrid, part: float = 1.0) -> tuple[float, float]:
     """Height of a region's top [m] if it stands up from its feet, and its standard deviation; infinite if unknown."""
     row, column = region.top
     ranges = grid.ranges_m[region.feet[:, 0], region.feet[:, 1]]
@@ -187,7 +187,7 @@ MIN_DEVIATION = 4.0
 
 
 def compute_parallax_odds(
-    region: Region, grid: FloorGrid, picture: NDArray[np.float32], earlier: NDArray[np.float32],
+    region: StandingRegion, grid: FloorGrid, picture: NDArray[np.float32], earlier: NDArray[np.float32],
     earlier_from_now: Pose2, camera: Camera, mount: CameraMount,
 ) -> float:
     """The odds that a region is solid against flat or reflected, by an earlier picture; 1 where nothing tells.
@@ -236,7 +236,7 @@ def compute_parallax_odds(
 
 
 def measure_foot_part(
-    region: Region, grid: FloorGrid, picture: NDArray[np.float32], earlier: NDArray[np.float32],
+    region: StandingRegion, grid: FloorGrid, picture: NDArray[np.float32], earlier: NDArray[np.float32],
     earlier_from_now: Pose2, camera: Camera, mount: CameraMount,
 ) -> float:
     """How far a region's lower border is, as a part of the distance at which it would stand on the floor; 1: it does.
@@ -276,7 +276,7 @@ def _below(points: Floats, eye: Floats, depth: float, grid: FloorGrid) -> Floats
     return np.column_stack([eye + (points - eye) * depth, height])
 
 
-def _find_upper_border(region: Region) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _find_upper_border(region: StandingRegion) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Rows and columns of some pixels of the upper border, spread over the region."""
     if region.is_clipped:
         return np.zeros(0, np.intp), np.zeros(0, np.intp)

@@ -100,7 +100,7 @@ class Base(Protocol):
         ...
 
 
-class Link(Protocol):
+class BytePipe(Protocol):
     """A byte pipe that may garble, lose and break. Every method raises OSError where the line is gone."""
 
     def write(self, data: bytes) -> None:
@@ -176,11 +176,11 @@ class BaseKind:
 
     name: str
     baud: int
-    connect: Callable[[Link], Base]
+    connect: Callable[[BytePipe], Base]
     watchdog: str
-    connect_emulated: Callable[[Link], Base] | None = None
+    connect_emulated: Callable[[BytePipe], Base] | None = None
 
-    def connect_to_emulator(self, link: Link) -> Base:
+    def connect_to_emulator(self, link: BytePipe) -> Base:
         """The driver over a line to an emulated base."""
         return (self.connect_emulated or self.connect)(link)
 
@@ -188,7 +188,7 @@ class BaseKind:
 class Driver(ABC):
     """A base over a line: one call at a time, a stop that comes through, and a line that is tried again."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: BytePipe) -> None:
         self._link = link
         self._lock = threading.Lock()
         self._stop_asked = threading.Event()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from harvey.errors import BadInput
 from harvey.hardware.drivers import denning
-from harvey.hardware.drivers.base import Base, BaseKind, SerialLink
+from harvey.hardware.drivers.base_driver import Base, BaseKind, SerialLink
 from world_models.plugins import list_absent, load_plugins
 
 WHY: Mapping[int, str] = {

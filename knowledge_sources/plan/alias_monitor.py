@@ -30,7 +30,7 @@ from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 
-class TwinWatcher(OlderSource):
+class AliasMonitor(OlderSource):
     """Keeps the odds of the believed place against the places that look like it, by every verified milestone.
 
     The first milestone is verified in each of many identical rooms. What the robot was told speaks for one of them;

@@ -13,8 +13,8 @@ from harvey.runner.page_kind import PageKind
 from harvey.runner.ports import Body
 from harvey.runner.teller import LiveTeller
 from harvey_serve.app import LOCAL_HOSTS, build_app, refuse_goal
-from harvey_serve.gate import Gate, GatedBody, do_nothing
 from harvey_serve.live_state import LiveState
+from harvey_serve.run_gate import Gate, GatedBody, do_nothing
 from harvey_serve.server import bind, serving
 from world_models.building.world import World
 from world_models.camera import Camera

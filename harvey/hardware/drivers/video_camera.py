@@ -19,15 +19,15 @@ import cv2
 from harvey.hardware.drivers.capture import (
     CameraFault,
     Capture,
+    CapturedPicture,
     Opener,
-    Picture,
     is_file,
     open_capture,
     open_in_time,
     picture_of,
     prepare,
 )
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 
 REOPEN_S = 0.5
 """An unplugged camera is looked for so often [s]."""
@@ -89,7 +89,7 @@ class _Pace:
         return max(0, round(interval_s / usual_s) - 1)
 
 
-class Newest:
+class LatestPictureThread:
     """Takes pictures until it is closed; opens the camera again when it was unplugged."""
 
     def __init__(self, capture: Capture, reopen: Callable[[], Capture], clock: Callable[[], float]) -> None:
@@ -97,7 +97,7 @@ class Newest:
         self._arrived = threading.Condition()
         self._closed = threading.Event()
         self._wanted_s: float | None = None
-        self._answer: tuple[Picture, float] | None = None
+        self._answer: tuple[CapturedPicture, float] | None = None
         self._broken = self._pictures = self._dropped = 0
         self._unplugged = ""
         self._pace = _Pace()
@@ -110,7 +110,7 @@ class Newest:
         with self._arrived:
             return Health(self._pictures, self._dropped, self._pace.rate_hz, self._pace.lag_s, self._unplugged)
 
-    def picture(self, since_s: float, until_s: float) -> tuple[Picture, float]:
+    def picture(self, since_s: float, until_s: float) -> tuple[CapturedPicture, float]:
         """The first picture of which nothing was taken before ``since_s``, and when it came; waits for it.
 
         Raises:
@@ -161,7 +161,7 @@ class Newest:
             self._dropped += self._pace.missing(now_s, self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0)
             if wanted_s is None or began_s < wanted_s or self._wanted_s != wanted_s:
                 return
-            if isinstance(retrieved, Picture):
+            if isinstance(retrieved, CapturedPicture):
                 self._wanted_s, self._answer = None, (retrieved, now_s)
                 self._arrived.notify_all()
             else:
@@ -187,7 +187,7 @@ class Newest:
 class _Source(Protocol):
     @property
     def health(self) -> Health: ...
-    def picture(self, since_s: float, until_s: float) -> tuple[Picture, float]: ...
+    def picture(self, since_s: float, until_s: float) -> tuple[CapturedPicture, float]: ...
     def close(self) -> None: ...
 
 
@@ -232,7 +232,7 @@ class VideoCamera:
             return prepare(open_in_time(capture, source), source, size)
 
         opened = open_source()
-        self._source: _Source = _Video(opened, source) if is_file(source) else Newest(opened, open_source, clock)
+        self._source: _Source = _Video(opened, source) if is_file(source) else LatestPictureThread(opened, open_source, clock)
 
     def __enter__(self) -> VideoCamera:
         return self
@@ -247,19 +247,19 @@ class VideoCamera:
         """How the camera has done so far: dropped pictures, rate, lag."""
         return self._source.health
 
-    def look(self, purpose: str = "") -> Frame:
+    def look(self, purpose: str = "") -> CameraPicture:
         """A picture, numbered from 0, with the time when it came. Raises CameraFault."""
         since_s = self._clock() + self._lag_s
         picture, taken_s = self._source.picture(since_s, since_s + self._late_s)
         self._check(picture)
         self._frames += 1
-        return Frame(jpeg=picture.jpeg, number=self._frames - 1, sim_time_s=taken_s, purpose=purpose)
+        return CameraPicture(jpeg=picture.jpeg, number=self._frames - 1, sim_time_s=taken_s, purpose=purpose)
 
     def close(self) -> None:
         """Let the camera go."""
         self._source.close()
 
-    def _check(self, picture: Picture) -> None:
+    def _check(self, picture: CapturedPicture) -> None:
         if self._size is not None and picture.size != self._size:
             expected, got = (f"{width} x {height}" for width, height in (self._size, picture.size))
             raise CameraFault("wrong size", f"expected pictures of {expected} px, as calibrated, got {got}")
@@ -283,7 +283,7 @@ class _Video:
     def health(self) -> Health:
         return Health(self._pictures, self._broken, None, 0.0, "")
 
-    def picture(self, since_s: float, until_s: float) -> tuple[Picture, float]:
+    def picture(self, since_s: float, until_s: float) -> tuple[CapturedPicture, float]:
         """The next one, and its time in the video. Raises CameraFault at the end, or where it is not whole."""
         if not self._capture.grab():
             raise CameraFault("unplugged", f"{self._name} ends after {self._pictures} pictures")

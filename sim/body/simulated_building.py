@@ -12,7 +12,7 @@ from sim.truth import Truth
 from world_models.building.geometry.faces import Face
 from world_models.building.locales import Link
 from world_models.entries.body import Ride
-from world_models.entries.location import Frames, Place
+from world_models.entries.location import LocalePoses, Place
 from world_models.frames import Pose2, flattened
 from world_models.units import Bounds, check_bounds
 
@@ -73,7 +73,7 @@ class Elevators:
     helpers: tuple[Helper, ...] = ()
 
     @staticmethod
-    def of_links(links: Sequence[Link], world: Frames, helpers: Sequence[Helper]) -> Elevators:
+    def of_links(links: Sequence[Link], world: LocalePoses, helpers: Sequence[Helper]) -> Elevators:
         """The elevators among the links of a world."""
         found = [link for link in links if link.kind == "elevator"]
         landings = sorted({name for link in found for name in link.between})
@@ -113,7 +113,7 @@ def no_world_from_place(place: Place) -> Pose2:
 
 
 @dataclass(frozen=True, eq=False)
-class Building:
+class SimulatedBuilding:
     """A building for one body to be in.
 
     Attributes:
@@ -134,14 +134,14 @@ class Building:
     world_from_place: Callable[[Place], Pose2] = no_world_from_place
     floor_m: float = 0.0
     elevators: Elevators = NO_ELEVATORS
-    on_floor: Callable[[float], Building] | None = field(default=None, repr=False)
-    at_time: Callable[[float], Building] | None = field(default=None, repr=False)
+    on_floor: Callable[[float], SimulatedBuilding] | None = field(default=None, repr=False)
+    at_time: Callable[[float], SimulatedBuilding] | None = field(default=None, repr=False)
     added: tuple[Face, ...] = ()
     gone: tuple[Face, ...] = ()
 
     @staticmethod
     def of_faces(
         faces: Sequence[FaceLike], locale_at: Callable[[Pose2], str] = no_locale_at, samples: int = 8
-    ) -> Building:
+    ) -> SimulatedBuilding:
         """A building with these faces; see :meth:`~sim.render.renderer.Renderer.of_faces` for ``samples``."""
-        return Building(Renderer.of_faces(faces, samples), Obstacles.of_faces(faces), locale_at=locale_at)
+        return SimulatedBuilding(Renderer.of_faces(faces, samples), Obstacles.of_faces(faces), locale_at=locale_at)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from sim.faults.fault import Fault
-from sim.faults.kinds import (
+from sim.faults.built_in_faults import (
     Bump,
     CameraKnocked,
     CameraUnplugged,
@@ -16,7 +15,8 @@ from sim.faults.kinds import (
     Occlusion,
     Stall,
 )
-from world_models.files.toml.settings import read_settings, suggest_keys
+from sim.faults.fault import Fault
+from world_models.files.toml.settings_reader import read_settings, suggest_keys
 from world_models.files.toml.source import Node, WorldError
 from world_models.plugins import PluginError, list_plugins, load_plugin_classes
 

@@ -53,7 +53,7 @@ def across(door: Doorway) -> NDArray[np.float64]:
     return np.asarray((here + there[::-1]) / 2)
 
 
-class Building(Logger):
+class ModelBuilding(Logger):
     """Logs the world model once."""
 
     def panels(self) -> Sequence[Panel]:
@@ -161,7 +161,7 @@ def _doorways(world: World) -> Any:
     return rr.LineStrips3D(strips, colors=[DOOR], radii=0.03)
 
 
-class TrueBuilding(Logger):
+class TrueDifferences(Logger):
     """Logs the differences, where somebody knows them, when they change: solid with green edges, or red edges only."""
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
@@ -194,4 +194,4 @@ def _log_surfaces(stream: RecordingStream, regions: Sequence[Region]) -> None:
         triangle_indices=np.concatenate([np.zeros((0, 3), np.uint32), *faces]).astype(np.uint32))
 
 
-LOGGERS = (Building, TrueBuilding)
+LOGGERS = (ModelBuilding, TrueDifferences)

@@ -13,7 +13,7 @@ from pathlib import Path
 from logs.disk import Appended
 
 
-class CameraFile:
+class MjpegFile:
     """Writes ``camera.mjpeg``."""
 
     def __init__(self, path: Path, *, keep: int = 0) -> None:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.body.collision import Obstacles
-from sim.differences.table import Lasting, TrueDoor
-from sim.differences.things import OAK, STEEL
+from sim.ground_truth.table import Lasting, TrueDoor
+from sim.ground_truth.things import OAK, STEEL
 from sim.render.light.lights import Lights
 from sim.render.renderer import Renderer
 from world_models.building.geometry.faces import Face
@@ -49,7 +49,7 @@ def build_leaf(door: TrueDoor, doorway: Doorway, floor_m: float) -> tuple[Face, 
 
 
 @dataclass(frozen=True, eq=False)
-class Change:
+class TrueChange:
     """One difference from the model.
 
     Attributes:
@@ -65,18 +65,18 @@ class Change:
     added: tuple[Face, ...] = ()
 
 
-def find_active(changes: Sequence[Change], time_s: float) -> tuple[int, ...]:
+def find_active(changes: Sequence[TrueChange], time_s: float) -> tuple[int, ...]:
     """Which changes hold at a time, ascending."""
     due = {change.about: i for i, change in enumerate(changes)
            if change.lasting.at_s <= time_s < change.lasting.until_s}
     return tuple(sorted(due.values()))
 
 
-def compare_faces(lasting: Lasting, about: str, before: Sequence[Face], after: Sequence[Face]) -> Change:
+def compare_faces(lasting: Lasting, about: str, before: Sequence[Face], after: Sequence[Face]) -> TrueChange:
     """The change from some faces to others."""
     known = {face.name: face for face in before}
     kept = {face.name for face in after if face.name in known and _is_same(face, known[face.name])}
-    return Change(lasting, about, frozenset(known.keys() - kept), tuple(f for f in after if f.name not in kept))
+    return TrueChange(lasting, about, frozenset(known.keys() - kept), tuple(f for f in after if f.name not in kept))
 
 
 def _is_same(one: Face, other: Face) -> bool:
@@ -97,7 +97,7 @@ class ChangingFaces:
     """
 
     def __init__(
-        self, faces: Sequence[Face], changes: Sequence[Change] = (), samples: int = 8, lights: Lights | None = None
+        self, faces: Sequence[Face], changes: Sequence[TrueChange] = (), samples: int = 8, lights: Lights | None = None
     ) -> None:
         self._changes = tuple(changes)
         passing = frozenset[str]().union(*(change.gone for change in self._changes))

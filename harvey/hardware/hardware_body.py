@@ -8,14 +8,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Protocol
 
-from harvey.hardware.drivers.base import Base, BaseFault
-from harvey.hardware.drivers.camera import VideoCamera
+from harvey.hardware.drivers.base_driver import Base, BaseFault
 from harvey.hardware.drivers.capture import CameraFault
+from harvey.hardware.drivers.video_camera import VideoCamera
 from world_models.entries.body import (
     STOP_KEY,
     BodyFault,
+    CameraPicture,
     Course,
-    Frame,
     MotionReport,
     MotorCommand,
     Odometry,
@@ -49,15 +49,15 @@ STOP_PERIOD_S, MAX_STOPS = 0.05, 200
 """A stop is sent again at this period, and at most so often, until it is heeded."""
 
 
-class Eye(Protocol):
+class CameraPort(Protocol):
     """A camera."""
 
-    def look(self, purpose: str, /) -> Frame | BodyFault:
+    def look(self, purpose: str, /) -> CameraPicture | BodyFault:
         """A picture that was taken after the call, or what was wrong."""
         ...
 
 
-class Watching:
+class WatchedCamera:
     """A camera whose faults are values.
 
     A frame rate below what the mission needs is reported once, when it begins: the robot stands while it looks, so
@@ -69,7 +69,7 @@ class Watching:
         self._camera, self._clock, self._needed_hz = camera, clock, rate_hz
         self._slow = False
 
-    def look(self, purpose: str) -> Frame | BodyFault:
+    def look(self, purpose: str) -> CameraPicture | BodyFault:
         """A picture, dated by the clock."""
         try:
             frame = self._camera.look(purpose)
@@ -97,7 +97,7 @@ class HardwareBody:
     """
 
     def __init__(
-        self, base: Base, eye: Eye, *, clock: Callable[[], float], pause: Callable[[float], object] | None = None,
+        self, base: Base, eye: CameraPort, *, clock: Callable[[], float], pause: Callable[[float], object] | None = None,
         carried: Callable[[Ride], RideReport | BodyFault] | None = None, ranges: bool = False,
     ) -> None:
         self._base, self._eye, self._clock = base, eye, clock
@@ -121,7 +121,7 @@ class HardwareBody:
             self._done = fault.done
             return self._to_base_fault(fault)
 
-    def steer(self, course: Course) -> tuple[MotionReport, Frame] | BodyFault:
+    def steer(self, course: Course) -> tuple[MotionReport, CameraPicture] | BodyFault:
         """A fault: these bases take the whole motion as one command."""
         detail = "it cannot be steered on the move: drive it with motion.continuous=off"
         return BodyFault("base", "base refuses", detail, "", self._clock(), 0.0, 0.0)
@@ -153,7 +153,7 @@ class HardwareBody:
             return None
         return None if found is None else replace(found, when_s=self._clock())
 
-    def look(self, purpose: str) -> Frame | BodyFault:
+    def look(self, purpose: str) -> CameraPicture | BodyFault:
         """A picture."""
         return self._to_stop_fault() if self._stopped.is_set() else self._eye.look(purpose)
 

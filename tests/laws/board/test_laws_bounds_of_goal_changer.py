@@ -1,4 +1,4 @@
-"""The redirector on each kind of board: with a goal and without, lost or not, while a milestone waits or not."""
+"""The goal changer on each kind of board: with a goal and without, lost or not, while a milestone waits or not."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from blackboard.change import Change
 from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from harvey.simulation.run import build_robot_model
-from knowledge_sources.action.redirector import Redirector
+from harvey.simulation.simulated_run import build_robot_model
+from knowledge_sources.action.goal_changer import GoalChanger
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.task import Goal, Milestone
-from world_models.entries.told import Redirection
+from world_models.entries.user_reports import Redirection
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
@@ -30,7 +30,7 @@ ASKED = "(archive (10,5,0))"
 
 
 def decide(*texts: str, goal: str = "active", is_lost: bool = False, is_waiting: bool = False) -> list[Effect] | None:
-    """What the redirector does when it is asked; None where it does not act."""
+    """What the goal changer does when it is asked; None where it does not act."""
     world, board = load_world(WORLDS / "two_ways.toml"), Blackboard()
     store, robot = FrameStore(world), build_robot_model(load_scenario("shut-door"), world)
     cycle = 0
@@ -49,7 +49,7 @@ def decide(*texts: str, goal: str = "active", is_lost: bool = False, is_waiting:
     if is_lost:
         apply(Post(Discrepancy(Level.GOAL, "it fits nowhere", None, (0.0, 0.0), "px")))
     asked = [apply(Post(Redirection(text)))[0] for text in texts][-1]
-    effects = answer(Redirector(DEFAULT), board.view, asked)
+    effects = answer(GoalChanger(DEFAULT), board.view, asked)
     assert effects is None or effects
     return None if effects is None else list(effects)
 

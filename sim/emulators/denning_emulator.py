@@ -31,7 +31,7 @@ class Claim:
     time_s: float = 0.0
 
 
-class Motion(Protocol):
+class BaseMotors(Protocol):
     """The motors of a base.
 
     Attributes:
@@ -73,7 +73,7 @@ class Motion(Protocol):
         ...
 
 
-class Body(Protocol):
+class CommandExecutor(Protocol):
     """Something that executes a whole command in one call."""
 
     def execute(self, command: MotorCommand, /) -> MotionReport: ...
@@ -88,7 +88,7 @@ class InstantMotion:
 
     turn_rate, speed = math.radians(45.0), 0.4
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: CommandExecutor) -> None:
         self._body = body
         self._claim = Claim()
         self._contact: Contact | None = None
@@ -231,7 +231,7 @@ class DenningEmulator:
         stops: how often the watchdog stopped it.
     """
 
-    def __init__(self, motion: Motion, *, boot: int = 1, watchdog_s: float = WATCHDOG_S) -> None:
+    def __init__(self, motion: BaseMotors, *, boot: int = 1, watchdog_s: float = WATCHDOG_S) -> None:
         self._motion, self._boot, self._watchdog_s = motion, boot, watchdog_s
         self.executed: list[Executed] = []
         self.rejected = self.stops = 0

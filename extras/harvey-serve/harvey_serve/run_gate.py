@@ -11,8 +11,8 @@ from harvey.runner.ports import Body
 from world_models.entries.body import (
     STOP_KEY,
     BodyFault,
+    CameraPicture,
     Course,
-    Frame,
     MotionReport,
     MotorCommand,
     Ride,
@@ -92,14 +92,14 @@ class GatedBody:
         self._pace(found.when_s if isinstance(found, BodyFault) else found.sim_time_s)
         return found
 
-    def steer(self, course: Course, /) -> tuple[MotionReport, Frame] | BodyFault:
+    def steer(self, course: Course, /) -> tuple[MotionReport, CameraPicture] | BodyFault:
         if not self._gate.hold(self._tick):
             return self._refuse()
         found = self._body.steer(course)
         self._pace(found.when_s if isinstance(found, BodyFault) else found[1].sim_time_s)
         return found
 
-    def look(self, purpose: str, /) -> Frame | BodyFault:
+    def look(self, purpose: str, /) -> CameraPicture | BodyFault:
         if not self._gate.hold(self._tick):
             return self._refuse()
         found = self._body.look(purpose)

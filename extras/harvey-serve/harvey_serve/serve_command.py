@@ -8,7 +8,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from harvey.campaign.campaign import Task, make_room, parse_pairs, parse_seeds
-from harvey.commands.command import Command
+from harvey.commands.command import CliCommand
 from harvey.errors import BadInput
 from logs.run_directory import RUNS, check_vacant
 
@@ -47,9 +47,9 @@ def _run(args: Namespace) -> int:
 
 def _serve(task: Task, args: Namespace, wanted: Path) -> int:
     from harvey.campaign.summary import format_result
-    from harvey.simulation.run import build_head, run_mission
-    from harvey_serve.gate import Gate
-    from harvey_serve.page import open_page
+    from harvey.simulation.simulated_run import build_head, run_mission
+    from harvey_serve.live_page import open_page
+    from harvey_serve.run_gate import Gate
     from harvey_serve.server import bind
     from logs.explain.story import first_lines
 
@@ -71,7 +71,7 @@ def _serve(task: Task, args: Namespace, wanted: Path) -> int:
 
 def _follow(path: Path, args: Namespace) -> int:
     from harvey_serve.follow import Follower, how_it_ended
-    from harvey_serve.page import open_page
+    from harvey_serve.live_page import open_page
     from harvey_serve.server import bind
     from logs.run_directory import RunDirectory
     from logs.run_head import RunHead
@@ -88,7 +88,7 @@ def _follow(path: Path, args: Namespace) -> int:
     return 0 if ended.startswith("reached") else 1
 
 
-COMMAND = Command(
+COMMAND = CliCommand(
     "serve", "drive a mission in the simulator, and show it on a page meanwhile; or show a run that goes on",
     (
         ("harvey serve lab-to-allens-office", "prints the page's address; open it in a browser"),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from harvey.campaign.campaign import Keep, Task, drive_missions, parse_pairs, parse_seeds, run_task
 from harvey.campaign.workers import add_worker_arguments, choose_workers, parse_workers
-from harvey.commands.command import Command
+from harvey.commands.command import CliCommand
 from harvey.errors import BadInput, Terminated
 from logs.run_directory import RUNS, check_vacant
 
@@ -78,7 +78,7 @@ def _check(task: Task) -> int:
     from harvey.campaign.summary import format_previews, summarize_dry_run
     from harvey.dry_run import dry_run
     from harvey.replay.what_if import WhatIf
-    from harvey.simulation.run import build_robot_model
+    from harvey.simulation.simulated_run import build_robot_model
     from world_models.files.world_files import load_world
 
     scenario = stage.scenario
@@ -130,7 +130,7 @@ def _several(tasks: tuple[Task, ...], keep: Keep) -> int:
     return 0 if len(results) == len(tasks) and all(r.outcome == "reached" for r in results) else 1
 
 
-RUN = Command(
+RUN = CliCommand(
     "run", "drive a mission in the simulator",
     (
         ("harvey run lab-to-allens-office", "Figure 17's mission"),
@@ -224,7 +224,7 @@ def _worker(args: Namespace) -> int:
     os.execv(sys.executable, [sys.executable, *command])
 
 
-CAMPAIGN = Command(
+CAMPAIGN = CliCommand(
     "campaign", "how far a campaign is, whether one is better than another, and workers for a cluster",
     (
         ("harvey campaign show runs/lab-to-allens-office", "progress, rate, remaining time, outcomes"),

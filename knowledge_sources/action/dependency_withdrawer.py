@@ -1,4 +1,4 @@
-"""Withdrawer (§3.4): what rested on a locale frame that was revised is withdrawn."""
+"""Dependency withdrawer (§3.4): what rested on a locale frame that was revised is withdrawn."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from world_models.entries.task import Milestone, PlanSketch
 LEG_SLACK_M = 0.03  # an obstacle that is nearer to a leg than the least clearance by so much blocks it
 
 
-class Withdrawer(OlderSource):
+class DependencyWithdrawer(OlderSource):
     """Withdraws milestones, plan sketches and tracks that rested on what a frame no longer says.
 
     A milestone that waits to be judged is withdrawn where its prediction rested on the frame; one that was verified,

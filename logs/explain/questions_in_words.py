@@ -14,21 +14,21 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from logs.errors import BadInput
 from logs.explain.phrases import plainly, sentence
 from logs.explain.story import Section, tell_contacts, tell_lost
 from logs.explain.turning_points import read_turning_points
 from logs.explain.why import Step, Story, headline, label_of, step, story_of
 from logs.records import EntryRecord, is_a
 from logs.run_directory import RunDirectory
+from logs.run_errors import BadInput
 from logs.timeline import Timeline
 from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.body import Frame, MotorCommand
+from world_models.entries.body import CameraPicture, MotorCommand
 from world_models.entries.door_state import DoorState
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Contact, Obstacle, Ranges
 from world_models.entries.task import Leg, Outcome, PlanSketch
-from world_models.entries.told import Redirection, Told
+from world_models.entries.user_reports import Redirection, UserReport
 from world_models.frames import Pose2, wrap_angle
 from world_models.words import count, degrees, metres
 
@@ -38,7 +38,7 @@ MOST_STORIES = 6
 """So many things, stops or doors are told of, the newest."""
 MOST_SIGHTS = 4
 """So many revisions of a thing are told of, the newest."""
-CHANGED: tuple[type[Any], ...] = (Obstacle, LocaleFrame, DoorState, Contact, Told, Redirection)
+CHANGED: tuple[type[Any], ...] = (Obstacle, LocaleFrame, DoorState, Contact, UserReport, Redirection)
 """What a plan may be withdrawn for, the most telling first."""
 STOPS: tuple[type[Any], ...] = (Leg, MotorCommand, Contact, Outcome)
 """What tells of a stop."""
@@ -110,7 +110,7 @@ def _tell_sights(history: Timeline, revisions: list[EntryRecord[Any]]) -> Iterat
     for record in revisions:
         told.setdefault((record.value.status, record.value.evidence), record)
     for (status, evidence), record in [*told.items()][-MOST_SIGHTS:]:
-        by = history.nearest(record, Frame, Ranges, Contact)
+        by = history.nearest(record, CameraPicture, Ranges, Contact)
         text = (f"In cycle {record.cycle} it was {status}, certainty {record.value.certainty:.2f}"
                 f"{': ' * bool(evidence)}{evidence}.")
         yield Step("evidence", text, (record.ref, *record.because, *((by.ref,) if by is not None else ())))
@@ -166,7 +166,7 @@ def _tell_reasons(history: Timeline, record: EntryRecord[Any]) -> Iterator[Step]
         if found is None or found is record or found.ref in record.because:
             continue
         if not is_a(found, LocaleFrame) or found.value.changes:
-            picture = history.nearest(found, Frame, Ranges) if kind in (Obstacle, DoorState) else None
+            picture = history.nearest(found, CameraPicture, Ranges) if kind in (Obstacle, DoorState) else None
             yield step(label_of(found), plainly(found), found, picture)
 
 

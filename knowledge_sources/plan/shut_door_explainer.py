@@ -41,7 +41,7 @@ from knowledge_sources.questions import (
 )
 from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.body import Frame
+from world_models.entries.body import CameraPicture
 from world_models.entries.door_state import DoorPicture, DoorState
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Segments
@@ -58,7 +58,7 @@ MIN_FEW_SHARE = 0.6  # least share of these that must be there
 MIN_SURE_FRAME_SHARE = 0.8  # where there are fewer, least share of the opening's frame that has the model's color
 
 
-class DoorDoubter(OlderSource):
+class ShutDoorExplainer(OlderSource):
     """Holds "I am where I believe, and this door is shut" against a picture by which a milestone was refuted.
 
     Through a door that is shut nothing is seen of what was expected there, so that the picture does not fit the belief.
@@ -102,7 +102,7 @@ class DoorDoubter(OlderSource):
     ) -> Post | Revise | None:
         """The door's state, where the picture says that it is shut and the robot where it believes to be."""
         door, locale = watched.doorway, belief.value.locale
-        frame: Entry[Frame] = view[segments.value.frame]
+        frame: Entry[CameraPicture] = view[segments.value.frame]
         robot, frames = find_robot_in(view, locale), find_frames(view, door.between)
         before, covariance = belief.value.world_from_robot(robot.world), belief.value.covariance_world(robot.world)
         as_shut = robot.in_building(with_door_shut(view, door.name, frames))

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from sim.differences.inexact import EXACT, TrueInexact
-from sim.differences.things import SHAPES
+from sim.ground_truth.inexact import EXACT, TrueInexact
+from sim.ground_truth.things import SHAPES
 from world_models.camera import Camera, CameraMount
-from world_models.files.toml.settings import MAX_NUMBER, read_settings, suggest_keys
+from world_models.files.toml.settings_reader import MAX_NUMBER, read_settings, suggest_keys
 from world_models.files.toml.source import Node
 from world_models.units import Bounds, check_bounds
 
@@ -118,7 +118,7 @@ class ExtraThing(Lasting):
     """A solid thing that the model lacks: one of ``[[truth.extra]]``.
 
     Attributes:
-        kind: its shape, one of :data:`~sim.differences.things.SHAPES`.
+        kind: its shape, one of :data:`~sim.ground_truth.things.SHAPES`.
         locale: the room where it stands; x_m, y_m, heading_rad: the middle of its footprint, in that room's frame.
     """
 

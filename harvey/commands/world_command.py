@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harvey.commands import find_added_commands
-from harvey.commands.command import Command, add_parser
+from harvey.commands.command import CliCommand, add_parser
 from harvey.errors import BadInput
 from world_models.words import count
 
@@ -61,7 +61,7 @@ def _new_arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    verb: Command = args.verb
+    verb: CliCommand = args.verb
     return verb.run(args)
 
 
@@ -190,7 +190,7 @@ def _downward(world: World, name: str) -> Iterator[str]:
 
 
 def _draw(world: World, out: Path) -> None:
-    from logs.errors import RecordingError
+    from logs.run_errors import RecordingError
 
     draw = {".svg": _svg, ".png": _png, ".rrd": _recording}.get(out.suffix)
     if draw is None:
@@ -216,13 +216,13 @@ def _png(world: World, out: Path) -> None:
 
 
 def _recording(world: World, out: Path) -> None:
-    from logs.recording.loggers.surroundings.building import record_building
+    from logs.recording.loggers.surroundings.model_building import record_building
 
     record_building(world, out)
 
 
 VERBS = (
-    Command(
+    CliCommand(
         "new", "write a first world file to change",
         (("harvey world new second-floor", "second-floor.toml: an office, a library and a corridor, with comments"),
          ("harvey world new second-floor --rooms office,kitchen,lab", "with these rooms along the corridor"),
@@ -231,7 +231,7 @@ VERBS = (
         "A file that exists is never overwritten. At the end of the file is a mission to copy.\n"
         "With many rooms some views look alike: harvey run MISSION --check says where to hang something else.",
     ),
-    Command(
+    CliCommand(
         "edit", "check a world file and draw its plan at each save",
         (("harvey world edit second-floor.toml --live", "second-floor-plan.html follows in a browser, until Ctrl-C"),
          ("harvey world edit second-floor.toml --live --viewer", "and the building in the rerun viewer"),
@@ -240,7 +240,7 @@ VERBS = (
         "Faults are printed with file and line. While the file cannot be read the page keeps the last plan that\n"
         "could be drawn. Files that it includes are watched too. Exit code 0 where it has no faults at last, else 2.",
     ),
-    Command(
+    CliCommand(
         "check", "check a world for faults",
         (("harvey world check my_floor.toml", "faults with file and line; exit code 2 where there are any"),
          ("harvey world check research_center", "one that comes with the project"),
@@ -248,21 +248,21 @@ VERBS = (
         add_file_arguments, lambda args: print_check(load_file(args.file, args.details), args.file),
         "Exit code 0 where there are none, 2 where there are any.",
     ),
-    Command(
+    CliCommand(
         "show", "show what is in a world, and draw its plan",
         (("harvey world show research_center", "rooms, doorways and what is in them"),
          ("harvey world show campus --out plan.png", "and the plan, storey beside storey (or .svg)"),
          ("harvey world show campus --out campus.rrd", "and the building for the viewer: rerun campus.rrd")),
         _show_arguments, lambda args: _show(load_file(args.file, args.details), args.out),
     ),
-    Command(
+    CliCommand(
         "compile", "compile a world into one file that is read room by room",
         (("harvey world compile campus.toml --out campus.world", "for worlds that are too large to read at once"),
          ("harvey run mission.toml", "a mission names it as any world: world = \"campus.world\"")),
         _compile_arguments, lambda args: _compile(args.file, args.details, args.out),
     ),
 )
-WORLD = Command(
+WORLD = CliCommand(
     "world", "begin, edit, check, show, compile, import or export a world file",
     tuple(verb.examples[0] for verb in VERBS), _arguments, _run,
     "harvey world VERB --help tells more of each and gives examples.",

@@ -1,4 +1,4 @@
-"""Redirector (§2): asked on its way to go elsewhere, the robot takes a new goal in place of the old one."""
+"""Goal changer (§2): asked on its way to go elsewhere, the robot takes a new goal in place of the old one."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from knowledge_sources.robot_knowledge_source import OlderSource
 from world_models.commands import read_destination
 from world_models.entries.location import Place
 from world_models.entries.task import Goal, Milestone
-from world_models.entries.told import Redirection
+from world_models.entries.user_reports import Redirection
 
 
-class Redirector(OlderSource):
+class GoalChanger(OlderSource):
     """Abandons the goal for the one that somebody asks for, from where the robot believes to be.
 
     A milestone that waits to be judged is withdrawn; the sketcher supersedes the sketches of the old goal. A robot that

@@ -7,13 +7,13 @@ from typing import Literal
 
 from blackboard.kinds import observation
 
-ToldState = Literal["shut", "open", "gone", "there"]
-DOOR_STATES: tuple[ToldState, ...] = ("shut", "open")
+ReportedState = Literal["shut", "open", "gone", "there"]
+DOOR_STATES: tuple[ReportedState, ...] = ("shut", "open")
 
 
 @observation()
 @dataclass(frozen=True, slots=True)
-class Told:
+class UserReport:
     """Somebody says how a door or a thing of the building is.
 
     Attributes:
@@ -23,7 +23,7 @@ class Told:
     """
 
     what: str
-    state: ToldState
+    state: ReportedState
     answer: str = ""
 
     def sentence(self) -> str:

@@ -1,7 +1,0 @@
-"""All kinds of entries that come with the project; a knowledge source of another package brings its own."""
-
-from blackboard.kinds import kinds_in
-from world_models.building import locale_frame
-from world_models.entries import body, door_state, floor, location, obstacle, percepts, robot, task, told
-
-KINDS = kinds_in(locale_frame, told, robot, body, task, percepts, location, obstacle, floor, door_state)
