@@ -273,5 +273,12 @@ class RecordedRun:
 
 
 __all__ = [
-    "RunPicture", "RecordedRun", "TrackPoint", "build_world", "load_scenario", "load_world", "open_run", "run",
+    "RecordedRun",
+    "RunPicture",
+    "TrackPoint",
+    "build_world",
+    "load_scenario",
+    "load_world",
+    "open_run",
+    "run",
 ]

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from logs.explain.story import MilestoneRow, read_milestones
-from logs.explain.turning_points import TurningPoint, read_turning_points
+from logs.explain.turning_points import read_turning_points
 from logs.reader import read_true_track
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
@@ -63,16 +63,18 @@ def read_tables(run: RunDirectory, history: Timeline) -> Iterator[Table]:
     Raises:
         BadInput, RecordingError: the journal or the recording cannot be read.
     """
-    yield _table("decisions", DECISIONS, [*_decisions(history)])
-    yield _table("poses", POSES, [*_poses(history, _world(run))])
-    yield _table("milestones", MILESTONES, [_milestone(row) for row in read_milestones(history)])
-    yield _table("turning_points", TURNS, [_turn(point) for point in read_turning_points(history)])
-    if _kind(run) == SIMULATOR and run.recording.is_file():
-        yield _table("truth", TRUTH, read_true_track(run.recording))
-
-
-def _table(name: str, columns: Mapping[str, type], rows: Sequence[tuple[Cell, ...]]) -> Table:
-    return Table(name, tuple(columns), tuple(columns.values()), rows)
+    try:
+        head: RunHead | None = RunHead.read(run.path)
+    except BadInput:
+        head = None
+    tables: dict[str, tuple[Mapping[str, type], Sequence[tuple[Cell, ...]]]] = {
+        "decisions": (DECISIONS, [*_decisions(history)]), "poses": (POSES, [*_poses(history, _world(head))]),
+        "milestones": (MILESTONES, [_milestone(row) for row in read_milestones(history)]),
+        "turning_points": (TURNS, [(p.cycle, p.time_s, p.kind, p.text) for p in read_turning_points(history)])}
+    if head is not None and head.kind == SIMULATOR and run.recording.is_file():
+        tables["truth"] = TRUTH, read_true_track(run.recording)
+    for name, (columns, rows) in tables.items():
+        yield Table(name, tuple(columns), tuple(columns.values()), rows)
 
 
 def _decisions(history: Timeline) -> Iterator[tuple[Cell, ...]]:
@@ -102,24 +104,12 @@ def _milestone(row: MilestoneRow) -> tuple[Cell, ...]:
     return (*cells, SEPARATOR.join(refs))
 
 
-def _turn(point: TurningPoint) -> tuple[Cell, ...]:
-    cycle, kind, text, time_s = astuple(point)
-    return cycle, time_s, kind, text
-
-
-def _world(run: RunDirectory) -> World | None:
+def _world(head: RunHead | None) -> World | None:
     """The world of the run; None where its file is not as it was, so that nothing is placed in another."""
     try:
-        return RunHead.read(run.path).load_world()
+        return None if head is None else head.load_world()
     except BadInput:
         return None
-
-
-def _kind(run: RunDirectory) -> str:
-    try:
-        return RunHead.read(run.path).kind
-    except BadInput:
-        return ""
 
 
 def write_csv(table: Table, folder: Path) -> Path:

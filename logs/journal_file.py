@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from blackboard.journal import Decision, decision_line
 from blackboard.kinds import is_request
 from logs.disk import Appended
-
-
-class JournalError(ValueError):
-    """A journal that cannot be read; names file and line."""
-
 
 HELD_LINES = 64
 """So many decisions on which nothing rests outside the board are written together."""
@@ -86,40 +79,3 @@ class JournalFile:
             self.flush()
         finally:
             self._file.close()
-
-
-def read_journal(path: Path) -> Iterator[dict[str, Any]]:
-    """The decisions of a journal, one by one.
-
-    A last line without its end, as a crash leaves it, is not a decision: it comes as ``{"truncated": <line number>}``.
-    Every cycle has its line, also where a run was cut off and went on: line 42 is cycle 42.
-
-    Raises:
-        JournalError: a line is not a decision, or not the one that follows on the line before.
-        OSError: the file cannot be read.
-    """
-    with path.open("rb") as file:
-        for number, line in enumerate(file, 1):
-            if not line.endswith(b"\n"):
-                yield {"truncated": number}
-                return
-            record = _decision(line, f"{path}:{number}")
-            if record["cycle"] != number:
-                raise JournalError(out_of_step(f"{path}:{number}", number, record["cycle"]))
-            yield record
-
-
-def out_of_step(where: str, expected: int, came: int) -> str:
-    """What to say of a line whose cycle is not the one that has to stand there."""
-    why = "a line is missing before it" if came > expected else "a line is there twice, or was moved"
-    return f"{where}: expected cycle {expected}, got {came} ({why})"
-
-
-def _decision(line: bytes, where: str) -> dict[str, Any]:
-    try:
-        record = json.loads(line)
-    except ValueError as error:
-        raise JournalError(f"{where}: expected a decision as a JSON object, got {line[:60]!r} ({error})") from None
-    if not isinstance(record, dict) or not isinstance(record.get("cycle"), int):
-        raise JournalError(f'{where}: expected a JSON object with a number "cycle", got {line[:60]!r}')
-    return record

@@ -64,7 +64,7 @@ def read_series(path: Path, entity: str, component: str) -> Series:
         RecordingError: the file is no recording, or is damaged.
     """
     found: list[tuple[bytes, int, Any]] = []
-    for batch in _whole_batches(path, entity):
+    for batch in _batches(path, entity):
         if component in batch.schema.names:
             found += zip(*(batch.column(name).to_pylist() for name in (ROW_ID, CYCLE, component)), strict=True)
     in_order = sorted((row for row in found if row[2]), key=lambda row: row[0])
@@ -99,27 +99,23 @@ def _rows(path: Path, entity: str, components: tuple[str, ...], timeline: str = 
 
     Each has its time on a timeline too, where one is named.
     """
-    rows = [row for batch in _whole_batches(path, entity) for row in _complete(batch, components, timeline)]
+    rows = [row for batch in _batches(path, entity) for row in _complete(batch, components, timeline)]
     return [row for _, row in sorted(rows, key=lambda pair: pair[0])]
 
 
-def _whole_batches(path: Path, entity: str) -> list[Any]:
+def _batches(path: Path, entity: str) -> list[Any]:
     """What was logged at an entity path. Raises RecordingError."""
     if not path.is_file():
         raise RecordingError(f"{path}: expected a recording, got no such file")
     try:
-        return list(_batches(path, entity))
+        with warnings.catch_warnings():  # a recording without its footer, as a crash leaves it, is read as well
+            warnings.simplefilter("ignore", RerunWarning)
+            reader = RrdReader(path)
+        chunks = reader.stream().filter(content=f"/{entity}", is_static=False)
+        return [chunk.to_record_batch() for chunk in chunks]
     except Exception as error:  # as above
         raise RecordingError(f"{path}: expected a whole Rerun recording, got: {error} (harvey repair {path.parent} "
                              "draws it anew)") from None
-
-
-def _batches(path: Path, entity: str) -> Iterator[Any]:
-    with warnings.catch_warnings():  # a recording without its footer, as a crash leaves it, is read as well
-        warnings.simplefilter("ignore", RerunWarning)
-        reader = RrdReader(path)
-    for chunk in reader.stream().filter(content=f"/{entity}", is_static=False):
-        yield chunk.to_record_batch()
 
 
 def _complete(batch: Any, components: tuple[str, ...], timeline: str) -> Iterator[tuple[bytes, dict[str, Any]]]:

@@ -24,7 +24,6 @@ from blackboard.entry import Entry, Ref
 from blackboard.kinds import Registry
 from blackboard.servoing import Discrepancy
 from logs.decoding import decode
-from logs.journal_file import JournalError, read_journal
 from logs.mjpeg_file import Pictures
 from logs.run_errors import BadInput
 from world_models import words
@@ -224,27 +223,44 @@ def as_line(data: Any) -> str:
 def read_records(path: Path) -> Iterator[DecisionRecord]:
     """The decisions of a journal, one by one. A last line that was cut off in the middle of writing is left out.
 
+    Every cycle has its line, also where a run was cut off and went on: line 42 is cycle 42.
+
     Raises:
-        BadInput: the file cannot be read, or a line is not a decision; names file and line.
+        BadInput: the file cannot be read, or a line is not the decision that follows on the line before; names both.
     """
-    lines = read_journal(path)
-    number = 0
-    while True:
-        number += 1
-        try:
-            data = next(lines, None)
-            if data is None or "truncated" in data:
-                return
-            decision = decision_of(data)
-        except JournalError as error:
-            raise BadInput(str(error)) from None
-        except RecursionError:
-            raise BadInput(f"{path}:{number}: expected a decision, got too many nested brackets") from None
-        except ValueError as error:
-            raise BadInput(f"{path}:{number}: {error}") from None
-        except OSError as error:
-            raise BadInput(f"{path}: expected a readable journal, got: {error.strerror}") from None
-        yield decision
+    try:
+        with path.open("rb") as file:
+            for number, line in enumerate(file, 1):
+                if not line.endswith(b"\n"):
+                    return
+                decision = decision_at(line, f"{path}:{number}")
+                check_step(path, number, decision.cycle)
+                yield decision
+    except OSError as error:
+        raise BadInput(f"{path}: expected a readable journal, got: {error.strerror}") from None
+
+
+def check_step(path: Path, line: int, cycle: int) -> None:
+    """Raises BadInput where a line has not the cycle that has to stand there."""
+    if cycle != line:
+        why = "a line is missing before it" if cycle > line else "a line is there twice, or was moved"
+        raise BadInput(f"{path}:{line}: expected cycle {line}, got {cycle} ({why})")
+
+
+def decision_at(line: bytes, where: str) -> DecisionRecord:
+    """A line of a journal as a decision. Raises BadInput naming ``where``, what was expected and what came."""
+    try:
+        data = json.loads(line)
+        if not isinstance(data, dict):
+            raise ValueError("it is no object")
+    except RecursionError:
+        raise BadInput(f"{where}: expected a decision, got too many nested brackets") from None
+    except ValueError as error:
+        raise BadInput(f"{where}: expected a decision as a JSON object, got {line[:60]!r} ({error})") from None
+    try:
+        return decision_of(data)
+    except ValueError as error:
+        raise BadInput(f"{where}: {error}") from None
 
 
 def decision_of(data: Any) -> DecisionRecord:
@@ -263,23 +279,20 @@ def decision_of(data: Any) -> DecisionRecord:
         made=tuple(_entry(item, cycle, False) for item in _get(data, "made", list)),
         refused=_get(data, "refused", str),
         data=data,
-        used=_texts(data, "used") if "used" in data else (),
+        used=_texts(data, "used", ()),
     )
 
 
 def _entry(item: Any, cycle: int, observed: bool) -> EntryRecord[Any]:
     return EntryRecord(
         _get(item, "change", str), _get(item, "entry", str), _get(item, "type", str), _get(item, "author", str),
-        _texts(item, "because"), _get(item, "value", object), cycle, observed,
-        _texts(item, "retracted_because") if "retracted_because" in item else (),
-    )
+        _texts(item, "because"), _get(item, "value", object), cycle, observed, _texts(item, "retracted_because", ()))
 
 
 def _candidate(item: Any, reason: str = "") -> Candidate:
     return Candidate(
         _get(item, "number", int), _get(item, "source", str), _get(item, "level", str), _get(item, "trigger", str),
-        _get(item, "kind", str), float(_get(item, "rating", (int, float))), _get(item, "since", int), reason,
-    )
+        _get(item, "kind", str), float(_get(item, "rating", (int, float))), _get(item, "since", int), reason)
 
 
 def _optional(data: Any, key: str) -> Candidate | None:
@@ -287,7 +300,9 @@ def _optional(data: Any, key: str) -> Candidate | None:
     return None if item is None else _candidate(item)
 
 
-def _texts(data: Any, key: str) -> tuple[str, ...]:
+def _texts(data: Any, key: str, otherwise: tuple[str, ...] | None = None) -> tuple[str, ...]:
+    if otherwise is not None and key not in data:
+        return otherwise
     items = _get(data, key, list)
     if not all(isinstance(item, str) for item in items):
         raise ValueError(f"{key}: expected texts, got {items!r}")
@@ -341,45 +356,39 @@ def effect_of(record: EntryRecord[Any], originals: Originals, view: View, kinds:
 
 
 def original_of(record: EntryRecord[Any], originals: Originals, kinds: Registry) -> Any:
-    """The value itself, with what the journal keeps by reference."""
-    if record.type == LocaleFrame.__name__:
-        return _restore_frame(record, originals.frames)
-    kind, fields = find_kind(record, kinds), record.fields
-    if kind is CameraPicture and isinstance(fields, dict):
-        fields = {**fields, "jpeg": _picture(record, originals.pictures)}
-    try:
-        return decode(fields, kind)
-    except (ValueError, TypeError) as error:
-        raise BadInput(f"{record.ref}: {error}") from None
+    """The value itself, with what the journal keeps by reference. Raises BadInput where it does not fit its kind."""
+    return _value(record, kinds, originals.pictures, originals.frames)
 
 
-def _picture(record: EntryRecord[Any], frames: Mapping[int, bytes]) -> bytes:
-    """The bytes of a frame, after checking that they are those that the journal saw."""
-    number, seen = record.fields.get("number"), record.fields.get("jpeg")
-    if not isinstance(number, int) or number not in frames:
-        raise BadInput(f"{record.ref}: expected picture {number} among those that were kept, which are {len(frames)}")
-    jpeg = frames[number]
-    if not isinstance(seen, dict) or hashlib.sha256(jpeg).hexdigest() != seen.get("sha256"):
-        where = f"{frames.where(number)}: " if isinstance(frames, Pictures) else ""
-        raise BadInput(f"{where}{record.ref}: expected the picture that the journal saw, got another one for number "
-                       f"{number}")
-    return jpeg
-
-
-def _restore_frame(record: EntryRecord[Any], store: FrameStore) -> LocaleFrame:
-    """The locale frame that a record refers to. Raises BadInput where the world has no such frame."""
-    try:
-        return store.restore(decode(record.fields, FrameReference))
-    except (ValueError, TypeError) as error:
-        raise BadInput(f"{record.ref}: {error}") from None
-
-
-def find_kind(record: EntryRecord[Any], kinds: Registry) -> type[Any]:
-    """The type of a record's value. Raises BadInput where it is not known here."""
+def _value(
+    record: EntryRecord[Any], kinds: Registry, pictures: Mapping[int, bytes] | None, frames: FrameStore | None
+) -> Any:
+    """As :func:`original_of`; without pictures or frames the value has no bytes, or is the reference."""
     if record.type not in kinds:
         raise BadInput(f"{record.ref}: expected a kind of entry that is known here ({', '.join(sorted(kinds))}), got a "
                        f"{record.type}: is the package that brings it installed?")
-    return kinds[record.type]
+    fields, kind = record.fields, kinds[record.type]
+    if kind is CameraPicture and isinstance(fields, dict):
+        fields = {**fields, "jpeg": b"" if pictures is None else _picture(record, pictures)}
+    try:
+        value = decode(fields, FrameReference if kind is LocaleFrame else kind)
+        return value if frames is None or kind is not LocaleFrame else frames.restore(value)
+    except (ValueError, TypeError) as error:
+        what = f"expected a {record.type} as this version has it, got another"
+        raise BadInput(f"{record.ref}: {what}: {error}") from None
+
+
+def _picture(record: EntryRecord[Any], pictures: Mapping[int, bytes]) -> bytes:
+    """The bytes of a frame, after checking that they are those that the journal saw."""
+    number, seen = record.fields.get("number"), record.fields.get("jpeg")
+    if not isinstance(number, int) or number not in pictures:
+        raise BadInput(f"{record.ref}: expected picture {number} among those that were kept, which are {len(pictures)}")
+    jpeg = pictures[number]
+    if not isinstance(seen, dict) or hashlib.sha256(jpeg).hexdigest() != seen.get("sha256"):
+        where = f"{pictures.where(number)}: " if isinstance(pictures, Pictures) else ""
+        raise BadInput(f"{where}{record.ref}: expected the picture that the journal saw, got another one for number "
+                       f"{number}")
+    return jpeg
 
 
 def entry_of(record: EntryRecord[Any], kinds: Registry, store: FrameStore | None = None) -> Entry[Any]:
@@ -390,19 +399,8 @@ def entry_of(record: EntryRecord[Any], kinds: Registry, store: FrameStore | None
     Raises:
         BadInput: the value is of a kind that is not known, or does not fit it.
     """
-    fields, kind = record.fields, find_kind(record, kinds)
-    if kind is CameraPicture and isinstance(fields, dict):
-        fields = {**fields, "jpeg": b""}
-    if kind is LocaleFrame and store is not None:
-        restored: Any = _restore_frame(record, store)
-    else:
-        try:
-            restored = decode(fields, FrameReference if kind is LocaleFrame else kind)
-        except (ValueError, TypeError) as error:
-            what = f"expected a {record.type} as this version has it, got another"
-            raise BadInput(f"{record.ref}: {what}: {error}") from None
-    ref = ref_of(record.ref)
-    return Entry(ref.id, ref.revision, restored, record.author, cycle_of_writing(record), refs_of(record.because))
+    value, ref = _value(record, kinds, None, store), ref_of(record.ref)
+    return Entry(ref.id, ref.revision, value, record.author, cycle_of_writing(record), refs_of(record.because))
 
 
 def cycle_of_writing(record: EntryRecord[Any]) -> int:

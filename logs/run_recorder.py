@@ -60,31 +60,31 @@ class RunRecorder:
         self.replaying = whole is not None or drawing is not None
         self._journal: JournalFile | None = None
         self._camera: MjpegFile | None = None
-        self._recording_writer: RecordingWriter | None = None
+        self._drawing: RecordingWriter | None = None
         drawing = run.recording if run is not None else drawing
         with ExitStack() as opened:
             if run is not None:
-                self._open(run, head, whole, opened)
+                if whole is None:
+                    run.path.mkdir(parents=True, exist_ok=True)
+                    head.write(run.path)
+                keep = whole or Extent()
+                self._journal = JournalFile(run.journal, keep=keep.journal)
+                opened.callback(self._journal.close)
+                self._camera = MjpegFile(run.camera, keep=keep.camera)
+                opened.callback(self._camera.close)
+                sync_folder(run.path)
             if drawing is not None or live:
-                self._recording_writer = _recording_writer(drawing, head, world, robot, live, self._journal)
-                opened.callback(self._recording_writer.close)
+                line_of = decision_line if self._journal is None else self._journal.line
+                self._drawing = RecordingWriter(
+                    drawing, world=world, camera=robot.lens, mount=robot.mount, live=live, line_of=line_of,
+                    title=f"harvey {head.name}", recording_id=f"{head.name}-{head.seed}")
+                opened.callback(self._drawing.close)
             self._opened = opened.pop_all()
-
-    def _open(self, run: RunDirectory, head: RunHead, whole: Extent | None, opened: ExitStack) -> None:
-        if whole is None:
-            run.path.mkdir(parents=True, exist_ok=True)
-            head.write(run.path)
-        keep = whole or Extent()
-        self._journal = JournalFile(run.journal, keep=keep.journal)
-        opened.callback(self._journal.close)
-        self._camera = MjpegFile(run.camera, keep=keep.camera)
-        opened.callback(self._camera.close)
-        sync_folder(run.path)
 
     @property
     def sinks(self) -> tuple[Sink, ...]:
         """For the scheduler; the journal comes first."""
-        return (self._write, *([self._recording_writer] if self._recording_writer else []))
+        return (self._write, *([self._drawing] if self._drawing else []))
 
     def record_port(self, port: Port) -> RecordedPort:
         """The port, whose pictures are on the disk before the board sees them."""
@@ -98,13 +98,13 @@ class RunRecorder:
 
     def draw_truth(self, pose: Pose2, sim_time_s: float, contacts: Sequence[Place] = ()) -> None:
         """Where the robot truly is, and where it touched something since the last cycle, for the drawing."""
-        if self._recording_writer is not None:
-            self._recording_writer.truth(pose, sim_time_s, contacts)
+        if self._drawing is not None:
+            self._drawing.truth(pose, sim_time_s, contacts)
 
     def draw_true_building(self, added: tuple[Face, ...], gone: tuple[Face, ...]) -> None:
         """How the building truly differs from its model from now on: faces that are there besides, and that are not."""
-        if self._recording_writer is not None:
-            self._recording_writer.true_building(added, gone)
+        if self._drawing is not None:
+            self._drawing.true_building(added, gone)
 
     def close(self) -> None:
         """No more decisions. Raises RecordingError where the recording's last part could not be written."""
@@ -137,13 +137,3 @@ class RecordedPort:
         for effect in self._port.answer(change):
             self._recorder.record_picture(effect)
             yield effect
-
-
-def _recording_writer(
-    path: Path | None, head: RunHead, world: World, robot: RobotModel, live: bool, journal: JournalFile | None
-) -> RecordingWriter:
-    return RecordingWriter(
-        path, world=world, camera=robot.lens, mount=robot.mount, live=live,
-        title=f"harvey {head.name}", recording_id=f"{head.name}-{head.seed}",
-        line_of=decision_line if journal is None else journal.line,
-    )

@@ -18,8 +18,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from logs.journal_file import out_of_step
-from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of, is_a
+from logs.records import Candidate, DecisionRecord, EntryRecord, check_step, decision_at, is_a
 from logs.run_errors import BadInput
 from world_models.building.locale_frame import FrameReference, LocaleFrame
 from world_models.entries.location import Hypothesis
@@ -33,12 +32,9 @@ PLAIN = re.compile(rb'\{"cycle":(\d{1,15}),"')
 CHANGE = re.compile(rb'\{"change":"(\w+)","entry":"([^"\\]+)"')
 """How a change begins there. Inside a text every quotation mark has a backslash before it, so no text looks like it."""
 CLOSES = ord("}")
-FAR = 3000
-"""So many entries are looked at for the nearest of a kind."""
-REVISIONS = 2000
-"""So many revisions of a belief are looked back for where it began."""
-TIMED_WITHIN = 100
-"""A time is looked for in so many decisions, backwards."""
+FAR, REVISIONS, TIMED_WITHIN = 3000, 2000, 100
+"""So many entries are looked at for the nearest of a kind, so many revisions of a belief for where it began, so many
+decisions for a time."""
 YAW_CALIBRATOR = "yaw_calibrator"
 """It turns a belief after a milestone, and tells nothing of where that is from."""
 
@@ -56,8 +52,7 @@ class Timeline:
         self._ends = [match.start() for match in re.finditer(rb"\n", self._data)]
         self._read: dict[int, DecisionRecord] = {}
         self._line_of: dict[int, int] = {}
-        self._entries: dict[bytes, int] = {}
-        self._retracted: dict[bytes, int] = {}
+        self._entries, self._retracted = dict[bytes, int](), dict[bytes, int]()
         self._sweep()
 
     @property
@@ -144,11 +139,10 @@ class Timeline:
 
     def decision(self, cycle: int) -> DecisionRecord:
         """Raises BadInput where the run has no such cycle."""
-        found = self.cycle_of(cycle)
-        if found is None:
-            have = f"cycles {min(self.cycles)} to {max(self.cycles)}" if self.cycles else "none"
-            raise BadInput(f"--at: expected a cycle of the run, which has {have}, got {cycle}")
-        return found
+        if (found := self.cycle_of(cycle)) is not None:
+            return found
+        have = f"cycles {min(self.cycles)} to {max(self.cycles)}" if self.cycles else "none"
+        raise BadInput(f"--at: expected a cycle of the run, which has {have}, got {cycle}")
 
     def decisions(self) -> Iterator[DecisionRecord]:
         """All of them, in their order."""
@@ -269,47 +263,38 @@ class Timeline:
 
     def near(self, text: str) -> list[str]:
         """Names like one that is not there: of the same kind with near numbers, else of a kind that is spelt alike."""
-        kinds = {id.rpartition("-")[0].lower(): id.rpartition("-")[0] for id in self.newest}
+        numbers: dict[str, list[int]] = {}
+        for head, _, number in (id.rpartition("-") for id in self.newest):
+            numbers.setdefault(head, []).extend([int(number)] if number.isdecimal() else [])
+        kinds = {kind.lower(): kind for kind in numbers}
         kind, _, rest = text.rpartition("-")
         alike = difflib.get_close_matches((kind or text).lower(), sorted(kinds), n=2, cutoff=0.6)
         if not alike:
-            ids = list(self.newest)
-            return [ids[0], ids[-1]] if ids else []
+            return [*self.newest][:1] + [*self.newest][-1:]
         wanted = int(rest.partition(".")[0]) if rest.partition(".")[0].isdecimal() else 1
-        near: list[str] = []
-        for name in alike:
-            numbers = sorted(_numbers(self.newest, kinds[name]), key=lambda n: (abs(n - wanted), n))
-            near += [f"{kinds[name]}-{n}" for n in numbers[:2]]
-        return near
+        return [f"{kinds[name]}-{n}" for name in alike
+                for n in sorted(numbers[kinds[name]], key=lambda n: (abs(n - wanted), n))[:2]]
 
     def _sweep(self) -> None:
         """Note where each cycle and each entry stands. What stands in an unusual line is read from it.
 
         Raises BadInput where a line is not the cycle that follows on the line before.
         """
-        start, unusual = 0, list[int]()
+        start, unusual = 0, False
         for line, end in enumerate(self._ends):
             plain = PLAIN.match(self._data, start)
-            if plain is None or self._data[end - 1] != CLOSES:
-                unusual.append(line)
+            unusual |= plain is None or self._data[end - 1] != CLOSES
             cycle = int(plain[1]) if plain else self._decision(line).cycle
-            if cycle != line + 1:
-                raise BadInput(out_of_step(f"{self._path}:{line + 1}", line + 1, cycle))
+            check_step(self._path, line + 1, cycle)
             self._line_of[cycle] = line
             start = end + 1
-        if unusual:
-            self._sweep_slowly()
-            return
-        whole = self._ends[-1] if self._ends else 0
-        for change in CHANGE.finditer(self._data, 0, whole):
-            kind, ref = change.groups()
-            (self._retracted if kind == b"Retracted" else self._entries)[ref] = change.start()
-
-    def _sweep_slowly(self) -> None:
-        for line in range(len(self._ends)):
+        for line in range(len(self._ends)) if unusual else ():
             for record in self._decision(line).changes:
                 where = self._retracted if record.is_gone else self._entries
                 where[record.ref.encode(errors="replace")] = self._ends[line] - 1
+        for change in () if unusual else CHANGE.finditer(self._data, 0, self._ends[-1] if self._ends else 0):
+            kind, ref = change.groups()
+            (self._retracted if kind == b"Retracted" else self._entries)[ref] = change.start()
 
     def _find(self, ref: str, offset: int | None, *, retracted: bool) -> EntryRecord[Any] | None:
         """The newest change of that name; where the index is wrong, every line is searched."""
@@ -328,7 +313,7 @@ class Timeline:
         """Raises BadInput where the line is no decision; names file and line."""
         if line not in self._read:
             start = self._ends[line - 1] + 1 if line else 0
-            self._read[line] = _decision_at(self._data[start : self._ends[line]], f"{self._path}:{line + 1}")
+            self._read[line] = decision_at(self._data[start : self._ends[line]], f"{self._path}:{line + 1}")
         return self._read[line]
 
 
@@ -340,33 +325,8 @@ def ranked(candidates: Iterable[Candidate], chosen: Candidate | None) -> tuple[C
 
 def _time_of(record: EntryRecord[Any]) -> float | None:
     """When an observation was made, read without decoding it."""
-    if not isinstance(record.fields, Mapping):
-        return None
-    value = record.fields.get("sim_time_s", record.fields.get("when_s"))
-    since, waited = record.fields.get("since_s"), record.fields.get("waited_s")
+    value = record.field("sim_time_s", record.field("when_s"))
+    since, waited = record.field("since_s"), record.field("waited_s")
     if isinstance(since, int | float) and isinstance(waited, int | float):
         value = since + waited
     return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
-
-
-def _numbers(ids: Iterable[str], kind: str) -> Iterator[int]:
-    for id in ids:
-        head, _, number = id.rpartition("-")
-        if head == kind and number.isdecimal():
-            yield int(number)
-
-
-def _decision_at(text: bytes, where: str) -> DecisionRecord:
-    """A line as a decision. Raises BadInput naming ``where``, what was expected and what came."""
-    try:
-        data = json.loads(text)
-    except RecursionError:
-        raise BadInput(f"{where}: expected a decision, got too many nested brackets") from None
-    except ValueError as error:
-        raise BadInput(f"{where}: expected a decision as a JSON object, got {text[:60]!r} ({error})") from None
-    if not isinstance(data, dict):
-        raise BadInput(f"{where}: expected a decision as a JSON object, got {text[:60]!r}")
-    try:
-        return decision_of(data)
-    except ValueError as error:
-        raise BadInput(f"{where}: {error}") from None

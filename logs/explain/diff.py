@@ -11,7 +11,7 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 from logs.explain.phrases import UNREADABLE, sentence
-from logs.records import Candidate, DecisionRecord, EntryRecord, as_line
+from logs.records import Candidate, DecisionRecord, EntryRecord, as_line, is_a
 from logs.run_directory import RunDirectory
 from logs.tables import table
 from logs.timeline import Timeline
@@ -265,7 +265,7 @@ def _tell_observation(ours: Timeline, theirs: Timeline, where: Parting) -> Itera
     cycle = _cycle(ours, theirs, where.observation)
     later = "" if not where.decision or cycle <= where.decision else ", after they had decided differently"
     yield from _tell_entry(ours, theirs, where.observation, "observation", later)
-    if all(one is not None and one.kind is CameraPicture for one in (h.entry(where.observation) for h in (ours, theirs))):
+    if all(is_a(history.entry(where.observation), CameraPicture) for history in (ours, theirs)):
         yield "  (the same picture was asked for, and another came: other noise, or the robot stood elsewhere)"
 
 

@@ -184,9 +184,8 @@ def tell_source(world: WorldFile, name: str) -> str:
     if world.missing:
         return f"From which line of the world's file {name} comes cannot be told: {world.missing}."
     element = world.element(name)
-    if element is None:
-        return f"The world's file has nothing of the name {name}."
-    return f"{name} is described in {element.source} ({element.kind})."
+    return f"The world's file has nothing of the name {name}." if element is None else (
+        f"{name} is described in {element.source} ({element.kind}).")
 
 
 def _find_in(frame: LocaleFrame, name: str) -> Element | None:

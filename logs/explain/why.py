@@ -300,8 +300,8 @@ SENTENCES: Mapping[type[Any], Callable[[Timeline, EntryRecord[Any]], str]] = {
 }
 LABELS: Mapping[type[Any], str] = {
     Leg: "driving", Hypothesis: "believed", Milestone: "looked for", Discrepancy: "doubted", PlanSketch: "plan",
-    Goal: "goal", Command: "command", Tracks: "seen", CameraPicture: "picture", MotionReport: "wheels", MotorCommand: "motion",
-    Course: "motion",
+    Goal: "goal", Command: "command", Tracks: "seen", CameraPicture: "picture", MotionReport: "wheels",
+    MotorCommand: "motion", Course: "motion",
     PictureRequest: "look", Segments: "seen", Panorama: "thought", BodyFault: "fault", Recovery: "recovery",
     Ride: "ride", RideReport: "ride", Obstruction: "hidden", Quiescence: "stillness", Outcome: "the end",
     Resumed: "resumed", Drift: "wheels", Travel: "wheels", LocaleFrame: "known", FrameRequest: "asked",

@@ -60,39 +60,40 @@ def in_cycle(history: Timeline, source: str, cycle: int) -> tuple[Occasion, ...]
     """
     decision = history.decision(cycle)
     found = [Occasion(cycle, Fate.DROPPED, c.trigger, _tell_drop(c)) for c in decision.obviated if c.source == source]
-    chosen = decision.chosen
     for c in history.candidates(cycle):
-        if c.source != source:
-            continue
-        if chosen is None or c.number != chosen.number:
-            found.append(Occasion(cycle, Fate.OUTRANKED, c.trigger, _tell_ranking(c, decision)))
-        elif decision.refused:
-            found.append(Occasion(cycle, Fate.REFUSED, c.trigger, _tell_refusal(decision)))
-        elif decision.asks is not None:
-            found.append(Occasion(cycle, Fate.ASKED, c.trigger, _tell_question(decision.asks)))
-        else:
-            found.append(Occasion(cycle, Fate.ACTED, c.trigger, f"it was the best there was, rated {c.rating:.2f}"))
+        if c.source == source:
+            is_chosen = decision.chosen is not None and c.number == decision.chosen.number
+            fate, why = _act(decision) if is_chosen else (Fate.OUTRANKED, _tell_ranking(c, decision))
+            why = f"it was the best there was, rated {c.rating:.2f}" if fate is Fate.ACTED else why
+            found.append(Occasion(cycle, fate, c.trigger, why))
     return tuple(found)
 
 
 def in_run(history: Timeline, source: str) -> tuple[Occasion, ...]:
     """Every time in a run that a knowledge source was woken, and what came of it in the end."""
     open_: dict[int, Candidate] = {}
-    ended: list[Occasion] = []
-    last = 0
+    ended, last = list[Occasion](), 0
     for decision in history.decisions():
         last = decision.cycle
         open_ |= {c.number: c for c in decision.activated if c.source == source}
-        for c in decision.obviated:
-            if open_.pop(c.number, None) is not None:
-                ended.append(Occasion(last, Fate.DROPPED, c.trigger, _tell_drop(c)))
+        ended += [Occasion(last, Fate.DROPPED, c.trigger, _tell_drop(c)) for c in decision.obviated
+                  if open_.pop(c.number, None) is not None]
         chosen = decision.chosen
         if decision.asks is None and chosen is not None and open_.pop(chosen.number, None) is not None:
-            fate, why = (Fate.REFUSED, _tell_refusal(decision)) if decision.refused else (Fate.ACTED, _did(decision))
-            ended.append(Occasion(last, fate, chosen.trigger, why))
+            ended.append(Occasion(last, _act(decision)[0], chosen.trigger, _act(decision)[1]))
     ended += [Occasion(last, Fate.OUTRANKED, c.trigger, "it was still waiting when the run ended")
               for c in open_.values()]
     return tuple(ended)
+
+
+def _act(decision: DecisionRecord) -> tuple[Fate, str]:
+    """What became of the act that was chosen."""
+    if decision.refused:
+        last = decision.refused.rstrip().splitlines()[-1]
+        return Fate.REFUSED, f"its act was refused, and nothing of it applied: {last}"
+    if decision.asks is not None:
+        return Fate.ASKED, f"its act waited for the answer to {decision.asks.ref}: {sentence(decision.asks)}"
+    return Fate.ACTED, f"it made {', '.join(r.ref for r in decision.made) or 'nothing'}"
 
 
 def _tell_drop(c: Candidate) -> str:
@@ -101,24 +102,11 @@ def _tell_drop(c: Candidate) -> str:
     return f"{waited}{reason}"
 
 
-def _did(decision: DecisionRecord) -> str:
-    return f"it made {', '.join(r.ref for r in decision.made) or 'nothing'}"
-
-
-def _tell_question(request: EntryRecord[Any]) -> str:
-    return f"its act waited for the answer to {request.ref}: {sentence(request)}"
-
-
-def _tell_refusal(decision: DecisionRecord) -> str:
-    last = decision.refused.rstrip().splitlines()[-1]
-    return f"its act was refused, and nothing of it applied: {last}"
-
-
 def _tell_ranking(c: Candidate, decision: DecisionRecord) -> str:
     """By what the chosen activation came before this one: focus, then rating, then age."""
     chosen = decision.chosen
     if chosen is None:
-        return f"nobody acted ({_tell_refusal(decision)})" if decision.refused else "nobody acted"
+        return f"nobody acted ({_act(decision)[1]})" if decision.refused else "nobody acted"
     who = f"the {words.source(chosen.source)} (on {chosen.trigger})"
     ours, theirs = _distance(c, decision.focus), _distance(chosen, decision.focus)
     if ours != theirs:
@@ -166,10 +154,8 @@ def of_entry(history: Timeline, ref: str) -> Iterator[str]:
 
 
 def _end(history: Timeline, record: EntryRecord[Any]) -> Iterator[str]:
-    id, _, revision = record.ref.rpartition(".")
-    after = history.entry(f"{id}.{int(revision) + 1}") if revision.isdecimal() else None
     gone = history.retraction(record.ref)
-    if after is not None:
+    if (after := history.entry(f"{record.id}.{record.revision + 1}")) is not None:
         yield (f"It was superseded in cycle {after.cycle} by {after.ref}, which the {words.source(after.author)} wrote:"
                f" {sentence(after)}.")
         yield from _grounds(history, after.because, after.ref, record.ref)
@@ -197,11 +183,8 @@ def _use(history: Timeline, record: EntryRecord[Any]) -> Iterator[str]:
         fates += [f"  cycle {decision.cycle}: it woke the {words.source(c.source)}, which was dropped: {_tell_drop(c)}."
                   for c in decision.obviated if c.trigger == record.ref]
         if decision.chosen is not None and decision.chosen.trigger == record.ref:
-            who = words.source(decision.chosen.source)
-            if decision.asks is not None:
-                fates.append(f"  cycle {decision.cycle}: it woke the {who}, and {_tell_question(decision.asks)}.")
-                continue
-            how = _tell_refusal(decision) if decision.refused else _did(decision)
-            fates.append(f"  cycle {decision.cycle}: it woke the {who}, which acted: {how}.")
+            fate, what = _act(decision)
+            how = f", and {what}" if fate is Fate.ASKED else f", which acted: {what}"
+            fates.append(f"  cycle {decision.cycle}: it woke the {words.source(decision.chosen.source)}{how}.")
     yield from fates or ["  It woke nobody who then acted."]
     yield f"Resting on it: {', '.join(dict.fromkeys(resting))}." if resting else "Nothing rests on it."

@@ -17,6 +17,8 @@ from logs.recording.stream import RecordingStream
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 
+BACKGROUND = rrb.Background(color=[28, 30, 34, 255])
+"""Of views in space."""
 Area = Literal["words", "world", "decisions", "measurements"]
 """``words``: the column to the left; ``world``: the middle, above; ``decisions``: the middle, below;
 ``measurements``: the column to the right."""

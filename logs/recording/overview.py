@@ -16,24 +16,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from logs.reader import Series, read_series
-from logs.recording.logger import window
-from logs.recording.loggers.lanes import ACTIVITIES, GAP, style
-from logs.recording.palette import BELIEVED, DONE, MATCHED, REJECTED, VERDICTS, Colour, faint
-from logs.recording.paths import (
-    BELIEVED_ROBOT,
-    BUILDING,
-    CHAPTERS,
-    FLEET,
-    HARVEY,
-    MILESTONES,
-    MOODS_OF,
-    NAMES,
-    OFF,
-    POSITION,
-    SUMMARY,
-    TRUE_ROBOT,
-    WORLD,
-)
+from logs.recording import paths
+from logs.recording.logger import BACKGROUND, window
+from logs.recording.loggers.lanes import GAP, style
+from logs.recording.palette import ACTIVITIES, BELIEVED, DONE, MATCHED, REJECTED, VERDICTS, Colour, faint
 from logs.recording.stream import RecordingStream
 from logs.run_errors import RecordingError
 from world_models.words import metres
@@ -98,12 +84,12 @@ def write_overview(runs: Sequence[RunFiles], path: Path, title: str) -> list[str
     places = [place for _, tale in tales for _, place in tale.way]
     stream = RecordingStream(path, f"overview {title}", title, overview_blueprint(places))
     try:
-        stream.fix(SUMMARY, rr.TextDocument(summary(runs), media_type="text/markdown"))
+        stream.fix(paths.SUMMARY, rr.TextDocument(summary(runs), media_type="text/markdown"))
         for number, (run, tale) in enumerate(tales):
             _draw(stream, number, run, tale)
-        stream.fix(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        stream.fix(paths.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         if tales:
-            stream.copy(tales[0][0].recording, f"/{BUILDING}/**")
+            stream.copy(tales[0][0].recording, f"/{paths.BUILDING}/**")
     finally:
         stream.close()
     return missing
@@ -137,28 +123,28 @@ class _Tale:
     @staticmethod
     def of(path: Path) -> _Tale:
         """Raises RecordingError where it cannot be read."""
-        true_way = read_series(path, TRUE_ROBOT, "Transform3D:translation")
+        true_way = read_series(path, paths.TRUE_ROBOT, "Transform3D:translation")
         return _Tale(
-            read_series(path, HARVEY, "StateChange:state"), read_series(path, CHAPTERS, "TextLog:level"),
-            read_series(path, POSITION, "Measurements:values") if true_way else [],
-            true_way or read_series(path, BELIEVED_ROBOT, "Transform3D:translation"))
+            read_series(path, paths.HARVEY, "StateChange:state"), read_series(path, paths.CHAPTERS, "TextLog:level"),
+            read_series(path, paths.POSITION, "Measurements:values") if true_way else [],
+            true_way or read_series(path, paths.BELIEVED_ROBOT, "Transform3D:translation"))
 
 
 def _draw(stream: RecordingStream, number: int, run: RunFiles, tale: _Tale) -> None:
     """What one run leaves in the overview: two lanes, a curve and a way."""
     part = rr.escape_entity_path_part(f"{number:03}_{run.name}")  # rows are sorted by name
-    for path, states, styles in ((f"{MOODS_OF}/{part}", tale.activities, ACTIVITIES),
-                                 (f"{MILESTONES}/{part}", [*_marks(tale.marks)], MARKED)):
+    for path, states, styles in ((f"{paths.MOODS_OF}/{part}", tale.activities, ACTIVITIES),
+                                 (f"{paths.MILESTONES}/{part}", [*_marks(tale.marks)], MARKED)):
         stream.fix(path, style(styles))
         for cycle, state in states:
             stream.at(cycle, 0.0)
             stream.log(path, rr.StateChange, state=[state])
-    path = f"{OFF}/{part}"
+    path = f"{paths.OFF}/{part}"
     stream.fix(path, rr.SeriesLines(names=[run.name], colors=[run.colour], widths=[1.5]))
     for cycle, (ahead_mm, left_mm) in tale.errors:
         stream.at(cycle, 0.0)
         stream.log(path, rr.Scalars, scalars=[math.hypot(ahead_mm, left_mm)])
-    path = f"{FLEET}/{part}"
+    path = f"{paths.FLEET}/{part}"
     stream.fix(path, rr.Points3D.from_fields(colors=[run.colour], radii=0.25))
     strip = np.array([(x, y, z + HEIGHT_M) for _, (x, y, z) in tale.way], float).reshape(-1, 3)
     stream.fix(f"{path}/way", rr.LineStrips3D([strip], colors=[faint(run.colour, 120)], radii=0.03))
@@ -189,16 +175,16 @@ def overview_blueprint(places: Sequence[Sequence[float]]) -> Any:
         kind=rrb.Eye3DKind.Orbital, position=[x, y - SOUTH * size, ABOVE * size], look_target=[x, y, 0.0],
         eye_up=[0.0, 0.0, 1.0])
     busy = rrb.StateTimelineView(
-        origin=f"/{MOODS_OF}", name="Drives blue, looks yellow, plans orange, doubts violet, lost red")
+        origin=f"/{paths.MOODS_OF}", name="Drives blue, looks yellow, plans orange, doubts violet, lost red")
     milestones = rrb.StateTimelineView(
-        origin=f"/{MILESTONES}", name="Milestones: verified green, refuted red, found itself blue")
+        origin=f"/{paths.MILESTONES}", name="Milestones: verified green, refuted red, found itself blue")
     off = rrb.TimeSeriesView(
-        origin=f"/{OFF}", name="How far the belief is from the truth [mm]",
+        origin=f"/{paths.OFF}", name="How far the belief is from the truth [mm]",
         axis_y=rrb.ScalarAxis(range=(0.0, MOST_MM)), plot_legend=rrb.PlotLegend(visible=False))
-    table = rrb.TextDocumentView(origin=f"/{SUMMARY}", name="How they ended")
+    table = rrb.TextDocumentView(origin=f"/{paths.SUMMARY}", name="How they ended")
     where = rrb.Spatial3DView(
-        origin=f"/{WORLD}", name="All robots, and their ways", line_grid=False, contents=["$origin/**", f"- /{NAMES}"],
-        background=rrb.Background(color=[28, 30, 34, 255]), eye_controls=eye)
+        origin=f"/{paths.WORLD}", name="All robots, and their ways", line_grid=False,
+        contents=["$origin/**", f"- /{paths.NAMES}"], background=BACKGROUND, eye_controls=eye)
     return window(rrb.Horizontal(
         rrb.Vertical(table, where, row_shares=[5, 4]),
         rrb.Vertical(rrb.Horizontal(busy, milestones), off, row_shares=[3, 1]), column_shares=[4, 7]), PLAYED_PER_S)

@@ -31,6 +31,14 @@ VERDICTS: Mapping[str, Colour] = {
 }
 
 
+ACTIVITIES: Mapping[str, Colour] = {
+    "waits": DONE, "plans": PLANNED, "drives": BELIEVED, "looks": EXPECTED, "doubts": NOT_TESTABLE, "is lost": REJECTED,
+    "is in trouble": REJECTED, "reached": MATCHED, "lost": REJECTED, "blocked": REJECTED, "failed": REJECTED,
+    "stopped": DONE,
+}
+"""What Harvey may be busy with, in a word or two."""
+
+
 def faint(colour: Colour, opacity: int) -> Colour:
     """The same colour, less of it."""
     return (*colour[:3], opacity)

@@ -16,16 +16,18 @@ from rerun.chunk import RrdReader
 from logs.run_errors import RecordingError
 
 APPLICATION = "harvey"
-
 FLUSH_CYCLES, LIVE_FLUSH_CYCLES = 128, 4
 """A crash loses at most so many cycles of the recording (the journal loses none, so they can be drawn again); a live
 viewer sees it so late."""
-
 LOCALHOST, LIVE_PORT = "127.0.0.1", 9876
-
 BATCHING = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1 << 30, flush_num_rows=1 << 40)
 """The stream itself never flushes: what is in a chunk then follows from the cycles alone, and equal runs are equal."""
-
+VERIFIED, REFUTED, TROUBLE = "✔", "✗", "⚠"
+LATIN = "".join(map(chr, (*range(0xA1, 0xAD), *range(0xAE, 0x180))))
+GREEK_AND_CYRILLIC = "".join(map(chr, (*range(0x3B1, 0x3CA), 0x3A9, *range(0x410, 0x450))))
+SIGNS = frozenset(
+    string.printable[:-2] + LATIN + GREEK_AND_CYRILLIC + "–—‘’“”…→≤−●▶" + VERIFIED + REFUTED + TROUBLE)
+"""What may be shown."""
 Batch = Sequence[Any] | np.ndarray[Any, Any]
 """The values of one component in one row: none, one or many."""
 Row = tuple[int, float, dict[str, Batch]]
@@ -59,7 +61,9 @@ class RecordingStream:
             APPLICATION, recording_id=recording_id, send_properties=False, batcher_config=BATCHING)
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
-        self._try(lambda: self._stream.set_sinks(*_sinks(path, live, live_port), default_blueprint=blueprint))
+        sinks: list[Any] = [*([rr.FileSink(path)] if path is not None else []),
+                 *([rr.GrpcServerSink(bind_ip=LOCALHOST, port=live_port)] if live else [])]
+        self._try(lambda: self._stream.set_sinks(*sinks, default_blueprint=blueprint))
         self._stream.send_recording_name(viewable(title))
         self._cycles, self._flush_cycles = 0, LIVE_FLUSH_CYCLES if live else FLUSH_CYCLES
         self._now = (0, 0.0)
@@ -70,8 +74,13 @@ class RecordingStream:
         self._now = cycle, sim_time_s
 
     def log(self, path: str, kind: type[Columnar], **components: Batch) -> None:
-        """Log one row at an entity path, now; each component is a batch of values, which may be empty."""
-        shown = {name: _viewable(batch) for name, batch in components.items()}
+        """Log one row at an entity path, now; each component is a batch of values, which may be empty.
+
+        Of a text the signs are left out that the viewer cannot show.
+        """
+        shown = {name: [viewable(text) for text in batch]
+                 if isinstance(batch, list | tuple) and batch and isinstance(batch[0], str) else batch
+                 for name, batch in components.items()}
         self._rows.setdefault((path, kind, tuple(shown)), []).append((*self._now, shown))
 
     def fix(self, path: str, *what: Any) -> None:
@@ -83,11 +92,7 @@ class RecordingStream:
         self._stream.send_chunks(RrdReader(recording).stream().filter(content=content, is_static=True))
 
     def end_cycle(self) -> None:
-        """Bring what was logged to the disk once in a while.
-
-        Raises:
-            RecordingError: the disk is full or gone.
-        """
+        """Bring what was logged to the disk once in a while. Raises RecordingError where the disk is full or gone."""
         self._cycles += 1
         if self._cycles % self._flush_cycles == 0:
             self.flush()
@@ -125,13 +130,6 @@ def _columns(kind: type[Columnar], name: str, batches: Sequence[Batch]) -> Itera
     return columns if lengths == [1] * len(lengths) else [column.partition(lengths) for column in columns]
 
 
-def _viewable(batch: Batch) -> Batch:
-    """Texts without signs that the viewer cannot show; anything else as it is."""
-    if isinstance(batch, list | tuple) and batch and isinstance(batch[0], str):
-        return [viewable(text) for text in batch]
-    return batch
-
-
 def _expect_free_port(port: int) -> None:
     """The live server itself does not tell when somebody else listens there."""
     with socket.socket() as probe:
@@ -141,20 +139,6 @@ def _expect_free_port(port: int) -> None:
         except OSError as error:
             address = f"{LOCALHOST}:{port}"
             raise RecordingError(f"live recording: {address} cannot be served: {error.strerror}") from None
-
-
-def _sinks(path: Path | None, live: bool, port: int) -> list[Any]:
-    file = [rr.FileSink(path)] if path is not None else []
-    return [*file, *([rr.GrpcServerSink(bind_ip=LOCALHOST, port=port)] if live else [])]
-
-
-VERIFIED, REFUTED, TROUBLE = "✔", "✗", "⚠"
-
-LATIN = "".join(map(chr, (*range(0xA1, 0xAD), *range(0xAE, 0x180))))
-GREEK_AND_CYRILLIC = "".join(map(chr, (*range(0x3B1, 0x3CA), 0x3A9, *range(0x410, 0x450))))
-SIGNS = frozenset(
-    string.printable[:-2] + LATIN + GREEK_AND_CYRILLIC + "–—‘’“”…→≤−●▶" + VERIFIED + REFUTED + TROUBLE)
-"""What may be shown."""
 
 
 def viewable(text: str) -> str:

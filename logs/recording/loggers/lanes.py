@@ -13,17 +13,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from logs.recording.logger import NEAR, Logger, Panel, Subject
 from logs.recording.moment import Moment
-from logs.recording.palette import (
-    BELIEVED,
-    DONE,
-    EXPECTED,
-    LEVELS,
-    MATCHED,
-    NOT_TESTABLE,
-    PLANNED,
-    REJECTED,
-    Colour,
-)
+from logs.recording.palette import ACTIVITIES, LEVELS, REJECTED, Colour
 from logs.recording.paths import FAULTS, FOCUS, HARVEY
 from logs.recording.stream import RecordingStream, viewable
 from world_models.entries.body import BodyFault
@@ -32,13 +22,6 @@ from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch
 ACTS, GAP = "acts", ""
 ACTIVITY_KINDS = (Outcome, BodyFault, Discrepancy, Milestone, Leg, PlanSketch, Goal)
 """What an activity follows from."""
-ACTIVITIES: Mapping[str, Colour] = {
-    "waits": DONE, "plans": PLANNED, "drives": BELIEVED, "looks": EXPECTED, "doubts": NOT_TESTABLE, "is lost": REJECTED,
-    "is in trouble": REJECTED, "reached": MATCHED, "lost": REJECTED, "blocked": REJECTED, "failed": REJECTED,
-    "stopped": DONE,
-}
-"""What it may be busy with, in a word or two."""
-
 
 def activity(board: View) -> tuple[str, str]:
     """One of :data:`ACTIVITIES` and a headline, by what matters most: the end, a fault, a doubt, a look, a drive."""

@@ -16,26 +16,10 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from blackboard.board import View
+from logs.recording import paths
 from logs.recording.logger import Logger, Panel, Subject
 from logs.recording.moment import Held, Moment
 from logs.recording.palette import DONE, EXPECTED, FOUND, FREE, MATCHED, NOT_TESTABLE, PLANNED, REJECTED, Colour, faint
-from logs.recording.paths import (
-    CAMERA,
-    DOOR_IN_PICTURE,
-    DRIFTS,
-    FLOOR_BOUNDARY,
-    FREE_IN_PICTURE,
-    IMAGE,
-    LANDMARK_NAMES,
-    OBSTRUCTION,
-    THINGS,
-    WAITING,
-    WINDOWS,
-)
-from logs.recording.paths import EXPECTED as EXPECTED_PATH
-from logs.recording.paths import MATCHED as MATCHED_PATH
-from logs.recording.paths import REJECTED as REJECTED_PATH
-from logs.recording.paths import SEGMENTS as SEGMENTS_PATH
 from logs.recording.stream import RecordingStream
 from world_models.camera import clip_segments
 from world_models.entries.body import CameraPicture
@@ -53,8 +37,9 @@ NUMBER = "number"
 """The component beside an image that holds the frame's number."""
 DRIFT_SCALE = 5.0
 """Drifts of a few pixels would not show: their arrows are drawn longer, and the view's legend says so."""
-STYLES = ((EXPECTED_PATH, EXPECTED, 1.5), (SEGMENTS_PATH, FOUND, 1.0), (MATCHED_PATH, MATCHED, 2.0),
-          (REJECTED_PATH, REJECTED, 2.0), (OBSTRUCTION, NOT_TESTABLE, 2.0), (FREE_IN_PICTURE, faint(FREE, 50), 2.0))
+STYLES = ((paths.EXPECTED, EXPECTED, 1.5), (paths.SEGMENTS, FOUND, 1.0), (paths.MATCHED, MATCHED, 2.0),
+          (paths.REJECTED, REJECTED, 2.0), (paths.OBSTRUCTION, NOT_TESTABLE, 2.0),
+          (paths.FREE_IN_PICTURE, faint(FREE, 50), 2.0))
 """Lines of each kind: where, colour and half width on the screen. Those of the free floor go from its near side to its
 far side, one a direction: together they are a translucent area."""
 ENDS: Mapping[FloorEnd, Colour] = {"thing": REJECTED, "model": DONE, "sight": FREE}
@@ -84,19 +69,19 @@ class Frames(Logger):
     def panels(self) -> Sequence[Panel]:
         camera = self.subject.camera
         view = rrb.Spatial2DView(
-            origin=CAMERA, name="Eye: yellow expected, cyan found, green fits, red not",
+            origin=paths.CAMERA, name="Eye: yellow expected, cyan found, green fits, red not",
             visual_bounds=rrb.VisualBounds2D(x_range=[0, camera.width], y_range=[0, camera.height]))
         return (Panel(view, "world", 2, 9),)
 
     def begin(self, stream: RecordingStream) -> None:
         camera = self.subject.camera
-        stream.fix(CAMERA, rr.Pinhole(image_from_camera=camera.matrix, width=camera.width, height=camera.height))
-        stream.fix(IMAGE, rr.EncodedImage.from_fields(media_type="image/jpeg"))
+        stream.fix(paths.CAMERA, rr.Pinhole(image_from_camera=camera.matrix, width=camera.width, height=camera.height))
+        stream.fix(paths.IMAGE, rr.EncodedImage.from_fields(media_type="image/jpeg"))
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         for entry in moment.changed(CameraPicture):
             frame = entry.value
-            stream.log(IMAGE, Delivered, blob=[frame.jpeg], **{NUMBER: [frame.number]}, purpose=[frame.purpose],
+            stream.log(paths.IMAGE, Delivered, blob=[frame.jpeg], **{NUMBER: [frame.number]}, purpose=[frame.purpose],
                        entry=[str(entry.ref)])
 
 
@@ -114,57 +99,59 @@ class Overlays(Logger):
         thin = rr.Radius.ui_points(1.5)
         for path, colour, width in STYLES:
             stream.fix(path, rr.LineStrips2D.from_fields(colors=[colour], radii=rr.Radius.ui_points(width)))
-        stream.fix(FLOOR_BOUNDARY, rr.LineStrips2D.from_fields(radii=thin))
-        for path, colour in ((LANDMARK_NAMES, EXPECTED), (WAITING, DONE)):
+        stream.fix(paths.FLOOR_BOUNDARY, rr.LineStrips2D.from_fields(radii=thin))
+        for path, colour in ((paths.LANDMARK_NAMES, EXPECTED), (paths.WAITING, DONE)):
             stream.fix(path, rr.Points2D.from_fields(show_labels=True, colors=[colour], radii=thin))
-        stream.fix(WINDOWS, rr.Boxes2D.from_fields(radii=thin))
-        stream.fix(DRIFTS, rr.Arrows2D.from_fields(colors=[PLANNED], radii=thin))
-        for path in (THINGS, DOOR_IN_PICTURE):
+        stream.fix(paths.WINDOWS, rr.Boxes2D.from_fields(radii=thin))
+        stream.fix(paths.DRIFTS, rr.Arrows2D.from_fields(colors=[PLANNED], radii=thin))
+        for path in (paths.THINGS, paths.DOOR_IN_PICTURE):
             stream.fix(path, rr.Boxes2D.from_fields(radii=thin, show_labels=True))
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         if not self._waits and not moment.mirror.all(CameraPicture):
             self._waits = True
-            stream.log(WAITING, rr.Points2D, positions=np.divide(self._size, 2)[None], labels=["no picture yet"])
+            stream.log(paths.WAITING, rr.Points2D, positions=np.divide(self._size, 2)[None], labels=["no picture yet"])
         if moment.touched(CameraPicture):
             if self._waits:
                 self._waits = False
-                stream.log(WAITING, rr.Points2D, positions=NO_POINTS, labels=())
+                stream.log(paths.WAITING, rr.Points2D, positions=NO_POINTS, labels=())
             self._wipe(stream, moment.mirror)
         if moment.touched(Obstruction):  # it moves with the camera: its outline stays from picture to picture
             known = moment.mirror.latest(Obstruction)
             corners = np.array(() if known is None else known.value.outline_px, float).reshape(-1, 2)
-            self._log_lines(stream, OBSTRUCTION, np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
+            self._log_lines(stream, paths.OBSTRUCTION, np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
         for milestone in moment.changed(Milestone)[-1:]:
             self._milestone(stream, milestone.value)
         for segments in moment.changed(Segments)[-1:]:
-            self._log_lines(stream, SEGMENTS_PATH, segments.value.segments_px)
+            self._log_lines(stream, paths.SEGMENTS, segments.value.segments_px)
         for match in moment.changed(LineMatch)[-1:]:
-            self._log_lines(stream, MATCHED_PATH, match.value.segments_px)
+            self._log_lines(stream, paths.MATCHED, match.value.segments_px)
         for fix in moment.changed(PoseFix)[-1:]:
             if (solved := moment.mirror.get(fix.value.match)) is not None:
-                self._log_lines(stream, MATCHED_PATH, solved.value.segments_px[fix.value.inliers])
-                self._log_lines(stream, REJECTED_PATH, solved.value.segments_px[~fix.value.inliers])
+                self._log_lines(stream, paths.MATCHED, solved.value.segments_px[fix.value.inliers])
+                self._log_lines(stream, paths.REJECTED, solved.value.segments_px[~fix.value.inliers])
         for tracks in moment.changed(Tracks)[-1:]:
             self._tracks(stream, tracks.value)
         for entry in moment.changed(FreeFloor):
             if entry.value.sense == "camera" and entry.value.bearings_rad and moment.held is not None:
                 self._floor(stream, moment.held, entry.value)
         if doors := [entry.value for entry in moment.changed(DoorState)]:
-            self._log_boxes(stream, DOOR_IN_PICTURE, self._bounds(door.last.box_px for door in doors),
+            self._log_boxes(stream, paths.DOOR_IN_PICTURE, self._bounds(door.last.box_px for door in doors),
                             [FREE if door.is_passable else REJECTED for door in doors],
                             [f"{door.door}: {door.last.shows}" for door in doors])
 
     def _wipe(self, stream: RecordingStream, board: View) -> None:
         """A new picture: nothing found in the last one holds; what is expected does while its milestone is open."""
         last = board.latest(Milestone)
-        keep = {OBSTRUCTION, *((EXPECTED_PATH, LANDMARK_NAMES) if last and last.value.status == "expected" else ())}
+        keep = {paths.OBSTRUCTION}
+        if last is not None and last.value.status == "expected":
+            keep |= {paths.EXPECTED, paths.LANDMARK_NAMES}
         for path in [path for path in self._shown if path not in keep]:
-            if path == LANDMARK_NAMES:
+            if path == paths.LANDMARK_NAMES:
                 stream.log(path, rr.Points2D, positions=NO_POINTS, labels=())
-            elif path in (WINDOWS, THINGS, DOOR_IN_PICTURE):
+            elif path in (paths.WINDOWS, paths.THINGS, paths.DOOR_IN_PICTURE):
                 self._log_boxes(stream, path, NO_BOXES, [], [])
-            elif path == DRIFTS:
+            elif path == paths.DRIFTS:
                 stream.log(path, rr.Arrows2D, origins=NO_POINTS, vectors=NO_POINTS)
             else:
                 stream.log(path, rr.LineStrips2D, strips=NO_LINES)
@@ -173,11 +160,11 @@ class Overlays(Logger):
     def _milestone(self, stream: RecordingStream, milestone: Milestone) -> None:
         if milestone.status == "turning" or not milestone.expected_px:
             return
-        lines, inside = self._log_lines(stream, EXPECTED_PATH, np.array(milestone.expected_px, float))
+        lines, inside = self._log_lines(stream, paths.EXPECTED, np.array(milestone.expected_px, float))
         names = _largest(milestone, lines, inside, self._size[0])
         spots = np.array(list(names.values()), float).reshape(-1, 2)
-        stream.log(LANDMARK_NAMES, rr.Points2D, positions=spots, labels=[without_locale(name) for name in names])
-        self._shown[LANDMARK_NAMES] = None
+        stream.log(paths.LANDMARK_NAMES, rr.Points2D, positions=spots, labels=[without_locale(name) for name in names])
+        self._shown[paths.LANDMARK_NAMES] = None
 
     def _tracks(self, stream: RecordingStream, tracks: Tracks) -> None:
         """The searched templates where they were found, red where they were expected and not found; and from where each
@@ -187,21 +174,22 @@ class Overlays(Logger):
         middles = self._bend(np.array([track.found_px or track.predicted_px for track in items], float).reshape(-1, 2))
         bounds = np.clip(np.hstack([middles - tracks.half_px, middles + tracks.half_px]), 0.0, self._last_px)
         names = [without_locale(track.landmark) if len(items) <= MOST_NAMES else "" for track in items]
-        self._log_boxes(stream, WINDOWS, bounds, [FOUND if track.found_px else REJECTED for track in items], names)
+        colours = [FOUND if track.found_px else REJECTED for track in items]
+        self._log_boxes(stream, paths.WINDOWS, bounds, colours, names)
         ends = np.array([(t.predicted_px, t.found_px) for t in items if t.found_px], float).reshape(-1, 2, 2)
         ends[:, 1] = ends[:, 0] + DRIFT_SCALE * (ends[:, 1] - ends[:, 0])
         ends, inside = self._clip(ends)
-        stream.log(DRIFTS, rr.Arrows2D, origins=ends[inside, 0], vectors=ends[inside, 1] - ends[inside, 0])
-        self._shown[DRIFTS] = None
+        stream.log(paths.DRIFTS, rr.Arrows2D, origins=ends[inside, 0], vectors=ends[inside, 1] - ends[inside, 0])
+        self._shown[paths.DRIFTS] = None
 
     def _floor(self, stream: RecordingStream, held: Held, floor: FreeFloor) -> None:
         near, far = np.array(floor.near_m, float), np.array(floor.far_m, float)
         is_free = far > near
         columns = np.stack([self._place(floor, held.world_from_robot, reach) for reach in (near, far)], axis=1)
-        self._log_lines(stream, FREE_IN_PICTURE, columns[is_free])
+        self._log_lines(stream, paths.FREE_IN_PICTURE, columns[is_free])
         ends = [ENDS[end] for end, free in zip(floor.ends, is_free, strict=True) if free]
-        self._log_lines(stream, FLOOR_BOUNDARY, np.array([*pairwise(columns[is_free, 1])], float), ends)
-        self._log_boxes(stream, THINGS, self._bounds(thing.box_px for thing in floor.things),
+        self._log_lines(stream, paths.FLOOR_BOUNDARY, np.array([*pairwise(columns[is_free, 1])], float), ends)
+        self._log_boxes(stream, paths.THINGS, self._bounds(thing.box_px for thing in floor.things),
                         [REJECTED if thing.p_thing > 0.5 else EXPECTED for thing in floor.things],
                         [_label_of(thing) for thing in floor.things])
 

@@ -21,8 +21,9 @@ from blackboard.servoing import Discrepancy
 from harvey.runner.ports import BodyPort
 from harvey.runner.world_port import WorldPort
 from harvey.wiring import knowledge_sources
+from journals import read_journal
 from logs import disk
-from logs.journal_file import JournalFile, read_journal
+from logs.journal_file import JournalFile
 from strategies import Note, Scripted
 from world_models.entries.entry_kinds import KINDS
 from world_models.words import sentence

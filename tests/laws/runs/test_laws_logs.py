@@ -13,7 +13,8 @@ from blackboard.board import Blackboard
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.journal import Decision, decision_record
 from blackboard.level import Level
-from logs.journal_file import JournalFile, read_journal
+from journals import read_journal
+from logs.journal_file import JournalFile
 from logs.mirror import Mirror
 from logs.recording.loggers.plan import outline
 from logs.recording.loggers.robots import SIGMA_SCALE, ring

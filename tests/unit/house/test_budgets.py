@@ -17,7 +17,7 @@ LINES = {
     "world_models": 9_880,
     "knowledge_sources": 22_300,
     "sim": 7_100,
-    "logs": 8_870,
+    "logs": 7_700,
     "harvey": 10_500,
     "experiments": 10_600,
     "tests": 33_900,

@@ -12,7 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from logs.recording.logger import Logger, Panel
+from logs.recording.logger import BACKGROUND, Logger, Panel
 from logs.recording.moment import Moment
 from logs.recording.palette import DOOR, NAME, REJECTED, TRUE, Colour
 from logs.recording.paths import BELIEVED_TRAIL, BUILDING, DOORWAYS, NAMES, TRUE_ADDED, TRUE_GONE, TRUE_TRAIL, WORLD
@@ -105,7 +105,7 @@ def space_view(name: str, eye: Any, *without: str) -> Any:
     """The world with both robots and their ways since the start, but for the paths ``without``."""
     return rrb.Spatial3DView(
         origin=WORLD, contents=["$origin/**", *without], name=name, line_grid=False,
-        background=rrb.Background(color=[28, 30, 34, 255]), eye_controls=eye,
+        background=BACKGROUND, eye_controls=eye,
         overrides={path: rrb.VisibleTimeRanges([SINCE_THE_START]) for path in (TRUE_TRAIL, BELIEVED_TRAIL)})
 
 
