@@ -2,21 +2,25 @@
 
 ``paper``: do the paper's tables and figures come out? ``perception``: how well does it see? ``robustness``: what
 happens when things go wrong? ``differences``: when the truth differs from what is believed? ``scale``: how fast, how
-large, how long? A new one needs its file and a line here.
+large, how long? A new one needs its file and a line here. Those of an extra are with the extra.
 """
 
 from __future__ import annotations
 
 import importlib
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from types import FunctionType
 from typing import TYPE_CHECKING
 
 from harvey.errors import BadInput
+from world_models.plugins import EXTRAS, list_absent, load_plugins
 
 if TYPE_CHECKING:
     from experiments.report import Report
 
+GROUP = "harvey.experiments"
+"""The entry points of other packages."""
 EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
     "differences": {
         "doors": "1,000 missions with doors otherwise than the model says",
@@ -80,19 +84,20 @@ def run(name: str, *, quick: bool = False, seed: int = 0, missions: int | None =
         from world_models.files.toml.settings_reader import suggest_keys
 
         raise BadInput(f"expected an experiment: {suggest_keys(name, list_names())}, got {name!r}")
-    try:
-        run_one = importlib.import_module(_module(name)).run
-    except ModuleNotFoundError as error:
-        if error.name is None or not error.name.startswith("harvey_"):
-            raise
-        extra = error.name.replace("_", "-")
-        raise BadInput(f"experiment {name} needs {extra}: pip install ./extras/{extra}") from None
+    run_one = _find(name)
     if missions is not None and "missions" not in inspect.signature(run_one).parameters:
         raise BadInput(f"--missions: {name} has no number of missions to choose")
     report: Report = run_one(quick, seed) if missions is None else run_one(quick, seed, missions=missions)
     return report
 
 
-def _module(name: str) -> str:
+def _find(name: str) -> Callable[..., Report]:
+    """The ``run`` of an experiment, here or in an extra. Raises BadInput where that is not installed."""
+    if name in EXTRAS[GROUP]:
+        if needs := list_absent(GROUP).get(name):
+            raise BadInput(f"experiment {name} needs {needs}")
+        found: Callable[..., Report] = load_plugins(GROUP, FunctionType, name)[name]
+        return found
     folder = next(folder for folder, group in EXPERIMENTS.items() if name in group)
-    return f"{__name__}.{folder}.{name.replace('-', '_')}"
+    run_one: Callable[..., Report] = importlib.import_module(f"{__name__}.{folder}.{name.replace('-', '_')}").run
+    return run_one

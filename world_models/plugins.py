@@ -30,9 +30,9 @@ COMMANDS_GROUP = "harvey.commands"
 PAGES_GROUP = "harvey.pages"
 WORKERS_GROUP = "harvey.workers"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
-    COMMANDS_GROUP: {
-        "serve": "harvey-serve", "world.export": "harvey-buildings", "world.import": "harvey-buildings",
-    },
+    COMMANDS_GROUP: {"serve": "harvey-serve", "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
+    "harvey.experiments": dict.fromkeys(("imported-building", "rosmaps"), "harvey-buildings") | {
+        "watchers": "harvey-serve"},
     PAGES_GROUP: {"live": "harvey-serve"},
     WORKERS_GROUP: {"dask": "harvey-cluster"},
     "harvey.bases": {"p2os": "harvey-bases", "create2": "harvey-bases"},

@@ -136,7 +136,7 @@ class Row:
     is_quick: bool = True
 
 
-ROWS = {row.name: row for row in (
+ROWS: Mapping[str, Row] = {row.name: row for row in (
     Row(CAMERA, 1),
     Row(WITH_RING, 5, RING),
     Row("no appearance", 10, NO_APPEARANCE, is_quick=False),

@@ -24,7 +24,7 @@ from blackboard.level import Level
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy, Servoing
 from experiments.generated.floors import Floor, generated_floor
-from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
+from experiments.report import Cell, Report
 from experiments.trials import RESULTS, campaign_folder, run_trials
 from harvey.runner.ports import BodyPort
 from harvey.runner.run import run_to_outcome
@@ -77,7 +77,7 @@ class KidnapResult:
     """Result of a kidnap.
 
     Attributes:
-        room, x_m, y_m, heading_rad: true pose [world].
+        room: where it truly is.
         verdict: found, ambiguous or lost.
         believed: reported locale; error_m: distance from the reported pose; infinite if there is none.
         probes: number of looks; places: number of pose candidates at the end.
@@ -88,9 +88,6 @@ class KidnapResult:
     rooms: int
     number: int
     room: str
-    x_m: float
-    y_m: float
-    heading_rad: float
     verdict: str
     believed: str
     error_m: float
@@ -156,7 +153,7 @@ def run_kidnap(trial: Kidnap) -> KidnapResult:
     error_m = held.value.world_from_robot(scene.robot.world).distance_to(pose) if held and is_found else math.inf
     verdict = "found" if is_found else "ambiguous" if len(candidates) > 1 else "lost"
     return KidnapResult(
-        trial.floor, trial.rooms, trial.number, room, there.x_m, there.y_m, there.heading_rad, verdict,
+        trial.floor, trial.rooms, trial.number, room, verdict,
         held.value.locale if held and is_found else "", error_m, len(panorama.value.glimpses) if panorama else 0,
         len(candidates), cpu_s,
     )
@@ -267,8 +264,6 @@ def run(quick: bool, seed: int) -> Report:
     trials = [*anywhere, *symmetric]
     found = run_trials(run_kidnap, trials, KidnapResult, folder, "kidnap")
     split = len(anywhere)
-    pictures = [folder / "probes.png", folder / "errors.png", folder / "map.png"]
-    _draw(found[:split], pictures)
     groups = ((f"{floors} of {rooms} rooms", found[:split]), (f"{symmetric_floors} symmetric corridors", found[split:]))
     report = Report(
         "Kidnaps to anywhere on a floor", COLUMNS, tuple(_row(name, group) for name, group in groups),
@@ -279,7 +274,7 @@ def run(quick: bool, seed: int) -> Report:
             " undecided: it stays lost, with one pose candidate or none. A probe is a look, the first one included.",
             "The paper gives no figures for lost robots.",
             *_worst(trials, found, folder),
-            f"Pictures: {', '.join(str(p) for p in pictures)}; one line per kidnap: {folder / RESULTS}",
+            f"One line per kidnap: {folder / RESULTS}",
         ),
         claims=_claims(found[:split], found[split:]),
     )
@@ -339,40 +334,3 @@ def _worst(trials: Sequence[Kidnap], found: Sequence[KidnapResult], folder: Path
         error = "" if math.isinf(f.error_m) else f", {1000.0 * f.error_m:.0f} mm off"
         yield (f"among the worst: floor {trial.floor}, kidnap {trial.number} to {f.room}: {f.verdict} after {f.probes}"
                f" probes{error}. See it: harvey run {path} --seed {trial.number}")
-
-
-def _draw(found: Sequence[KidnapResult], pictures: Sequence[Path]) -> None:
-    probes = np.array([f.probes for f in found])
-    with chart(pictures[0], "Number of probes", "probes", "kidnaps") as axes:
-        for label, keep, colour in (("right", True, OURS), ("otherwise", False, PEER)):
-            chosen = probes[[is_right(f) == keep for f in found]]
-            if len(chosen):
-                axes.hist(chosen, bins=[n + 0.5 for n in range(9)], rwidth=0.8, color=colour, label=label)
-    right = np.sort([1000.0 * f.error_m for f in found if is_right(f)])
-    with chart(pictures[1], "Errors", "true distance from the reported pose [mm]", "share below it") as axes:
-        if len(right):
-            axes.step(right, np.arange(1, len(right) + 1) / len(right), where="post", color=OURS)
-        axes.axvline(1000.0 * MAX_ERROR_M, color=PAPER, linestyle="--", label="required")
-        axes.set_xscale("log")
-    _draw_map(found, pictures[2])
-
-
-def _draw_map(found: Sequence[KidnapResult], path: Path) -> None:
-    """Draw the first floor with the true poses of the robot."""
-    first = found[0].floor
-    here = [f for f in found if f.floor == first]
-    with chart(path, f"Floor {first}: true poses and number of probes", "east [m]", "north [m]",
-               (9.0, 9.0)) as axes:
-        world = get_floor(Kidnap(first, found[0].rooms, False, 0)).world
-        for name in world.rooms:
-            x, y = np.vstack([world.outline(name), world.outline(name)[:1]]).T
-            axes.plot(x, y, color=PAPER, linewidth=0.8)
-        for keep, colour, label in ((True, OURS, "right"), (False, PEER, "otherwise")):
-            chosen = [f for f in here if is_right(f) == keep]
-            if chosen:
-                axes.quiver([f.x_m for f in chosen], [f.y_m for f in chosen],
-                            [math.cos(f.heading_rad) for f in chosen], [math.sin(f.heading_rad) for f in chosen],
-                            color=colour, angles="xy", scale=35.0, width=0.003, label=label)
-            for f in chosen:
-                axes.annotate(str(f.probes), (f.x_m, f.y_m), fontsize=8)
-        axes.set_aspect("equal")

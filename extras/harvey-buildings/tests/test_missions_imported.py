@@ -4,8 +4,8 @@ from importlib.util import find_spec
 
 import pytest
 
-from experiments.robustness import imported_building
 from experiments.shared_data import DUPLEX, data_path, describe_absence
+from harvey_buildings.experiments import imported_building
 
 needs_duplex = pytest.mark.skipif(find_spec("ifcopenshell") is None or not data_path(DUPLEX).is_file(),
                                   reason=f"needs ifcopenshell, or {describe_absence(DUPLEX)}")

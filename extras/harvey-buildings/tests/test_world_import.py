@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.robustness.imported_building import draw_trips
 from harvey.cli import main
 from harvey_buildings import BuildingError, ImportedBuilding, import_building
 from harvey_buildings.building_plan import Furnishing, Names, Space, WallOpening, slug
+from harvey_buildings.experiments.imported_building import draw_trips
 from harvey_buildings.placement import build_bounding_boxes, fit_into_room, place_door, place_wide_opening
 from harvey_buildings.polygons import (
     clean_outline,

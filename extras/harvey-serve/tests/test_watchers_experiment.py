@@ -9,11 +9,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.scale.watcher_clients import attack, make_request
 from harvey_serve.app import build_app
 from harvey_serve.live_state import LiveState
 from harvey_serve.run_gate import Gate
 from harvey_serve.server import bind, serving
+from harvey_serve.watcher_clients import attack, make_request
 from world_models.camera import Camera
 from world_models.files.world_files import load_world
 

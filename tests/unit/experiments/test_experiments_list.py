@@ -9,6 +9,9 @@ import pytest
 
 import experiments
 from harvey.cli import main
+from harvey.errors import BadInput
+from world_models import plugins
+from world_models.plugins import EXTRAS
 
 FOLDER = Path(experiments.__file__).parent
 RUN = re.compile(r"^def run\(quick: bool", re.MULTILINE)
@@ -18,7 +21,18 @@ def test_every_experiment_is_listed_in_its_folder_in_alphabetical_order() -> Non
     assert list(experiments.EXPERIMENTS) == sorted(experiments.EXPERIMENTS)
     for folder, group in experiments.EXPERIMENTS.items():
         files = [path for path in (FOLDER / folder).glob("*.py") if RUN.search(path.read_text("utf-8"))]
-        assert list(group) == sorted(path.stem.replace("_", "-") for path in files)
+        here = [name for name in group if name not in EXTRAS[experiments.GROUP]]
+        assert here == sorted(path.stem.replace("_", "-") for path in files) and list(group) == sorted(group)
+
+
+@pytest.mark.parametrize("name", EXTRAS[experiments.GROUP])
+def test_an_experiment_of_an_extra_that_is_not_installed_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setattr(plugins, "entry_points", lambda **_: ())
+    assert name in experiments.list_names()
+    with pytest.raises(BadInput, match=f"experiment {name} needs harvey-.*: pip install ./extras/harvey-"):
+        experiments.run(name, quick=True)
 
 
 def test_the_list_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:

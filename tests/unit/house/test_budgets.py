@@ -19,9 +19,9 @@ LINES = {
     "sim": 7_100,
     "logs": 7_700,
     "harvey": 10_500,
-    "experiments": 10_600,
+    "experiments": 9_900,
     "tests": 33_900,
-    "extras": 12_720,
+    "extras": 13_520,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}

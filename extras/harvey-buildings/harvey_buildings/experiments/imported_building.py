@@ -38,8 +38,8 @@ MIN_CLEARANCE_M = 0.4
 """Free space on all sides at which a robot can be put down in a room."""
 DECLARED = ("lost", "blocked", "failed")
 SCENARIO = """\
-# {name} of harvey experiment imported-building; again: harvey run THIS_FILE --seed {seed}
-world = "house.toml"
+# Of an experiment; again: harvey run THIS_FILE --seed {seed}
+world = "{world}"
 goal = "Go from {origin} to {destination}"
 
 [start]
@@ -76,7 +76,8 @@ def run(quick: bool, seed: int) -> Report:
     (folder / "house.toml").write_text(text, encoding="utf-8")
     world = load_world(folder / "house.toml")
     trips = list(draw_trips(world, QUICK_MISSIONS if quick else MISSIONS, seed))
-    ends = run_trials(run_task, [_task(trip, folder, seed) for trip in trips], MissionResult, folder, "mission")
+    tasks = [write_trip(trip, Path("house.toml"), folder, seed) for trip in trips]
+    ends = run_trials(run_task, tasks, MissionResult, folder, "mission")
     groups = _groups(world)
     rows = [_row(name, chosen) for name, rooms in groups.items()
             if (chosen := [end for trip, end in zip(trips, ends, strict=True) if trip.origin in rooms])]
@@ -128,9 +129,10 @@ def _clearance_m(world: World, room: str) -> float:
     return min(distance_to_border(middle, border) for border in (world.outline(room), *world.obstacles(room)))
 
 
-def _task(trip: Trip, folder: Path, seed: int) -> Task:
+def write_trip(trip: Trip, world: Path, folder: Path, seed: int) -> Task:
+    """Write a trip as a scenario, ``mission-N.toml`` beside its world's file, with a seed of its own."""
     path = folder / f"mission-{trip.number}.toml"
-    path.write_text(SCENARIO.format(name=path.stem, seed=seed + trip.number, origin=trip.origin,
+    path.write_text(SCENARIO.format(seed=seed + trip.number, world=world.as_posix(), origin=trip.origin,
                                     destination=trip.destination, heading_deg=trip.heading_deg), encoding="utf-8")
     return Task(str(path), (), seed + trip.number)
 

@@ -17,12 +17,18 @@ import numpy as np
 
 from experiments.generated.floors import ScanNoise, generated_floor, write_floor_map
 from experiments.report import Cell, Report, count_kinds
-from experiments.robustness.imported_building import Trip, draw_trips
-from experiments.robustness.rosmaps_scores import MapTruth, correlate_rooms, count_found, draw_rooms, read_truth
 from experiments.shared_data import MAP_PLANS, data_path, describe_absence
 from experiments.trials import at_least, campaign_folder, run_trials
-from harvey.campaign.campaign import Task, run_task
+from harvey.campaign.campaign import run_task
 from harvey_buildings import import_building
+from harvey_buildings.experiments.imported_building import Trip, draw_trips, write_trip
+from harvey_buildings.experiments.rosmaps_scores import (
+    MapTruth,
+    correlate_rooms,
+    count_found,
+    draw_rooms,
+    read_truth,
+)
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.files.world_files import load_world
@@ -40,16 +46,6 @@ QUICK_ENDS = ENDS[::2]
 CELL_M = 0.05
 YAML = ("image: {image}\nresolution: 0.05\norigin: [0.0, 0.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\n"
         "free_thresh: 0.196\n")
-SCENARIO = """\
-# {name} of harvey experiment rosmaps; again: harvey run THIS_FILE --seed {seed}
-world = "{world}"
-goal = "Go from {origin} to {destination}"
-
-[start]
-heading_deg = {heading_deg:.1f}
-put_down_sigma_m = 0.03
-put_down_sigma_deg = 2.0
-"""
 COLUMNS = ("map", "true rooms", "traced", "Matthews correlation", "weighted by area", "doorways", "found", "not true",
            "faults")
 
@@ -79,7 +75,7 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
     floors = list(_trace_floors(folder, QUICK_FLOORS if quick else FLOORS, seed))
     scores += [score for _, _, score in floors]
     trips = list(_draw(floors, missions or (QUICK_MISSIONS if quick else MISSIONS), seed))
-    tasks = [_task(trip, world, folder, seed) for world, trip in trips]
+    tasks = [write_trip(trip, world.relative_to(folder), folder, seed) for world, trip in trips]
     ends = run_trials(run_task, tasks, MissionResult, folder, "mission")
     arrived = [end for end in ends if _has_arrived(end)]
     worst_mm = max((1000.0 * end.error_m for end in arrived), default=0.0)
@@ -167,14 +163,6 @@ def _draw(floors: Sequence[tuple[Path, World, Score]], count: int, seed: int) ->
         path, world, _ = floors[number % len(floors)]
         for trip in draw_trips(world, 1, seed + number):
             yield path, Trip(number, trip.origin, trip.destination, trip.heading_deg)
-
-
-def _task(trip: Trip, world: Path, folder: Path, seed: int) -> Task:
-    path = folder / f"mission-{trip.number}.toml"
-    path.write_text(SCENARIO.format(name=path.stem, seed=seed + trip.number, world=world.relative_to(folder).as_posix(),
-                                    origin=trip.origin, destination=trip.destination, heading_deg=trip.heading_deg),
-                    encoding="utf-8")
-    return Task(str(path), (), seed + trip.number)
 
 
 def _has_arrived(end: MissionResult) -> bool:

@@ -1,6 +1,6 @@
 """Clients of a live page, in a process of their own: watchers, one that reads nothing, and hostile requests.
 
-``python -m experiments.scale.watcher_clients watch|stall|attack PORT COUNT SEED`` prints a line when it is connected,
+``python -m harvey_serve.watcher_clients watch|stall|attack PORT COUNT SEED`` prints a line when it is connected,
 and at its end what it got, as JSON.
 """
 

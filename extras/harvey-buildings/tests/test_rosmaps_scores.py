@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from experiments.robustness.rosmaps_scores import correlate_rooms, count_found, draw_rooms, read_truth
+from harvey_buildings.experiments.rosmaps_scores import correlate_rooms, count_found, draw_rooms, read_truth
 
 LABELS = arrays(np.int32, (6, 7), elements=st.integers(0, 3))
 

@@ -1,0 +1,1 @@
+"""Experiments with buildings of other formats: ``harvey experiment imported-building``, ``rosmaps``."""
