@@ -88,7 +88,8 @@ def certify(site: Site, case: Case) -> View:
     """Judge a case; returned is the board with its certificate."""
     sources = [LineFinder(DEFAULT), Matcher(DEFAULT), MedRAndT(DEFAULT), MilestoneJudge(DEFAULT)]
     scheduler = build_scheduler(sources, site.floor.world, site.robot)
-    effects: list[Effect] = [Post(case.belief), Post(case.milestone), Post(CameraPicture(case.jpeg, 0, 0.0, "milestone"))]
+    picture = CameraPicture(case.jpeg, 0, 0.0, "milestone")
+    effects: list[Effect] = [Post(case.belief), Post(case.milestone), Post(picture)]
     scheduler.post([Post(case.alternative), *effects] if case.alternative else effects, "case")
     while scheduler.view.latest(Certificate) is None:
         decision = scheduler.step()
