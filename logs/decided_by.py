@@ -30,21 +30,16 @@ DECIDING: Mapping[str, tuple[str, ...]] = {
 """The packages that decide, with the endings of their files; a run names its world's bytes itself."""
 WIRING = "harvey/wiring.py"
 """The file that lists the knowledge sources."""
-
 DIGITS = 16
 
 
 @cache
 def deciding_code() -> str:
     """The first digits of a SHA-256 of what decides; it takes some milliseconds, once a process."""
-    return read_code_in(Path(__file__).parents[1], Path(blackboard.__file__).parents[1])
-
-
-def read_code_in(root: Path, board: Path | None = None) -> str:
-    """The same of a program elsewhere, whose board may be somewhere else again. Raises OSError."""
+    root, board = Path(__file__).parents[1], Path(blackboard.__file__).parents[1]
     files = {WIRING: f"{root}/{WIRING}"}
     for package, endings in DECIDING.items():
-        files |= files_in(board if board and package == "blackboard" else root, package, endings)
+        files |= files_in(board if package == "blackboard" else root, package, endings)
     return digest_of(files)
 
 

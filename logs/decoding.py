@@ -41,8 +41,7 @@ class MisfitError(ValueError):
 def decode(value: Any, hint: Any) -> Any:
     """A value of the type that a hint names, from JSON types. Numbers stay as they were written; arrays are frozen.
 
-    Raises:
-        ValueError: it is of another type; names the field, what was expected and what came.
+    Raises ValueError where it is of another type; names the field, what was expected and what came.
     """
     if hint is Any:
         return value

@@ -40,8 +40,7 @@ class JournalFile:
         Args:
             forced: which decisions are forced onto the disk before this sink returns.
 
-        Raises:
-            OSError: the file cannot be written, or another process is writing it.
+        Raises OSError where the file cannot be written, or another process is writing it.
         """
         self._forced = forced
         self._held: list[str] = []
@@ -51,8 +50,7 @@ class JournalFile:
     def __call__(self, decision: Decision) -> None:
         """Write one line, or hold it back.
 
-        Raises:
-            CannotWriteError: the file cannot be written any more, as when the disk is full; names the file.
+        Raises CannotWriteError where the file cannot be written any more, as when the disk is full; names the file.
         """
         self._held.append(self.line(decision))
         if self._forced(decision):

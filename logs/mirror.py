@@ -28,8 +28,4 @@ class Mirror(View):
 
 def find_belief(board: View) -> Entry[Hypothesis] | None:
     """The hypothesis that is acted on."""
-    return board.latest(Hypothesis, _is_held)
-
-
-def _is_held(value: Hypothesis) -> bool:
-    return value.is_held
+    return board.latest(Hypothesis, lambda value: value.is_held)

@@ -1,8 +1,7 @@
-"""Reading a recording back: every decision and every picture, without the simulator."""
+"""Reading a recording back: pictures, the true way, and whatever else was logged."""
 
 from __future__ import annotations
 
-import json
 import math
 import warnings
 from collections.abc import Iterator
@@ -12,9 +11,8 @@ from typing import Any
 from rerun.chunk import RrdReader
 from rerun.error_utils import RerunWarning
 
-from logs.recording.loggers.decisions import RECORD
 from logs.recording.loggers.picture import NUMBER
-from logs.recording.paths import IMAGE, RECORDS, TRUE_ROBOT
+from logs.recording.paths import IMAGE, TRUE_ROBOT
 from logs.run_errors import RecordingError
 
 ROW_ID = "rerun.controls.RowId"
@@ -26,20 +24,10 @@ Series = list[tuple[int, Any]]
 """(cycle, value) in the order of time."""
 
 
-def read_decisions(path: Path) -> list[dict[str, Any]]:
-    """The decisions of a recording in their order, each as it stands in the journal.
-
-    Raises:
-        RecordingError: the file is no recording, or is damaged.
-    """
-    return [_decision(path, row[RECORD].as_py()) for row in _rows(path, RECORDS, (RECORD,))]
-
-
 def read_frames(path: Path) -> dict[int, bytes]:
     """The pictures of a recording: number -> JPEG bytes, as the camera delivered them.
 
-    Raises:
-        RecordingError: the file is no recording, or is damaged.
+    Raises RecordingError where the file is no recording, or is damaged.
     """
     return {row[NUMBER].as_py(): row[JPEG].values.to_numpy().tobytes() for row in _rows(path, IMAGE, (NUMBER, JPEG))}
 
@@ -47,8 +35,7 @@ def read_frames(path: Path) -> dict[int, bytes]:
 def read_true_track(path: Path) -> list[tuple[int, float, float, float]]:
     """Where the robot truly was: (cycle, x [m], y [m], heading [rad]) wherever it had moved, in the world frame.
 
-    Raises:
-        RecordingError: the file is no recording, or is damaged.
+    Raises RecordingError where the file is no recording, or is damaged.
     """
     track = []
     for row in _rows(path, TRUE_ROBOT, (TRANSLATION, QUATERNION), CYCLE):
@@ -60,8 +47,7 @@ def read_true_track(path: Path) -> list[tuple[int, float, float, float]]:
 def read_series(path: Path, entity: str, component: str) -> Series:
     """(cycle, value) of a component in the order in which it was logged; a value of many is a list.
 
-    Raises:
-        RecordingError: the file is no recording, or is damaged.
+    Raises RecordingError where the file is no recording, or is damaged.
     """
     found: list[tuple[bytes, int, Any]] = []
     for batch in _batches(path, entity):
@@ -82,16 +68,6 @@ def damage_of(path: Path) -> str | None:
     except Exception as error:  # the reader's errors have no common type; the cause is in the file in any case
         return str(error)
     return None
-
-
-def _decision(path: Path, line: str) -> dict[str, Any]:
-    try:
-        record = json.loads(line)
-    except ValueError as error:
-        raise RecordingError(f"{path}: /{RECORDS}: expected a decision as JSON, got {line[:60]!r} ({error})") from None
-    if not isinstance(record, dict):
-        raise RecordingError(f"{path}: /{RECORDS}: expected a decision as a JSON object, got {line[:60]!r}")
-    return record
 
 
 def _rows(path: Path, entity: str, components: tuple[str, ...], timeline: str = "") -> list[dict[str, Any]]:

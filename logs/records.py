@@ -39,7 +39,6 @@ WHAT_IF = "what if"
 OWN = Registry((*KINDS, Discrepancy, Quiescence))
 """The kinds that come with the project: no knowledge source needs to be loaded to read them."""
 CHANGES: Mapping[str, type[Change]] = {kind.__name__: kind for kind in (Posted, Revised, Retracted)}
-
 Kind = type[Any]
 K = TypeVar("K")
 T_co = TypeVar("T_co", covariant=True)
@@ -146,8 +145,7 @@ class EntryRecord(Generic[T_co]):
     def value(self) -> T_co:
         """As it was on the board, but a picture has no bytes, and a locale frame is the reference to it.
 
-        Raises:
-            BadInput: the fields are not those of its kind: the run is of another version.
+        Raises BadInput where the fields are not those of its kind: the run is of another version.
         """
         if self.kind is Opaque:
             return cast(T_co, Opaque(self.fields))
@@ -396,8 +394,7 @@ def entry_of(record: EntryRecord[Any], kinds: Registry, store: FrameStore | None
 
     A locale frame comes from the store; without a store, the reference to it that the journal keeps is the value.
 
-    Raises:
-        BadInput: the value is of a kind that is not known, or does not fit it.
+    Raises BadInput where the value is of a kind that is not known, or does not fit it.
     """
     value, ref = _value(record, kinds, None, store), ref_of(record.ref)
     return Entry(ref.id, ref.revision, value, record.author, cycle_of_writing(record), refs_of(record.because))

@@ -20,9 +20,7 @@ from logs.run_errors import BadInput
 
 RUNS = Path("runs")
 """Where runs are kept unless ``--out`` says otherwise."""
-
 FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json", "camera.toml")
-
 RESULT: Mapping[str, tuple[Any, str]] = {
     "scenario": (str, "a text"),
     "outcome": (str, "a text"),
@@ -112,8 +110,7 @@ def prepare_directory(path: Path, name: str, seed: int) -> tuple[Path, Path | No
     Returns:
         where the run may be written, and where the older one is now, if it is kept.
 
-    Raises:
-        BadInput: the directory cannot be used.
+    Raises BadInput where the directory cannot be used.
     """
     try:
         check_vacant(path).mkdir(parents=True, exist_ok=True)
@@ -146,8 +143,7 @@ def _free_beside(path: Path) -> Path:
 def open_run(text: str, needed: str = "journal.jsonl") -> RunDirectory:
     """The run that a user names: its directory, a file in it, or its name under ``runs/``.
 
-    Raises:
-        BadInput: there is none (near ones are listed), or it lacks the needed file.
+    Raises BadInput where there is none (near ones are listed), or it lacks the needed file.
     """
     run = RunDirectory(find_directory(text))
     inner = sorted(str(p.parent) for p in run.path.glob("*/journal.jsonl"))

@@ -28,7 +28,6 @@ SIMULATOR, HARDWARE = "simulator", "hardware"
 PARTS: Mapping[str, type[Any]] = {
     "camera": Camera, "mount": CameraMount, "actuator": ActuatorModel, "deviation": CameraDeviation}
 """What a robot knows of itself that has parts of its own."""
-
 T = TypeVar("T")
 
 

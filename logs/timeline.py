@@ -13,7 +13,7 @@ import math
 import re
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -26,7 +26,6 @@ from world_models.entries.percepts import Tracks
 from world_models.entries.task import Outcome
 
 K = TypeVar("K")
-
 PLAIN = re.compile(rb'\{"cycle":(\d{1,15}),"')
 """How a line begins as the scheduler writes it; a line that begins otherwise is read in full."""
 CHANGE = re.compile(rb'\{"change":"(\w+)","entry":"([^"\\]+)"')
@@ -151,8 +150,7 @@ class Timeline:
     def candidates(self, cycle: int) -> tuple[Candidate, ...]:
         """Among whom a cycle chose: what was pending or new, and not dropped; the chosen first, then the best rated.
 
-        Raises:
-            BadInput: the run has no such cycle.
+        Raises BadInput where the run has no such cycle.
         """
         decision = self.decision(cycle)
         wanted = decision.pending + (decision.chosen is not None and decision.asks is None)
@@ -176,16 +174,15 @@ class Timeline:
     def time_at(self, cycle: int) -> float | None:
         """The newest time that anything from outside had told by a cycle [s]; None where nothing had lately."""
         for one in reversed(self.cycles[: bisect_right(self.cycles, cycle)][-TIMED_WITHIN:]):
-            told = [found for found in map(_time_of, self.decision(one).observed) if found is not None]
-            if told:
-                return max(told)
+            told = [time_told(record.field) for record in self.decision(one).observed]
+            if known := [time_s for time_s in told if time_s is not None]:
+                return max(known)
         return None
 
     def outcome(self) -> str:
         """Ref of how the mission ended, or, where it did not come to that, of the last entry.
 
-        Raises:
-            BadInput: the journal is empty.
+        Raises BadInput where the journal is empty.
         """
         if not self.newest:
             self.verify()
@@ -243,8 +240,7 @@ class Timeline:
     def resolve(self, text: str) -> str:
         """The ref that a user means: ``MotorCommand-12.3``, or ``MotorCommand-12`` for its last revision.
 
-        Raises:
-            BadInput: the run has no such entry; near ones are named.
+        Raises BadInput where the run has no such entry; near ones are named.
         """
         found = self.find(text)
         if found is not None:
@@ -323,10 +319,10 @@ def ranked(candidates: Iterable[Candidate], chosen: Candidate | None) -> tuple[C
     return tuple(sorted(candidates, key=lambda c: (c.number != first, -c.rating, c.number)))
 
 
-def _time_of(record: EntryRecord[Any]) -> float | None:
-    """When an observation was made, read without decoding it."""
-    value = record.field("sim_time_s", record.field("when_s"))
-    since, waited = record.field("since_s"), record.field("waited_s")
+def time_told(get: Callable[[str], Any]) -> float | None:
+    """When an observation was made, by the body's clock [s], by its fields; None where they do not tell."""
+    since, waited = get("since_s"), get("waited_s")
+    value = get("when_s") if get("sim_time_s") is None else get("sim_time_s")
     if isinstance(since, int | float) and isinstance(waited, int | float):
         value = since + waited
     return float(value) if isinstance(value, int | float) and math.isfinite(value) else None

@@ -37,7 +37,6 @@ LONGEST = 60
 """Of a value [characters]."""
 IGNORED = frozenset({"harvey", "code", "arithmetic", "folder", "world_sha256"})
 """Of a run's head: what is told apart, or follows from the rest."""
-
 Records = Sequence[EntryRecord[Any]]
 Maybe = EntryRecord[Any] | None
 

@@ -27,6 +27,8 @@ if TYPE_CHECKING:  # a world is loaded only for an answer that needs it, and so 
 FRAME = "LocaleFrame-"
 MAX_LISTED = 4
 """So many frames or landmarks are named."""
+MAX_NEAR, MIN_SIMILARITY = 4, 0.5
+NOT_THERE = "not in the world's file"
 Sentence = tuple[str, tuple[str, ...]]
 """A sentence, and the entries that say so."""
 
@@ -84,7 +86,8 @@ def tell_model_lines(history: Timeline, fix: EntryRecord[Any], world: WorldFile 
     locales = [locale for locale in dict.fromkeys(_find_holder(name, frames, world) for name in names) if locale]
     if not locales:
         return
-    where = [f"{landmark(name)} ({_find_line(name, world)})" for name in names if world and not world.missing]
+    known = [] if world is None or world.missing else [(name, world.element(name)) for name in names]
+    where = [f"{landmark(name)} ({one.source if one else NOT_THERE})" for name, one in known]
     text = f"The model lines come from what is known of {listed(locales, MAX_LISTED)}"
     text += f": {listed(where, MAX_LISTED)}" if where else ""
     lost = f" From which lines of the world's file cannot be told: {world.missing}." if world and world.missing else ""
@@ -99,12 +102,6 @@ def _find_holder(name: str, frames: Mapping[str, EntryRecord[Any]], world: World
     return next((locale for locale in locales if locale in frames), "")
 
 
-def _find_line(name: str, world: WorldFile) -> str:
-    element = world.element(name)
-    return element.source if element is not None else "not in the world's file"
-
-
-MAX_NEAR, MIN_SIMILARITY = 4, 0.5
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,13 +82,10 @@ def describe_decision(history: Timeline, record: EntryRecord[Any]) -> str:
     decision, text = history.decision(record.cycle), f"Decided in {when} by the {words.source(record.author)}"
     if decision.chosen is None:
         return text + "."
-    second = f"; next best was {_bid(decision.runner_up)}" if decision.runner_up else "; nobody else could act"
+    c = decision.runner_up
+    second = f"; next best was the {words.source(c.source)}, rated {c.rating:.2f}" if c else "; nobody else could act"
     return (f"{text}, woken by {decision.chosen.trigger}, rated {decision.chosen.rating:.2f}{second}."
             f"{_tell_questions(history, record, decision.chosen)}")
-
-
-def _bid(c: Candidate) -> str:
-    return f"the {words.source(c.source)}, rated {c.rating:.2f}"
 
 
 def _tell_questions(history: Timeline, record: EntryRecord[Any], chosen: Candidate) -> str:

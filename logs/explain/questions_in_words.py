@@ -71,12 +71,9 @@ class Asked:
 
     def by_entry(self, kind: type[Any]) -> list[list[EntryRecord[Any]]]:
         """The revisions of each entry of a kind until then."""
-        records = sorted(self.history.of_kind(kind, until=self.at), key=lambda record: _number(record.id))
+        number = {id: number for number, id in enumerate(self.history.ids_of(kind))}
+        records = sorted(self.history.of_kind(kind, until=self.at), key=lambda record: number[record.id])
         return [list(revisions) for _, revisions in groupby(records, key=lambda record: record.id)]
-
-
-def _number(id: str) -> int:
-    return int(id.rpartition("-")[2])
 
 
 def answers(
@@ -84,8 +81,7 @@ def answers(
 ) -> Iterator[Story]:
     """The answer's stories; with ``at`` as it was known in that cycle; ``run`` tells what only the simulator knows.
 
-    Raises:
-        BadInput: it is none of the questions that are known, or what it takes is not recorded.
+    Raises BadInput where it is none of the questions that are known, or what it takes is not recorded.
     """
     asked = set(re.findall(r"[a-z]+", question.lower()))
     for words, answer in ANSWERS.items():
@@ -206,10 +202,6 @@ def _tell_door(record: EntryRecord[DoorState]) -> Step:
     return Step("evidence", text, (record.ref, *record.because))
 
 
-def _tell_when_lost(asked: Asked) -> Iterator[Story]:
-    yield from _stories(tell_lost(asked.history), asked.at, "Up to then it was not lost.")
-
-
 def _tell_touched(asked: Asked) -> Iterator[Story]:
     result = {} if asked.run is None else asked.run.read_result()
     section = tell_contacts(asked.history, tuple(read_turning_points(asked.history)), result)
@@ -251,7 +243,7 @@ def _tell_error(asked: Asked) -> Iterator[Story]:
 
 
 ANSWERS: Mapping[frozenset[str], Callable[[Asked], Iterator[Story]]] = {
-    frozenset({"lost"}): _tell_when_lost,
+    frozenset({"lost"}): lambda asked: _stories(tell_lost(asked.history), asked.at, "Up to then it was not lost."),
     frozenset({"touch", "touched", "contact", "contacts", "collide", "collided", "collision", "collisions", "hit"}):
         _tell_touched,
     frozenset({"far", "off", "truth", "truly", "error"}): _tell_error,
@@ -294,8 +286,7 @@ class TrueError:
 def read_errors(run: RunDirectory, history: Timeline) -> tuple[TrueError, ...]:
     """The error of each belief that was held, in the order of time, against the truth in the cycle in which it came.
 
-    Raises:
-        BadInput: it is not a run of the simulator, or it has no recording, or its world's file has changed.
+    Raises BadInput where it is not a run of the simulator, or it has no recording, or its world's file has changed.
     """
     return tuple(_errors(run, history))
 

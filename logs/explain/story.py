@@ -156,8 +156,7 @@ def _head(run: RunDirectory) -> dict[str, Any]:
 def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
     """Which run it is, how it ended, and what went wrong on the way: the first lines of a story.
 
-    Raises:
-        BadInput: the journal has no decision, or ``result.json`` is malformed.
+    Raises BadInput where the journal has no decision, or ``result.json`` is malformed.
     """
     if not history.cycles:
         history.verify()

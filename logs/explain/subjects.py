@@ -37,14 +37,14 @@ ENTRY = re.compile(r"[A-Z]\w*-\d+(\.\d+)?")
 def milestones(history: Timeline, name: str) -> tuple[str, ...]:
     """Ids of the milestones that a user means: ``Milestone-10``, ``M1 of hallway``, ``M1``, ``check``.
 
-    Raises:
-        BadInput: there is none of that name; near ones are listed.
+    Raises BadInput where there is none of that name; near ones are listed.
     """
     last, low = {record.id: record for record in history.last_of_kind(Milestone)}, name.lower()
     if exact := [id for id, one in last.items() if low in (id.lower(), one.ref.lower(), id.rpartition("-")[2])]:
         return tuple(exact)
     called = {id: str(one.field("what", "")) for id, one in last.items()}
-    found = tuple(id for id, what in called.items() if _means(low, what.lower()))
+    found = tuple(id for id, what in called.items() if f"{what.lower()},".startswith((f"{low} ", f"{low},"))
+                  or (" " in low and low in what.lower()))
     if not found:
         history.verify()
         there = list(dict.fromkeys(what.partition(", because")[0] for what in called.values()))
@@ -55,18 +55,13 @@ def milestones(history: Timeline, name: str) -> tuple[str, ...]:
     return found
 
 
-def _means(low: str, what: str) -> bool:
-    return what == low or what.startswith((low + " ", low + ",")) or (" " in low and low in what)
-
-
 def milestone_story(history: Timeline, id: str, world: WorldFile | None = None) -> Story:
     """Everything about one milestone, in the order in which it happened.
 
     Args:
         world: tells from which file and line model lines come; None where that is not asked for.
 
-    Raises:
-        BadInput: its entries have other fields than those known here, or the journal says nothing of it.
+    Raises BadInput where its entries have other fields than those known here, or the journal says nothing of it.
     """
     last = history.entry(history.newest[id])
     if last is None:
@@ -137,8 +132,7 @@ def stories_of(history: Timeline, what: str | int | None, world: WorldFile) -> I
 
     The outcome's is to come fast: it does not ask the world from which lines model lines come.
 
-    Raises:
-        BadInput: the run has none of that name; near ones are listed.
+    Raises BadInput where the run has none of that name; near ones are listed.
     """
     if isinstance(what, str) and is_element(history, what):
         yield element_story(history, what, world)
@@ -149,8 +143,7 @@ def stories_of(history: Timeline, what: str | int | None, world: WorldFile) -> I
 def element_story(history: Timeline, name: str, world: WorldFile) -> Story:
     """Everything about a part of the building's description, by name: ``allens-office/desk``, ``allens-door``.
 
-    Raises:
-        BadInput: neither the world nor the run has anything of that name; near names are listed.
+    Raises BadInput where neither the world nor the run has anything of that name; near names are listed.
     """
     element = world.element(name)
     locales = element.locales if element is not None else (name.partition("/")[0],)

@@ -5,10 +5,10 @@ They are found while the run goes on, or read from its journal; the collisions a
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from blackboard.change import Change, Posted, Retracted
@@ -20,9 +20,9 @@ from logs.explain.phrases import wrap
 from logs.mirror import Mirror, find_belief
 from logs.records import EntryRecord, Opaque, is_a
 from logs.run_errors import BadInput
-from logs.timeline import Timeline
+from logs.timeline import Timeline, time_told
 from world_models import words
-from world_models.entries.body import BodyFault, Recovery
+from world_models.entries.body import BodyFault
 from world_models.entries.door_state import DoorState
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Contact, Obstacle
@@ -41,7 +41,6 @@ MARKS, NOT_VERIFIED = ("escalated", "relocalization"), ("refuted", "not testable
 TOLD_KINDS: tuple[type[Any], ...] = (BodyFault, Contact, DoorState, Obstacle, Resumed, UserReport, Redirection)
 KINDS: tuple[type[Any], ...] = (*TOLD_KINDS, Goal, PlanSketch, Certificate, Outcome)
 NOTHING = "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
-
 Get = Callable[[str], Entry[Any] | None]
 """Gives the current revision of an entry by its id."""
 Believed = Callable[[int], Entry[Hypothesis] | None]
@@ -110,19 +109,15 @@ class TurningPointFinder:
         """The turning points of the next decision."""
         before, changes = find_belief(self._mirror), (*decision.observed, *decision.made)
         self._mirror.take(*changes)
-        times = [when for change in decision.observed if (when := time_of(change.entry.value)) is not None]
-        self._time_s = max(times, default=self._time_s)
+        times = [time_told(partial(_get, change.entry.value)) for change in decision.observed]
+        self._time_s = max((time_s for time_s in times if time_s is not None), default=self._time_s)
         found = _turns(changes, decision.cycle, self._mirror.get, lambda _: find_belief(self._mirror) or before,
                        self._states)
         return [replace(point, time_s=self._time_s) for point in found]
 
 
-def time_of(value: Any) -> float | None:
-    """When an observation was made, by the body's clock [s]; None where it does not tell."""
-    if isinstance(value, Recovery):
-        return value.since_s + value.waited_s
-    found = getattr(value, "sim_time_s", getattr(value, "when_s", None))
-    return float(found) if isinstance(found, int | float) and math.isfinite(found) else None
+def _get(value: Any, name: str) -> Any:
+    return getattr(value, name, None)
 
 
 def _turns(
@@ -188,35 +183,39 @@ def read_turning_points(history: Timeline, *, told: bool = False) -> Iterator[Tu
     beliefs = [ref for ref in history.refs if ref.startswith("Hypothesis-")]
     states: dict[str, str] = {}
     for cycle in sorted(cycles):
-        changes = [change for record in history.decision(cycle).changes if (change := _change_of(record)) is not None]
+        records = filter(_may_turn, history.decision(cycle).changes)
+        changes = [change for change in map(_change_of, records) if change is not None]
         found = _turns(changes, cycle, lambda id: _newest(history, id),
                        lambda then: _belief(history, beliefs, then), states)
         yield from (replace(point, time_s=history.time_at(cycle)) for point in found if point.is_told or not told)
 
 
+def _may_turn(record: EntryRecord[Any]) -> bool:
+    """Whether a record can be a turning point, as far as is seen without decoding it."""
+    if record.kind is Discrepancy:
+        return not record.is_gone and record.field("status") == "escalated"
+    if record.kind is Hypothesis:
+        return not record.is_gone and record.field("basis") == "relocalization"
+    return not record.is_gone and record.kind in KINDS
+
+
 def _change_of(record: EntryRecord[Any]) -> Change | None:
-    """None where it cannot be a turning point, as far as is seen without decoding it, or is of another version."""
-    may_turn = record.kind in KINDS or (
-        record.field("status") == "escalated" if record.kind is Discrepancy else
-        record.kind is Hypothesis and record.field("basis") == "relocalization")
-    try:
-        return None if record.is_gone or not may_turn else record.change_of_board
-    except BadInput:
-        return None
-
-
-def _entry(record: EntryRecord[Any] | None) -> Entry[Any] | None:
     """None for one of another version, or of a kind that is not known here."""
     try:
-        return None if record is None or record.kind is Opaque else record.change_of_board.entry
+        return None if record.kind is Opaque else record.change_of_board
     except BadInput:
         return None
+
+
+def _entry_of(record: EntryRecord[Any] | None) -> Entry[Any] | None:
+    change = None if record is None else _change_of(record)
+    return None if change is None else change.entry
 
 
 def _belief(history: Timeline, refs: list[str], cycle: int) -> Entry[Hypothesis] | None:
     """The newest belief that was held in a cycle, or until then."""
     for ref in reversed(refs[: bisect_right(refs, cycle, key=history.cycle_of_ref)]):
-        entry = _entry(history.entry(ref))
+        entry = _entry_of(history.entry(ref))
         if entry is not None and entry.value.is_held:
             return entry
     return None
@@ -227,7 +226,7 @@ def _newest(history: Timeline, id: str) -> Entry[Any] | None:
     record = history.entry(history.newest[id]) if id in history.newest else None
     if is_a(record, Milestone) and isinstance(record.fields, dict):
         record = replace(record, fields={k: [] if isinstance(v, list) else v for k, v in record.fields.items()})
-    return _entry(record)
+    return _entry_of(record)
 
 
 def read_collisions(history: Timeline, result: Mapping[str, Any]) -> Iterator[TurningPoint]:

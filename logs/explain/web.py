@@ -161,8 +161,7 @@ def _distances(history: Timeline, refs: Sequence[str], depth: int) -> dict[str, 
 def explain(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Iterator[str]:
     """The walk in plain sentences, indented.
 
-    Raises:
-        BadInput: a reason is missing, and so is a line of the journal, or a part of one.
+    Raises BadInput where a reason is missing, and so is a line of the journal, or a part of one.
     """
     reasons = list(walk(history, refs, depth))
     if any(reason.record is None for reason in reasons):

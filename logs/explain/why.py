@@ -203,14 +203,14 @@ class _Teller:
         if key in self.told or record.ref in self.met or len(self.told) > MOST or len(self.met) > MOST_MET:
             return
         self.met.add(record.ref)
-        label, say, frame = label_of(record), SENTENCES.get(record.kind, _plainly), None
+        label, say, frame = label_of(record), SENTENCES.get(record.kind), None
         if perhaps:
             label, text = "thought", f"It may have stood at {phrases.pose(record.value)} ({record.value.weight:.0%})."
         elif is_a(record, Segments) and above.kind in (MotorCommand, PictureRequest):
             frame = self.history.reason(record, CameraPicture)
             text = f"It saw {phrases.describe_segments(record.value)}; where it is did not yet follow from them."
         else:
-            text = "" if record.kind in FOLDED else say(self.history, record)
+            text = "" if record.kind in FOLDED else say(self.history, record) if say else plainly(record)
         yield from self._one(key, label, text, record, frame)
         if perhaps:
             for below in self._below(record, Panorama):
@@ -276,10 +276,6 @@ class _Teller:
             if text not in self.told:
                 self.told.add(text)
                 yield Step("model", text, refs)
-
-
-def _plainly(_history: Timeline, record: EntryRecord[Any]) -> str:
-    return plainly(record)
 
 
 def _line(history: Timeline, record: EntryRecord[Leg]) -> str:

@@ -55,8 +55,7 @@ class Occasion:
 def in_cycle(history: Timeline, source: str, cycle: int) -> tuple[Occasion, ...]:
     """What became of a knowledge source in one cycle, for each trigger; none where the journal does not name it.
 
-    Raises:
-        BadInput: the run has no such cycle.
+    Raises BadInput where the run has no such cycle.
     """
     decision = history.decision(cycle)
     found = [Occasion(cycle, Fate.DROPPED, c.trigger, _tell_drop(c)) for c in decision.obviated if c.source == source]

@@ -11,9 +11,8 @@ from typing import Any, TypeVar
 from blackboard.change import Change, Retracted
 from blackboard.entry import Entry
 from blackboard.journal import Decision
-from logs.mirror import Mirror, find_belief
+from logs.mirror import Mirror
 from world_models.building.geometry.faces import Face
-from world_models.building.world import World
 from world_models.entries.location import Hypothesis, Place
 from world_models.frames import Pose2
 
@@ -84,32 +83,3 @@ class Moment:
     def touched(self, *kinds: type[Any]) -> bool:
         """Whether any entry of these types changed or went."""
         return not self._kinds.isdisjoint(kinds)
-
-
-class Moments:
-    """Makes a moment of each decision; what only a simulator knows is told in between."""
-
-    def __init__(self, world: World) -> None:
-        self._world, self._mirror = world, Mirror()
-        self._held: Held | None = None
-        self._truth: Pose2 | None = None
-        self.contacts: list[Place] = []
-        self.differences: list[Difference] = []
-
-    def tell_truth(self, world_from_robot: Pose2, contacts: Sequence[Place]) -> None:
-        """Where the robot truly is, and where it touched something."""
-        self._truth = world_from_robot
-        self.contacts += contacts
-
-    def after(self, decision: Decision) -> Moment:
-        """The moment after a decision."""
-        self._mirror.take(*decision.observed, *decision.made)
-        belief = find_belief(self._mirror)
-        if belief is None:
-            self._held = None
-        elif self._held is None or self._held.value is not belief.value:
-            self._held = Held(belief.value, belief.value.world_from_robot(self._world))
-        moment = Moment(decision, self._mirror, self._held, self._truth, tuple(self.contacts), tuple(self.differences))
-        self.contacts.clear()
-        self.differences.clear()
-        return moment

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 Colour = tuple[int, int, int, int]
-
 TRUE: Colour = (70, 210, 90, 255)
 BELIEVED: Colour = (70, 150, 255, 255)
 CANDIDATE: Colour = (180, 120, 255, 200)
@@ -22,9 +21,7 @@ KNOWN: Colour = (0, 200, 215, 170)
 REVISED: Colour = (255, 90, 215, 255)
 FREE: Colour = (80, 225, 190, 255)
 NOT_TESTABLE: Colour = (190, 130, 255, 255)
-
 LEVELS: Mapping[str, Colour] = {"action": (90, 170, 255, 255), "plan": (255, 160, 50, 255), "goal": (235, 90, 120, 255)}
-
 VERDICTS: Mapping[str, Colour] = {
     "verified": MATCHED, "refuted": REJECTED, "not testable": NOT_TESTABLE, "turning": EXPECTED,
     "expected": EXPECTED,

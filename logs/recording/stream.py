@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 import string
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any, Protocol
@@ -37,9 +37,22 @@ Row = tuple[int, float, dict[str, Batch]]
 class Columnar(Protocol):
     """Makes columns of components: an archetype of rerun, or what acts like one."""
 
-    @classmethod
-    def columns(cls, *args: Any, **kwargs: Any) -> Iterable[Any]:
+    def columns(self, *args: Any, **kwargs: Any) -> Iterable[Any]:
         """One column for each component."""
+
+
+class Mixed:
+    """Components of several archetypes in one row; what none of them has is a value under its own name."""
+
+    def __init__(self, **kinds: Any) -> None:
+        """``kinds``: component -> its archetype."""
+        self._kinds = kinds
+
+    def columns(self, **components: Any) -> Iterator[Any]:
+        """One column for each component."""
+        for name, values in components.items():
+            kind = self._kinds.get(name)
+            yield from kind.columns(**{name: values}) if kind else rr.AnyValues.columns(True, **{name: values})
 
 
 class RecordingStream:
@@ -67,13 +80,13 @@ class RecordingStream:
         self._stream.send_recording_name(viewable(title))
         self._cycles, self._flush_cycles = 0, LIVE_FLUSH_CYCLES if live else FLUSH_CYCLES
         self._now = (0, 0.0)
-        self._rows: dict[tuple[str, type[Columnar], tuple[str, ...]], list[Row]] = {}
+        self._rows: dict[tuple[str, Columnar, tuple[str, ...]], list[Row]] = {}
 
     def at(self, cycle: int, sim_time_s: float) -> None:
         """What is logged from now on happened then."""
         self._now = cycle, sim_time_s
 
-    def log(self, path: str, kind: type[Columnar], **components: Batch) -> None:
+    def log(self, path: str, kind: Columnar, **components: Batch) -> None:
         """Log one row at an entity path, now; each component is a batch of values, which may be empty.
 
         Of a text the signs are left out that the viewer cannot show.
@@ -121,7 +134,7 @@ class RecordingStream:
             raise RecordingError(f"{self._path or 'live recording'}: cannot be written: {error}") from None
 
 
-def _columns(kind: type[Columnar], name: str, batches: Sequence[Batch]) -> Iterable[Any]:
+def _columns(kind: Columnar, name: str, batches: Sequence[Batch]) -> Iterable[Any]:
     """A component's values, row by row."""
     lengths = [len(batch) for batch in batches]
     is_array = isinstance(batches[0], np.ndarray)

@@ -8,9 +8,10 @@ from importlib import import_module
 from pathlib import Path
 
 from blackboard.journal import Decision, decision_line
+from logs.mirror import Mirror, find_belief
 from logs.recording import loggers as built_in
 from logs.recording.logger import Logger, Subject, blueprint
-from logs.recording.moment import Difference, Moments
+from logs.recording.moment import Difference, Held, Moment
 from logs.recording.stream import LIVE_PORT, RecordingStream
 from logs.run_errors import RecordingError
 from world_models.building.geometry.faces import Face
@@ -28,8 +29,7 @@ GROUP = "harvey.loggers"
 def logger_classes() -> tuple[type[Logger], ...]:
     """Everything that a recording shows: the loggers of the project, then those of other packages.
 
-    Raises:
-        RecordingError: a logger of another package cannot be loaded.
+    Raises RecordingError where a logger of another package cannot be loaded.
     """
     try:
         return (*_find_built_in_loggers(), *load_plugin_classes(GROUP, Logger).values())
@@ -66,26 +66,32 @@ class RecordingWriter:
         self._loggers = tuple(logger(subject) for logger in (logger_classes() if loggers is None else loggers))
         self._stream = RecordingStream(
             path, recording_id, title, blueprint(self._loggers), live=live, live_port=live_port)
-        self._moments, self._sim_time_s = Moments(world), 0.0
+        self._world, self._mirror, self._sim_time_s = world, Mirror(), 0.0
+        self._held: Held | None = None
+        self._truth: Pose2 | None = None
+        self._contacts, self._differences = list[Place](), list[Difference]()
         for logger in self._loggers:
             logger.begin(self._stream)
 
     def truth(self, world_from_robot: Pose2, sim_time_s: float, contacts: Sequence[Place] = ()) -> None:
         """Where the robot truly is, and where it touched something; drawn with the next decision."""
-        self._moments.tell_truth(world_from_robot, contacts)
+        self._truth = world_from_robot
+        self._contacts += contacts
         self._sim_time_s = max(self._sim_time_s, sim_time_s)
 
     def true_building(self, added: tuple[Face, ...], gone: tuple[Face, ...]) -> None:
         """How the building truly differs from its model from now on; drawn with the next decision."""
-        self._moments.differences.append(Difference(added, gone))
+        self._differences.append(Difference(added, gone))
 
     def __call__(self, decision: Decision) -> None:
-        """Draw one decision.
-
-        Raises:
-            RecordingError: the recording cannot be written any more.
-        """
-        moment = self._moments.after(decision)
+        """Draw one decision. Raises RecordingError where the recording cannot be written any more."""
+        self._mirror.take(*decision.observed, *decision.made)
+        belief = find_belief(self._mirror)
+        if belief is None:
+            self._held = None
+        elif self._held is None or self._held.value is not belief.value:
+            self._held = Held(belief.value, belief.value.world_from_robot(self._world))
+        moment = Moment(decision, self._mirror, self._held, self._truth, self._contacts, self._differences)
         times_s = [*(e.value.sim_time_s for e in moment.changed(CameraPicture)),
                    *(e.value.sim_time_s for e in moment.changed(MotionReport))]
         self._sim_time_s = max([self._sim_time_s, *times_s])
@@ -93,6 +99,7 @@ class RecordingWriter:
         for logger in self._loggers:
             logger.log(self._stream, moment)
         self._stream.end_cycle()
+        self._contacts, self._differences = [], []
 
     def flush(self) -> None:
         """Bring everything to the disk and to the viewers now. Raises RecordingError where that fails."""

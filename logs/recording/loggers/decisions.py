@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard.agenda import Activation
 from blackboard.change import Change, Retracted, Revised
 from blackboard.journal import Decision
 from blackboard.servoing import Discrepancy
@@ -17,7 +16,7 @@ from logs.recording.logger import Logger, Panel, Subject, log_view
 from logs.recording.moment import Moment
 from logs.recording.palette import DONE, LEVELS, REJECTED
 from logs.recording.paths import RECORDS, TABLE
-from logs.recording.stream import TROUBLE, RecordingStream
+from logs.recording.stream import TROUBLE, Mixed, RecordingStream
 from world_models import words
 from world_models.building.locale_frame import FrameRequest, LocaleFrame, has_answer
 from world_models.entries.location import Hypothesis
@@ -32,16 +31,8 @@ COLUMNS = ("focus_level", "chosen_knowledge_source", "rating", "trigger_entry", 
 MARKS: Mapping[str, str] = {"ERROR": f"{TROUBLE} ", "WARN": f"{TROUBLE} ", "INFO": "", "DEBUG": ""}
 RECORD = "record"
 """The component that holds a decision's line."""
-
-
-class Row:
-    """Columns of the sentence, of the table and of the record."""
-
-    @classmethod
-    def columns(cls, **components: Any) -> Iterator[Any]:
-        for name, values in components.items():
-            kind = rr.TextLog if name in ("text", "level", "color") else None
-            yield from kind.columns(**{name: values}) if kind else rr.AnyValues.columns(True, **{name: values})
+ROW = Mixed(text=rr.TextLog, level=rr.TextLog, color=rr.TextLog)
+"""The sentence, and what else the table has."""
 
 
 class Decisions(Logger):
@@ -61,10 +52,10 @@ class Decisions(Logger):
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         decision = moment.decision
-        stream.log(RECORDS, Row, **{RECORD: [self.subject.line_of(decision)]})
+        stream.log(RECORDS, ROW, **{RECORD: [self.subject.line_of(decision)]})
         level = log_level(decision)
         fields: dict[str, list[Any]] = {name: [value] for name, value in row(decision).items()}
-        stream.log(TABLE, Row, text=[MARKS[level] + sentence(decision, self._messages)], level=[level],
+        stream.log(TABLE, ROW, text=[MARKS[level] + sentence(decision, self._messages)], level=[level],
                    color=[_colour(decision)], **fields)
 
 
@@ -155,12 +146,8 @@ def row(decision: Decision) -> dict[str, str | float]:
     values = (
         str(decision.focus), chosen.source.name if chosen else "", float(chosen.rating) if chosen else 0.0,
         str(chosen.trigger.entry.ref) if chosen else "", _describe_effects(decision.made),
-        _bid(second) if second else "", float(decision.pending))
+        f"{second.source.name} (rating {second.rating:.2f})" if second else "", float(decision.pending))
     return dict(zip(COLUMNS, values, strict=True))
-
-
-def _bid(activation: Activation) -> str:
-    return f"{activation.source.name} (rating {activation.rating:.2f})"
 
 
 def _describe_effects(made: Sequence[Change]) -> str:

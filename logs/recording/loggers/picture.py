@@ -6,9 +6,8 @@ before the camera, and the floor: where it is free, what ends it (its boundary's
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -20,7 +19,7 @@ from logs.recording import paths
 from logs.recording.logger import Logger, Panel, Subject
 from logs.recording.moment import Held, Moment
 from logs.recording.palette import DONE, EXPECTED, FOUND, FREE, MATCHED, NOT_TESTABLE, PLANNED, REJECTED, Colour, faint
-from logs.recording.stream import RecordingStream
+from logs.recording.stream import Mixed, RecordingStream
 from world_models.camera import clip_segments
 from world_models.entries.body import CameraPicture
 from world_models.entries.door_state import DoorState
@@ -32,9 +31,10 @@ from world_models.frames import Pose2, frozen
 from world_models.words import without_locale
 
 Floats = NDArray[np.float64]
-
 NUMBER = "number"
 """The component beside an image that holds the frame's number."""
+DELIVERED = Mixed(blob=rr.EncodedImage)
+"""A picture and what is known about it."""
 DRIFT_SCALE = 5.0
 """Drifts of a few pixels would not show: their arrows are drawn longer, and the view's legend says so."""
 STYLES = ((paths.EXPECTED, EXPECTED, 1.5), (paths.SEGMENTS, FOUND, 1.0), (paths.MATCHED, MATCHED, 2.0),
@@ -49,18 +49,6 @@ LABEL_PX, LABEL_HIGH_PX = 80.0, 26.0
 """Half a long name's width, and a name's height: nearer to the border it is moved inwards; nearer to another, left out.
 """
 NO_LINES, NO_POINTS, NO_BOXES = (frozen(np.zeros(shape)) for shape in ((0, 2, 2), (0, 2), (0, 4)))
-
-
-class Delivered:
-    """Columns of a picture and of what is known about it."""
-
-    @classmethod
-    def columns(cls, **components: Any) -> Iterator[Any]:
-        for name, values in components.items():
-            if name == "blob":
-                yield from rr.EncodedImage.columns(blob=values)
-            else:
-                yield from rr.AnyValues.columns(True, **{name: values})
 
 
 class Frames(Logger):
@@ -81,7 +69,7 @@ class Frames(Logger):
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         for entry in moment.changed(CameraPicture):
             frame = entry.value
-            stream.log(paths.IMAGE, Delivered, blob=[frame.jpeg], **{NUMBER: [frame.number]}, purpose=[frame.purpose],
+            stream.log(paths.IMAGE, DELIVERED, blob=[frame.jpeg], **{NUMBER: [frame.number]}, purpose=[frame.purpose],
                        entry=[str(entry.ref)])
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -17,13 +16,12 @@ from logs.recording.logger import Logger, Panel
 from logs.recording.moment import Moment
 from logs.recording.palette import DONE, EXPECTED, PLANNED, VERDICTS, WAITING, Colour, faint
 from logs.recording.paths import GOAL, LANDMARKS, LEG, PATH, SKETCH
-from logs.recording.stream import REFUTED, VERIFIED, RecordingStream
+from logs.recording.stream import REFUTED, VERIFIED, Mixed, RecordingStream
 from world_models.entries.location import Place
 from world_models.entries.task import Certificate, Goal, Leg, Milestone, PlanSketch, Subgoal
 from world_models.words import short
 
 Point = tuple[float, float, float]
-
 FLAG_M = 3.0
 
 
@@ -83,6 +81,7 @@ class Plan(Logger):
 ROW, INDENT = 26.0, 34.0
 LETTER, BORDER = 5.4, 26.0
 """The graph's own units: height of a row, step to the right of a level, width of a letter and of a node's border."""
+TREE = Mixed(edges=rr.GraphEdges, **dict.fromkeys(("node_ids", "positions", "labels", "colors"), rr.GraphNodes))
 NO_SKETCH = "the way there is yet to be sketched"
 MARKS: Mapping[str, str] = {
     "verified": VERIFIED, "refuted": REFUTED, "not testable": "?", "turning": "…", "expected": "…", "": "·",
@@ -98,15 +97,6 @@ class Node:
     colour: Colour
     depth: int
     after: str
-
-
-class Tree:
-    """Columns of nodes and edges."""
-
-    @classmethod
-    def columns(cls, **components: Any) -> Iterator[Any]:
-        for name, values in components.items():
-            yield from (rr.GraphEdges if name == "edges" else rr.GraphNodes).columns(**{name: values})
 
 
 class SketchTree(Logger):
@@ -128,7 +118,7 @@ class SketchTree(Logger):
         nodes = outline(moment.mirror)
         if nodes and self.is_new(SKETCH, nodes):
             middles = [(INDENT * n.depth + (BORDER + LETTER * len(n.label)) / 2, ROW * i) for i, n in enumerate(nodes)]
-            stream.log(SKETCH, Tree, node_ids=[n.id for n in nodes], positions=middles,
+            stream.log(SKETCH, TREE, node_ids=[n.id for n in nodes], positions=middles,
                        labels=[n.label for n in nodes], colors=[n.colour for n in nodes],
                        edges=[(n.after, n.id) for n in nodes if n.after])
 

@@ -153,7 +153,6 @@ THOUGHTS: Mapping[str, tuple[Any, ...]] = {
     "Last order:": (_order, MotorCommand),
 }
 """Title -> what tells it, and the types of values that it rests on."""
-
 ASTRAY_M, BACK_M = 0.2, 0.1
 """The belief is called wrong when it is so far from the truth, and right again when it is so near."""
 COLOURS: Mapping[str, Colour] = {

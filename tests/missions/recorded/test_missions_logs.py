@@ -10,8 +10,8 @@ from jsonschema import Draft202012Validator
 from docs.tools.site.journal import SCHEMA
 from experiments.generated.missions import HALLWAY, fault
 from harvey.simulation.simulated_run import run_mission
-from journals import read_journal
-from logs.reader import read_decisions, read_frames, read_series
+from journals import read_decisions, read_journal
+from logs.reader import read_frames, read_series
 from logs.recording.paths import CHAPTERS, HARVEY, TABLE, WHY
 from logs.run_directory import RunDirectory
 from sim.scenario import parse_scenario

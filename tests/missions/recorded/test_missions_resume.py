@@ -19,9 +19,10 @@ from harvey.runner.replay import open_originals, replay
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import redraw, resume_mission, run_mission
+from journals import read_decisions
 from logs import disk
 from logs.pictures import open_pictures
-from logs.reader import damage_of, read_decisions, read_frames
+from logs.reader import damage_of, read_frames
 from logs.records import DecisionRecord, read_records
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead

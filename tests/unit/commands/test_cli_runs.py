@@ -21,11 +21,10 @@ from harvey.campaign.workers import Workers
 from harvey.cli import main
 from harvey.errors import BadInput, Terminated
 from harvey.wiring import load_kinds
-from journals import read_journal
+from journals import read_decisions, read_journal
 from logs.decided_by import arithmetic, deciding_code
 from logs.disk import Appended
 from logs.explain.phrases import sentence
-from logs.reader import read_decisions
 from logs.records import entry_of, read_records
 from world_models import words
 from world_models.frames import Pose2

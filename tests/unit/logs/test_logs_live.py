@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from logs.reader import read_decisions, read_frames
+from journals import read_decisions
+from logs.reader import read_frames
 from logs.recording.writer import RecordingWriter
 from logs.run_errors import RecordingError
 from scripted_mission import CAMERA, MOUNT, house, play

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from rerun.chunk import RrdReader
 
-from journals import read_journal
+from journals import read_decisions, read_journal
 from logs.journal_file import JournalFile
-from logs.reader import read_decisions, read_frames
+from logs.reader import read_frames
 from logs.recording.writer import RecordingWriter
 from logs.run_errors import RecordingError
 from scripted_mission import CAMERA, MOUNT, house, picture, play

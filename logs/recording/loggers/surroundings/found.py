@@ -22,7 +22,6 @@ from world_models.entries.obstacle import Contact, Obstacle, Ranges
 from world_models.entries.robot_state import Footprint
 
 Points = NDArray[np.float64]
-
 BUMPER_M, EAR_M = 0.3, 0.6
 """Of a bumper and of range sensors above the floor."""
 ABOVE_FLOOR_M, OUTLINE_M, OPACITY = 0.03, 0.02, 110
