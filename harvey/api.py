@@ -273,12 +273,5 @@ class RecordedRun:
 
 
 __all__ = [
-    "RecordedRun",
-    "RunPicture",
-    "TrackPoint",
-    "build_world",
-    "load_scenario",
-    "load_world",
-    "open_run",
-    "run",
+    "RecordedRun", "RunPicture", "TrackPoint", "build_world", "load_scenario", "load_world", "open_run", "run",
 ]

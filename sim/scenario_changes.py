@@ -80,7 +80,8 @@ def move_scenario_things(scenario: Scenario, world: World, faces: Sequence[Face]
 
 
 def check_room(
-    scenario: Scenario, world: World, start: Place, building: SimulatedBuilding, on_floor: Callable[[float], SimulatedBuilding]
+    scenario: Scenario, world: World, start: Place, building: SimulatedBuilding,
+    on_floor: Callable[[float], SimulatedBuilding],
 ) -> None:
     """Check that the robot has room at the start and where a fault puts it. Raises ScenarioError."""
     _check_place(scenario, ("goal",), "start", world, start, building)

@@ -16,9 +16,9 @@ from world_models.plugins import COMMANDS_GROUP, list_absent, list_plugins, load
 
 MODULES: Mapping[str, str] = {
     "list": "listing", "run": "run_command", "view": "view", "story": "explain", "why": "explain", "replay": "again",
-    "diff": "explain", "report": "report", "export": "report", "resume": "again", "repair": "again", "world": "world_command",
-    "settings": "listing", "experiment": "listing", "campaign": "run_command", "drive": "drive", "calibrate": "calibrate",
-    "emulate": "emulate", "completion": "listing",
+    "diff": "explain", "report": "report", "export": "report", "resume": "again", "repair": "again",
+    "world": "world_command", "settings": "listing", "experiment": "listing", "campaign": "run_command",
+    "drive": "drive", "calibrate": "calibrate", "emulate": "emulate", "completion": "listing",
 }
 """The module of each command; there it stands under its name in capitals."""
 
@@ -56,4 +56,4 @@ def _absent(name: str, needs: str) -> CliCommand:
         raise BadInput(f"{name.replace('.', ' ')} needs {needs}")
 
     return CliCommand(name.rpartition(".")[2], f"needs {needs}", ((needs.partition(": ")[2], "adds it"),),
-                   lambda _: None, refuse, open_ended=True)
+                      lambda _: None, refuse, open_ended=True)

@@ -26,8 +26,8 @@ def _add_replay_arguments(parser: ArgumentParser) -> None:
     what_if = parser.add_argument_group("what would it have done")
     what_if.add_argument("--without", metavar="NAME", action="append", default=[],
                          help="without a knowledge source, a landmark or face of its model, or one segment, as"
-                              " 'CameraPicture-9 segment 12'; may be repeated. Of a thing, as allens-office/desk, only the"
-                              " landmark goes: nothing of it is expected to be seen, and it stays in the way")
+                              " 'CameraPicture-9 segment 12'; may be repeated. Of a thing, as allens-office/desk, only"
+                              " the landmark goes: nothing of it is expected to be seen, and it stays in the way")
     what_if.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
                          help="with a servo level off, as servo.plan=off, or another number of harvey settings, as"
                               " action.min_tolerance_px=8, or camera.tilt_deg=1 for what the robot believes of itself;"

@@ -97,7 +97,8 @@ class HardwareBody:
     """
 
     def __init__(
-        self, base: Base, eye: CameraPort, *, clock: Callable[[], float], pause: Callable[[float], object] | None = None,
+        self, base: Base, eye: CameraPort, *, clock: Callable[[], float],
+        pause: Callable[[float], object] | None = None,
         carried: Callable[[Ride], RideReport | BodyFault] | None = None, ranges: bool = False,
     ) -> None:
         self._base, self._eye, self._clock = base, eye, clock

@@ -86,7 +86,8 @@ def resume(
 
 @contextmanager
 def _hardware_run(
-    mission: HardwareMission, head: RunHead, base: Base, eye: CameraPort, clock: Callable[[], float], files: RunDirectory,
+    mission: HardwareMission, head: RunHead, base: Base, eye: CameraPort, clock: Callable[[], float],
+    files: RunDirectory,
     sinks: Sequence[Sink], live: bool, whole: Extent | None = None, *, around: Around = unchanged,
     tell: Tell = tell_nothing,
 ) -> Iterator[Run]:

@@ -111,7 +111,8 @@ class BodyPort:
         return () if contact is None else (Post(contact, (request,)),)
 
     def _post_with_ranges(
-        self, request: Entry[Any], found: MotionReport | CameraPicture | RideReport | BodyFault, why: tuple[Effect, ...] = ()
+        self, request: Entry[Any], found: MotionReport | CameraPicture | RideReport | BodyFault,
+        why: tuple[Effect, ...] = (),
     ) -> Iterable[Effect]:
         """An answer; with a picture comes what range sensors measure at the same place and time."""
         ranges = self._body.ranges() if isinstance(found, CameraPicture) else None
@@ -120,7 +121,8 @@ class BodyPort:
         yield self._post(request, found, why)
 
     def _post(
-        self, request: Entry[Any], found: MotionReport | CameraPicture | RideReport | BodyFault, why: tuple[Effect, ...] = ()
+        self, request: Entry[Any], found: MotionReport | CameraPicture | RideReport | BodyFault,
+        why: tuple[Effect, ...] = (),
     ) -> Effect:
         if isinstance(found, BodyFault):
             self._unanswered[request.id] = request

@@ -86,7 +86,9 @@ class CorrelatorTracker(OlderSource):
     writes = (Tracks, Hypothesis, Drift, Discrepancy)
 
     def judge(self, view: View, trigger: Change) -> float | None:
-        if find_belief(view) is None or view.latest(CameraPicture) is None or open_discrepancy(view, Level.GOAL) is not None:
+        if find_belief(view) is None or view.latest(CameraPicture) is None:
+            return None
+        if open_discrepancy(view, Level.GOAL) is not None:
             return None
         if unmeasured_doubt(view) is not None:  # tracking failed: the plan level looks where the robot is
             return None
@@ -200,7 +202,8 @@ class CorrelatorTracker(OlderSource):
         return self._take_new(view, frame, image, kept, anchors, belief)
 
     def _take_new(
-        self, view: View, frame: Entry[CameraPicture], image: Image, kept: tuple[Track, ...], anchors: tuple[Anchor, ...],
+        self, view: View, frame: Entry[CameraPicture], image: Image, kept: tuple[Track, ...],
+        anchors: tuple[Anchor, ...],
         belief: Hypothesis,
     ) -> Renewed:
         """Take new landmarks beside those that are kept, once the belief is aligned with the model's edges."""

@@ -54,7 +54,8 @@ class YawCalibrator(OlderSource):
         if travel is None or belief is None or not is_standing(view):
             return None
         milestone = view.latest(Milestone)
-        if milestone is not None and milestone.value.displacement_modes:  # an inexact model bends the way more than the yaw does
+        # an inexact model bends the way more than the yaw does
+        if milestone is not None and milestone.value.displacement_modes:
             return None
         if self._is_spent(travel.value):
             return 1.0

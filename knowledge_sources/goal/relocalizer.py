@@ -72,7 +72,8 @@ class Relocalizer(OlderSource):
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "odometry"),
         Watch(Segments, (Posted,), lambda s: s.milestone == ""),
     )
-    writes = (PictureRequest, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama, Obstruction, PlaceOdds, CameraState)
+    writes = (
+        PictureRequest, MotorCommand, Hypothesis, Goal, Discrepancy, Panorama, Obstruction, PlaceOdds, CameraState)
 
     def judge(self, view: View, trigger: Change) -> float | None:
         lost = open_discrepancy(view, Level.GOAL)
@@ -118,8 +119,7 @@ class Relocalizer(OlderSource):
         building, rooms = find_building(view), self._list_rooms(view, belief.value)
         locale = belief.value.locale
         here = belief.value.world_from_robot(building)
-        told = StatedPlace(here, belief.value.covariance_world(building),
-                         _find_prior(view, tuning))
+        told = StatedPlace(here, belief.value.covariance_world(building), _find_prior(view, tuning))
         followed = _list_moved_candidates(view, before, robot.actuator, building)
         tried = []
         for camera, among in itertools.product(self._list_cameras(view), self._list_buildings(view)):

@@ -1,4 +1,4 @@
-"""Discrepancy raiser (§2, Figure 2): passes a discrepancy beyond its bound to the level above, a limited number of times."""
+"""Discrepancy raiser (§2, Figure 2): passes a discrepancy beyond its bound to the level above, so many times."""
 
 from __future__ import annotations
 

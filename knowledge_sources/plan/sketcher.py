@@ -155,7 +155,8 @@ class Sketcher(OlderSource):
         s, belief = sketch.value, find_belief(view)
         if belief is None:
             return
-        if s.at > 0 and self._is_off(view, belief.value, s.subgoals[s.at - 1], bool(milestone.value.displacement_modes)):
+        is_inexact = bool(milestone.value.displacement_modes)
+        if s.at > 0 and self._is_off(view, belief.value, s.subgoals[s.at - 1], is_inexact):
             yield from self._adjust(view, milestone, sketch, belief)
         elif s.at_end:
             yield Revise(sketch, replace(s, status="done", verified=True), (milestone, belief))

@@ -57,7 +57,9 @@ class BodyCamera:
         """Deliver these pictures (JPEG, by frame number) instead of rendering them; later noise is the same."""
         self._recorded = pictures
 
-    def take_frame(self, building: SimulatedBuilding, truth: Truth, motion: ContinuousMotion, purpose: str) -> CameraPicture:
+    def take_frame(
+        self, building: SimulatedBuilding, truth: Truth, motion: ContinuousMotion, purpose: str
+    ) -> CameraPicture:
         """The next frame, numbered from 0, for the purpose of the request."""
         number, self.frames = self.frames, self.frames + 1
         jpeg = self._recorded.get(number)

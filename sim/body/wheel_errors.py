@@ -105,7 +105,8 @@ class SimulatedWheels:
         """The wheels of one run. Always takes three numbers from ``rng``."""
         shortfall = rng.uniform(parameters.shortfall_low, parameters.shortfall_high)
         curvature = rng.uniform(parameters.curvature_low_per_m, parameters.curvature_high_per_m)
-        return SimulatedWheels(parameters, 1.0 - float(shortfall), float(curvature) * (1.0 if rng.random() < 0.5 else -1.0))
+        side = 1.0 if rng.random() < 0.5 else -1.0
+        return SimulatedWheels(parameters, 1.0 - float(shortfall), float(curvature) * side)
 
     def sample_turn(self, turn_rad: float, rng: np.random.Generator) -> Pose2:
         """What a TURN does, as a displacement in the robot's frame; a turn of 0 does nothing. Four random numbers."""

@@ -228,7 +228,9 @@ class MeshView:
     reaches: NDArray[np.float64]
 
 
-def project_mesh(mesh: Mesh, lens: Pinhole, rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> MeshView:
+def project_mesh(
+    mesh: Mesh, lens: Pinhole, rotation: NDArray[np.float64], translation: NDArray[np.float64]
+) -> MeshView:
     """Project the mesh for a camera at ``camera_from_world`` = (rotation (3, 3), translation (3,) [m])."""
     centre = -rotation.T @ translation
     normals, offsets = mesh.planes_world[:, :3], mesh.planes_world[:, 3]

@@ -120,7 +120,8 @@ def test_told_while_it_rolls_it_stops_and_goes_another_way(tmp_path: Path) -> No
 
 def test_told_of_what_is_not_there_it_says_so_and_revises_nothing(tmp_path: Path) -> None:
     """A file cannot say so, but somebody can: the mission goes on as if nothing had been said."""
-    tellings = [UserReport("study/sofa-1", "gone"), UserReport("study/table-1", "shut"), UserReport("nowhere/door", "shut"),
+    tellings = [UserReport("study/sofa-1", "gone"), UserReport("study/table-1", "shut"),
+                UserReport("nowhere/door", "shut"),
                 UserReport("north-door", "gone"), UserReport("north-door", "open")]
     decisions: list[Decision] = []
     agent = build_agent(build_head(stage := two_doors(tmp_path), SEED))

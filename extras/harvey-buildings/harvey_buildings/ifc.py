@@ -129,7 +129,7 @@ def _build_shape_reader() -> Callable[[Any, bool], ElementShape]:
         if not len(points) or not np.isfinite(points).all() or not np.isfinite(frame).all():
             raise ValueError("it has no shape")
         return ElementShape(points, np.array(made.geometry.faces, int).reshape(-1, 3), frame,
-                    np.array(made.geometry.edges, int).reshape(-1, 2))
+                            np.array(made.geometry.edges, int).reshape(-1, 2))
 
     return shape
 

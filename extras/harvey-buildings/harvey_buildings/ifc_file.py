@@ -157,7 +157,8 @@ class WallHole:
 
 
 def find_hole(
-    own: ElementShape | None, opening: ElementShape | None, wall: Callable[[], ElementShape | None], stated_m: float | None
+    own: ElementShape | None, opening: ElementShape | None, wall: Callable[[], ElementShape | None],
+    stated_m: float | None,
 ) -> WallHole:
     """The wall hole of an element; its opening counts first, as a door's frame is wider, or its leaf is drawn open.
 
@@ -183,7 +184,9 @@ def find_hole(
     return WallHole(centre, along, width, low, high - low)
 
 
-def _find_direction(own: ElementShape, shape: ElementShape, wall: Callable[[], ElementShape | None], stated_m: float | None) -> Floats:
+def _find_direction(
+    own: ElementShape, shape: ElementShape, wall: Callable[[], ElementShape | None], stated_m: float | None
+) -> Floats:
     """(2,) direction of the wall: the element's x axis, as in the standard, unless stated width or wall contradict."""
     axes = [axis[:2] / np.linalg.norm(axis[:2]) for axis in own.frame[:, :2].T if np.linalg.norm(axis[:2]) > 0.9]
     axes.append(_longer_side(own))
@@ -332,8 +335,8 @@ def build_column(name: str, space: Space, hole: shapely.Polygon) -> Furnishing:
     """A column from floor to ceiling in a hole of a floor."""
     corners = shapely.get_coordinates(hole.minimum_rotated_rectangle)[:-1]
     arm = corners[1] - corners[0]
-    body = ElementShape(np.array([(x, y, z) for x, y in corners for z in (space.floor_m, space.floor_m + space.height_m)]), (),
-                np.eye(4)[:3])
+    points = np.array([(x, y, z) for x, y in corners for z in (space.floor_m, space.floor_m + space.height_m)])
+    body = ElementShape(points, (), np.eye(4)[:3])
     turn = math.atan2(arm[1], arm[0])
     c, s = math.cos(turn), math.sin(turn)
     frame = np.array([[c, -s, 0.0, 0.0], [s, c, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])

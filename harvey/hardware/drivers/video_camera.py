@@ -232,7 +232,8 @@ class VideoCamera:
             return prepare(open_in_time(capture, source), source, size)
 
         opened = open_source()
-        self._source: _Source = _Video(opened, source) if is_file(source) else LatestPictureThread(opened, open_source, clock)
+        self._source: _Source = (
+            _Video(opened, source) if is_file(source) else LatestPictureThread(opened, open_source, clock))
 
     def __enter__(self) -> VideoCamera:
         return self

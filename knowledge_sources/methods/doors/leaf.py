@@ -124,7 +124,7 @@ def predict_opening(
     is_whole = np.all(np.abs(look - look[:, :1]) < 1e-4, axis=(1, 2))
     frame = beside[mine] & clear & is_whole & (depth[mine] < first_m[mine] + OWN_SURFACE_M)
     return SeenOpening(box, distance_m, pixels[free, 0], across[mine][free], height_m[mine][free], known[mine][free],
-                   is_whole[free], pixels[frame, 0], known[mine][frame])
+                       is_whole[free], pixels[frame, 0], known[mine][frame])
 
 
 def _find_box(

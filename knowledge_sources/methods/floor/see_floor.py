@@ -205,7 +205,8 @@ class _Scan(NamedTuple):
 
 
 def _scan(
-    grid: FloorGrid, model: ModelFloor, tells: NDArray[np.bool_], things: Sequence[tuple[StandingRegion, FloorThing, float]],
+    grid: FloorGrid, model: ModelFloor, tells: NDArray[np.bool_],
+    things: Sequence[tuple[StandingRegion, FloorThing, float]],
     fy: float, settings: FloorSettings,
 ) -> _Scan:
     """From the lower border up: as far as the model has floor, its looks are known, and no thing is in the way."""

@@ -176,7 +176,9 @@ def _keep_likelier(found: list[PlaceCandidate], new: PlaceCandidate) -> None:
         found[:] = [*(c for c in found if c not in near), new]
 
 
-def _list_repetitions(robot: RobotModel, candidate: PlaceCandidate, rooms: Sequence[str]) -> Iterator[tuple[str, Pose2]]:
+def _list_repetitions(
+    robot: RobotModel, candidate: PlaceCandidate, rooms: Sequence[str]
+) -> Iterator[tuple[str, Pose2]]:
     """Where the plan repeats the candidate's place; what is in the rooms may differ, which the pictures tell."""
     room = _find_room(robot, rooms[0], candidate.world_from_robot)
     return find_repetitions(robot.world, room, candidate.world_from_robot, rooms)

@@ -90,7 +90,8 @@ def compute_sigmas_px(
     seen = np.flatnonzero(np.isfinite(projected).all(axis=(1, 2)))
     if len(seen) and len(errors.displacement_modes):
         lines = build_line_set(lines_world[seen], projected[seen], camera, 1.0)
-        _, _, by_mode = compute_displaced_jacobian(lines, errors.displacements[:, seen], _to_state(pose), camera_from_robot)
+        _, _, by_mode = compute_displaced_jacobian(
+            lines, errors.displacements[:, seen], _to_state(pose), camera_from_robot)
         sigmas[seen] = np.sqrt(np.sum(by_mode**2, axis=2)).max(axis=1)
     return sigmas
 

@@ -131,7 +131,8 @@ def _solve_inexact(
         belief = replace(belief, information=np.zeros((3, 3)))
     pose = first.world_from_robot
     found = maximise_marginal(
-        lines, errors.displacements, sigma_px, camera_from_robot, belief, np.array([pose.x_m, pose.y_m, pose.heading_rad]),
+        lines, errors.displacements, sigma_px, camera_from_robot, belief,
+        np.array([pose.x_m, pose.y_m, pose.heading_rad]),
         first.inliers, settings)
     rejected = tuple(None if near else reason or DISTANCE
                      for near, reason in zip(found.near, first.rejected, strict=True))

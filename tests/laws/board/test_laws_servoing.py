@@ -94,7 +94,8 @@ class ServoMachine(RuleBasedStateMachine):
         self.decisions: list[Decision] = []
         self.found: dict[Ref, Discrepancy] = {}
         self.scheduler = Scheduler(
-            [*map(worker, Level), *map(corrector, Level), *map(measurer, (Level.PLAN, Level.GOAL)), DiscrepancyRaiser()],
+            [*map(worker, Level), *map(corrector, Level), *map(measurer, (Level.PLAN, Level.GOAL)),
+             DiscrepancyRaiser()],
             sinks=[self.decisions.append],
         )
 

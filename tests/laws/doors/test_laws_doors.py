@@ -63,7 +63,9 @@ def buildings(world: World, doorway: Doorway) -> dict[str, SimulatedBuilding]:
     return {"open": SimulatedBuilding.of_faces(world.faces), "shut": SimulatedBuilding.of_faces([*world.faces, *leaf])}
 
 
-def weigh(robot: RobotModel, doorway: Doorway, building: SimulatedBuilding, pose: Pose2, gain: float = 1.0) -> float | None:
+def weigh(
+    robot: RobotModel, doorway: Doorway, building: SimulatedBuilding, pose: Pose2, gain: float = 1.0
+) -> float | None:
     """What a picture of the door says."""
     opening = predict_opening(robot, pose, SURE, doorway, HALL, robot.world)
     if opening is None:
@@ -85,7 +87,8 @@ def before_door(doorway: Doorway, away_m: float, aside_m: float) -> Pose2:
 @pytest.mark.parametrize("gain", [0.5, 1.0])
 @pytest.mark.parametrize(("away_m", "aside_m"), [(1.6, 0.2), (2.5, -0.3), (4.0, 0.4), (5.5, 0.0)])
 def test_a_leaf_is_told_from_what_is_beyond_in_any_light(
-    robot: RobotModel, doorway: Doorway, buildings: dict[str, SimulatedBuilding], away_m: float, aside_m: float, gain: float
+    robot: RobotModel, doorway: Doorway, buildings: dict[str, SimulatedBuilding], away_m: float, aside_m: float,
+    gain: float,
 ) -> None:
     pose = before_door(doorway, away_m, aside_m)
     shut, opened = (weigh(robot, doorway, buildings[state], pose, gain) for state in ("shut", "open"))

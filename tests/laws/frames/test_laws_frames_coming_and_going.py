@@ -195,7 +195,9 @@ visits = st.one_of(
 
 @given(st.lists(visits, min_size=10, max_size=60))
 @settings(max_examples=30)
-def test_what_nobody_needs_leaves_and_what_is_believed_otherwise_stays(chain: World, steps: list[Note | UserReport]) -> None:
+def test_what_nobody_needs_leaves_and_what_is_believed_otherwise_stays(
+    chain: World, steps: list[Note | UserReport]
+) -> None:
     """However many rooms the robot visits, the board holds those that it is in, those that changed, and a few more."""
     sources = (Visitor(), ModelReviser())
     scheduler = Scheduler(sources, ports=[WorldPort(FrameStore(chain))], kinds=KINDS,

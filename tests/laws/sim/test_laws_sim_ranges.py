@@ -98,7 +98,9 @@ def test_ranges_come_with_each_picture_and_with_nothing_else(seed: int, sensors:
     robot = SimulatedBody(BUILDING, Pose2(2.0, 2.2, 0.3), CAMERA, CameraMount(1.0, 0.1), seed=seed,
                           ranges=RangeRing(sensors))
     port, board = BodyPort(FaultyBody(robot)), Blackboard()
-    for request in (PictureRequest("track"), MotorCommand(0.3, 0.2), Course("Leg-1", 0.2, 0.0), PictureRequest("probe")):
+    for request in (
+        PictureRequest("track"), MotorCommand(0.3, 0.2), Course("Leg-1", 0.2, 0.0), PictureRequest("probe")
+    ):
         (asked,) = board.apply([Post(request)], author="motor", cycle=1)
         entries = [change.entry for change in board.apply(port.answer(Posted(asked.entry)), author="body", cycle=1)]
         ranges = [entry for entry in entries if isinstance(entry.value, Ranges)]

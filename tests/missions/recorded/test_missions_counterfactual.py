@@ -153,7 +153,8 @@ def test_where_it_parts_the_record_no_longer_answers(run: RunDirectory) -> None:
     ([], [("servo.plan", "3")], "expected on or off"),
     ([], [("servo.plans", "on")], "plan"),
     (["CameraPicture-999 segment 3"], (),
-     r"CameraPicture-999 segment 3: expected a frame of the run, CameraPicture-1 to CameraPicture-\d+, got CameraPicture-999"),
+     r"CameraPicture-999 segment 3: expected a frame of the run, CameraPicture-1 to CameraPicture-\d+,"
+     r" got CameraPicture-999"),
     (["line_finder", "CameraPicture-1 segment 9999"], (), r"expected a segment of CameraPicture-1, 0 to \d+, got 9999"),
     (["CameraPicture-2 segment 0"], (),
      r"expected a frame in which segments were looked for, CameraPicture-1 and CameraPicture-\d+, got CameraPicture-2"),

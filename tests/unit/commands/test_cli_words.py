@@ -30,7 +30,8 @@ from world_models.entries.task import Leg, Outcome
 from world_models.frames import Pose2
 from world_models.words import degrees, metres, turn
 
-FOUND = Track("door-frame", (1.0, 2.0, 3.0), "CameraPicture-3", (10.0, 20.0), 2.5, (100.0, 80.0), (95.8, 81.5), 0.97, 0.1)
+FOUND = Track(
+    "door-frame", (1.0, 2.0, 3.0), "CameraPicture-3", (10.0, 20.0), 2.5, (100.0, 80.0), (95.8, 81.5), 0.97, 0.1)
 
 
 @pytest.mark.parametrize(("error_m", "text"), [

@@ -11,8 +11,10 @@ from logs.records import DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
 
 BECAUSE = {
-    "PictureRequest-1.0": (), "CameraPicture-1.0": ("PictureRequest-1.0",), "Belief-1.0": ("CameraPicture-1.0",), "CameraPicture-2.0": ("PictureRequest-1.0",),
-    "Belief-1.1": ("CameraPicture-2.0", "Belief-1.0"), "Leg-1.0": ("Belief-1.1",), "Motion-1.0": ("Leg-1.0", "Belief-1.1"),
+    "PictureRequest-1.0": (), "CameraPicture-1.0": ("PictureRequest-1.0",), "Belief-1.0": ("CameraPicture-1.0",),
+    "CameraPicture-2.0": ("PictureRequest-1.0",),
+    "Belief-1.1": ("CameraPicture-2.0", "Belief-1.0"), "Leg-1.0": ("Belief-1.1",),
+    "Motion-1.0": ("Leg-1.0", "Belief-1.1"),
 }
 
 
@@ -28,7 +30,8 @@ def build_history(otherwise: Collection[str]) -> MemoryTimeline:
     (["Motion-1.0"], ["Motion-1.0"]),
     (["Motion-1.0", "Belief-1.1", "CameraPicture-2.0"], ["Motion-1.0", "Belief-1.1", "CameraPicture-2.0"]),
     (list(BECAUSE)[1:], ["Motion-1.0", "Belief-1.1", "Belief-1.0", "CameraPicture-1.0"]),
-    ([ref for ref in BECAUSE if ref not in ("CameraPicture-1.0", "PictureRequest-1.0")], ["Motion-1.0", "Belief-1.1", "Belief-1.0"]),
+    ([ref for ref in BECAUSE if ref not in ("CameraPicture-1.0", "PictureRequest-1.0")],
+     ["Motion-1.0", "Belief-1.1", "Belief-1.0"]),
 ])
 def test_it_comes_from_the_oldest_difference_and_not_from_the_nearest(differing: list[str], way: list[str]) -> None:
     """A belief that differs since the first picture rests on the last one too, which differs as well."""

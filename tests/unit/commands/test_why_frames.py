@@ -86,7 +86,8 @@ def test_a_withdrawn_milestone_says_what_it_rested_on() -> None:
     value = Milestone("", 0, "M1 of hallway", 0.0, ("hallway/pillar-1",), status="expected")
     expected = entry("Milestone-1.0", value, (known.ref,))
     revised = frame("LocaleFrame-1.1", "hallway", SHUT, because=(said.ref, known.ref), cycle=2)
-    gone = entry("Milestone-1.1", {**plain(value), "status": "withdrawn"}, (revised.ref,), author="dependency_withdrawer", cycle=3)
+    gone = entry("Milestone-1.1", {**plain(value), "status": "withdrawn"}, (revised.ref,),
+                 author="dependency_withdrawer", cycle=3)
     history = MemoryTimeline([
         decision(expected, observed=(said, known)), decision(revised, cycle=2), decision(gone, cycle=3)])
     told = milestone_story(history, "Milestone-1")

@@ -20,7 +20,8 @@ from world_models.entries.task import Outcome, PlanSketch
 
 SQUARE = ((0.0, 0.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5))
 BOX = Obstacle("hallway/obstacle-1", "hallway", SQUARE, 0.05, 0.25, 0.25, 0.5, certainty=0.7, by="camera",
-               evidence="CameraPicture-3, pixels (10, 20) to (30, 40): it does not look like the floor", status="suspected")
+               evidence="CameraPicture-3, pixels (10, 20) to (30, 40): it does not look like the floor",
+               status="suspected")
 THERE = replace(BOX, status="there", certainty=0.99)
 PICTURE = DoorPicture("CameraPicture-3", (10.0, 20.0, 30.0, 40.0), 0.0, 0.0, 0.0, 3.0, "a leaf")
 DOOR = DoorState("library-door", ("hallway", "library"), "shut", 0.99, 4.0, 2, PICTURE, 5.0)

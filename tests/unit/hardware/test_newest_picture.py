@@ -241,7 +241,8 @@ def test_a_picture_is_black_where_less_than_a_thousandth_is_bright(bright: int, 
 def test_images_are_compressed_with_quality_95_and_keep_their_size() -> None:
     image = np.random.default_rng(0).integers(0, 256, (30, 50, 3), np.uint8)
     picture = picture_of(image)
-    assert picture == CapturedPicture(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes(), (50, 30), False)
+    jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
+    assert picture == CapturedPicture(jpeg, (50, 30), False)
 
 
 @pytest.mark.parametrize(("behind", "is_whole"), [(0, True), (62, True), (63, False)])

@@ -135,7 +135,8 @@ def test_a_fault_has_one_of_the_known_kinds(kind: Any) -> None:
 
 
 def simulated() -> SimulatedBody:
-    return SimulatedBody(SimulatedBuilding.of_faces(box_room()), Pose2(1.0, 2.0, 0.0), Camera.from_field_of_view(1.1, 64, 64),
+    room, lens = SimulatedBuilding.of_faces(box_room()), Camera.from_field_of_view(1.1, 64, 64)
+    return SimulatedBody(room, Pose2(1.0, 2.0, 0.0), lens,
                          CameraMount(1.0, 0.1, 0.0), seed=3)
 
 

@@ -57,7 +57,8 @@ def test_turns_skitter_by_millimetres_and_err_by_about_two_percent() -> None:
 
 
 def test_the_encoders_claim_what_was_commanded_to_their_resolution() -> None:
-    wheels = SimulatedWheels.draw(ActuatorParameters(encoder_step_m=0.002, encoder_step_rad=0.001), np.random.default_rng(0))
+    parameters = ActuatorParameters(encoder_step_m=0.002, encoder_step_rad=0.001)
+    wheels = SimulatedWheels.draw(parameters, np.random.default_rng(0))
     turn, move = wheels.quantize(0.12345, -0.5031)
     assert (turn, move) == pytest.approx((0.123, -0.504), abs=1e-12)
 
