@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from blackboard.board import View
 from blackboard.change import Change, Watch
+from blackboard.condition import Condition
 from blackboard.effect import Effect
 from blackboard.level import Level
 
@@ -17,13 +18,14 @@ class KnowledgeSource(ABC):
     """One knowledge source. It keeps no memory between acts but the board; what it is built with must be immutable.
 
     Its trigger, precondition and action are those of the classic blackboard systems (Hearsay-II, BB1): a change that it
-    watches for triggers it, :meth:`bind` finds what it needs or says that it is not all there, and :meth:`act` gets
-    what was found. A trigger stands while its entry is the current revision; a retraction stands for good.
+    watches triggers it; where its ``needs`` are met, :meth:`bind` finds what it acts on, if anything, and :meth:`act`
+    gets what was found. A trigger stands while its entry is the current revision; a retraction stands for good.
 
     Class attributes:
         level: the servo level (Figure 2) at which it works.
         closes: the servo loop that it closes, if any: switched off with that level.
         on: the changes that trigger it.
+        needs: what must be so before it is asked at all.
         priority: how urgent its act is, 0..1, where no :meth:`rate` of its own tells from the case.
         writes: the types of value that its effects may touch; the scheduler refuses any other.
     """
@@ -31,6 +33,7 @@ class KnowledgeSource(ABC):
     level: ClassVar[Level]
     closes: ClassVar[Level | None] = None
     on: ClassVar[tuple[Watch, ...]]
+    needs: ClassVar[tuple[Condition[Any], ...]] = ()
     priority: ClassVar[float] = 0.5
     writes: ClassVar[tuple[type[Any], ...]]
 
@@ -50,11 +53,18 @@ class KnowledgeSource(ABC):
         """Its class name in snake case, as in the folder listing."""
         return self._called
 
-    def bind(self, view: View, trigger: Change) -> Any | None:
-        """The case: all that the act needs, found; None when it could not act. Pure.
+    def find_case(self, view: View, trigger: Change) -> Any | None:
+        """What :meth:`bind` finds where its ``needs`` are met: asked on the trigger, for the choice and for the act."""
+        return None if self.find_unmet(view) else self.bind(view, trigger)
 
-        Unless it says otherwise, the trigger is all that it needs. It is asked when the trigger comes, when the
-        activation is about to be chosen, and for the act itself.
+    def find_unmet(self, view: View) -> Condition[Any] | None:
+        """The first of its ``needs`` that is not met."""
+        return next((need for need in self.needs if need.find(view) in (None, False)), None)
+
+    def bind(self, view: View, trigger: Change) -> Any | None:
+        """The case: all that the act takes, found; None when there is nothing to act on. Pure.
+
+        Unless it says otherwise, the trigger is all that it takes. It is asked only where its ``needs`` are met.
         """
         return trigger
 

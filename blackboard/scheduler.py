@@ -228,7 +228,7 @@ class Scheduler:
         source, view = chosen.source, TracedView(self.board, self._traced)
         try:
             try:
-                case = source.bind(view, chosen.trigger)
+                case = source.find_case(view, chosen.trigger)
                 effects = () if case is None else tuple(source.act(view, case))
                 made, refused = self._apply(source, effects)
             except MissingEntryError as missing:
@@ -278,7 +278,7 @@ def registry_of(
 
 def _rate(source: KnowledgeSource, view: View, trigger: Change) -> float | None:
     try:
-        case = source.bind(view, trigger)
+        case = source.find_case(view, trigger)
         return None if case is None else source.rate(case)
     except MissingEntryError:
         return MISSING_RATING

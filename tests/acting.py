@@ -10,11 +10,11 @@ from blackboard.knowledge_source import KnowledgeSource
 
 def answer(source: KnowledgeSource, view: View, trigger: Change) -> tuple[Effect, ...] | None:
     """The effects by which it answers a trigger; None where it could not act."""
-    case = source.bind(view, trigger)
+    case = source.find_case(view, trigger)
     return None if case is None else tuple(source.act(view, case))
 
 
 def rating(source: KnowledgeSource, view: View, trigger: Change) -> float | None:
     """How urgent it finds a trigger; None where it could not act."""
-    case = source.bind(view, trigger)
+    case = source.find_case(view, trigger)
     return None if case is None else source.rate(case)

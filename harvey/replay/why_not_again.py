@@ -1,7 +1,7 @@
 """``harvey why RUN --not NAME``: the answers about a knowledge source or an entry; and asking a knowledge source again:
 could it have acted in a cycle, and if not, what did it find on the board?
 
-The board as it stood is rebuilt from the journal, and ``rate`` is asked once more. That is honest as far as ``rate`` is
+The board as it stood is rebuilt from the journal, and ``bind`` is asked once more. That is honest as far as ``bind`` is
 what it has to be, a pure function of the board; no act is repeated and no picture is looked at.
 """
 
@@ -147,6 +147,10 @@ def _ask_rating(source: KnowledgeSource, board: Blackboard, change: Change) -> I
         return
     view = AskedView(board)
     try:
+        unmet = source.find_unmet(board.view)
+        if unmet is not None:
+            yield f"{ref} woke the {name}. It needs: {unmet.name}; {unmet.tell_otherwise(board.view)}."
+            return
         case = source.bind(view, change)
     except MissingEntryError as missing:
         yield (f"{ref} woke the {name}; asked again, it lacks something to tell whether it could act:"

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
+from knowledge_sources.conditions import GOING_ON, HELD, PICTURE, SURE, UP_TO_DATE, Belief
 from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M, Seen, see_free_floor
-from knowledge_sources.questions import (
-    find_belief,
-    find_robot,
-    is_in_doubt,
-    is_over,
-    is_up_to_date,
-    rolling_course,
-)
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.priority import Priority
+from knowledge_sources.questions import rolling_course
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import CameraPicture
 from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor
 from world_models.entries.location import Hypothesis
@@ -35,7 +31,14 @@ CORRECTED_BY = ("milestone", "tracks", "relocalization")
 """What the belief rests on when a picture has corrected it."""
 
 
-class FloorWatcher(OlderSource):
+class Case(NamedTuple):
+    """A picture, and the belief by which it shows the floor."""
+
+    frame: Entry[CameraPicture]
+    belief: Belief
+
+
+class FloorWatcher(RobotKnowledgeSource):
     """Looks at the floor in each picture, once the belief was corrected by it.
 
     It says how far the floor is free in each direction, and what ends it: something of the model, or a thing that the
@@ -44,37 +47,35 @@ class FloorWatcher(OlderSource):
     place is in doubt, or not known well, it does not look: it could not tell a wall from a thing.
     """
 
-    level = Level.ACTION
+    level, priority = Level.ACTION, Priority.SEE
     on = (
         Watch(CameraPicture, (Posted,), lambda f: f.purpose not in ("milestone", "probe")),
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in CORRECTED_BY),
     )
+    needs = (GOING_ON, PICTURE, HELD, UP_TO_DATE, SURE)
     writes = (FreeFloor, FloorAppearance, FloorView)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        frame, belief = view.latest(CameraPicture), find_belief(view)
-        if frame is None or belief is None or is_over(view) or is_in_doubt(view) or not is_up_to_date(view):
-            return None
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """A picture in which the floor was not looked at yet, and a belief that is sharp enough to tell by it."""
+        frame, belief = PICTURE.of(view), HELD.of(view)
         if belief.value.sigma_m > MAX_FLOOR_SIGMA_M or belief.value.sigma_rad > MAX_FLOOR_SIGMA_RAD:
             return None
-        if _is_seen(view, frame) or (rolling_course(view) is not None and self._is_near_last(view, belief.value)):
+        if _is_seen(view, frame) or (rolling_course(view) is not None and _is_near_last(view, belief)):
             return None
-        return 0.8
+        return Case(frame, belief)
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        frame, belief = view.latest(CameraPicture), find_belief(view)
-        if frame is None or belief is None:
-            return
-        robot, locale = find_robot(view), belief.value.locale
-        pose, floor_m = belief.value.world_from_robot(robot.world), robot.world.floor_m(locale)
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        frame, belief, robot, pose = case.frame, case.belief.entry, case.belief.robot, case.belief.pose
+        locale = case.belief.locale
+        floor_m = robot.world.floor_m(locale)
         known = {entry.value.locale: entry for entry in view.all(FloorAppearance)}
         kept = [entry for entry in view.newest_first(FloorView)
                 if entry.value.belief == belief.id and entry.value.floor_m == floor_m]
         apart_m = FLOOR_VIEW_DISTANCE_M
         earlier = [entry for entry in kept if _measure_way_m(entry.value, pose) >= apart_m]
-        lit = self._find_lit(view, frame.value.sim_time_s)
+        lit = _find_lit(view, frame.value.sim_time_s)
         seen, learnt = see_free_floor(
-            robot.on_floor_of(locale), locale, pose, belief.value.covariance_world(robot.world), frame.value.jpeg,
+            robot, locale, pose, case.belief.covariance, frame.value.jpeg,
             [Seen(view[e.value.frame].value.jpeg, _pose_of(e.value)) for e in earlier],
             {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings,
             None if lit is None else lit.value.light)
@@ -87,21 +88,23 @@ class FloorWatcher(OlderSource):
             yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,
                                  frame.value.sim_time_s), (frame, belief))
 
-    def _find_lit(self, view: View, now_s: float) -> Entry[FreeFloor] | None:
-        """The last picture of which the light is known, if it was taken shortly before."""
-        since_s = now_s - MAX_LIGHT_AGE_S
-        return view.latest(FreeFloor, lambda f: f.light is not None and f.seen_s >= since_s)
 
-    def _is_near_last(self, view: View, belief: Hypothesis) -> bool:
-        """Whether the floor was looked at from about here: on the move each picture shows hardly more than the last.
+def _find_lit(view: View, now_s: float) -> Entry[FreeFloor] | None:
+    """The last picture of which the light is known, if it was taken shortly before."""
+    since_s = now_s - MAX_LIGHT_AGE_S
+    return view.latest(FreeFloor, lambda f: f.light is not None and f.seen_s >= since_s)
 
-        Only so many looks stay on the board; they must reach back to where what is before the robot now was in sight.
-        """
-        last, robot = view.latest(FreeFloor, lambda f: f.sense == "camera"), find_robot(view)
-        if last is None:
-            return False
-        eye = belief.world_from_robot(robot.world) @ Pose2(robot.mount.forward_m, 0.0, 0.0)
-        return math.hypot(last.value.x_m - eye.x_m, last.value.y_m - eye.y_m) < FLOOR_STEP_M
+
+def _is_near_last(view: View, belief: Belief) -> bool:
+    """Whether the floor was looked at from about here: on the move each picture shows hardly more than the last.
+
+    Only so many looks stay on the board; they must reach back to where what is before the robot now was in sight.
+    """
+    last = view.latest(FreeFloor, lambda f: f.sense == "camera")
+    if last is None:
+        return False
+    eye = belief.pose @ Pose2(belief.robot.mount.forward_m, 0.0, 0.0)
+    return math.hypot(last.value.x_m - eye.x_m, last.value.y_m - eye.y_m) < FLOOR_STEP_M
 
 
 def _is_seen(view: View, frame: Entry[CameraPicture]) -> bool:

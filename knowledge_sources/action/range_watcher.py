@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import islice
+from typing import NamedTuple
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.level import Level
+from knowledge_sources.conditions import HELD, SURE, UP_TO_DATE, Belief
 from knowledge_sources.methods.floor.ranges import see_ranges
-from knowledge_sources.questions import find_belief, find_robot, is_in_doubt, is_up_to_date
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.priority import Priority
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.floor import FreeFloor
 from world_models.entries.obstacle import Ranges
 
@@ -21,33 +23,38 @@ MAX_RANGE_AGE_S = 5.0  # a reading is compared with those that are no older
 MAX_EARLIER_READINGS = 4  # readings that the newest is compared with
 
 
-class RangeWatcher(OlderSource):
+class Case(NamedTuple):
+    """A reading, and the belief by which it tells of the floor."""
+
+    reading: Entry[Ranges]
+    belief: Belief
+
+
+class RangeWatcher(RobotKnowledgeSource):
     """Concludes from a reading of range sensors where the floor is free, and what ends it.
 
     It acts after the tracker has corrected the belief by the picture of the same moment, and only while the robot knows
     where it is: as long as its place is in doubt, an echo may be of a wall.
     """
 
-    level = Level.ACTION
+    level, priority = Level.ACTION, Priority.ADVANCE
     on = (Watch(Ranges, (Posted,)),)
+    needs = (HELD, UP_TO_DATE, SURE)
     writes = (FreeFloor,)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        s, belief = self._settings.floor, find_belief(view)
-        if not s.use_ranges or belief is None or is_in_doubt(view) or not is_up_to_date(view):
-            return None
-        return 0.6 if view.latest(Ranges) is trigger.entry and belief.value.sigma_m <= MAX_BELIEF_SIGMA_M else None
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """The newest reading, and a belief that is sharp enough to tell whether an echo is of a wall."""
+        belief = HELD.of(view)
+        is_newest = view.latest(Ranges) is trigger.entry
+        is_told = self._settings.floor.use_ranges and is_newest and belief.value.sigma_m <= MAX_BELIEF_SIGMA_M
+        return Case(trigger.entry, belief) if is_told else None
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        reading: Entry[Ranges] = trigger.entry
-        belief = find_belief(view)
-        if belief is None:
-            return
-        robot, b = find_robot(view), belief.value
-        pose = b.world_from_robot(robot.world)
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        reading, belief = case
+        b = belief.value
         before = (entry for entry in view.newest_first(FreeFloor) if entry.value.sense == "ranges")
         earlier = tuple(entry for entry in islice(before, MAX_EARLIER_READINGS)
                         if reading.value.when_s - entry.value.seen_s <= MAX_RANGE_AGE_S)
-        floor = see_ranges(robot, b.locale, pose, b.sigma_m, b.sigma_rad, reading.value,
+        floor = see_ranges(belief.robot, b.locale, belief.pose, b.sigma_m, b.sigma_rad, reading.value,
                            [entry.value for entry in earlier])
-        yield Post(floor, (reading, belief, *earlier[:1]))
+        yield Post(floor, (reading, belief.entry, *earlier[:1]))

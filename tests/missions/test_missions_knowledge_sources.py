@@ -167,9 +167,9 @@ def test_rating_and_acting_are_pure(short_stage: Stage) -> None:
         def name(self) -> str:
             return self._inner.name
 
-        def bind(self, view: View, trigger: Change) -> Any | None:
+        def find_case(self, view: View, trigger: Change) -> Any | None:
             nonlocal checked
-            size, case, again = len(view), self._inner.bind(view, trigger), self._inner.bind(view, trigger)
+            size, case, again = len(view), self._inner.find_case(view, trigger), self._inner.find_case(view, trigger)
             assert (case is None) == (again is None)
             if case is not None:
                 assert self._inner.rate(case) == self._inner.rate(again)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Retracted, Revised
+from blackboard.condition import Condition
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry
 from blackboard.journal import decision_line
@@ -313,3 +314,28 @@ def test_every_change_is_seen_exactly_once_in_the_cycle_after_it(program: list[A
     for one, two in pairwise(decisions):
         assert two.seen == one.made
         assert all(c.entry.cycle == one.cycle for c in one.made if not isinstance(c, Retracted))
+
+
+def test_a_source_is_asked_only_where_all_that_it_needs_is_so() -> None:
+    """And the first need that is not met is what it says of itself."""
+    asked: list[Any] = []
+    source = Scripted("needy", Note, lambda v, t: [Post(Tally(9))], rate=lambda v, t: asked.append(t) or 0.5)
+    tally: Condition[Entry[Tally]] = Condition("a tally", lambda view: view.latest(Tally), "none was counted")
+    few = Condition("few tallies", lambda view: len(view.all(Tally)) < 3, lambda view: f"{len(view.all(Tally))} were")
+    source.needs = (tally, few)
+    scheduler = Scheduler([source])
+    for met, told in ((False, "none was counted"), (True, ""), (True, ""), (False, "3 were")):
+        asked.clear()
+        unmet = source.find_unmet(scheduler.view)
+        assert told == ("" if unmet is None else unmet.tell_otherwise(scheduler.view))
+        post(scheduler, Note("a"))
+        decision = scheduler.step()
+        assert bool(asked) == bool(decision.chosen) == met
+        if not met and not scheduler.view.all(Tally):
+            with pytest.raises(LookupError, match="a tally, but none was counted"):
+                tally.of(scheduler.view)
+            post(scheduler, Tally(1))
+            scheduler.step()
+        elif met:
+            assert tally.of(scheduler.view).value == Tally(9)
+            run(scheduler)
