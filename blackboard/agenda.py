@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable, Iterator
+from enum import IntEnum
 from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
 from blackboard.change import Change
 from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
 
 
 class Activation(NamedTuple):
@@ -19,7 +18,7 @@ class Activation(NamedTuple):
         number: sequence number; ties go by it.
         source: who would act.
         trigger: on what.
-        rating: how well, 0..1.
+        rating: how urgent, 0..1.
         cycle: when it was activated.
     """
 
@@ -38,44 +37,35 @@ class Obviated(NamedTuple):
 
 
 SPARE = 16
-"""So many queues of a level are kept whether or not they are empty."""
+"""So many activations that are gone may stand in the heap of a level however few are left."""
 
 
 class Agenda:
-    """Pending activations, one for each (source, entry).
+    """Pending activations, one for each (source, entry): a trigger is stale as soon as its entry is revised."""
 
-    Adding, taking and finding the best cost the same however many are pending: sources give few different ratings, and
-    those of one rating stand in a queue.
-    """
-
-    def __init__(self) -> None:
+    def __init__(self, levels: Iterable[IntEnum]) -> None:
         self._count = 0
         self._by_entry: dict[str, Activation | list[Activation]] = {}  # mostly one; a list for each takes its time
-        self._levels: tuple[_Queues, ...] = tuple(_Queues() for _ in Level)
+        self._levels: dict[IntEnum, _Ranked] = {level: _Ranked() for level in levels}
 
-    def add(self, activation: Activation) -> Obviated | None:
-        """Add a new one; the pending activation of the same source on the same entry, if any, is replaced."""
-        source, id = activation.source, activation.trigger.entry.id
-        self._levels[source.level].add(activation)
+    def add(self, activation: Activation) -> None:
+        """Add a new one."""
+        self._levels[activation.source.level].add(activation)
         self._count += 1
+        id = activation.trigger.entry.id
         pending = self._by_entry.get(id)
         if pending is None:
             self._by_entry[id] = activation
-            return None
-        same = self._by_entry[id] = pending if isinstance(pending, list) else [pending]
-        old = next((a for a in same if a.source is source), None)
-        same.append(activation)
-        if old is None:
-            return None
-        self.take(old)
-        return Obviated(old, f"newer trigger {activation.trigger.entry.ref}")
+        elif isinstance(pending, list):
+            pending.append(activation)
+        else:
+            self._by_entry[id] = [pending, activation]
 
     def put_back(self, activation: Activation) -> None:
         """Add one that was taken: by its age it stands before others."""
-        self._levels[activation.source.level].put_back(activation)
-        self._count += 1
+        self.add(activation)
         id = activation.trigger.entry.id
-        self._by_entry[id] = sorted((*self.triggered_by(id), activation), key=_number)
+        self._by_entry[id] = sorted(self.triggered_by(id), key=_number)
 
     def take(self, activation: Activation) -> None:
         """Remove one that is about to be executed, or that is dropped."""
@@ -95,19 +85,12 @@ class Agenda:
             return ()
         return tuple(same) if isinstance(same, list) else (same,)
 
-    def best(self, groups: Iterable[Iterable[Level]]) -> Activation | None:
+    def best(self, groups: Iterable[Iterable[IntEnum]]) -> Activation | None:
         """The best rated, and of these the oldest, of the first group of levels that has any."""
-        levels = self._levels
         for group in groups:
-            best = None
-            for level in group:
-                queues = levels[level]
-                if queues.ratings:
-                    first = queues.first()
-                    if first is not None and (best is None or _rank(first) < _rank(best)):
-                        best = first
-            if best is not None:
-                return best
+            firsts = [first for level in group if (first := self._levels[level].first()) is not None]
+            if firsts:
+                return min(firsts)[2]
         return None
 
     def __iter__(self) -> Iterator[Activation]:
@@ -118,87 +101,47 @@ class Agenda:
         return self._count
 
 
-class _Queues:
-    """The activations of one level: a queue for each rating, oldest first, and a heap of those ratings.
+Place = tuple[float, int, Activation]
+"""Where an activation stands: best rated first, then oldest."""
 
-    What is taken from the midst of a queue stays there until it comes to the front, or until more are gone than are
-    left. A queue that has run empty stays until it comes to the top of the heap, or until there are twice as many
-    queues as were needed when the empty ones were last closed.
-    """
 
-    __slots__ = ("_count", "_gone", "_most", "_queues", "ratings")
+class _Ranked:
+    """The activations of one level as a heap. What is taken from its midst stays until it comes to the front, or until
+    more are gone than are left."""
+
+    __slots__ = ("_gone", "_heap")
 
     def __init__(self) -> None:
-        self._queues: dict[float, deque[Activation]] = {}
+        self._heap: list[Place] = []
         self._gone: set[int] = set()
-        self._count = 0
-        self.ratings: list[float] = []
-        self._most = SPARE
 
     def add(self, activation: Activation) -> None:
-        queue = self._queues.get(activation.rating)
-        if queue is None:
-            queue = self._opened(activation.rating)
-        queue.append(activation)
-        self._count += 1
-
-    def put_back(self, activation: Activation) -> None:
         if activation.number in self._gone:
-            self._gone.remove(activation.number)
-            self._count += 1
-            return
-        self.add(activation)
-        rating = activation.rating
-        self._queues[rating] = deque(sorted(self._queues[rating], key=_number))
+            self._gone.remove(activation.number)  # it still stands there
+        else:
+            heappush(self._heap, (-activation.rating, activation.number, activation))
 
     def take(self, activation: Activation) -> None:
-        """The front of a queue is never gone."""
-        queue, gone = self._queues[activation.rating], self._gone
-        self._count -= 1
-        if queue[0] is not activation:
+        """The front of the heap is never gone."""
+        heap, gone = self._heap, self._gone
+        if heap[0][2] is not activation:
             gone.add(activation.number)
-            if len(gone) > self._count + SPARE:
-                self._sweep()
+            if 2 * len(gone) > len(heap) + SPARE:
+                self._heap = [place for place in heap if place[1] not in gone]
+                heapify(self._heap)
+                gone.clear()
             return
-        queue.popleft()
-        while gone and queue and queue[0].number in gone:
-            gone.remove(queue.popleft().number)
+        heappop(heap)
+        while gone and heap and heap[0][1] in gone:
+            gone.remove(heappop(heap)[1])
 
-    def first(self) -> Activation | None:
+    def first(self) -> Place | None:
         """The best rated, and of these the oldest."""
-        ratings, queues = self.ratings, self._queues
-        while ratings:
-            queue = queues[-ratings[0]]
-            if queue:
-                return queue[0]
-            del queues[-heappop(ratings)]
-        return None
-
-    def _opened(self, rating: float) -> deque[Activation]:
-        if len(self._queues) > self._most:
-            self._close_empty()
-        queue = self._queues[rating] = deque()
-        heappush(self.ratings, -rating)
-        return queue
-
-    def _sweep(self) -> None:
-        for rating, queue in self._queues.items():
-            self._queues[rating] = deque(a for a in queue if a.number not in self._gone)
-        self._gone.clear()
-
-    def _close_empty(self) -> None:
-        self._queues = {rating: queue for rating, queue in self._queues.items() if queue}
-        self.ratings = [-rating for rating in self._queues]
-        heapify(self.ratings)
-        self._most = 2 * len(self._queues) + SPARE
+        return self._heap[0] if self._heap else None
 
     def __len__(self) -> int:
-        """What it holds beside what is pending: queues, and activations that are gone."""
-        return len(self._queues) + len(self._gone)
-
-
-def _rank(activation: Activation) -> tuple[float, int]:
-    return -activation.rating, activation.number
+        """With what is gone."""
+        return len(self._heap)
 
 
 def _number(activation: Activation) -> int:

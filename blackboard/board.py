@@ -205,7 +205,8 @@ class TracedView(View):
 
     __slots__ = ("_kinds", "used")
 
-    def __init__(self, board: Blackboard, kinds: Collection[type[Any]]) -> None:
+    def __init__(self, board: Blackboard, kinds: Collection[type[Any]] | None) -> None:
+        """``kinds``: which; None: all."""
         super().__init__(board)
         self._kinds = kinds
         self.used: set[Ref] = set()
@@ -234,6 +235,6 @@ class TracedView(View):
         return tuple(map(self._note, super().since(kind, cycle)))
 
     def _note(self, entry: Entry[T]) -> Entry[T]:
-        if type(entry.value) in self._kinds:
+        if self._kinds is None or type(entry.value) in self._kinds:
             self.used.add(entry.ref)
         return entry

@@ -6,14 +6,14 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from enum import Enum
+from enum import Enum, IntEnum
 from math import inf, isfinite, nan
 from typing import Any, NamedTuple
 
 from blackboard.agenda import Activation, Obviated
 from blackboard.change import Change
 from blackboard.entry import Entry, Ref
-from blackboard.level import Level
+from blackboard.level import word_of
 
 NOT_FINITE = frozenset(map(repr, (nan, inf, -inf)))
 """Floats that JSON has no word for; they are written as texts."""
@@ -73,7 +73,7 @@ class Decision(NamedTuple):
     cycle: int
     seen: tuple[Change, ...]
     observed: tuple[Change, ...]
-    focus: Level
+    focus: IntEnum
     activated: tuple[Activation, ...]
     obviated: tuple[Obviated, ...]
     chosen: Activation | None
@@ -113,7 +113,7 @@ def activation_record(a: Activation | None) -> dict[str, Any] | None:
     return {
         "number": a.number,
         "source": a.source.name,
-        "level": str(a.source.level),
+        "level": word_of(a.source.level),
         "trigger": str(a.trigger.entry.ref),
         "kind": a.trigger.kind,
         "rating": a.rating,
@@ -125,7 +125,7 @@ def decision_record(d: Decision) -> dict[str, Any]:
     """A decision as JSON types: every changed entry in full, everything else by name."""
     record = {
         "cycle": d.cycle,
-        "focus": str(d.focus),
+        "focus": word_of(d.focus),
         "observed": [change_record(c) for c in d.observed],
         "seen": [str(c.entry.ref) for c in d.seen],
         "activated": [activation_record(a) for a in d.activated],

@@ -1,8 +1,8 @@
 """Kinds of entries: what each type of value is to the board, said once, where the type is defined.
 
-``@request``, ``@observation`` and ``@inference`` mark a frozen dataclass as a kind of entry. Everything that differs by
-kind follows from the mark: what ports are asked for, what is on the disk before they are asked, what is read back from
-a journal, how long an entry is kept, and what people are told of it.
+``@request``, ``@observation`` and ``@inference`` mark a frozen dataclass as a kind of entry, and make one of a class
+that is none yet. Everything that differs by kind follows from the mark: what ports are asked for, what is on the disk
+before they are asked, what is read back from a journal, how long an entry is kept, and what people are told of it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, dataclass_transform, overload
 
 T = TypeVar("T")
 
@@ -67,19 +67,34 @@ class NotAKindError(TypeError):
     """A type that was put on the board, watched or written without being marked as a kind of entry."""
 
 
-def request(**more: Any) -> Callable[[type[T]], type[T]]:
+@overload
+def request(value_type: type[T], /) -> type[T]: ...
+@overload
+def request(**more: Any) -> Callable[[type[T]], type[T]]: ...
+@dataclass_transform(frozen_default=True)
+def request(value_type: type[T] | None = None, /, **more: Any) -> Any:
     """Marks what ports act on; ``more`` are the other attributes of :class:`Kind`."""
-    return _mark(Kind(Role.REQUEST, **more))
+    return _mark(Kind(Role.REQUEST, **more), value_type)
 
 
-def observation(**more: Any) -> Callable[[type[T]], type[T]]:
+@overload
+def observation(value_type: type[T], /) -> type[T]: ...
+@overload
+def observation(**more: Any) -> Callable[[type[T]], type[T]]: ...
+@dataclass_transform(frozen_default=True)
+def observation(value_type: type[T] | None = None, /, **more: Any) -> Any:
     """Marks what comes from outside."""
-    return _mark(Kind(Role.OBSERVATION, **more))
+    return _mark(Kind(Role.OBSERVATION, **more), value_type)
 
 
-def inference(**more: Any) -> Callable[[type[T]], type[T]]:
+@overload
+def inference(value_type: type[T], /) -> type[T]: ...
+@overload
+def inference(**more: Any) -> Callable[[type[T]], type[T]]: ...
+@dataclass_transform(frozen_default=True)
+def inference(value_type: type[T] | None = None, /, **more: Any) -> Any:
     """Marks what knowledge sources conclude."""
-    return _mark(Kind(Role.INFERENCE, **more))
+    return _mark(Kind(Role.INFERENCE, **more), value_type)
 
 
 def kind_of(value_type: type[Any]) -> Kind:
@@ -138,12 +153,14 @@ class Registry(Mapping[str, type[Any]]):
         return len(self._kinds)
 
 
-def _mark(kind: Kind) -> Callable[[type[T]], type[T]]:
+def _mark(kind: Kind, value_type: type[T] | None) -> Any:
     def mark(value_type: type[T]) -> type[T]:
-        parameters = getattr(value_type, "__dataclass_params__", None)
+        parameters = value_type.__dict__.get("__dataclass_params__")
+        if parameters is None and "__annotations__" in value_type.__dict__:
+            return mark(dataclass(frozen=True)(value_type))
         if parameters is None or not parameters.frozen:
             raise TypeError(f"expected a frozen dataclass, got {value_type.__name__}")
         setattr(value_type, MARK, kind)
         return value_type
 
-    return mark
+    return mark if value_type is None else mark(value_type)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
+from enum import IntEnum
 from typing import Any, ClassVar
 
 from blackboard.board import View
@@ -30,8 +31,8 @@ class KnowledgeSource(ABC):
         writes: the types of value that its effects may touch; the scheduler refuses any other.
     """
 
-    level: ClassVar[Level]
-    closes: ClassVar[Level | None] = None
+    level: ClassVar[IntEnum] = Level.ACTION
+    closes: ClassVar[IntEnum | None] = None
     on: ClassVar[tuple[Watch, ...]]
     needs: ClassVar[tuple[Condition[Any], ...]] = ()
     priority: ClassVar[float] = 0.5

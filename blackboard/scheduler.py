@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from enum import IntEnum
 from itertools import chain
 from typing import Any, Protocol
 
@@ -24,7 +25,6 @@ from blackboard.entry import Ref, new_tuple
 from blackboard.journal import Decision, Sink
 from blackboard.kinds import Kind, Registry, always, is_request, kind_of
 from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
 from blackboard.retention import Retention
 from blackboard.servoing import Discrepancy, Groups, Servoing
 
@@ -84,7 +84,7 @@ class Scheduler:
         self._watchers: dict[tuple[type[Change], type[Any]], Watchers] = {}
         self._ports = tuple(ports)
         self._sinks = tuple(sinks)
-        self._agenda = Agenda()
+        self._agenda = Agenda(self._servoing.levels)
         self.kinds = registry_of(sources, kinds)
         self._requests = frozenset(filter(is_request, self.kinds.values()))
         self._traced = frozenset(kind for kind in self.kinds.values() if kind_of(kind).traced)
@@ -140,7 +140,7 @@ class Scheduler:
                 if watchers is None:
                     watchers = self._watchers[kind, value] = self._watchers_of(kind, value)
                 if watchers:
-                    self._hear_bids_on(change, watchers, activated, obviated)
+                    self._hear_bids_on(change, watchers, activated)
         except Exception:  # whatever a source does wrong is journalled, never lost
             return RAISED + traceback.format_exc(limit=-4)
         return ""
@@ -159,9 +159,7 @@ class Scheduler:
         found = ((source, [w.where for w in source.on if w.is_for(change, value)]) for source in self._sources)
         return tuple((source, () if always in wheres else tuple(wheres)) for source, wheres in found if wheres)
 
-    def _hear_bids_on(
-        self, change: Change, watchers: Watchers, activated: list[Activation], obviated: list[Obviated]
-    ) -> None:
+    def _hear_bids_on(self, change: Change, watchers: Watchers, activated: list[Activation]) -> None:
         view, value = self.view, change.entry.value
         if not self._stands(change):
             return
@@ -176,9 +174,7 @@ class Scheduler:
             self._numbers += 1
             activation = new_tuple(Activation, (self._numbers, source, change, rating, self.cycle))
             activated.append(activation)
-            replaced = self._agenda.add(activation)
-            if replaced is not None:
-                obviated.append(replaced)
+            self._agenda.add(activation)
 
     def _stands(self, trigger: Change) -> bool:
         """A trigger stands while its entry is the current revision; a retraction stands for good."""
@@ -186,7 +182,7 @@ class Scheduler:
         return self._current.get(entry.id) is entry or isinstance(trigger, Retracted)
 
     def _two_best(
-        self, focus: Level, obviated: list[Obviated]
+        self, focus: IntEnum, obviated: list[Obviated]
     ) -> tuple[Activation | None, Activation | None, str]:
         """Take the activation to be executed from the agenda; also the next best, or the traceback of a source."""
         chosen: Activation | None = None
@@ -230,6 +226,8 @@ class Scheduler:
             try:
                 case = source.find_case(view, chosen.trigger)
                 effects = () if case is None else tuple(source.act(view, case))
+                if not all(effect.because for effect in effects):
+                    effects = self._reasoned(chosen, effects)
                 made, refused = self._apply(source, effects)
             except MissingEntryError as missing:
                 made, refused = self._ask(chosen, missing.request)
@@ -238,6 +236,26 @@ class Scheduler:
             return (), f"stale: {error}", ()
         except Exception:
             return (), RAISED + traceback.format_exc(limit=-4), ()
+
+    def _reasoned(self, chosen: Activation, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
+        """Effects that name no reasons rest on all that the act read: it is pure, so it is watched doing it again."""
+        view = TracedView(self.board, None)
+        case = chosen.source.bind(view, chosen.trigger)
+        tuple(chosen.source.act(view, case))
+        trigger = chosen.trigger.entry.ref
+        read = (trigger, *sorted(view.used - {trigger}, key=_by_number))
+        instead: dict[int, Effect] = {}
+        for effect in effects:
+            because = tuple(instead.get(id(reason), reason) for reason in effect.because) or read
+            instead[id(effect)] = effect._replace(because=because)
+        return tuple(instead.values())
+
+    def run(self, limit: int | None = None) -> int:
+        """Cycle until nothing is left to do, or so many times; how many cycles it took."""
+        cycles = 0
+        while (limit is None or cycles < limit) and self.step() is not None:
+            cycles += 1
+        return cycles
 
     def _apply(self, source: KnowledgeSource, effects: tuple[Effect, ...]) -> tuple[tuple[Change, ...], str]:
         alien = aliens(effects, source.writes)

@@ -11,15 +11,18 @@ above a level is in focus while all open discrepancies belong to it.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from functools import cache
 from itertools import groupby
-from typing import Literal
+from typing import Any, Literal
 
 from blackboard.board import View
 from blackboard.entry import Entry
 from blackboard.entry_store import Index
 from blackboard.kinds import inference
-from blackboard.level import Level
+from blackboard.level import Level, highest
 
 DiscrepancyStatus = Literal["open", "corrected", "escalated"]
 
@@ -66,7 +69,8 @@ class Discrepancy:
     @property
     def bound(self) -> float:
         """The bound of its own level."""
-        return math.inf if self.level is Level.GOAL else self.bounds[self.level]
+        levels = type(self.level)
+        return math.inf if self.level is highest(levels) else self.bounds[self.level - min(levels)]
 
     @property
     def is_open(self) -> bool:
@@ -88,7 +92,8 @@ class Discrepancy:
         """
         if not self.exceeds:
             raise ValueError(f"expected more than the bound of {self.bound} {self.unit}, got {self.magnitude}")
-        return replace(self, status="escalated"), replace(self, level=self.level.above, magnitude=None)
+        above = type(self.level)(self.level + 1)
+        return replace(self, status="escalated"), replace(self, level=above, magnitude=None)
 
     def sentence(self) -> str:
         if self.magnitude is None:
@@ -96,7 +101,7 @@ class Discrepancy:
         else:
             size = f"{self.magnitude:.2f} {self.unit}" if math.isfinite(self.magnitude) else "too large to be measured"
         head = "" if self.is_open else f"{self.status}: "
-        bound = "" if self.level is Level.GOAL else f", where up to {self.bound:.2f} {self.unit} may be corrected"
+        bound = "" if self.bound == math.inf else f", where up to {self.bound:.2f} {self.unit} may be corrected"
         return f"{head}{self.what}: {size}; discrepancy at the {self.level} level{bound}; {self.status}"
 
 
@@ -109,42 +114,44 @@ OPEN: Index[Discrepancy] = Index(Discrepancy, lambda found: found.level if found
 """Open discrepancies by their level."""
 
 
-Groups = tuple[tuple[Level, ...], ...]
+Groups = tuple[tuple[IntEnum, ...], ...]
 """Levels, those together that are equally near."""
 
 
-def _nearest(focus: Level) -> Groups:
-    def distance(level: Level) -> int:
+@cache
+def _nearest(levels: type[IntEnum], focus: int) -> Groups:
+    """All levels in groups, nearest to the focus first. Levels of two enums may be equal numbers: both are the key."""
+    def distance(level: IntEnum) -> int:
         return abs(level - focus)
 
-    return tuple(tuple(group) for _, group in groupby(sorted(Level, key=distance), key=distance))
-
-
-NEAREST: tuple[Groups, ...] = tuple(_nearest(focus) for focus in Level)
-"""For each level in focus: all levels in groups, nearest first."""
+    return tuple(tuple(group) for _, group in groupby(sorted(levels, key=distance), key=distance))
 
 
 @dataclass(frozen=True, slots=True)
 class Servoing:
-    """Which levels are switched on, and how the next activation is chosen."""
+    """Which levels there are, which are switched on, and how the next activation is chosen.
 
-    off: frozenset[Level] = field(default_factory=frozenset)
+    Attributes:
+        off: the levels whose loops are not closed.
+        levels: an ordered enum, lowest first; a system without a ladder may have one level.
+    """
 
-    def allows(self, closes: Level | None) -> bool:
+    off: frozenset[IntEnum] = field(default_factory=frozenset)
+    levels: type[IntEnum] = Level
+
+    def allows(self, closes: IntEnum | None) -> bool:
         """Whether a knowledge source that closes this loop may be activated."""
         return closes not in self.off
 
-    def focus(self, view: View) -> Level:
-        """The highest level with an open discrepancy; action where there is none."""
-        found = view.keys(OPEN)
-        if not found:
-            return Level.ACTION
-        return Level.GOAL if Level.GOAL in found else Level.PLAN if Level.PLAN in found else Level.ACTION
+    def focus(self, view: View) -> IntEnum:
+        """The highest level with an open discrepancy; the lowest where there is none."""
+        found: Collection[Any] = view.keys(OPEN)
+        return max(found) if found else min(self.levels)
 
-    def nearest(self, focus: Level) -> Groups:
+    def nearest(self, focus: IntEnum) -> Groups:
         """The levels, nearest to the focus first; two that are equally near stand together. Pure.
 
         This is the choice rule: the best rated activation of the nearest level that has any is executed, and of equally
         rated ones the oldest.
         """
-        return NEAREST[focus]
+        return _nearest(self.levels, focus)

@@ -15,15 +15,18 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeGuard, TypeVar, cast
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Generic, TypeGuard, TypeVar, cast, get_args
+
+import numpy as np
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Quiescence, Retracted, Revised
+from blackboard.decoding import Decoders, brief, decode
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref
 from blackboard.kinds import Registry
 from blackboard.servoing import Discrepancy
-from logs.decoding import decode
 from logs.mjpeg_file import Pictures
 from logs.run_errors import BadInput
 from world_models import words
@@ -213,6 +216,20 @@ class DecisionRecord:
         return as_line(self.data)
 
 
+def _array(value: Any, hint: tuple[Any, ...]) -> np.ndarray[Any, Any]:
+    """A frozen array from JSON types; the hint is that of its annotation. Raises ValueError."""
+    element = get_args(hint[1])[0]
+    try:
+        array = np.array(value, dtype=element)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"expected an array of {element.__name__}, got {brief(value)}") from None
+    array.setflags(write=False)
+    return array
+
+
+ARRAYS: Decoders = MappingProxyType({np.ndarray: _array})
+
+
 def as_line(data: Any) -> str:
     """JSON types as one line, as the journal writes them; equal lines mean equal values to the last bit."""
     return json.dumps(data, separators=(",", ":"))
@@ -369,7 +386,7 @@ def _value(
     if kind is CameraPicture and isinstance(fields, dict):
         fields = {**fields, "jpeg": b"" if pictures is None else _picture(record, pictures)}
     try:
-        value = decode(fields, FrameReference if kind is LocaleFrame else kind)
+        value = decode(fields, FrameReference if kind is LocaleFrame else kind, ARRAYS)
         return value if frames is None or kind is not LocaleFrame else frames.restore(value)
     except (ValueError, TypeError) as error:
         what = f"expected a {record.type} as this version has it, got another"

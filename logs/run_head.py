@@ -11,9 +11,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from blackboard.decoding import MisfitError, decode, fields_of
 from blackboard.journal import plain
 from logs.decided_by import arithmetic, deciding_code
-from logs.decoding import MisfitError, decode, fields_of
 from logs.run_errors import BadInput
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World

@@ -17,11 +17,13 @@ SAYS = {
     "ask_why": "replayed: every decision is the same",
     "build_a_world": "reached, ",
     "compare_seeds": "drawn in",
-    "hearsay": "heard: go to the kitchen\nbecause of Word-",
+    "hearsay": "heard: go to the kitchen\n",
     "read_a_run": "the belief was off by",
+    "recorded_model": "decided again without the model: the same",
     "revise_a_frame": "reached; replayed the same",
     "run_a_mission": "reached: every milestone",
     "solve_a_pose": "ok: True, 20 of 30 lines agree",
+    "sudoku": "4 3 2 1\nin ",
 }
 
 

@@ -57,7 +57,7 @@ def test_a_cycle_goes_in_order() -> None:
 
     pending = Scripted("pending", rate=0.1)
     source = Scripted(
-        "source", Tally, lambda v, t: said("act", [Post(Tally(2))]), rate=lambda v, t: said("rate", 0.9),
+        "source", Tally, lambda v, t: said("act", [Post(Tally(2), (t.entry,))]), rate=lambda v, t: said("rate", 0.9),
         where=lambda tally: tally.count == 1,
     )
     scheduler = Scheduler([pending, source], ports=[Port(heard)], sinks=[lambda d: heard.append("sink")])

@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[3]
 LINES = {
-    "blackboard": 1_800,
+    "blackboard": 2_200,
     "world_models": 9_880,
     "knowledge_sources": 22_300,
     "sim": 7_100,

@@ -6,17 +6,19 @@ import collections.abc
 import dataclasses
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from enum import Enum
 from typing import Any
-
-import numpy as np
 
 from blackboard.journal import NOT_FINITE
 
 WORDS: Mapping[type[Any], str] = {
     float: "a number", int: "a whole number", str: "a text", bool: "true or false", dict: "an object", list: "a list"}
 """What a user calls a type."""
+
+Decoders = Mapping[Any, Callable[[Any, tuple[Any, ...]], Any]]
+"""How values of other generic types, as arrays, come from JSON types and the arguments of the hint."""
+NO_OTHERS: Decoders = types.MappingProxyType({})
 
 
 class MisfitError(ValueError):
@@ -38,8 +40,8 @@ class MisfitError(ValueError):
         return MisfitError(name, str(error))
 
 
-def decode(value: Any, hint: Any) -> Any:
-    """A value of the type that a hint names, from JSON types. Numbers stay as they were written; arrays are frozen.
+def decode(value: Any, hint: Any, others: Decoders = NO_OTHERS) -> Any:
+    """A value of the type that a hint names, from JSON types. Numbers stay as they were written.
 
     Raises ValueError where it is of another type; names the field, what was expected and what came.
     """
@@ -47,80 +49,72 @@ def decode(value: Any, hint: Any) -> Any:
         return value
     origin = typing.get_origin(hint)
     if origin in (types.UnionType, typing.Union):
-        return None if value is None else decode(value, next(a for a in typing.get_args(hint) if a is not type(None)))
+        of = next(a for a in typing.get_args(hint) if a is not type(None))
+        return None if value is None else decode(value, of, others)
     if origin is typing.Literal:
         return _choice(value, typing.get_args(hint))
     if origin is collections.abc.Mapping:
         if not isinstance(value, dict):
-            raise ValueError(f"expected an object, got {_brief(value)}")
+            raise ValueError(f"expected an object, got {brief(value)}")
         return value
     if origin is tuple:
-        return _tuple(value, typing.get_args(hint))
-    if origin is np.ndarray:
-        return _array(value, typing.get_args(typing.get_args(hint)[1])[0])
+        return _tuple(value, typing.get_args(hint), others)
+    if origin in others:
+        return others[origin](value, typing.get_args(hint))
     if dataclasses.is_dataclass(hint) and isinstance(hint, type):
-        return _dataclass(value, hint)
+        return _dataclass(value, hint, others)
     if isinstance(hint, type) and issubclass(hint, Enum):
         return _member(value, hint)
     if hint is float and isinstance(value, str) and value in NOT_FINITE:
         return float(value)
     fits = isinstance(value, (int, float) if hint is float else hint)
     if not fits or (isinstance(value, bool) and hint is not bool):
-        raise ValueError(f"expected {WORDS.get(hint, hint.__name__)}, got {_brief(value)}")
+        raise ValueError(f"expected {WORDS.get(hint, hint.__name__)}, got {brief(value)}")
     return value
 
 
 def _choice(value: Any, choices: tuple[Any, ...]) -> Any:
     if value not in choices:
-        raise ValueError(f"expected one of {', '.join(map(str, choices))}, got {_brief(value)}")
+        raise ValueError(f"expected one of {', '.join(map(str, choices))}, got {brief(value)}")
     return value
-
-
-def _array(value: Any, element: type[Any]) -> Any:
-    try:
-        array = np.array(value, dtype=element)
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"expected an array of {element.__name__}, got {_brief(value)}") from None
-    array.setflags(write=False)
-    return array
 
 
 def _member(value: Any, kind: type[Enum]) -> Enum:
     names = {member.name.lower(): member for member in kind}
     if value not in names:
-        raise ValueError(f"expected one of {', '.join(names)}, got {_brief(value)}")
+        raise ValueError(f"expected one of {', '.join(names)}, got {brief(value)}")
     return names[value]
 
 
-def _tuple(value: Any, hints: tuple[Any, ...]) -> tuple[Any, ...]:
+def _tuple(value: Any, hints: tuple[Any, ...], others: Decoders) -> tuple[Any, ...]:
     if not isinstance(value, list):
-        raise ValueError(f"expected a list, got {_brief(value)}")
+        raise ValueError(f"expected a list, got {brief(value)}")
     kinds = hints[:1] * len(value) if Ellipsis in hints else hints
     if len(kinds) != len(value):
-        raise ValueError(f"expected {len(kinds)} items, got {_brief(value)}")
-    return tuple(decode(item, kind) for item, kind in zip(value, kinds, strict=True))
+        raise ValueError(f"expected {len(kinds)} items, got {brief(value)}")
+    return tuple(decode(item, kind, others) for item, kind in zip(value, kinds, strict=True))
 
 
-def _dataclass(value: Any, kind: type[Any]) -> Any:
+def _dataclass(value: Any, kind: type[Any], others: Decoders) -> Any:
     names = [field.name for field in dataclasses.fields(kind)]
     if not isinstance(value, dict) or sorted(value) != sorted(names):
-        raise ValueError(f"expected {kind.__name__} with {', '.join(names)}, got {_brief(value)}")
-    return kind(**fields_of(value, kind))
+        raise ValueError(f"expected {kind.__name__} with {', '.join(names)}, got {brief(value)}")
+    return kind(**fields_of(value, kind, others))
 
 
-def fields_of(value: Mapping[str, Any], kind: type[Any]) -> dict[str, Any]:
+def fields_of(value: Mapping[str, Any], kind: type[Any], others: Decoders = NO_OTHERS) -> dict[str, Any]:
     """The fields of a dataclass that JSON types tell, each of its type. Raises ValueError as :func:`decode` does."""
     hints, fields = typing.get_type_hints(kind), dict[str, Any]()
     for name, item in value.items():
         if name not in hints:
             raise ValueError(f"expected {', '.join(field.name for field in dataclasses.fields(kind))}, got {name!r}")
         try:
-            fields[name] = decode(item, hints[name])
+            fields[name] = decode(item, hints[name], others)
         except (ValueError, TypeError) as error:
             raise MisfitError.within(name, error) from None
     return fields
 
 
-def _brief(value: Any) -> str:
+def brief(value: Any) -> str:
     text = f"the keys {', '.join(value)}" if isinstance(value, dict) else repr(value)
     return text if len(text) < 300 else text[:297] + "..."
