@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -12,6 +13,8 @@ import experiments
 from driven_here import run_here
 from experiments.differences import doors, inexact, light, miscalibrated, obstacles, twins
 from experiments.drives import End, Trial
+from experiments.generated.door_missions import DoorMission
+from experiments.generated.missions import OFFICE, TwinMission
 from experiments.robustness import missions, soak
 from harvey.errors import BadInput
 
@@ -135,6 +138,40 @@ def test_the_memory_of_each_process_is_told_apart() -> None:
 def test_only_an_experiment_that_drives_missions_by_number_takes_their_number() -> None:
     with pytest.raises(BadInput, match="levels has no number of missions"):
         experiments.run("levels", quick=True, missions=3)
+
+
+SHORT = OFFICE.replace("max_cycles = 600", "max_cycles = 40")
+WRITERS: dict[ModuleType, tuple[str, str, Callable[[Path], Any]]] = {
+    doors: ("another way", "write_door_mission", lambda path: DoorMission(path, "")),
+    inexact: ("2 cm", "write_inexact_mission", lambda path: path),
+    light: ("flat", "write_light_mission", lambda path: path),
+    miscalibrated: ("as told", "write_camera_mission", lambda path: path),
+    obstacles: (obstacles.CAMERA, "write_mission", lambda path: path),
+    twins: (twins.RIGHT, "write_twin_mission", lambda path: TwinMission(path, "a", "a", 6)),
+    soak: ("flat", "write_soak_mission", lambda path: path),
+}
+"""A row of each, the writer of its missions, and what that returns of a scenario's file."""
+
+
+@pytest.mark.parametrize("experiment", [*WRITERS, missions], ids=lambda e: e.__name__.rpartition(".")[2])
+def test_a_mission_is_driven_and_told_of(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, experiment: ModuleType
+) -> None:
+    path = tmp_path / "short.toml"
+    path.write_text(SHORT, encoding="utf-8")
+    row, writer, written = WRITERS.get(experiment, (str(path), "drive", lambda _: experiment.drive))
+    if experiment in WRITERS:
+        monkeypatch.setattr(experiment, writer, lambda *_, **__: written(path))
+    found = experiment.drive(Trial(row, 0))
+    assert type(found) is OWN[experiment][0] and (found.row, found.seed) == (row, 0)
+    assert (found.outcome, found.false_accepts, found.contacts) == ("failed", 0, 0) and "cycles" in found.reason
+    assert found.verified >= 1 and found.path_m > 0.0 and found.robot_s > 0.0 and found.error_m > 0.1
+    if experiment is inexact:
+        assert len(found.chi2) == found.verified and not found.wrong
+    elif experiment is miscalibrated:
+        assert max(map(abs, found.found)) < 0.02
+    elif experiment is obstacles:
+        assert found.verdict == "failed" and found.shortest_m is not None and not found.false_obstacles
 
 
 @pytest.mark.slow
