@@ -8,9 +8,10 @@ from dataclasses import replace
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
+from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.questions import find_building
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.commands import read_places
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.task import Command, Goal, Outcome
@@ -18,7 +19,7 @@ from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 
 
-class Interpreter(OlderSource):
+class Interpreter(RobotKnowledgeSource):
     """Reads ``(ptrans (locale (x,y,z)) (locale (x,y,z)))``, from where to where, in feet in each locale's frame.
 
     It also understands "Go from the laboratory to Allen's office", from the middle of one room to that of another. The
@@ -29,16 +30,19 @@ class Interpreter(OlderSource):
     on = (Watch(Command, (Posted,)),)
     writes = (Goal, Hypothesis, Outcome)
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        command: Command = trigger.entry.value
+    def bind(self, view: View, trigger: Change) -> Entry[Command]:
+        return trigger.entry
+
+    def act(self, view: View, case: Entry[Command]) -> Iterable[Effect]:
+        command = case.value
         try:
             origin, destination = _read_places(find_building(view), command)
         except ValueError as error:
-            yield Post(Outcome("failed", f"the command was not understood: {error}"), (trigger.entry,))
+            yield Post(Outcome("failed", f"the command was not understood: {error}"), (case,))
             return
         pose = Pose2(origin.x_m, origin.y_m, command.start_heading_rad)
-        yield Post(Hypothesis(origin.locale, pose, command.start_covariance, "command"), (trigger.entry,))
-        yield Post(Goal(origin, destination), (trigger.entry,))
+        yield Post(Hypothesis(origin.locale, pose, command.start_covariance, "command"), (case,))
+        yield Post(Goal(origin, destination), (case,))
 
 
 def _read_places(building: FrameBuilding, command: Command) -> tuple[Place, Place]:

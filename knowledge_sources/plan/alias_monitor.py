@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,16 +22,27 @@ from knowledge_sources.methods.localization.place_odds import compute_prior, com
 from knowledge_sources.methods.localization.pose_candidates import are_distinct
 from knowledge_sources.methods.localization.refinement import compute_pose_likelihood
 from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_building, find_robot_in, is_over, open_discrepancy
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis, PlaceOdds, Twin, TwinOdds
-from world_models.entries.percepts import LineMatch, PoseFix, Segments
+from world_models.entries.percepts import PoseFix, Segments
 from world_models.entries.task import Certificate
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 
-class AliasMonitor(OlderSource):
+class Case(NamedTuple):
+    """A verified milestone with its pose and its picture, the belief, and the odds that are known, if any are."""
+
+    certificate: Entry[Certificate]
+    fix: Entry[PoseFix]
+    looked: Entry[Segments]
+    belief: Entry[Hypothesis]
+    known: Entry[TwinOdds] | None
+
+
+class AliasMonitor(RobotKnowledgeSource):
     """Keeps the odds of the believed place against the places that look like it, by every verified milestone.
 
     The first milestone is verified in each of many identical rooms. What the robot was told speaks for one of them;
@@ -39,27 +51,23 @@ class AliasMonitor(OlderSource):
     doubts its place at the goal level, and looks round.
     """
 
-    level = Level.PLAN
+    level, priority = Level.PLAN, Priority.ENTER
     on = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
     writes = (TwinOdds, Discrepancy)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        if is_over(view) or open_discrepancy(view, Level.GOAL) is not None or find_belief(view) is None:
-            return None
-        fix = view.get(trigger.entry.value.fix)
-        if fix is None:
-            return None
-        known = _find_odds(view)
-        return 1.0 if known is None or (known.value.twins and self._is_new(known.value, fix.value)) else None
-
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def bind(self, view: View, trigger: Change) -> Case | None:
         belief, fix = find_belief(view), view.get(trigger.entry.value.fix)
-        match = None if fix is None else view.get(fix.value.match)
-        if belief is None or fix is None or match is None:
-            return
-        looked = _segments_of(view, match)
+        if is_over(view) or open_discrepancy(view, Level.GOAL) is not None or belief is None or fix is None:
+            return None
+        known, match = _find_odds(view), view.get(fix.value.match)
+        looked = None if match is None else view.get(match.value.segments)
+        is_new = known is None or (known.value.twins and self._is_new(known.value, fix.value))
+        return Case(trigger.entry, fix, looked, belief, known) if is_new and looked is not None else None
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        certificate, fix, looked, belief, known = case
         robot, here = find_robot_in(view, belief.value.locale), fix.value.world_from_robot
-        known, s = _find_odds(view), self._settings.localization
+        s = self._settings.localization
         if known is None:
             p_prior = compute_prior(len(view.where(PlaceOdds, lambda _: True)), s)
             twins = self._find_twins(view, robot, belief.value, here)
@@ -68,9 +76,9 @@ class AliasMonitor(OlderSource):
         weighed = self._weigh(robot, looked.value, here, twins)
         odds = compute_twin_odds([twin.log_ratio for twin in weighed], p_prior)
         kept = tuple(twin for twin, p in zip(weighed, odds[1:], strict=True) if p >= s.min_p_twin)
-        counted = (*(() if known is None else known.value.counted), trigger.entry.id)
+        counted = (*(() if known is None else known.value.counted), certificate.id)
         found = TwinOdds(p_prior, odds[0], kept, counted, here)
-        because = (trigger.entry, fix, looked, belief)
+        because = (certificate, fix, looked, belief)
         change = Post(found, because) if known is None else Revise(known, found, (*because, known))
         yield change
         if odds[0] < s.min_p_tracked:
@@ -120,8 +128,3 @@ def _find_odds(view: View) -> Entry[TwinOdds] | None:
     known = view.latest(TwinOdds)
     found = view.latest(Discrepancy, lambda d: d.level is Level.GOAL)
     return None if known is None or (found is not None and found.cycle > known.cycle) else known
-
-
-def _segments_of(view: View, match: Entry[LineMatch]) -> Entry[Segments]:
-    entry: Entry[Segments] = view[match.value.segments]
-    return entry

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Revise
+from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.camera_knowledge import compute_camera_covariance, learn
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.priority import Priority
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.camera import YAW
 from world_models.entries.location import Travel, begin_travel
 from world_models.entries.percepts import PoseFix
@@ -19,29 +22,37 @@ from world_models.entries.robot_state import CameraState
 from world_models.entries.task import Certificate
 
 
-class CameraCalibrator(OlderSource):
+class Case(NamedTuple):
+    """A verified milestone whose pose fix says something of the camera, and the camera as it is known."""
+
+    certificate: Entry[Certificate]
+    fix: Entry[PoseFix]
+    camera: Entry[CameraState]
+
+
+class CameraCalibrator(RobotKnowledgeSource):
     """Takes over what the lines of a verified milestone say of the camera: tilt, roll, height, lens.
 
     The pose was solved for with the same camera, so it acts before the plan adjuster takes the pose over. After a knock
     the yaw is open again, and the way by which it was learnt ends.
     """
 
-    level = Level.PLAN
+    level, priority = Level.PLAN, Priority.ENTER
     on = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
     writes = (CameraState, Travel)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        fix = view.get(trigger.entry.value.fix)
-        return 1.0 if fix is not None and fix.value.camera_step else None
-
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
+    def bind(self, view: View, trigger: Change) -> Case | None:
         fix, camera = view.get(trigger.entry.value.fix), view.latest(CameraState)
-        if fix is None or camera is None:
-            return
-        f: PoseFix = fix.value
+        if fix is None or not fix.value.camera_step or camera is None:
+            return None
+        return Case(trigger.entry, fix, camera)
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        certificate, fix, camera = case
+        f = fix.value
         state = learn(camera.value, f.camera_step, np.array(f.camera_covariance), f.world_from_robot,
                       self._settings.camera_state)
-        learnt = Revise(camera, state, (trigger.entry, fix, camera))
+        learnt = Revise(camera, state, (certificate, fix, camera))
         yield learnt
         before = compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW]
         travel, variance = view.latest(Travel), state.covariance[YAW][YAW]

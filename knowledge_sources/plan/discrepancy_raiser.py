@@ -11,8 +11,9 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy, last_escalated
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import deepest_sketch, is_over
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.task import Outcome, PlanSketch
 
 GIVEN_UP: Mapping[Level, tuple[str, str]] = {
@@ -22,27 +23,27 @@ GIVEN_UP: Mapping[Level, tuple[str, str]] = {
 """The outcome when a level was asked too often, and its reason."""
 
 
-class DiscrepancyRaiser(OlderSource):
+class DiscrepancyRaiser(RobotKnowledgeSource):
     """Closes a discrepancy beyond its bound and posts it one level up; after too many, it ends the mission.
 
     The level above measures it by its own means. As each level is asked only so often, the same failure is not answered
     in the same way for ever.
     """
 
-    level = Level.PLAN
+    level, priority = Level.PLAN, Priority.ENTER
     on = (Watch(Discrepancy, where=lambda d: d.exceeds),)
     writes = (Discrepancy, Outcome)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        return 1.0
+    def bind(self, view: View, trigger: Change) -> Entry[Discrepancy]:
+        return trigger.entry
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        closed, raised = trigger.entry.value.escalated()
+    def act(self, view: View, case: Entry[Discrepancy]) -> Iterable[Effect]:
+        closed, raised = case.value.escalated()
         sketch = deepest_sketch(view) if raised.level is Level.PLAN else None
         tried, last = _describe_attempt(sketch), last_escalated(view, closed.level)
         times = 1 + (last.value.times if last is not None and last.value.tried == tried else 0)
         counted = tuple(entry for entry in (sketch, last) if entry is not None)
-        close = Revise(trigger.entry, replace(closed, tried=tried, times=times), (*trigger.entry.because, *counted))
+        close = Revise(case, replace(closed, tried=tried, times=times), (*case.because, *counted))
         yield close
         yield Post(raised, (close,))
         s = self._settings.plan

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
+from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.camera_knowledge import (
     RIGID_DISTANCE_M,
@@ -23,8 +25,9 @@ from knowledge_sources.camera_knowledge import (
 )
 from knowledge_sources.methods.localization.camera_matching import match_with_camera, rate_match
 from knowledge_sources.methods.matching import Match, PoseMatch, match_lines, match_on_floor
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_robot
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, Segments
 from world_models.entries.task import Milestone
@@ -36,7 +39,15 @@ MAX_RIGID_SIGMA_PX = 6.0  # up to this uncertainty lines are matched in the imag
 Floats = NDArray[np.float64]
 
 
-class Matcher(OlderSource):
+class Case(NamedTuple):
+    """The segments of a picture, the milestone that waits for it, and the belief from which it was predicted."""
+
+    segments: Entry[Segments]
+    milestone: Entry[Milestone]
+    belief: Entry[Hypothesis]
+
+
+class Matcher(RobotKnowledgeSource):
     """Matches the lines that a milestone expects to the segments of the picture.
 
     Search, objective and starts are §6.1's. Where the belief is sure enough, the projected model is fitted as a rigid
@@ -44,20 +55,19 @@ class Matcher(OlderSource):
     known, the pose and the camera's state are fitted together.
     """
 
-    level = Level.PLAN
+    level, priority = Level.PLAN, Priority.SEE
     on = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
     writes = (LineMatch,)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        milestone = view.get(trigger.entry.value.milestone)
-        return 0.8 if milestone is not None and milestone.value.status == "expected" and find_belief(view) else None
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        milestone, belief = view.get(trigger.entry.value.milestone), find_belief(view)
+        if milestone is None or milestone.value.status != "expected" or belief is None:
+            return None
+        return Case(trigger.entry, milestone, belief)
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        segments, belief = trigger.entry, find_belief(view)
-        milestone = view[segments.value.milestone]
-        if belief is None:
-            return
-        m: Milestone = milestone.value
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        segments, milestone, belief = case
+        m = milestone.value
         lines_world = np.array(m.expected, float).reshape(-1, 2, 3)
         data_px = segments.value.segments_px
         if not len(lines_world):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
+from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.camera_knowledge import (
     add_yaw,
@@ -23,15 +25,25 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.methods.pose.estimate import PlanarEstimate
 from knowledge_sources.methods.pose.with_camera import CameraEstimate, estimate_camera_and_pose
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_robot
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, PoseFix
 from world_models.entries.task import Milestone
 from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
 
 
-class MedRAndT(OlderSource):
+class Case(NamedTuple):
+    """The lines that were matched, the milestone that expected them, and the belief near which the pose is sought."""
+
+    match: Entry[LineMatch]
+    milestone: Entry[Milestone]
+    belief: Entry[Hypothesis]
+
+
+class MedRAndT(RobotKnowledgeSource):
     """Solves for the pose on the floor, and names the pairs that are outliers.
 
     The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose
@@ -40,18 +52,17 @@ class MedRAndT(OlderSource):
     pose's covariance. Where the model is inexact, its errors are integrated out, and nothing is learnt of the camera.
     """
 
-    level = Level.PLAN
+    level, priority = Level.PLAN, Priority.SEE
     on = (Watch(LineMatch, (Posted,)),)
     writes = (PoseFix,)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        return 0.8 if find_belief(view) is not None else None
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        milestone, belief = view.get(trigger.entry.value.milestone), find_belief(view)
+        return None if milestone is None or belief is None else Case(trigger.entry, milestone, belief)
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        match, belief, milestone = trigger.entry, find_belief(view), view.get(trigger.entry.value.milestone)
-        if belief is None or milestone is None:
-            return
-        m: Milestone = milestone.value
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        match, milestone, belief = case
+        m = milestone.value
         own, locale = self._settings.camera_state, belief.value.locale
         robot, camera = find_robot(view).on_floor_of(locale), find_camera(view)
         here = belief.value.world_from_robot(robot.world)

@@ -13,8 +13,9 @@ from blackboard.effect import Effect, to_say
 from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.methods.localization.views import CameraView, update_obstruction
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import active_goal, find_robot, unmeasured_doubt
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import Settings
 from world_models.camera import Camera
 from world_models.entries.obstacle import Obstruction
@@ -25,27 +26,26 @@ MIN_OBSTRUCTION_LOOKS = 3  # what stands still in so many looks is before the ca
 MIN_OBSTRUCTION_PART = 0.04  # smallest part of the picture that an obstruction covers
 
 
-class ObstructionFinder(OlderSource):
+class ObstructionFinder(RobotKnowledgeSource):
     """Finds what is at the same place in pictures taken in several directions: it is before the camera.
 
     It acts when a milestone was not testable or the belief is in doubt, before the new picture is judged. While the
     robot is lost, the relocalizer does the same with its own pictures.
     """
 
-    level = Level.PLAN
+    level, priority = Level.PLAN, Priority.REVISE
     on = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
     writes = (Obstruction,)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
+    def bind(self, view: View, trigger: Change) -> Effect | None:
+        """The change of what the board says of an obstruction; None where there is none."""
         milestone = view.get(trigger.entry.value.milestone)
         if milestone is None or not (milestone.value.tried or unmeasured_doubt(view) is not None):
             return None
-        return 0.9 if self._find_change(view) is not None else None
+        return self._find_change(view)
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        news = self._find_change(view)
-        if news is not None:
-            yield news
+    def act(self, view: View, case: Effect) -> Iterable[Effect]:
+        yield case
 
     def _find_change(self, view: View) -> Effect | None:
         """The obstruction in the last looks, as an effect where the board does not say it."""

@@ -3,40 +3,51 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Revise
+from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_building, open_discrepancy
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import PoseFix
 from world_models.entries.task import Certificate
 
 
-class PlanAdjuster(OlderSource):
+class Case(NamedTuple):
+    """A verified milestone with its pose, the belief, and the discrepancy within the plan level's bound."""
+
+    certificate: Entry[Certificate]
+    fix: Entry[PoseFix]
+    belief: Entry[Hypothesis]
+    found: Entry[Discrepancy]
+
+
+class PlanAdjuster(RobotKnowledgeSource):
     """Replaces the belief by the pose of a verified milestone, within the plan level's bound."""
 
-    level = Level.PLAN
-    closes = Level.PLAN
+    level = closes = Level.PLAN
+    priority = Priority.CORRECT
     on = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
     writes = (Hypothesis, Discrepancy)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        found = open_discrepancy(view, Level.PLAN)
-        return 0.9 if found is not None and not found.value.exceeds and find_belief(view) is not None else None
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        found, belief, fix = open_discrepancy(view, Level.PLAN), find_belief(view), view.get(trigger.entry.value.fix)
+        if found is None or found.value.exceeds or belief is None or fix is None:
+            return None
+        return Case(trigger.entry, fix, belief, found)
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, found, fix = find_belief(view), open_discrepancy(view, Level.PLAN), view.get(trigger.entry.value.fix)
-        if belief is None or found is None or fix is None:
-            return
-        pose_fix: PoseFix = fix.value
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        certificate, fix, belief, found = case
         here = Hypothesis.of_world(
-            find_building(view), belief.value.locale, pose_fix.world_from_robot, pose_fix.covariance, "milestone",
+            find_building(view), belief.value.locale, fix.value.world_from_robot, fix.value.covariance, "milestone",
             motion=belief.value.motion,
         )
-        correction = Revise(belief, here, (trigger.entry, fix, belief))
+        correction = Revise(belief, here, (certificate, fix, belief))
         yield correction
         yield Revise(found, found.value.corrected(), (correction,))

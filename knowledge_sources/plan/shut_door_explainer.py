@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from blackboard.board import View
 from blackboard.change import Change, Revised, Watch
@@ -31,6 +32,7 @@ from knowledge_sources.methods.doors.belief import (
 from knowledge_sources.methods.doors.leaf import describe, measure_opening, predict_opening, weigh_leaf
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import (
     find_belief,
     find_frames,
@@ -39,7 +41,7 @@ from knowledge_sources.questions import (
     is_up_to_date,
     open_discrepancy,
 )
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.body import CameraPicture
 from world_models.entries.door_state import DoorPicture, DoorState
@@ -58,7 +60,21 @@ MIN_FEW_SHARE = 0.6  # least share of these that must be there
 MIN_SURE_FRAME_SHARE = 0.8  # where there are fewer, least share of the opening's frame that has the model's color
 
 
-class ShutDoorExplainer(OlderSource):
+class Case(NamedTuple):
+    """A refuted milestone, the lines of its picture, what is believed and in doubt, and the doors in view.
+
+    Attributes:
+        doors: that are not believed to be shut.
+    """
+
+    milestone: Entry[Milestone]
+    segments: Entry[Segments]
+    belief: Entry[Hypothesis]
+    doubt: Entry[Discrepancy]
+    doors: tuple[Watched, ...]
+
+
+class ShutDoorExplainer(RobotKnowledgeSource):
     """Holds "I am where I believe, and this door is shut" against a picture by which a milestone was refuted.
 
     Through a door that is shut nothing is seen of what was expected there, so that the picture does not fit the belief.
@@ -67,40 +83,35 @@ class ShutDoorExplainer(OlderSource):
     its frame. Then the discrepancy is corrected: by the model, not by the belief.
     """
 
-    level = Level.PLAN
+    level, priority = Level.PLAN, Priority.ENTER
     on = (Watch(Milestone, (Revised,), lambda m: m.status in ("refuted", "not testable")),)
     writes = (DoorState, LocaleFrame, Discrepancy)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
+    def bind(self, view: View, trigger: Change) -> Case | None:
         belief, doubt = find_belief(view), open_discrepancy(view, Level.PLAN)
         if belief is None or doubt is None or not doubt.value.exceeds or is_over(view) or not is_up_to_date(view):
             return None
-        if open_discrepancy(view, Level.GOAL) is not None or _find_segments(view, trigger.entry) is None:
+        segments = _find_segments(view, trigger.entry)
+        if open_discrepancy(view, Level.GOAL) is not None or segments is None:
             return None
         if belief.value.sigma_m > MAX_DOUBTED_SIGMA_M or belief.value.sigma_rad > MAX_DOUBTED_SIGMA_RAD:
             return None
-        return 1.0 if any(not w.is_shut for w in list_doors_in_view(view, belief.value)) else None
+        doors = tuple(w for w in list_doors_in_view(view, belief.value) if not w.is_shut)
+        return Case(trigger.entry, segments, belief, doubt, doors) if doors else None
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, segments = find_belief(view), _find_segments(view, trigger.entry)
-        doubt = open_discrepancy(view, Level.PLAN)
-        if belief is None or segments is None or doubt is None:
-            return
-        for watched in list(list_doors_in_view(view, belief.value)):
-            if not watched.is_shut:
-                found = self._hold_against(view, watched, trigger.entry, belief, segments)
-                if found is not None:
-                    yield found
-                    frames = find_frames(view, watched.doorway.between)
-                    yield from shut_in_frames(watched.doorway.name, self.name, frames, found)
-                    yield Revise(doubt, doubt.value.corrected(), (found,))
-                    return
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        for watched in case.doors:
+            found = self._hold_against(view, watched, case)
+            if found is not None:
+                yield found
+                frames = find_frames(view, watched.doorway.between)
+                yield from shut_in_frames(watched.doorway.name, self.name, frames, found)
+                yield Revise(case.doubt, case.doubt.value.corrected(), (found,))
+                return
 
-    def _hold_against(
-        self, view: View, watched: Watched, milestone: Entry[Milestone], belief: Entry[Hypothesis],
-        segments: Entry[Segments],
-    ) -> Post | Revise | None:
+    def _hold_against(self, view: View, watched: Watched, case: Case) -> Post | Revise | None:
         """The door's state, where the picture says that it is shut and the robot where it believes to be."""
+        milestone, segments, belief, _, _ = case
         door, locale = watched.doorway, belief.value.locale
         frame: Entry[CameraPicture] = view[segments.value.frame]
         robot, frames = find_robot_in(view, locale), find_frames(view, door.between)

@@ -9,4 +9,5 @@ In reading order:
 * :mod:`pose_confidence`: both checks, and the distance from the belief, as eight numbers; logistic regression of these
   to the probability of a wrong pose (``verification_weights.toml``, fitted by ``harvey experiment
   milestones-calibrate``).
+* :mod:`weigh`: all of it for one picture of a milestone, and the verdict by that place alone.
 """

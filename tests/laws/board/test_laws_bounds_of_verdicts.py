@@ -26,14 +26,14 @@ from experiments.generated.missions import OFFICE
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
-from knowledge_sources.plan.milestone_judge import MilestoneJudge, Verdict, Weighed, _update
+from knowledge_sources.methods.verification.weigh import Verdict, Weighed, judge_place, update
+from knowledge_sources.plan.milestone_judge import Case, MilestoneJudge
 from knowledge_sources.questions import HELD, find_belief
 from knowledge_sources.settings import DEFAULT, Settings
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 from world_models.entries.location import diagonal
 from world_models.entries.percepts import Segments, Track, Tracks
-from world_models.entries.task import Milestone
 
 T = TypeVar("T")
 PLAN, VERIFICATION = DEFAULT.plan, DEFAULT.verification
@@ -80,7 +80,7 @@ FEW, REFUTE, CHI2 = VERIFICATION.min_matched_lines, POSE_CONFIDENCE.refute, DEFA
     ({"shift_px": 10.0 + SMALL, "is_enough": False}, "not testable"),
 ])
 def test_the_verdict_just_below_and_just_above_each_bound(changed: dict[str, Any], verdict: str) -> None:
-    assert MilestoneJudge()._first_verdict(weigh(**changed))[0] == verdict
+    assert judge_place(weigh(**changed), DEFAULT).kind == verdict
 
 
 @pytest.mark.parametrize(("modes", "told", "most"), [
@@ -89,14 +89,14 @@ def test_it_looks_again_as_often_as_it_may(modes: tuple[str, ...], told: float, 
     judge = MilestoneJudge()
     for tried in range(most + 2):
         milestone: Any = SimpleNamespace(displacement_modes=modes, log_odds_so_far=told, tried=(0.0,) * tried)
-        assert judge._may_look_again(Verdict("not testable", "", 0.1), milestone) is (tried + 1 < most)
-        assert not judge._may_look_again(Verdict("refuted", "", 0.1), milestone)
+        assert judge.may_look_again(Verdict("not testable", "", 0.1), milestone) is (tried + 1 < most)
+        assert not judge.may_look_again(Verdict("refuted", "", 0.1), milestone)
 
 
 @pytest.mark.parametrize("p", [0.001, 0.1, 0.5, 0.9])
 @pytest.mark.parametrize("log_odds", [-3.0, 0.0, 0.5, 3.0])
 def test_what_was_told_changes_the_odds_by_bayes_rule(p: float, log_odds: float) -> None:
-    updated = _update(p, log_odds)
+    updated = update(p, log_odds)
     assert updated / (1.0 - updated) == pytest.approx(p / (1.0 - p) * math.exp(log_odds))
 
 
@@ -150,6 +150,13 @@ def find_prior_at_bound(p_false: float) -> float:
     return odds / (1.0 + odds)
 
 
+def case_on(view: View, trigger: Change) -> Case:
+    """What the judge finds for a pose fix."""
+    case = MilestoneJudge().bind(view, trigger)
+    assert case is not None
+    return case
+
+
 def run_with(check: Callable[[Blackboard, Change], None]) -> None:
     """Drive a mission, and check something on the board before each judgement."""
     def sources(settings: Settings) -> list[Any]:
@@ -179,18 +186,17 @@ def test_each_state_of_the_robot_asks_for_its_own_evidence() -> None:
               "p_wrong_unfollowed": ((False, 0), (False, least - 1))}
 
     def check(board: Blackboard, trigger: Change) -> None:
-        fix = trigger.entry.value
-        milestone: Milestone = board.view[board.view[fix.match].value.milestone].value
         for own, boards in states.items():
             for in_doubt, followed in boards:
                 view = StateView(board, in_doubt, followed)
-                weighed = MilestoneJudge()._weigh(view, fix, milestone)
+                weighed = MilestoneJudge().weigh(view, case_on(view, trigger))
                 assert weighed.is_weak is (in_doubt or followed < least)
                 bound = find_prior_at_bound(weighed.p_false)
                 for value, enough in ((bound * 0.99, True), (bound + 0.01 * (1.0 - bound), False)):
                     others = {name: (0.999 if enough else 1e-9) for name in states if name != own}
                     judge = MilestoneJudge(tune(**others, **{own: value}))
-                    assert judge._weigh(view, fix, milestone).is_enough is enough, (own, in_doubt, followed, value)
+                    is_enough = judge.weigh(view, case_on(view, trigger)).is_enough
+                    assert is_enough is enough, (own, in_doubt, followed, value)
                 checked.append(own)
 
     run_with(check)
@@ -205,11 +211,9 @@ def test_landmarks_that_were_followed_speak_for_no_place_where_the_belief_leaves
     least, judge, checked = DEFAULT.action.min_followed_landmarks, MilestoneJudge(), []
 
     def check(board: Blackboard, trigger: Change) -> None:
-        fix = trigger.entry.value
-        milestone: Milestone = board.view[board.view[fix.match].value.milestone].value
-
         def weigh_at(sigma_rad: float) -> Weighed:
-            return judge._weigh(StateView(board, False, least, sigma_rad), fix, milestone)
+            view = StateView(board, False, least, sigma_rad)
+            return judge.weigh(view, case_on(view, trigger))
 
         by_pixel = 1.0 / (VERIFICATION.motion_tolerance_sigmas * weigh_at(1e-3).robot.camera.fx)
         sure, unsure = weigh_at(0.5 * PLAN.max_followed_px * by_pixel), weigh_at(12.0 * PLAN.max_followed_px * by_pixel)

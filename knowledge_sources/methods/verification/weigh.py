@@ -1,0 +1,217 @@
+"""What a picture says of a milestone: how much agrees, how far it is from where it was expected, and what follows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors
+from knowledge_sources.methods.verification.line_check import LineCheck, check_lines, find_errors, predict_lines
+from knowledge_sources.methods.verification.pose_confidence import (
+    POSE_CONFIDENCE,
+    compute_evidence,
+    compute_motion_tolerance_px,
+)
+from knowledge_sources.settings import Settings
+from world_models.entries.percepts import LineMatch, PoseFix, Segments
+from world_models.entries.task import Certificate, Milestone, MilestoneVerdict
+from world_models.frames import Pose2, wrap_angle
+from world_models.robot import RobotModel
+
+
+class Before(NamedTuple):
+    """What was believed before a look.
+
+    Attributes:
+        pose: world; covariance: of it, (3, 3).
+        in_doubt: whether that is in doubt; has_followed: whether landmarks were followed up to here.
+        is_as_put_down: whether it is no more than what the mission says of where the robot was put down.
+        is_camera_known: whether the camera's mounting is known well enough for a picture to be predicted.
+    """
+
+    pose: Pose2
+    covariance: Floats
+    in_doubt: bool
+    has_followed: bool
+    is_as_put_down: bool
+    is_camera_known: bool
+
+
+class Seen(NamedTuple):
+    """A picture, its line segments, what was expected in it, and the pose that was solved for by them."""
+
+    jpeg: bytes
+    segments: Segments
+    milestone: Milestone
+    fix: PoseFix
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Weighed:
+    """What a picture says of a milestone, before anything is decided.
+
+    Attributes:
+        robot: the model on the floor of the belief, behind what stands before its camera.
+        segments: of the picture.
+        pose: as solved for; before: as believed before the look.
+        expected: number of lines that should be seen.
+        lines: how they agree with the segments; faces: how the faces' colours agree.
+        p_false: probability that the pose is wrong, by lines and colours.
+        is_enough: whether that is little enough to accept the pose.
+        shift_px: median distance of the lines from where they were expected.
+        tolerance_px: the largest that may be.
+        is_inexact: whether the model's lines may be displaced.
+        is_weak: whether what was believed before adds little: it is in doubt, leaves much open in the picture, or no
+            landmarks were followed.
+        camera_chi2: squared distance of the camera, as solved for, from what was believed of it.
+        is_camera_known: whether the camera's mounting is known well enough for the picture to be predicted.
+    """
+
+    robot: RobotModel
+    segments: Segments
+    pose: Pose2
+    before: Pose2
+    expected: int
+    lines: LineCheck
+    faces: ColorCheck
+    p_false: float
+    is_enough: bool
+    shift_px: float
+    tolerance_px: float
+    is_weak: bool
+    is_inexact: bool
+    camera_chi2: float
+    is_camera_known: bool
+
+
+class Verdict(NamedTuple):
+    """What is decided: ``verified``, ``refuted`` or ``not testable``, in words why, and how likely it is wrong."""
+
+    kind: MilestoneVerdict
+    reason: str
+    p_false: float
+
+
+def weigh_picture(robot: RobotModel, seen: Seen, before: Before, settings: Settings) -> Weighed:
+    """Compare the lines and the colours of faces with the picture, and weigh them to a probability.
+
+    ``robot``: with the camera as it was solved for, where it was.
+    """
+    milestone, fix, segments_px, s = seen.milestone, seen.fix, seen.segments.segments_px, settings
+    lines, pose = np.array(milestone.expected, float).reshape(-1, 2, 3), fix.world_from_robot
+    agreed = check_lines(robot, lines, segments_px, pose, s.verification, milestone.errors, s.pose)
+    plain_px = agreed.projected_px if not milestone.displacement_modes else check_lines(
+        robot, lines, segments_px, pose, s.verification).projected_px
+    faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors, s)
+    p_false = POSE_CONFIDENCE.p_false(compute_evidence(
+        robot, lines, segments_px, pose, fix.covariance, before.pose, before.covariance, agreed, faces))
+    motion_px = compute_motion_tolerance_px(
+        robot, lines, before.pose, before.covariance + fix.covariance, s.verification)
+    followed = before.has_followed and motion_px <= s.plan.max_followed_px
+    expected_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
+    if fix.camera_step:  # how far the robot is from where it was believed, not the camera
+        expected_px = robot.camera.project_segments(lines, robot.camera_from_world(before.pose))[0]
+    p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed
+    p_wrong = update(s.plan.p_wrong_in_doubt if before.in_doubt else p_wrong, milestone.log_odds_so_far)
+    return Weighed(
+        robot=robot,
+        segments=seen.segments,
+        pose=pose,
+        before=before.pose,
+        expected=len(lines),
+        lines=agreed,
+        faces=faces,
+        p_false=p_false,
+        is_enough=POSE_CONFIDENCE.accepts(p_false, p_wrong),
+        shift_px=_median_shift(expected_px, plain_px),
+        tolerance_px=_find_tolerance_px(before, motion_px, POSE_CONFIDENCE.accepts(p_false), s),
+        is_weak=before.in_doubt or not followed,
+        is_inexact=bool(milestone.displacement_modes),
+        camera_chi2=fix.camera_chi2,
+        is_camera_known=before.is_camera_known,
+    )
+
+
+def _find_tolerance_px(before: Before, motion_px: float, is_sure: bool, settings: Settings) -> float:
+    """How far the lines may be from where they were expected [px]; ``is_sure``: so much agrees at the right place only.
+    """
+    tolerance_px, most_px = settings.action.min_tolerance_px + motion_px, settings.plan.max_deviation_px
+    if is_sure or before.in_doubt:
+        tolerance_px = most_px if before.in_doubt and not before.is_as_put_down else max(most_px, tolerance_px)
+    return tolerance_px if before.is_as_put_down or is_sure else min(tolerance_px, most_px)
+
+
+def judge_place(w: Weighed, settings: Settings) -> Verdict:
+    """The verdict by this place alone, and why."""
+    a, faces = w.lines.agreement, w.faces
+    if w.segments.contrast < settings.plan.min_contrast:
+        return Verdict("not testable", f"the frame is dark (contrast {w.segments.contrast:.1f} of 255)", w.p_false)
+    if w.expected < settings.verification.min_matched_lines:
+        return Verdict("not testable", f"only {w.expected} lines are expected in this view", w.p_false)
+    colours = f" and {round(faces.agreeing * faces.count)} of {faces.count} faces' colours" * faces.is_testable
+    found = f"{a.matched} of {a.visible} lines, {w.lines.coverage:.0%} of their length,{colours} accounted for"
+    if w.p_false >= POSE_CONFIDENCE.refute:
+        if not w.is_camera_known:  # a place where the camera's own error hides what agrees
+            return Verdict("not testable", f"{found}: the camera is not known well enough to tell", w.p_false)
+        kind: MilestoneVerdict = "not testable" if w.is_inexact else "refuted"
+        return Verdict(kind, f"{found}; at a wrong place {a.chance:.0%} are by chance", w.p_false)
+    where = f"{found}, {w.shift_px:.1f} px from where expected"
+    if w.camera_chi2 > settings.camera_state.max_chi2:
+        return Verdict("refuted", f"{where}: only with a camera that is mounted otherwise than it can be", w.p_false)
+    if not w.is_enough or a.matched < settings.verification.min_matched_lines:
+        return Verdict("not testable", f"{where}: not enough to tell the place by", w.p_false)
+    if w.shift_px > w.tolerance_px:
+        most = f"more than the {w.tolerance_px:.0f} px that the plan may be adjusted by"
+        return Verdict("refuted", f"{where}: {most}", w.p_false)
+    return Verdict("verified", where, w.p_false)
+
+
+def compute_coverage_elsewhere(w: Weighed, there: Pose2, settings: Settings) -> float:
+    """The part of the lines' length that the picture shows of what should be seen at another place, so corrected."""
+    corrected = there @ (w.before.inverse() @ w.pose)
+    lines = predict_lines(w.robot, corrected, settings.verification)
+    return check_lines(w.robot, lines.lines_world, w.segments.segments_px, corrected, settings.verification,
+                       find_errors(w.robot, lines), settings.pose).coverage
+
+
+def certify(names: tuple[str, str], w: Weighed, verdict: Verdict, fix: PoseFix, match: LineMatch) -> Certificate:
+    """The certificate of a verdict; ``names``: of the milestone and of the pose fix on the board."""
+    residuals = fix.residuals_px[fix.inliers]
+    return Certificate(
+        milestone=names[0],
+        fix=names[1],
+        verdict=verdict.kind,
+        reason=verdict.reason,
+        expected=w.expected,
+        matched=len(np.unique(match.pairs[:, 0])),
+        inliers=int(np.count_nonzero(fix.inliers)),
+        coverage=w.lines.coverage,
+        residual_px=float(np.sqrt(np.mean(residuals**2))) if len(residuals) else math.inf,
+        deviation_m=w.pose.distance_to(w.before),
+        deviation_rad=wrap_angle(w.pose.heading_rad - w.before.heading_rad),
+        deviation_px=w.shift_px,
+        tolerance_px=w.tolerance_px,
+        p_false=verdict.p_false,
+        faces=w.faces.count,
+        faces_alike=w.faces.agreeing,
+    )
+
+
+def update(p_wrong: float, log_odds: float) -> float:
+    """The probability of a wrong place after evidence, by Bayes' rule."""
+    if not log_odds:
+        return p_wrong
+    odds = p_wrong / (1.0 - p_wrong) * math.exp(log_odds)
+    return odds / (1.0 + odds)
+
+
+def _median_shift(before_px: Floats, after_px: Floats) -> float:
+    """Median distance of line middles before and after [px]; infinite where none is in view."""
+    shift = np.linalg.norm(before_px.mean(axis=1) - after_px.mean(axis=1), axis=1)
+    shift = shift[np.isfinite(shift)]
+    return float(np.median(shift)) if len(shift) else math.inf
