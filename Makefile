@@ -18,6 +18,9 @@ COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
+# Two at once; each takes neighbours, so that what the tests of a file share is seldom made twice.
+TWO := -n 2 --dist worksteal
+
 .PHONY: help run test test-rest test-all mutants environment site course lock clean
 
 help:
@@ -39,15 +42,15 @@ test: $(VENV)/.ready-to-test
 	@echo "== ruff" && $(BIN)/ruff check
 	@echo "== mypy" && $(BIN)/mypy
 	@echo "== import contracts" && $(BIN)/lint-imports
-	@echo "== pytest" && $(BIN)/pytest -n 2 -m "not slow" tests --ignore tests/installed --ignore tests/browser
+	@echo "== pytest" && $(BIN)/pytest $(TWO) -m "not slow" tests --ignore tests/installed --ignore tests/browser
 
 test-all: test test-rest
 
 test-rest: $(VENV)/.ready-to-test-all
 	@for extra in $(EXTRAS); do echo "== mypy $$extra" && $(BIN)/mypy $$extra/harvey_* || exit 1; done
 	@echo "== pytest of the extras, of an installation and in a browser" \
-		&& $(BIN)/pytest -n 2 $(wildcard extras/*/tests) tests/installed tests/browser
-	@echo "== pytest of what drives for minutes" && $(BIN)/pytest -n 2 -m slow tests
+		&& $(BIN)/pytest $(TWO) $(wildcard extras/*/tests) tests/installed tests/browser
+	@echo "== pytest of what drives for minutes" && $(BIN)/pytest $(TWO) -m slow tests
 
 # Minutes to hours; not in CI. Rooms and equivalent mutants: tests/mutation/rooms.toml.
 mutants: $(VENV)/.ready-to-test

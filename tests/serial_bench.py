@@ -6,7 +6,7 @@ import math
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -15,14 +15,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from blackboard.journal import Decision
 from experiments.robustness.serial_chaos import NOISES, Trial
 from experiments.robustness.serial_line import Findings, Killed, Noise, NoisyLine
 from harvey.hardware.bases import base_kinds
 from harvey.hardware.drivers.base_driver import Base, BaseFault
+from harvey.runner.result import MissionResult
+from harvey.simulation.simulated_run import run_mission
+from sim.body.simulated_body import SimulatedBody
 from sim.emulators.emulator import IdealGround
 from sim.emulators.emulator_registry import emulator_kinds
 from sim.emulators.line import PseudoTerminalLink
-from world_models.entries.body import MotorCommand
+from sim.faults.fault_registry import find_fault_class
+from sim.stage import Stage
+from world_models.entries.body import BodyFault, MotorCommand, Recovery
 from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD
 
 NEAR_M, NEAR_RAD = 0.011, math.radians(1.0)
@@ -357,3 +363,35 @@ def check_over_a_good_line_every_motion_is_done(protocol: str) -> None:
     Trial(protocol, np.random.default_rng(7), found, 0.0).run(5, 0.0)
     assert found.done == found.asked == 6
     assert not found.faults and not found.strays
+
+
+def drive_over(stage: Stage, body: str) -> tuple[MissionResult, list[Decision], list[Any]]:
+    """A mission whose body is behind a line: its result, its decisions, and the values of all that they made or saw."""
+    decisions = list[Decision]()
+    result = run_mission(stage, 3, body=body, sinks=[decisions.append])
+    return result, decisions, [c.entry.value for d in decisions for c in (*d.observed, *d.made)]
+
+
+def check_a_failing_line_is_waited_for(
+    stage: Stage, body: str, fault_kind: str, lasts_s: float, stands_after_s: float | None
+) -> None:
+    """It is told; nobody moves meanwhile, and from ``stands_after_s`` on the robot truly stands; it gets there."""
+    bodies, made = list[SimulatedBody](), Stage.body
+    fault = find_fault_class(fault_kind)(after_m=0.7, duration_s=lasts_s)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Stage, "body", lambda self, seed: bodies.append(made(self, seed)) or bodies[-1])
+        result, _, told = drive_over(replace(stage, scenario=replace(stage.scenario, faults=(fault,))), body)
+    assert result.outcome == "reached" and result.final_error_m < 0.0254, result.reason
+    faults = [v for v in told if isinstance(v, BodyFault)]
+    assert faults[0].part == "base" and faults[0].what in {"link lost", "base answers nonsense"}
+    assert faults[-1].status == "over"
+    assert any(isinstance(v, Recovery) and v.status == "over" for v in told)
+    at_fault = False
+    for value in told:
+        at_fault = value.is_open if isinstance(value, BodyFault) else at_fault
+        assert not (at_fault and isinstance(value, MotorCommand))
+    if stands_after_s is not None:
+        began_s = next(t.time_s for t in bodies[0].track if t.path_m >= 0.7)
+        still = [t.world_from_robot for t in bodies[0].track
+                 if began_s + stands_after_s < t.time_s < began_s + lasts_s]
+        assert still and all(pose == still[0] for pose in still)

@@ -9,24 +9,18 @@ from typing import Any
 import pytest
 
 from browser_pages import TELEPHONE
-from experiments.generated.missions import OFFICE, fault
-from harvey.campaign.campaign import Task, run_task
 from harvey.report.page import build_page
-from logs.run_directory import RunDirectory
 from logs.timeline import Timeline
+from recorded_runs import Recorded
 from report_contents import read_contents
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report(recorded: Recorded, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of a kidnap."""
-    folder = tmp_path_factory.mktemp("report")
-    (folder / "kidnapped.toml").write_text(
-        OFFICE + fault("kidnap", "allens-office", 3.0, distance_m=0.8, turn_deg=30.0), encoding="utf-8")
-    assert run_task(Task(str(folder / "kidnapped.toml"), (), 0, folder / "run")).outcome == "reached"
-    run = RunDirectory(folder / "run")
-    (folder / "report.html").write_text(build_page(run, Timeline(run.journal)), encoding="utf-8")
-    return folder / "report.html"
+    run, page = recorded("kidnap"), tmp_path_factory.mktemp("report") / "report.html"
+    page.write_text(build_page(run, Timeline(run.journal)), encoding="utf-8")
+    return page
 
 
 @pytest.fixture(scope="module")

@@ -24,6 +24,7 @@ def result_of(folder: Path) -> dict[str, object]:
     return found
 
 
+@pytest.mark.slow
 def test_dry_run_then_a_mission_in_which_line_and_camera_fail_and_come_back(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -58,6 +59,7 @@ def test_whoever_wants_it_to_stop_is_heeded_at_once(tmp_path: Path) -> None:
     assert main(["why", str(tmp_path / "run")]) == 0
 
 
+@pytest.mark.slow
 def test_a_mission_whose_process_was_killed_in_mid_move_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -16,6 +16,7 @@ def kept_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(trials, "RUNS", tmp_path)
 
 
+@pytest.mark.slow
 def test_the_levels_of_servoing_do_what_quick_claims() -> None:
     report = levels.run(quick=True, seed=0)
     assert report.holds, report.text()

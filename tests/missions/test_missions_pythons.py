@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from elsewhere import ROOT, SEED, drive_elsewhere
-from harvey.simulation.simulated_run import run_mission
-from sim.stage import Stage
+from elsewhere import ROOT, drive_elsewhere
+from recorded_runs import Recorded
 
 
 def _other_python() -> Path | None:
@@ -28,11 +27,9 @@ def _version(python: Path) -> str:
     return asked.stdout.strip()
 
 
-def test_another_python_writes_the_same_journal(short_stage: Stage, tmp_path: Path) -> None:
+def test_another_python_writes_the_same_journal(recorded: Recorded, tmp_path: Path) -> None:
     python = _other_python()
     if python is None:
         pytest.skip("no environment with another Python is here: make environment PYTHON=python3.13 VENV=.venv-3.13")
-    here, there = tmp_path / "here", tmp_path / "there"
-    run_mission(short_stage, SEED, out=here)
-    drive_elsewhere(python, there)
-    assert (here / "journal.jsonl").read_bytes() == (there / "journal.jsonl").read_bytes()
+    drive_elsewhere(python, tmp_path)
+    assert recorded("office").journal.read_bytes() == (tmp_path / "journal.jsonl").read_bytes()

@@ -9,6 +9,7 @@ import pytest
 
 from harvey.runner.result import MissionResult
 from harvey.simulation.simulated_run import run_mission
+from recorded_runs import Recorded
 from sim.stage import Stage
 
 INCH_M = 0.0254
@@ -19,9 +20,13 @@ KEYS = {
 
 
 @pytest.fixture(scope="module")
-def runs(short_stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Path, MissionResult]]:
-    out = [tmp_path_factory.mktemp("run") for _ in range(2)]
-    return [(path, run_mission(short_stage, 3, out=path)) for path in out]
+def runs(
+    recorded: Recorded, short_stage: Stage, tmp_path_factory: pytest.TempPathFactory
+) -> list[tuple[Path, MissionResult]]:
+    """One driven now, and that of the library, with the same result."""
+    out = tmp_path_factory.mktemp("run")
+    result = run_mission(short_stage, 3, out=out)
+    return [(out, result), (recorded("office").path, result)]
 
 
 def test_reaches_within_an_inch(runs: list[tuple[Path, MissionResult]]) -> None:

@@ -8,6 +8,7 @@ from rerun.chunk import RrdReader
 
 from experiments.generated.missions import OFFICE
 from harvey.simulation.simulated_run import run_mission
+from recorded_runs import Recorded
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 
@@ -28,9 +29,8 @@ def test_the_recording_shows_what_is_there_while_it_is(tmp_path: Path) -> None:
     assert count_rows(tmp_path / "recording.rrd", "/world/truth/added") == 2  # it comes, and it goes
 
 
-def test_where_nothing_differs_nothing_is_drawn(tmp_path: Path) -> None:
-    run_mission(build_stage(parse_scenario(OFFICE)), 3, out=tmp_path)
-    assert count_rows(tmp_path / "recording.rrd", "/world/truth/added") == 0
+def test_where_nothing_differs_nothing_is_drawn(recorded: Recorded) -> None:
+    assert count_rows(recorded("office").recording, "/world/truth/added") == 0
 
 
 def count_rows(recording: Path, path: str) -> int:

@@ -15,6 +15,7 @@ from harvey.simulation.simulated_run import build_head, run_mission
 from knowledge_sources.settings import list_rows
 from logs.records import DecisionRecord, read_records
 from logs.run_directory import RunDirectory
+from recorded_runs import Recorded
 from sim.stage import Stage
 
 SEEN, BEHIND, FAR = "allens-office/desk", "allens-office/bookshelf-1", "robot-laboratory/long-bench"
@@ -22,10 +23,8 @@ SEEN, BEHIND, FAR = "allens-office/desk", "allens-office/bookshelf-1", "robot-la
 
 
 @pytest.fixture(scope="module")
-def run(short_stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
-    out = tmp_path_factory.mktemp("runs") / "run"
-    assert run_mission(short_stage, 3, out=out).outcome == "reached"
-    return RunDirectory(out)
+def run(recorded: Recorded) -> RunDirectory:
+    return recorded("office")
 
 
 def rests_on(records: list[DecisionRecord], landmark: str) -> int:

@@ -8,31 +8,17 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from docs.tools.site.journal import SCHEMA
-from experiments.generated.missions import HALLWAY, fault
-from harvey.simulation.simulated_run import run_mission
 from journals import read_decisions, read_journal
 from logs.reader import read_frames, read_series
 from logs.recording.paths import CHAPTERS, HARVEY, TABLE, WHY
 from logs.run_directory import RunDirectory
-from sim.scenario import parse_scenario
-from sim.stage import build_stage
-
-SCENARIO = (
-    HALLWAY
-    + fault("bump", "hallway", 5.0, left_m=0.3, turn_deg=10.0)
-    + fault("kidnap", "hallway", 12.0, forward_m=0.8, turn_deg=15.0)
-    + fault("camera_unplugged", "", 2.0, duration_s=10.0)
-)
-"""Unplugged, pushed aside and carried off in the hallway."""
+from recorded_runs import Recorded
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
-    folder = tmp_path_factory.mktemp("faulty")
-    out = folder / "run"
-    out.mkdir()
-    run_mission(build_stage(parse_scenario(SCENARIO, "faulty")), 0, out=out)
-    return RunDirectory(out)
+def run(recorded: Recorded) -> RunDirectory:
+    """Unplugged, pushed aside and carried off in the hallway."""
+    return recorded("hallway")
 
 
 def test_every_field_of_every_decision_is_in_the_recording(run: RunDirectory) -> None:

@@ -8,22 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from experiments.generated.missions import OFFICE, fault
-from harvey.campaign.campaign import Task, run_task
 from harvey.report.page import build_page
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline
+from recorded_runs import Recorded
 from report_contents import read_contents
 from world_models.entries.body import CameraPicture
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
-    folder = tmp_path_factory.mktemp("report")
-    (folder / "kidnapped.toml").write_text(
-        OFFICE + fault("kidnap", "allens-office", 3.0, distance_m=0.8, turn_deg=30.0), encoding="utf-8")
-    assert run_task(Task(str(folder / "kidnapped.toml"), (), 0, folder / "run")).outcome == "reached"
-    return RunDirectory(folder / "run")
+def run(recorded: Recorded) -> RunDirectory:
+    return recorded("kidnap")
 
 
 @pytest.fixture(scope="module")

@@ -26,17 +26,16 @@ from logs.reader import damage_of, read_frames
 from logs.records import DecisionRecord, read_records
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
+from recorded_runs import Recorded
 from sim.stage import Stage
 
 SEED = 3
 
 
 @pytest.fixture(scope="module")
-def whole(short_stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+def whole(recorded: Recorded) -> RunDirectory:
     """A run that was not cut off."""
-    run = RunDirectory(tmp_path_factory.mktemp("runs") / "whole")
-    assert run_mission(short_stage, SEED, out=run.path).outcome == "reached"
-    return run
+    return recorded("office")
 
 
 def cut(whole: RunDirectory, to: Path, decisions: int, *, tail: int = 40) -> RunDirectory:

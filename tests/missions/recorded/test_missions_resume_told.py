@@ -10,14 +10,13 @@ import pytest
 from harvey.agent import build_agent
 from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains
-from harvey.simulation.simulated_run import resume_mission, run_mission
+from harvey.simulation.simulated_run import resume_mission
 from logs.records import DecisionRecord, read_records
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
+from recorded_runs import TOLD, Recorded
 from sim.stage import Stage
 from two_doors import two_doors
-
-TOLD = ((2.0, "study/bookshelf-1", "gone"), (3.0, "north-door", "shut"))
 
 
 @pytest.fixture(scope="module")
@@ -26,10 +25,8 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Stage:
 
 
 @pytest.fixture(scope="module")
-def whole(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
-    run = RunDirectory(tmp_path_factory.mktemp("runs") / "whole")
-    assert run_mission(stage, 3, out=run.path).outcome == "reached"
-    return run
+def whole(recorded: Recorded) -> RunDirectory:
+    return recorded("two doors")
 
 
 def records_of(run: RunDirectory) -> list[DecisionRecord]:

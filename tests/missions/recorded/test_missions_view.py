@@ -18,15 +18,14 @@ from PIL import Image
 import harvey
 from elsewhere import ROOT
 from harvey.cli import main
+from recorded_runs import Recorded
 
 HOSTING = re.compile(r"http://127\.0\.0\.1:(\d+)\?url=rerun%2Bhttp%3A%2F%2Flocalhost%3A(\d+)%2Fproxy")
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> harvey.RecordedRun:
-    out = tmp_path_factory.mktemp("viewed") / "run"
-    harvey.run("forty-foot-hallway", out=out, settings={"limits.max_cycles": 40})
-    return harvey.open_run(out)
+def run(recorded: Recorded) -> harvey.RecordedRun:
+    return harvey.open_run(recorded("office").path)
 
 
 def test_the_picture_of_a_cycle_is_the_newest_that_was_seen(

@@ -14,16 +14,15 @@ from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import build_head, resume_mission, run_mission
 from logs.records import EntryRecord, read_records
 from logs.run_directory import RunDirectory
+from recorded_runs import Recorded
 from sim.stage import Stage
 
 DESK = "allens-office/desk"
 
 
 @pytest.fixture(scope="module")
-def run(short_stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
-    out = tmp_path_factory.mktemp("runs") / "run"
-    assert run_mission(short_stage, 3, out=out).outcome == "reached"
-    return RunDirectory(out)
+def run(recorded: Recorded) -> RunDirectory:
+    return recorded("office")
 
 
 @pytest.fixture(scope="module")

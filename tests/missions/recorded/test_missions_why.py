@@ -15,10 +15,8 @@ import pytest
 
 from acting import rating
 from blackboard.scheduler import registry_of
-from experiments.generated.missions import OFFICE, fault
 from experiments.scale.explanations import write_hour
 from harvey.agent import Agent, build_agent
-from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
 from harvey.replay.why_not_again import AskedView, board_at, changes, why_absent
 from logs.explain.diff import grounds, parting, same
@@ -29,10 +27,10 @@ from logs.explain.why import lines_of, story
 from logs.explain.why_not import in_cycle
 from logs.run_head import RunHead
 from logs.timeline import Timeline
+from recorded_runs import Recorded
 from world_models.entries.entry_kinds import KINDS
 from world_models.entries.location import Hypothesis
 
-BUMPED = OFFICE + fault("bump", "allens-office", 3.0, left_m=0.3, turn_deg=10.0)
 KNOWN = registry_of((), KINDS)
 MOTION = re.compile(
     r"Harvey was told to .+ because the line to follow lay .+ (left|right) of where it believed that it faced,"
@@ -43,13 +41,8 @@ MOTION = re.compile(
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    folder = tmp_path_factory.mktemp("bumped")
-    scenario = folder / "bumped.toml"
-    scenario.write_text(BUMPED, encoding="utf-8")
-    for seed in (0, 1):
-        assert run_task(Task(str(scenario), (), seed, folder / str(seed))).outcome == "reached"
-    return folder / "0", folder / "1"
+def runs(recorded: Recorded) -> tuple[Path, Path]:
+    return recorded("bump").path, recorded("other bump").path
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
 from logs.explain.model import WorldFile
 from logs.explain.phrases import describe_decision
@@ -20,6 +19,7 @@ from logs.explain.why_not import Fate, in_cycle, in_run
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
 from logs.timeline import Timeline
+from recorded_runs import Recorded
 from world_models.files.toml.mission import ROOT
 from world_models.frame_store import FrameStore, elements_of
 
@@ -28,10 +28,8 @@ WHERE = re.compile(r"([\w-]+)(?: of ([\w-]+))? \(([\w/.-]+):(\d+)\)")
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
-    folder = tmp_path_factory.mktemp("told") / "shut-door"
-    run_task(Task("shut-door", (("limits.max_cycles", "300"),), 0, folder))
-    return RunDirectory(folder)
+def run(recorded: Recorded) -> RunDirectory:
+    return recorded("shut door")
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,8 @@ import pytest
 
 from harvey.errors import BadInput
 from harvey.hardware.hardware_run import count_pictures, time_of_last_observation
-from harvey.simulation.simulated_run import run_mission
 from logs.run_directory import RunDirectory
-from sim.stage import Stage
+from recorded_runs import Recorded
 
 
 def test_time_and_pictures_go_on_from_the_last_ones(short_run: RunDirectory) -> None:
@@ -37,13 +36,6 @@ def test_what_is_no_time_and_no_number_is_said(
         read(spoilt)
 
 
-@pytest.fixture(scope="module")
-def short_run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
-    from experiments.generated.missions import OFFICE
-    from sim.scenario import parse_scenario
-    from sim.stage import build_stage
-
-    out = tmp_path_factory.mktemp("run")
-    stage: Stage = build_stage(parse_scenario(OFFICE, "across-allens-office"))
-    run_mission(stage, 0, out=out)
-    return RunDirectory(out)
+@pytest.fixture
+def short_run(recorded: Recorded) -> RunDirectory:
+    return recorded("office")

@@ -198,8 +198,9 @@ def test_decisions_know_neither_wall_clock_nor_global_chance() -> None:
 
 
 def loops_over_sets(tree: ast.AST) -> list[ast.AST]:
-    loops = (n.iter for n in ast.walk(tree) if isinstance(n, ast.For | ast.comprehension))
-    return [i for i in loops if isinstance(i, ast.Set | ast.SetComp) or i in calls(tree, "set", "frozenset")]
+    made = [*calls(tree, "set", "frozenset"), *(n for n in ast.walk(tree) if isinstance(n, ast.Set | ast.SetComp))]
+    loops = [n.iter for n in ast.walk(tree) if isinstance(n, ast.For | ast.comprehension)] if made else []
+    return [i for i in loops if i in made]
 
 
 def test_no_set_is_gone_through_unsorted() -> None:
