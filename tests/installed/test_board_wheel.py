@@ -9,7 +9,17 @@ import sys
 import venv
 from pathlib import Path
 
+import pytest
+
 from elsewhere import ROOT
+
+
+@pytest.mark.parametrize(("example", "package"), [("greeter_py_trees", "py_trees"), ("greeter_clipspy", "clips")])
+def test_the_same_program_written_for_another_system_greets_as_well(example: str, package: str) -> None:
+    pytest.importorskip(package, reason=f"{package} is not installed here")
+    program = ROOT / "examples" / "peers" / f"{example}.py"
+    done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout == "hello, world\n"
 
 
 def test_the_hello_world_of_its_readme_runs_from_its_own_wheel(tmp_path: Path) -> None:
