@@ -82,7 +82,7 @@ class RunHead:
         if robot.deviation == NOT_STATED:
             del known["deviation"]
         return RunHead(
-            kind, name, seed, _portable(world), _sha256(world), plain(known), asdict(servo), plain(command), **more
+            kind, name, seed, _portable(world), fingerprint(world), plain(known), asdict(servo), plain(command), **more
         )
 
     def write(self, folder: Path) -> None:
@@ -135,7 +135,7 @@ class RunHead:
     def load_world(self) -> World:
         """The world that the robot believes in. Raises BadInput where its file has changed since."""
         path = ROOT / self.world
-        if _sha256_or_none(path) != self.world_sha256:
+        if not path.is_file() or fingerprint(path) != self.world_sha256:
             raise BadInput(f"{path}: expected the world file as it was when the run was made, got another or none")
         return _world(path, self.world_sha256)
 
@@ -169,7 +169,7 @@ def load_known_world(path: Path) -> World:
 
     Raises WorldError, OSError.
     """
-    return _world(ROOT / _portable(path), _sha256(path))
+    return _world(ROOT / _portable(path), fingerprint(path))
 
 
 @lru_cache(maxsize=1)  # with all that was computed of it: some 100 MB for a large floor
@@ -200,14 +200,3 @@ def _portable(path: Path) -> str:
     """A path that also holds where the project lies elsewhere."""
     there = path.resolve()
     return str(there.relative_to(ROOT)) if there.is_relative_to(ROOT) else str(there)
-
-
-def _sha256(path: Path) -> str:
-    return fingerprint(path)
-
-
-def _sha256_or_none(path: Path) -> str | None:
-    try:
-        return _sha256(path)
-    except OSError:
-        return None

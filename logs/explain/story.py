@@ -9,11 +9,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from logs.explain import phrases
+from logs.explain import phrases, turning_points
 from logs.explain.phrases import UNREADABLE, capital, named, plainly, sentence, wrap
-from logs.explain.turning_points import TurningPoint, at, read_collisions, read_turning_points, turn_lines
+from logs.explain.turning_points import TurningPoint, read_collisions, read_turning_points, turn_lines
 from logs.records import EntryRecord, is_a
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
@@ -245,13 +244,12 @@ def _cause(history: Timeline, ref: str) -> str:
 
 
 def tell_lost(history: Timeline) -> Section:
-    """Each time that it was lost: that nobody below the goal level could correct where it believed to be."""
+    """Each time that it was lost."""
     told: list[Sentence] = []
-    found = [record for record in history.of_kind(Hypothesis)
-             if not record.is_gone and record.field("basis") == "relocalization" and record.value.is_held]
+    found = [one for one in history.of_kind(Hypothesis)
+             if turning_points.may_turn(one) and turning_points.is_found(one.value)]
     for record in history.of_kind(Discrepancy):
-        is_escalated = not record.is_gone and record.field("status") == "escalated"
-        if is_escalated and record.value.level.above is Level.GOAL:
+        if turning_points.may_turn(record) and turning_points.is_lost(record.value):
             until = next((one for one in found if one.cycle >= record.cycle), None)
             told += sorted(_tell_loss(history, record, until), key=lambda one: one.cycle or 0)
     return Section("Lost and found", tuple(told) or (Sentence("It was never lost."),))
@@ -430,7 +428,7 @@ def story_lines(story: RunStory) -> Iterator[str]:
 
 
 def _section_lines(section: Section) -> Iterator[str]:
-    heads = ["" if one.cycle is None else at(one.cycle, one.time_s) for one in section.sentences]
+    heads = ["" if one.cycle is None else turning_points.at(one.cycle, one.time_s) for one in section.sentences]
     width = max(map(len, heads), default=0)
     for head, one in zip(heads, section.sentences, strict=True):
         yield wrap(named(one.text, one.refs), f"  {head:<{width}}" + "  " * (width > 0))

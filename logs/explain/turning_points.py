@@ -120,6 +120,16 @@ def _get(value: Any, name: str) -> Any:
     return getattr(value, name, None)
 
 
+def is_lost(value: Discrepancy) -> bool:
+    """Whether with it nobody below the goal level could correct where the robot believed to be."""
+    return value.status == "escalated" and value.level.above is Level.GOAL
+
+
+def is_found(value: Hypothesis) -> bool:
+    """Whether with it the robot knew again where it was."""
+    return value.is_held and value.basis == "relocalization"
+
+
 def _turns(
     changes: Iterable[Change], cycle: int, get: Get, believed: Believed, states: dict[str, str]
 ) -> Iterator[TurningPoint]:
@@ -144,11 +154,10 @@ def _turn(value: Any, is_new: bool, cycle: int, get: Get, believed: Believed, wa
         said = f"{words.metres(value.deviation_m)} off" if value.verdict == "verified" else value.reason
         yield TurningPoint(cycle, value.verdict, f"{what}: {said}")
     elif isinstance(value, Discrepancy) and value.status == "escalated":
-        is_lost = value.level.above is Level.GOAL
-        belief = believed(cycle) if is_lost else None
+        belief = believed(cycle) if is_lost(value) else None
         where = "" if belief is None else f"{belief.value.place()} by its belief; "
-        yield TurningPoint(cycle, "lost" if is_lost else "doubt", f"{where}{value.what}")
-    elif isinstance(value, Hypothesis) and value.is_held and value.basis == "relocalization":
+        yield TurningPoint(cycle, "lost" if is_lost(value) else "doubt", f"{where}{value.what}")
+    elif isinstance(value, Hypothesis) and is_found(value):
         yield TurningPoint(cycle, "found", f"{value.place()}; {value.evidence or 'it knows again where it is'}")
     elif isinstance(value, BodyFault):
         yield TurningPoint(cycle, "fault", f"{value.part}: {value.what}{'' if value.is_open else ', over'}")
@@ -183,14 +192,14 @@ def read_turning_points(history: Timeline, *, told: bool = False) -> Iterator[Tu
     beliefs = [ref for ref in history.refs if ref.startswith("Hypothesis-")]
     states: dict[str, str] = {}
     for cycle in sorted(cycles):
-        records = filter(_may_turn, history.decision(cycle).changes)
+        records = filter(may_turn, history.decision(cycle).changes)
         changes = [change for change in map(_change_of, records) if change is not None]
         found = _turns(changes, cycle, lambda id: _newest(history, id),
                        lambda then: _belief(history, beliefs, then), states)
         yield from (replace(point, time_s=history.time_at(cycle)) for point in found if point.is_told or not told)
 
 
-def _may_turn(record: EntryRecord[Any]) -> bool:
+def may_turn(record: EntryRecord[Any]) -> bool:
     """Whether a record can be a turning point, as far as is seen without decoding it."""
     if record.kind is Discrepancy:
         return not record.is_gone and record.field("status") == "escalated"

@@ -10,8 +10,7 @@ from pathlib import Path
 from blackboard.journal import Decision, decision_line
 from logs.mirror import Mirror, find_belief
 from logs.recording import loggers as built_in
-from logs.recording.logger import Logger, Subject, blueprint
-from logs.recording.moment import Difference, Held, Moment
+from logs.recording.logger import Difference, Held, Logger, Moment, Subject, blueprint
 from logs.recording.stream import LIVE_PORT, RecordingStream
 from logs.run_errors import RecordingError
 from world_models.building.geometry.faces import Face

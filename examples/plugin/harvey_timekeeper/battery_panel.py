@@ -8,8 +8,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from harvey_timekeeper.timekeeper import BATTERY_S
-from logs.recording.logger import Logger, Panel
-from logs.recording.moment import Moment
+from logs.recording.logger import Logger, Moment, Panel
 from logs.recording.stream import RecordingStream
 from world_models.entries.body import MotionReport
 

@@ -12,8 +12,7 @@ import rerun.blueprint as rrb
 from blackboard.change import Change, Retracted, Revised
 from blackboard.journal import Decision
 from blackboard.servoing import Discrepancy
-from logs.recording.logger import Logger, Panel, Subject, log_view
-from logs.recording.moment import Moment
+from logs.recording.logger import Logger, Moment, Panel, Subject, log_view
 from logs.recording.palette import DONE, LEVELS, REJECTED
 from logs.recording.paths import RECORDS, TABLE
 from logs.recording.stream import TROUBLE, Mixed, RecordingStream

@@ -12,8 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from blackboard.servoing import Discrepancy
-from logs.recording.logger import NEAR, Logger, Panel
-from logs.recording.moment import Moment
+from logs.recording.logger import NEAR, Logger, Moment, Panel
 from logs.recording.palette import BELIEVED, LEVELS, PLANNED, faint
 from logs.recording.paths import DEVIATION, HEADING, POSITION
 from logs.recording.stream import RecordingStream

@@ -11,8 +11,7 @@ from blackboard.agenda import Activation
 from blackboard.board import View
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from logs.recording.logger import NEAR, Logger, Panel, Subject
-from logs.recording.moment import Moment
+from logs.recording.logger import NEAR, Logger, Moment, Panel, Subject
 from logs.recording.palette import ACTIVITIES, LEVELS, REJECTED, Colour
 from logs.recording.paths import FAULTS, FOCUS, HARVEY
 from logs.recording.stream import RecordingStream, viewable

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from blackboard.board import View
 from logs.recording import paths
-from logs.recording.logger import Logger, Panel, Subject
-from logs.recording.moment import Held, Moment
+from logs.recording.logger import Held, Logger, Moment, Panel, Subject
 from logs.recording.palette import DONE, EXPECTED, FOUND, FREE, MATCHED, NOT_TESTABLE, PLANNED, REJECTED, Colour, faint
 from logs.recording.stream import Mixed, RecordingStream
 from world_models.camera import clip_segments

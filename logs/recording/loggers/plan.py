@@ -12,8 +12,7 @@ import rerun.blueprint as rrb
 
 from blackboard.board import View
 from blackboard.entry import Entry
-from logs.recording.logger import Logger, Panel
-from logs.recording.moment import Moment
+from logs.recording.logger import Logger, Moment, Panel
 from logs.recording.palette import DONE, EXPECTED, PLANNED, VERDICTS, WAITING, Colour, faint
 from logs.recording.paths import GOAL, LANDMARKS, LEG, PATH, SKETCH
 from logs.recording.stream import REFUTED, VERIFIED, Mixed, RecordingStream

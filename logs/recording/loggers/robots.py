@@ -11,9 +11,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from logs.recording.logger import Logger, Panel
+from logs.recording.logger import Logger, Moment, Panel
 from logs.recording.loggers.surroundings.model_building import space_view
-from logs.recording.moment import Moment
 from logs.recording.palette import BELIEVED, CANDIDATE, TRUE, Colour, faint
 from logs.recording.paths import (
     BELIEVED_BODY,

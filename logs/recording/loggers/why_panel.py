@@ -16,9 +16,8 @@ from blackboard.servoing import Discrepancy
 from logs.explain import phrases
 from logs.explain.turning_points import TurningPoint, TurningPointFinder
 from logs.mirror import find_belief
-from logs.recording.logger import Logger, Panel, Subject, log_view
+from logs.recording.logger import Logger, Moment, Panel, Subject, log_view
 from logs.recording.loggers.lanes import ACTIVITY_KINDS, activity, doubts, leg_under_way
-from logs.recording.moment import Moment
 from logs.recording.palette import BELIEVED, DONE, LEVELS, MATCHED, PLANNED, REJECTED, REVISED, TRUE, VERDICTS, Colour
 from logs.recording.paths import CHAPTERS, DESCRIPTION, WHY
 from logs.recording.stream import RecordingStream, viewable

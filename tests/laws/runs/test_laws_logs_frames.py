@@ -14,9 +14,8 @@ from blackboard.entry import Entry, Ref
 from blackboard.journal import Decision
 from blackboard.level import Level
 from logs.mirror import Mirror
-from logs.recording.logger import Subject
+from logs.recording.logger import Moment, Subject
 from logs.recording.loggers.surroundings.locale_frames import LocaleFrames, marks_path, outline_path
-from logs.recording.moment import Moment
 from logs.recording.palette import KNOWN, REVISED
 from logs.recording.paths import FRAME_LIST
 from logs.recording.stream import RecordingStream

@@ -9,9 +9,8 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from logs.recording.logger import Logger, Subject
+from logs.recording.logger import Logger, Moment, Subject
 from logs.recording.loggers.surroundings.model_building import Strip, across, strip
-from logs.recording.moment import Moment
 from logs.recording.palette import BELIEVED, EXPECTED, FREE, MATCHED, REJECTED, Colour, faint
 from logs.recording.paths import CONTACTS, DOORS, OBSTACLES, RANGES, SEEN_FLOOR
 from logs.recording.stream import RecordingStream

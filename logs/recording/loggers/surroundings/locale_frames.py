@@ -11,9 +11,8 @@ import rerun.blueprint as rrb
 
 from blackboard.change import Change, Retracted
 from blackboard.entry import Entry
-from logs.recording.logger import Logger, Panel, Subject
+from logs.recording.logger import Logger, Moment, Panel, Subject
 from logs.recording.loggers.surroundings.model_building import Strip, across, strip
-from logs.recording.moment import Moment
 from logs.recording.palette import KNOWN, REVISED
 from logs.recording.paths import FRAME_LIST, FRAMES
 from logs.recording.stream import RecordingStream, viewable

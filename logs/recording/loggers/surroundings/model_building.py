@@ -12,8 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from logs.recording.logger import BACKGROUND, Logger, Panel
-from logs.recording.moment import Moment
+from logs.recording.logger import BACKGROUND, Logger, Moment, Panel
 from logs.recording.palette import DOOR, NAME, REJECTED, TRUE, Colour
 from logs.recording.paths import BELIEVED_TRAIL, BUILDING, DOORWAYS, NAMES, TRUE_ADDED, TRUE_GONE, TRUE_TRAIL, WORLD
 from logs.recording.stream import RecordingStream, viewable
