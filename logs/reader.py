@@ -11,7 +11,7 @@ from typing import Any
 from rerun.chunk import RrdReader
 from rerun.error_utils import RerunWarning
 
-from logs.recording.loggers.picture import NUMBER
+from logs.recording.loggers.picture_overlays import NUMBER
 from logs.recording.paths import IMAGE, TRUE_ROBOT
 from logs.run_errors import RecordingError
 

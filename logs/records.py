@@ -28,6 +28,7 @@ from blackboard.entry import Entry, Ref
 from blackboard.kinds import Registry
 from blackboard.servoing import Discrepancy
 from logs.mjpeg_file import Pictures
+from logs.run_directory import check_version
 from logs.run_errors import BadInput
 from world_models import words
 from world_models.building.locale_frame import FrameReference, FrameRequest, LocaleFrame
@@ -243,6 +244,7 @@ def read_records(path: Path) -> Iterator[DecisionRecord]:
     Raises:
         BadInput: the file cannot be read, or a line is not the decision that follows on the line before; names both.
     """
+    check_version(path.parent)
     try:
         with path.open("rb") as file:
             for number, line in enumerate(file, 1):

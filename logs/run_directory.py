@@ -21,6 +21,8 @@ from logs.run_errors import BadInput
 RUNS = Path("runs")
 """Where runs are kept unless ``--out`` says otherwise."""
 FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json", "camera.toml")
+JOURNAL_VERSION = 2
+"""Of the names in journals; one that is older calls kinds, fields and knowledge sources otherwise (CHANGELOG.md)."""
 RESULT: Mapping[str, tuple[Any, str]] = {
     "scenario": (str, "a text"),
     "outcome": (str, "a text"),
@@ -87,6 +89,23 @@ class RunDirectory:
             raise
 
 
+def check_version(folder: Path) -> None:
+    """Raises BadInput where a run's journal is of another version; where nothing tells, it is read as it is."""
+    try:
+        head = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return
+    if isinstance(head, dict) and "world" in head:
+        refuse_version(folder, head.get("journal_version", 1))
+
+
+def refuse_version(folder: Path, version: object) -> None:
+    """Raises BadInput for any version but this program's."""
+    if version != JOURNAL_VERSION:
+        raise BadInput(f"{folder}: expected a run whose journal is of version {JOURNAL_VERSION}, got version {version};"
+                       " the program that made it reads it, and here the mission can be run again")
+
+
 def check_vacant(path: Path) -> Path:
     """A place where a run may be written: nothing, or an older run. Raises BadInput where there is anything else."""
     try:
@@ -143,12 +162,13 @@ def _free_beside(path: Path) -> Path:
 def open_run(text: str, needed: str = "journal.jsonl") -> RunDirectory:
     """The run that a user names: its directory, a file in it, or its name under ``runs/``.
 
-    Raises BadInput where there is none (near ones are listed), or it lacks the needed file.
+    Raises BadInput where there is none (near ones are listed), it is of another version, or it lacks the needed file.
     """
     run = RunDirectory(find_directory(text))
     inner = sorted(str(p.parent) for p in run.path.glob("*/journal.jsonl"))
     if inner and not run.journal.exists():
         raise BadInput(f"expected one run, got {text!r}, which holds {len(inner)} of them, as {inner[0]}")
+    check_version(run.path)
     if not (run.path / needed).is_file():
         raise BadInput(f"expected a run directory with a {needed}, got {text!r}, which has none")
     return run

@@ -14,6 +14,7 @@ from typing import Any, TypeVar, cast
 from blackboard.decoding import MisfitError, decode, fields_of
 from blackboard.journal import plain
 from logs.decided_by import arithmetic, deciding_code
+from logs.run_directory import JOURNAL_VERSION, refuse_version
 from logs.run_errors import BadInput
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
@@ -52,6 +53,7 @@ class RunHead:
             "" in a run that is older than that.
         plugins: the knowledge sources of other packages that decide too: name -> package and version.
         arithmetic: how the libraries calculated, as :func:`logs.decided_by.arithmetic` tells; "" in an older run.
+        journal_version: of the names in its journal; only this program's own is read.
     """
 
     kind: str
@@ -71,6 +73,7 @@ class RunHead:
     code: str = field(default_factory=deciding_code)
     arithmetic: str = field(default_factory=arithmetic)
     plugins: Mapping[str, str] = field(default_factory=lambda: dict(list_plugins(SOURCES_GROUP)))
+    journal_version: int = JOURNAL_VERSION
 
     @staticmethod
     def of(
@@ -93,7 +96,7 @@ class RunHead:
 
     @staticmethod
     def read(folder: Path) -> RunHead:
-        """Raises BadInput where ``run.json`` is missing or malformed."""
+        """Raises BadInput where ``run.json`` is missing or malformed, or the journal of another version."""
         path = folder / "run.json"
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
@@ -102,10 +105,11 @@ class RunHead:
         except (ValueError, RecursionError) as error:
             raise BadInput(f"{path}: expected JSON, got: {error}") from None
         try:
-            older = {"code": "", "arithmetic": "", "plugins": {}}
+            older = {"code": "", "arithmetic": "", "plugins": {}, "journal_version": 1}
             head: RunHead = decode({**older, **data} if isinstance(data, dict) else data, RunHead)
         except (ValueError, TypeError) as error:
             raise BadInput(f"{path}: {error}") from None
+        refuse_version(folder, head.journal_version)
         return head
 
     def is_like(self, other: RunHead) -> bool:

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from logs.records import Candidate, DecisionRecord, EntryRecord, check_step, decision_at, is_a
+from logs.run_directory import check_version
 from logs.run_errors import BadInput
 from world_models.building.locale_frame import FrameReference, LocaleFrame
 from world_models.entries.location import Hypothesis
@@ -42,7 +43,8 @@ class Timeline:
     """A run by its ``journal.jsonl``. A last line that was cut off in the middle of writing is left out."""
 
     def __init__(self, path: Path) -> None:
-        """Raises BadInput where the file cannot be read."""
+        """Raises BadInput where the file cannot be read, or is of another version."""
+        check_version(path.parent)
         try:
             self._data = path.read_bytes()
         except OSError as error:

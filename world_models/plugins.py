@@ -11,10 +11,10 @@
 ``harvey.commands``           a ``harvey.commands.command.CliCommand``; of a verb: ``world.import``
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
 ``harvey.exporters``          a ``harvey_buildings.exporters.Exporter``
+``harvey.experiments``        a module as those of ``experiments``
 ============================  ==========================================================================
 
-The name of an entry point is the name under which Harvey knows what it points to. What the folder ``extras`` has is
-added in the same way; of what is absent it can be said what to install.
+An entry point's name is the one that Harvey knows. ``extras`` are added so too; one that is absent can be named.
 """
 
 from __future__ import annotations

@@ -80,7 +80,7 @@ def _runs(text: str) -> list[RunDirectory]:
     here = find_directory(text)
     if not _is_campaign(here):
         return [open_run(text)]
-    return [RunDirectory(path) for path in sorted((p.parent for p in here.glob("*/journal.jsonl")), key=_natural)]
+    return [open_run(str(path)) for path in sorted((p.parent for p in here.glob("*/journal.jsonl")), key=_natural)]
 
 
 def _is_campaign(here: Path) -> bool:

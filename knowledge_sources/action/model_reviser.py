@@ -17,7 +17,7 @@ from world_models.entries.user_reports import DOOR_STATES, UserReport
 
 
 class ModelReviser(OlderSource):
-    """Revises the frames that have a door or a thing of which somebody told the robot that it is otherwise.
+    """Revises the frames of a door or a thing that somebody says is otherwise.
 
     A door is in the frames of both its rooms. What cannot be taken up, because the model has nothing of that name, is
     answered, and nothing is revised. It acts at once, before the next increment: the door may be just ahead.

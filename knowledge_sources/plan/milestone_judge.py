@@ -19,7 +19,7 @@ from knowledge_sources.camera_knowledge import add_yaw, compute_camera_covarianc
 from knowledge_sources.methods.localization.aliasing import find_strongest_alias
 from knowledge_sources.methods.verification.weigh import (
     Before,
-    Seen,
+    PictureEvidence,
     Verdict,
     Weighed,
     certify,
@@ -110,7 +110,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         before = Before(
             belief.world_from_robot(robot.world), covariance, open_discrepancy(view, Level.PLAN) is not None,
             has_followed(view, s.action), belief.basis == "command", is_camera_known(robot, known, s))
-        seen = Seen(case.frame.value.jpeg, case.segments.value, case.milestone.value, fix)
+        seen = PictureEvidence(case.frame.value.jpeg, case.segments.value, case.milestone.value, fix)
         return weigh_picture(robot, seen, before, s)
 
     def _hold_against_others(self, view: View, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:

@@ -226,8 +226,7 @@ class Milestone:
         expected: the visible model lines, ((x0, y0, z0), (x1, y1, z1)) [m, world].
         expected_px: their expected projection, ((u0, v0), (u1, v1)).
         landmark_of: for each line, its index in ``landmarks``.
-        face_colors: the faces that should be seen, each as its colour (red, green, blue; 0..1) and points of it
-            [m, world].
+        face_colors: of each face that should be seen its colour (red, green, blue; 0..1) and points [m, world].
         tried: headings from which it was looked for before, and could not be told [rad, world].
         displacement_modes: what of the model may be displaced as one: walls, doors, things; none where it is exact.
         displacements: by how much a standard deviation of a mode displaces a line: (mode, line, x, y, z [m, world]).

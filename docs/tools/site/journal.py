@@ -1,7 +1,7 @@
 """The reference of ``journal.jsonl``, and its JSON Schema, from the kinds of entries.
 
 ``python -m docs.tools.site.journal`` writes the schema anew. Where a reader of the old journal would fail on the new
-one, raise ``VERSION`` first.
+one, raise :data:`logs.run_directory.JOURNAL_VERSION` first.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from blackboard.kinds import Role, kind_of
 from blackboard.level import Level
 from docs.tools.site.markdown import describe_fields, escape, summary, table
 from harvey.wiring import load_kinds
+from logs.run_directory import JOURNAL_VERSION
 
-VERSION = 1
 SCHEMA = Path(__file__).parents[2] / "reference" / "journal.schema.json"
 ROLES: Mapping[Role, str] = {
     Role.OBSERVATION: "Observations: from outside", Role.REQUEST: "Requests: what ports act on",
@@ -94,8 +94,8 @@ def build_schema() -> dict[str, Any]:
         "chosen": either, "runner_up": either, "pending": {"type": "integer", "minimum": 0}, "made": changes,
         "refused": {"type": "string"}}, used=REFS)
     return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema", "$id": f"harvey-journal-{VERSION}",
-        "title": f"A decision: one line of journal.jsonl, version {VERSION}", **decision,
+        "$schema": "https://json-schema.org/draft/2020-12/schema", "$id": f"harvey-journal-{JOURNAL_VERSION}",
+        "title": f"A decision: one line of journal.jsonl, version {JOURNAL_VERSION}", **decision,
         "$defs": {
             "change": {**change, "allOf": by_type}, "activation": _object(activation), **dict(sorted(parts.items()))},
     }

@@ -42,7 +42,7 @@ class Before(NamedTuple):
     is_camera_known: bool
 
 
-class Seen(NamedTuple):
+class PictureEvidence(NamedTuple):
     """A picture, its line segments, what was expected in it, and the pose that was solved for by them."""
 
     jpeg: bytes
@@ -97,7 +97,7 @@ class Verdict(NamedTuple):
     p_false: float
 
 
-def weigh_picture(robot: RobotModel, seen: Seen, before: Before, settings: Settings) -> Weighed:
+def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, settings: Settings) -> Weighed:
     """Compare the lines and the colours of faces with the picture, and weigh them to a probability.
 
     ``robot``: with the camera as it was solved for, where it was.

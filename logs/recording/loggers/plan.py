@@ -88,7 +88,7 @@ MARKS: Mapping[str, str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class OutlineRow:
     """One row of the outline; ``after`` is the row that it hangs on, or ""."""
 
     id: str
@@ -122,18 +122,18 @@ class SketchTree(Logger):
                        edges=[(n.after, n.id) for n in nodes if n.after])
 
 
-def outline(board: View) -> list[Node]:
+def outline(board: View) -> list[OutlineRow]:
     """The rows of the newest goal's tree from top to bottom; finished sketches are folded into their subgoal."""
     goal = board.latest(Goal)
     if goal is None:
         return []
     label = f"{goal.id}: be in {goal.value.destination.locale} ({goal.value.status})"
-    root = Node(goal.id, label, DONE if goal.value.status == "reached" else PLANNED, 0, "")
+    root = OutlineRow(goal.id, label, DONE if goal.value.status == "reached" else PLANNED, 0, "")
     rows = list(_rows(board, goal.id, (), root))
-    return [root, *rows] if rows else [root, Node(f"{goal.id}/none", NO_SKETCH, WAITING, 1, goal.id)]
+    return [root, *rows] if rows else [root, OutlineRow(f"{goal.id}/none", NO_SKETCH, WAITING, 1, goal.id)]
 
 
-def _rows(board: View, goal: str, path: tuple[int, ...], parent: Node) -> Iterator[Node]:
+def _rows(board: View, goal: str, path: tuple[int, ...], parent: OutlineRow) -> Iterator[OutlineRow]:
     sketch = board.latest(PlanSketch, lambda s: s.goal == goal and s.path == path and s.status != "superseded")
     if sketch is None or (sketch.value.status == "done" and path):
         return
@@ -144,13 +144,13 @@ def _rows(board: View, goal: str, path: tuple[int, ...], parent: Node) -> Iterat
         if number < len(value.subgoals):
             behind = value.status == "done" or number < value.at
             colour = DONE if behind else PLANNED if number == value.at and value.is_active else WAITING
-            last = Node(f"{sketch.id}/subgoal-{number}", _subgoal_label(value.subgoals[number]), colour,
-                        parent.depth + 1, last.id)
+            last = OutlineRow(f"{sketch.id}/subgoal-{number}", _subgoal_label(value.subgoals[number]), colour,
+                              parent.depth + 1, last.id)
             yield last
             yield from _rows(board, goal, (*path, number), last)
 
 
-def _milestone_node(board: View, sketch: Entry[PlanSketch], number: int, depth: int, after: str) -> Node:
+def _milestone_node(board: View, sketch: Entry[PlanSketch], number: int, depth: int, after: str) -> OutlineRow:
     """What the sketch holds of a milestone counts most, then the last look at it."""
     value = sketch.value
     what = board.latest(Milestone, lambda m: m.sketch == sketch.id and m.index == number)
@@ -158,7 +158,7 @@ def _milestone_node(board: View, sketch: Entry[PlanSketch], number: int, depth: 
     verdict = "verified" if is_verified else what.value.status if what else ""
     text = short(what.value.what.removeprefix(f"M{number} ")) if what and what.value.is_open else ""
     label = f"{MARKS.get(verdict, '·')} M{number} {text}".rstrip()
-    return Node(f"{sketch.id}/milestone-{number}", label, VERDICTS.get(verdict, WAITING), depth, after)
+    return OutlineRow(f"{sketch.id}/milestone-{number}", label, VERDICTS.get(verdict, WAITING), depth, after)
 
 
 def _subgoal_label(subgoal: Subgoal) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sim.render.light.light_map import LightMap
 from sim.render.light.lit_shading import NO_MIRROR, shade_lit
-from sim.render.light.mirror import before_plane, mirror_camera
+from sim.render.light.mirrored_camera import before_plane, mirror_camera
 from sim.render.mesh import MeshView, Pinhole, project_mesh
 from sim.render.pieces import Pieces, split_pieces
 from sim.render.rasterizer import find_visible_patches, sample_offsets

@@ -22,7 +22,7 @@ from sim.render.light.lamps import Lamp, Room, hang_lamps
 from sim.render.light.light_map import lay_light_map
 from sim.render.light.lighting import GAMMA, Lighting
 from sim.render.light.lights import Lights
-from sim.render.light.mirror import mirror_camera
+from sim.render.light.mirrored_camera import mirror_camera
 from sim.render.light.panes import find_panes
 from sim.render.light.rays import build_ray_tree, first_hits
 from sim.render.light.sun_patches import find_sun_patches

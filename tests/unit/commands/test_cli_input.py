@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from harvey.cli import main
 from harvey.commands import MODULES
 from harvey.commands.world_command import VERBS
-from logs.run_directory import prepare_directory
+from logs.run_directory import JOURNAL_VERSION, check_version, prepare_directory
 from sim.scenario import SCENARIOS
 from world_models.entries.task import Outcome
 
@@ -26,7 +26,7 @@ DECISION = {"cycle": 1, "focus": "action", "observed": [], "seen": [], "activate
 
 HEAD = {"kind": "simulator", "name": "bump", "seed": 0, "world": "", "world_sha256": "", "robot": {}, "servo": {},
         "command": {}, "without": [], "constants": [], "scenario": {}, "folder": "", "body": "simulated",
-        "harvey": version("harvey")}
+        "harvey": version("harvey"), "journal_version": JOURNAL_VERSION}
 
 
 SMALL_WORLD = """name = "cottage"
@@ -336,3 +336,26 @@ def test_a_damaged_world_never_ends_in_a_traceback(data: st.DataObject, tmp_path
     file = tmp_path / "world.toml"
     file.write_bytes(data.draw(damaged(SMALL_WORLD.encode())))
     assert main(["world", "check", str(file)]) in (0, 2)
+
+
+@pytest.mark.parametrize("argv", [
+    ["why", "RUN"], ["why", "RUN", "when was it lost?"], ["why", "RUN", "--not", "motor"], ["story", "RUN"],
+    ["replay", "RUN"], ["replay", "RUN", "--without", "motor"], ["resume", "RUN"], ["repair", "RUN"],
+    ["diff", "RUN", "RUN"], ["report", "RUN"], ["report", "RUN", "RUN"], ["view", "RUN"], ["view", "RUN", "RUN"],
+    ["export", "RUN", "--csv", "OUT"],
+])
+@pytest.mark.parametrize("older", [1, 3, "2", None])
+def test_a_journal_of_another_version_is_refused_by_all_who_read_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], argv: list[str], older: object
+) -> None:
+    """None: as the first version had it, which did not name one. Nothing is written."""
+    run = Path(journalled(tmp_path / "run", json.dumps(DECISION)))
+    check_version(run)
+    (run / "run.json").write_text(json.dumps({key: value for key, value in HEAD.items() if key != "journal_version"} | (
+        {} if older is None else {"journal_version": older})))
+    before = sorted(tmp_path.rglob("*"))
+    code, words = said(capsys, [{"RUN": str(run), "OUT": str(tmp_path / "out")}.get(word, word) for word in argv])
+    got = 1 if older is None else older
+    wanted = f"expected a run whose journal is of version {JOURNAL_VERSION}, got version {got}"
+    assert code == 2 and wanted in words and words.count("\n") <= 1
+    assert sorted(tmp_path.rglob("*")) == before

@@ -6,6 +6,7 @@ import ast
 import importlib
 import sys
 import tomllib
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -210,3 +211,21 @@ def test_no_set_is_gone_through_unsorted() -> None:
 
 def test_every_module_says_what_it_is() -> None:
     assert [str(p) for p, tree in SOURCES.items() if p.name != "__init__.py" and not ast.get_docstring(tree)] == []
+
+
+def test_a_public_class_and_a_file_have_their_name_for_themselves() -> None:
+    """In the product and what extends it: who reads a name knows what it is, and who looks for it finds one.
+
+    But ``Case``: what a rule binds, and its own file alone acts on.
+    """
+    files = [path for path in FILES if path.relative_to(ROOT).parts[0] != "experiments"]
+    files += sorted(path for path in (ROOT / "extras").glob("*/harvey_*/**/*.py") if "experiments" not in path.parts)
+    classes, names = defaultdict(list), defaultdict(list)
+    for path in files:
+        if path.name != "__init__.py":
+            names[path.name].append(str(path.relative_to(ROOT)))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_") and node.name != "Case":
+                classes[node.name].append(str(path.relative_to(ROOT)))
+    assert names["scheduler.py"] == ["blackboard/scheduler.py"] and "extras" in str(names) and "Scheduler" in classes
+    assert [(name, where) for name, where in (*names.items(), *classes.items()) if len(where) > 1] == []

@@ -56,7 +56,7 @@ def test_every_kind_of_entry_is_there() -> None:
 
 
 def test_the_schema_of_the_journal_is_current() -> None:
-    """``python -m docs.tools.site.journal`` writes it; raise its VERSION where a reader of the old one would fail."""
+    """``python -m docs.tools.site.journal`` writes it; ``JOURNAL_VERSION`` is raised where a reader would fail."""
     assert journal.SCHEMA.read_text(encoding="utf-8") == journal.format_schema()
 
 

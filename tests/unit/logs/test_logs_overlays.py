@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from logs.recording.loggers.picture import LABEL_PX
+from logs.recording.loggers.picture_overlays import LABEL_PX
 from logs.recording.paths import DRIFTS, EXPECTED, IMAGE, LANDMARK_NAMES, MATCHED, SEGMENTS, WINDOWS
 from logs.recording.writer import RecordingWriter
 from scripted_mission import CAMERA, MOUNT, house, play
