@@ -14,7 +14,7 @@ from types import FunctionType
 from typing import TYPE_CHECKING
 
 from harvey.errors import BadInput
-from world_models.plugins import EXTRAS, list_absent, load_plugins
+from world_models.plugins import list_absent, list_plugins, load_plugins
 
 if TYPE_CHECKING:
     from experiments.report import Report
@@ -70,8 +70,8 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
 
 
 def list_names() -> tuple[str, ...]:
-    """Return the names of all experiments."""
-    return tuple(name for group in EXPERIMENTS.values() for name in group)
+    """Return the names of all experiments, those that other packages add last."""
+    return tuple(dict.fromkeys([*(name for group in EXPERIMENTS.values() for name in group), *list_plugins(GROUP)]))
 
 
 def run(name: str, *, quick: bool = False, seed: int = 0, missions: int | None = None) -> Report:
@@ -92,10 +92,10 @@ def run(name: str, *, quick: bool = False, seed: int = 0, missions: int | None =
 
 
 def _find(name: str) -> Callable[..., Report]:
-    """The ``run`` of an experiment, here or in an extra. Raises BadInput where that is not installed."""
-    if name in EXTRAS[GROUP]:
-        if needs := list_absent(GROUP).get(name):
-            raise BadInput(f"experiment {name} needs {needs}")
+    """The ``run`` of an experiment, here or of another package. Raises BadInput where that is not installed."""
+    if needs := list_absent(GROUP).get(name):
+        raise BadInput(f"experiment {name} needs {needs}")
+    if name in list_plugins(GROUP):
         found: Callable[..., Report] = load_plugins(GROUP, FunctionType, name)[name]
         return found
     folder = next(folder for folder, group in EXPERIMENTS.items() if name in group)

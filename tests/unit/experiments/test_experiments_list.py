@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import experiments
+from experiments.report import Report
 from harvey.cli import main
 from harvey.errors import BadInput
 from world_models import plugins
@@ -48,3 +50,15 @@ def test_help_names_every_experiment(capsys: pytest.CaptureFixture[str]) -> None
     told = capsys.readouterr().out
     assert [name for name in experiments.list_names() if name not in told] == []
     assert "--quick" in told and "claims" in told and "runs/experiments" in told
+
+
+def test_another_package_adds_an_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(quick: bool, seed: int) -> Report:
+        return Report("Of another package", ("what", "ours"), ((f"quick {quick}", seed),))
+
+    point = SimpleNamespace(name="mine", value="mine:run", group=experiments.GROUP, dist=None, load=lambda: run)
+    monkeypatch.setattr(plugins, "entry_points", lambda **_: (point,))
+    assert "mine" in experiments.list_names()
+    assert experiments.run("mine", quick=True, seed=7).rows == (("quick True", 7),)
+    with pytest.raises(BadInput, match="mine has no number of missions"):
+        experiments.run("mine", missions=3)
