@@ -6,14 +6,18 @@ Nobody writes into them: a test that changes a run copies it. In the end it is s
 from __future__ import annotations
 
 import fcntl
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.generated.missions import HALLWAY, OFFICE, fault
+from harvey.agent import build_agent
 from harvey.campaign.campaign import Task
+from harvey.runner.replay import open_originals, replay
 from harvey.simulation.simulated_run import build_head, run_mission
 from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from two_doors import two_doors
@@ -90,6 +94,23 @@ class Library:
         """The names of the runs that are not as they were made."""
         return [made.parent.name for made in sorted(self._folder.glob("*/made"))
                 if made.read_text("utf-8") != _describe(RunDirectory(made.parent / "run"))]
+
+
+def cut_off(whole: RunDirectory, to: Path, decisions: int, *, tail: int = 40) -> RunDirectory:
+    """A run as a crash leaves it: so many decisions, and ``tail`` bytes of the next."""
+    run = RunDirectory(to)
+    to.mkdir()
+    for name in ("run.json", "camera.mjpeg"):
+        shutil.copy(whole.path / name, to / name)
+    lines = whole.journal.read_bytes().splitlines(keepends=True)
+    run.journal.write_bytes(b"".join(lines[:decisions]) + b"".join(lines[decisions:])[:tail])
+    return run
+
+
+def is_decided_again(run: RunDirectory) -> bool:
+    """Whether the whole journal, crashes included, comes out again byte for byte."""
+    agent = build_agent(RunHead.read(run.path))
+    return all(told.same for told in replay(run, open_originals(run, agent.store), agent.scheduler()))
 
 
 def _describe(run: RunDirectory) -> str:

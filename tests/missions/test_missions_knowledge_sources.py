@@ -13,7 +13,7 @@ import pytest
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
-from blackboard.journal import Decision, plain
+from blackboard.journal import Decision
 from blackboard.kinds import inference
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
@@ -151,50 +151,3 @@ def _reachable(root: Any) -> Iterable[Any]:
             if id(other) not in seen and not isinstance(other, type | ModuleType | FunctionType):
                 seen.add(id(other))
                 todo.append(other)
-
-
-def test_rating_and_acting_are_pure(short_stage: Stage) -> None:
-    """Asked twice, every source gives the same rating and effects, and the board is as it was."""
-    checked = 0
-
-    class Asked(KnowledgeSource):
-        """Stands in for a knowledge source and asks it twice."""
-
-        def __init__(self, inner: KnowledgeSource) -> None:
-            self._inner = inner
-            self.level, self.closes = inner.level, inner.closes
-            self.on, self.writes = inner.on, inner.writes
-
-        @property
-        def name(self) -> str:
-            return self._inner.name
-
-        def find_case(self, view: View, trigger: Change) -> Any | None:
-            nonlocal checked
-            size, case, again = len(view), self._inner.find_case(view, trigger), self._inner.find_case(view, trigger)
-            assert (case is None) == (again is None)
-            if case is not None:
-                assert self._inner.rate(case) == self._inner.rate(again)
-                assert 0.0 <= self._inner.rate(case) <= 1.0
-            assert len(view) == size
-            checked += 1
-            return case
-
-        def rate(self, case: Any) -> float:
-            return self._inner.rate(case)
-
-        def act(self, view: View, case: Any) -> Iterable[Effect]:
-            size = len(view)
-            first, second = tuple(self._inner.act(view, case)), tuple(self._inner.act(view, case))
-            assert [_plain(e) for e in first] == [_plain(e) for e in second]
-            assert len(view) == size
-            return first
-
-    result = run_mission(short_stage, 3, sources=lambda known: [Asked(ks) for ks in knowledge_sources(known)])
-    assert result.outcome == "reached", result.reason
-    assert checked > 100
-
-
-def _plain(effect: Effect) -> Any:
-    value = getattr(effect, "value", None)
-    return type(effect).__name__, None if value is None else plain(value)

@@ -7,13 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from harvey.agent import build_agent
-from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import resume_mission, run_mission
 from logs.records import read_records
 from logs.run_directory import RunDirectory
-from logs.run_head import RunHead
+from recorded_runs import cut_off, is_decided_again
 from sim.scenario import parse_scenario, with_settings
 from sim.stage import Stage, build_stage
 
@@ -49,11 +47,6 @@ def run(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
     return out
 
 
-def decided_again(run: RunDirectory) -> bool:
-    agent = build_agent(RunHead.read(run.path))
-    return all(told.same for told in replay(run, open_originals(run, agent.store), agent.scheduler()))
-
-
 def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_again_to_the_byte(
     run: RunDirectory,
 ) -> None:
@@ -65,23 +58,18 @@ def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_a
              if e.type == "CameraPicture" and e.because[0].startswith("Course-1.")]
     steps = [b - a for a, b in itertools.pairwise(taken)][:-1]
     assert all(abs(step - 1.0 / 30.0) < 1e-9 for step in steps)
-    assert decided_again(run)
+    assert is_decided_again(run)
 
 
 def test_a_run_that_is_cut_off_on_the_move_goes_on(run: RunDirectory, stage: Stage, tmp_path: Path) -> None:
     """The robot has come to a stand by then; what the wheels claim of that is told, and it sets off again."""
-    lines = run.journal.read_bytes().splitlines(keepends=True)
     rolling = [r.cycle for r in read_records(run.journal) if any(e.type == "Course" for e in r.made)]
-    cut = RunDirectory(tmp_path / "cut")
-    cut.path.mkdir()
-    for name in ("run.json", "camera.mjpeg"):
-        (cut.path / name).write_bytes((run.path / name).read_bytes())
-    cut.journal.write_bytes(b"".join(lines[: rolling[30]]))
+    cut = cut_off(run, tmp_path / "cut", rolling[30], tail=0)
     assert resume_mission(cut, find_remains(cut), stage=stage).outcome == "reached"
     told = next(e for r in read_records(cut.journal) for e in r.observed if e.type == "Resumed")
     assert told.fields["interrupted"] == [next(
         e.ref for r in read_records(cut.journal) if r.cycle == rolling[30] for e in r.made if e.type == "Course")]
-    assert decided_again(cut)
+    assert is_decided_again(cut)
 
 
 def test_who_is_carried_off_on_the_move_stops_at_once(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from harvey.runner.teller import PAGE, LiveTeller
 from harvey.simulation.simulated_run import resume_mission, run_mission
 from logs.records import read_records
 from logs.run_directory import RunDirectory
+from recorded_runs import cut_off
 from sim.scenario import ScenarioError
 from sim.stage import Stage
 from two_doors import two_doors
@@ -88,17 +89,13 @@ def test_by_the_missions_file_it_is_asked_at_its_time_and_once_after_a_crash(tmp
     stage = two_doors(tmp_path, ((2.0, "north-door", "open"),), more=f'[[told]]\nat_s = 4.0\ngoal = "{BACK}"\n')
     result, _ = drive(stage, Asks(12, "Go to the attic"), tmp_path / "whole")
     assert result.outcome == "reached" and result.error_m < 0.0254
-    whole, run = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "cut")
+    whole = RunDirectory(tmp_path / "whole")
     told = [entry.fields for record in read_records(whole.journal) for entry in record.observed
             if entry.type in ("UserReport", "Redirection")]
     assert [one.get("text", one.get("what")) for one in told] == ["Go to the attic", "north-door", BACK]
-    run.path.mkdir()
     cycles = [record.cycle for record in read_records(whole.journal)
               if any(entry.type == "UserReport" for entry in record.observed)]
-    for name in ("run.json", "camera.mjpeg"):
-        (run.path / name).write_bytes((whole.path / name).read_bytes())
-    lines = whole.journal.read_bytes().splitlines(keepends=True)
-    run.journal.write_bytes(b"".join(lines[:cycles[0] + 2]))
+    run = cut_off(whole, tmp_path / "cut", cycles[0] + 2, tail=0)
     assert resume_mission(run, find_remains(run), stage=stage).outcome == "reached"
     again = [entry.fields for record in read_records(run.journal) for entry in record.observed
              if entry.type in ("UserReport", "Redirection")]

@@ -13,9 +13,7 @@ from typing import Any
 import pytest
 
 from experiments.robustness import crash
-from harvey.agent import build_agent
 from harvey.cli import main
-from harvey.runner.replay import open_originals, replay
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import redraw, resume_mission, run_mission
@@ -25,8 +23,7 @@ from logs.pictures import open_pictures
 from logs.reader import damage_of, read_frames
 from logs.records import DecisionRecord, read_records
 from logs.run_directory import RunDirectory
-from logs.run_head import RunHead
-from recorded_runs import Recorded
+from recorded_runs import Recorded, cut_off, is_decided_again
 from sim.stage import Stage
 
 SEED = 3
@@ -39,25 +36,14 @@ def whole(recorded: Recorded) -> RunDirectory:
 
 
 def cut(whole: RunDirectory, to: Path, decisions: int, *, tail: int = 40) -> RunDirectory:
-    """The run as a crash leaves it: so many decisions, and the beginning of the next."""
-    run = RunDirectory(to)
-    to.mkdir()
-    for name in ("run.json", "camera.mjpeg"):
-        shutil.copy(whole.path / name, to / name)
-    (to / "recording.rrd").write_bytes(whole.recording.read_bytes()[:5000])
-    lines = whole.journal.read_bytes().splitlines(keepends=True)
-    run.journal.write_bytes(b"".join(lines[:decisions]) + b"".join(lines[decisions:])[:tail])
+    """The same, with the beginning of its recording."""
+    run = cut_off(whole, to, decisions, tail=tail)
+    run.recording.write_bytes(whole.recording.read_bytes()[:5000])
     return run
 
 
 def go_on(run: RunDirectory, stage: Stage) -> MissionResult:
     return resume_mission(run, find_remains(run), stage=stage)
-
-
-def decided_again(run: RunDirectory) -> bool:
-    """Whether the whole journal, the crash included, comes out again byte for byte."""
-    agent = build_agent(RunHead.read(run.path))
-    return all(told.same for told in replay(run, open_originals(run, agent.store), agent.scheduler()))
 
 
 def made_by(records: list[DecisionRecord], kind: str, which: int) -> int:
@@ -84,7 +70,7 @@ def test_where_no_motion_was_broken_off_it_is_as_if_nothing_had_been(
     told = [e for e in read_records(run.journal) for e in e.observed if e.type == "Resumed"]
     assert [(e.cycle, e.author, e.fields["interrupted"]) for e in told] == [(before + 1, "resume", [])]
     assert run.camera.read_bytes() == whole.camera.read_bytes()
-    assert decided_again(run)
+    assert is_decided_again(run)
     assert damage_of(run.recording) is None
     assert [d["cycle"] for d in read_decisions(run.recording)] == [r.cycle for r in records]
 
@@ -104,13 +90,13 @@ def test_a_motion_that_nobody_reported_on_is_not_carried_out_again(
     claimed, asked = (abs(v["turn_rad"]) + v["move_m"] for v in (report.fields, command.fields))
     assert claimed < asked
     assert len(answered(run)) == len(set(answered(run)))
-    assert decided_again(run)
+    assert is_decided_again(run)
 
     again = cut(run, tmp_path / "twice", made_by(records, "MotorCommand", 4))
     assert go_on(again, short_stage).outcome == "reached"
     assert sum(e.type == "Resumed" for r in read_records(again.journal) for e in r.observed) == 2
     assert len(answered(again)) == len(set(answered(again)))
-    assert decided_again(again)
+    assert is_decided_again(again)
 
 
 @pytest.mark.parametrize("tail", [0, 200])
@@ -192,7 +178,7 @@ def test_a_full_disk_stops_the_run_and_what_was_written_stays(
     assert "No space left on device" in result.reason and str(run.path / name) in result.reason
     assert (run.path / name).stat().st_size <= room
     assert run.journal.read_bytes().endswith(b"\n")
-    assert decided_again(run)
+    assert is_decided_again(run)
     assert go_on(run, short_stage).outcome == "reached"
 
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
 
-from harvey.agent import build_agent
-from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import resume_mission
 from logs.records import DecisionRecord, read_records
 from logs.run_directory import RunDirectory
-from logs.run_head import RunHead
-from recorded_runs import TOLD, Recorded
+from recorded_runs import TOLD, Recorded, cut_off, is_decided_again
 from sim.stage import Stage
 from two_doors import two_doors
 
@@ -38,11 +34,6 @@ def told_in(records: list[DecisionRecord]) -> list[tuple[int, str]]:
             if entry.type == "UserReport"]
 
 
-def is_decided_again(run: RunDirectory) -> bool:
-    agent = build_agent(RunHead.read(run.path))
-    return all(decided.same for decided in replay(run, open_originals(run, agent.store), agent.scheduler()))
-
-
 def test_a_run_that_was_told_something_is_replayed_to_the_byte(whole: RunDirectory) -> None:
     assert [what for _, what in told_in(records_of(whole))] == [what for _, what, _ in TOLD]
     assert is_decided_again(whole)
@@ -55,7 +46,7 @@ def test_a_run_that_was_cut_off_near_a_telling_is_told_each_thing_once(
     """Before it was written down that it was told; after, while it asks what is meant; and when that was taken up."""
     records = records_of(whole)
     decisions = told_in(records)[which][0] + away
-    run = cut(whole, tmp_path / "run", decisions)
+    run = cut_off(whole, tmp_path / "run", decisions)
     assert resume_mission(run, find_remains(run), stage=stage).outcome == "reached"
     now = records_of(run)
     assert [what for _, what in told_in(now)] == [what for _, what, _ in TOLD]
@@ -63,14 +54,3 @@ def test_a_run_that_was_cut_off_near_a_telling_is_told_each_thing_once(
     if all(entry.type != "MotorCommand" for entry in records[decisions - 1].made):  # else a motion was broken off
         assert [r.data for r in now[:decisions]] == [r.data for r in records[:decisions]]
         assert [r.data for r in now[decisions + 1:]] == [r.data for r in records[decisions + 1:]]
-
-
-def cut(whole: RunDirectory, to: Path, decisions: int) -> RunDirectory:
-    """The run as a crash leaves it: so many decisions, and the beginning of the next."""
-    run = RunDirectory(to)
-    to.mkdir()
-    for name in ("run.json", "camera.mjpeg"):
-        shutil.copy(whole.path / name, to / name)
-    lines = whole.journal.read_bytes().splitlines(keepends=True)
-    run.journal.write_bytes(b"".join(lines[:decisions]) + lines[decisions][:50])
-    return run

@@ -120,7 +120,8 @@ def asked_twice(source: KnowledgeSource, impure: list[str]) -> KnowledgeSource:
         before = state(view)
         case, again = cls.bind(self, view, trigger), cls.bind(self, view, trigger)
         rated = [None if c is None else cls.rate(self, c) for c in (case, again)]
-        if rated[0] != rated[1] or state(view) != before:
+        is_rating = rated[0] is None or 0.0 <= rated[0] <= 1.0
+        if not is_rating or rated[0] != rated[1] or state(view) != before:
             impure.append(f"{cls.__name__}.bind on {trigger.entry.ref}")
         return None if case is None else (case, again)
 
