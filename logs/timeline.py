@@ -207,6 +207,13 @@ class Timeline:
         found = self.reason(record, kind)
         return None if found is None else found.value
 
+    def chain(self, record: EntryRecord[Any], *kinds: type[Any]) -> list[EntryRecord[Any] | None]:
+        """An entry's reason of the first kind, the reason of that of the second, and so on; None from where none is."""
+        found: list[EntryRecord[Any] | None] = [record]
+        for kind in kinds:
+            found.append(None if found[-1] is None else self.reason(found[-1], kind))
+        return found[1:]
+
     def within(self, record: EntryRecord[Any]) -> Iterator[EntryRecord[Any]]:
         """An entry and what it rests on, nearest first, each once; not more than FAR."""
         known, queue = {record.ref}, deque([record])

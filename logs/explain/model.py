@@ -76,8 +76,7 @@ def tell_model_lines(history: Timeline, fix: EntryRecord[Any], world: WorldFile 
     Args:
         world: None where files and lines are not asked for.
     """
-    match = history.reason(fix, LineMatch)
-    expected = None if match is None else history.reason(match, Milestone)
+    match, expected = history.chain(fix, LineMatch, Milestone)
     if match is None or expected is None:
         return
     used = (*history.decision(expected.cycle).used, *history.decision(match.cycle).used)
@@ -109,13 +108,11 @@ class Element:
     """A part of the building's description.
 
     Attributes:
-        name: unique in the world.
         kind: in a word: ``desk``, ``open door``, ``wall``.
         locales: whose frames hold it.
         source: file:line of its description; the file relative to the project where it comes with it.
     """
 
-    name: str
     kind: str
     locales: tuple[str, ...]
     source: str
@@ -139,9 +136,9 @@ class WorldFile:
         world = self._store.world
         if name in world.frames:
             locale = world.locale(name)
-            return Element(name, locale.kind, (name,), _brief(locale.source))
+            return Element(locale.kind, (name,), _brief(locale.source))
         if (passage := world.find_passage(name)) is not None:
-            return Element(name, getattr(passage, "kind", "open door"), tuple(passage.between), _brief(passage.source))
+            return Element(getattr(passage, "kind", "open door"), tuple(passage.between), _brief(passage.source))
         frame = self._frame(name)
         return None if frame is None else _find_in(frame, name)
 
@@ -188,14 +185,14 @@ def tell_source(world: WorldFile, name: str) -> str:
 def _find_in(frame: LocaleFrame, name: str) -> Element | None:
     thing = next((thing for thing in frame.things if thing.name == name), None)
     if thing is not None:
-        return Element(name, thing.kind, (frame.name,), _brief(thing.source))
+        return Element(thing.kind, (frame.name,), _brief(thing.source))
     for part in frame.parts:
         locales = (part.locale, *((part.neighbour,) if part.neighbour else ()))
         mark = next((mark for _, mark in part.landmarks if mark.name == name), None)
         if mark is not None:
-            return Element(name, mark.kind, locales, _brief(mark.source))
+            return Element(mark.kind, locales, _brief(mark.source))
         if any(face.name == name for _, face in part.faces):
-            return Element(name, "face", locales, _brief(frame.locale.source))
+            return Element("face", locales, _brief(frame.locale.source))
     return None
 
 

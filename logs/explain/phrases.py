@@ -315,8 +315,7 @@ def _tell_worst_landmark(history: Timeline, belief: EntryRecord[Any]) -> Iterato
 def _tell_match(history: Timeline, belief: EntryRecord[Any]) -> Iterator[str]:
     """The match that the belief goes back to, by the landmark of which most segments agree with it."""
     anchor = history.anchor_of(belief)
-    fix = None if anchor is None else history.reason(anchor, PoseFix)
-    match = None if fix is None else history.reason(fix, LineMatch)
+    fix, match = (None, None) if anchor is None else history.chain(anchor, PoseFix, LineMatch)
     if fix is not None and match is not None:
         seen, by_name = history.because(match, Segments), by_landmark(history, fix.value, match)
         where = f"in {seen.frame if seen else 'a picture'}"

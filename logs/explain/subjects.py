@@ -101,10 +101,8 @@ def _tell(
 
 
 def _tell_verdict(history: Timeline, certificate: EntryRecord[Any], world: WorldFile | None) -> Iterator[Step]:
-    if (fix := history.reason(certificate, PoseFix)) is not None:
-        match = history.reason(fix, LineMatch)
-        segments = None if match is None else history.reason(match, Segments)
-        frame = None if segments is None else history.reason(segments, CameraPicture)
+    fix, match, segments, frame = history.chain(certificate, PoseFix, LineMatch, Segments, CameraPicture)
+    if fix is not None:
         yield step("seen", phrases.describe_line_match(history, fix), fix, match, segments, frame)
         yield from (Step("model", *told) for told in tell_model_lines(history, fix, world))
     said = phrases.verdict(certificate.value, history.because(certificate, Milestone))
@@ -122,11 +120,6 @@ def _tell_consequences(history: Timeline, certificate: EntryRecord[Any]) -> Iter
                 yield step("followed", f"In cycle {decision.cycle} the {who} acted: {said}.", record)
 
 
-def is_element(history: Timeline, text: str) -> bool:
-    """Whether a name is meant for a part of the building and not for an entry of the run."""
-    return history.find(text) is None and ENTRY.fullmatch(text) is None
-
-
 def stories_of(history: Timeline, what: str | int | None, world: WorldFile) -> Iterator[Story]:
     """The story of an entry or a part of the building (by name), of a cycle (by number), or of the outcome (None).
 
@@ -134,7 +127,7 @@ def stories_of(history: Timeline, what: str | int | None, world: WorldFile) -> I
 
     Raises BadInput where the run has none of that name; near ones are listed.
     """
-    if isinstance(what, str) and is_element(history, what):
+    if isinstance(what, str) and history.find(what) is None and ENTRY.fullmatch(what) is None:
         yield element_story(history, what, world)
     else:
         yield from tell_stories(history, find_refs(history, what), None if what is None else world)

@@ -69,11 +69,6 @@ class TurningPoint:
         """Whether a short account of the run must not leave it out."""
         return self.kind in TOLD
 
-    @property
-    def when(self) -> str:
-        """As a line of text begins that tells it."""
-        return at(self.cycle, self.time_s)
-
 
 def at(cycle: int, time_s: float | None) -> str:
     """``cycle 360     63.9 s``, as a line of text begins."""
@@ -263,7 +258,8 @@ def turn_lines(history: Timeline, result: Mapping[str, Any]) -> Iterator[str]:
         yield NOTHING
         return
     yield "On the way:"
-    width, kind = (max(map(len, column), default=0) for column in ([p.when for p in points], [p.kind for p in points]))
-    yield from (wrap(p.text, f"  {p.when:<{width}}  {p.kind:<{kind}}  ") for p in points)
+    heads, kinds = [at(point.cycle, point.time_s) for point in points], [point.kind for point in points]
+    width, kind = (max(map(len, column), default=0) for column in (heads, kinds))
+    yield from (wrap(p.text, f"  {head:<{width}}  {p.kind:<{kind}}  ") for head, p in zip(heads, points, strict=True))
     if unplaced > 0:
         yield f"  {count(unplaced, 'collision')}; this run does not say where"

@@ -246,8 +246,8 @@ class _Teller:
             return
         begun, certificate = phrases.pose(anchor.value), self.history.reason(anchor, Certificate)
         if anchor.value.basis == "relocalization":
-            segments, lost = self.history.reason(anchor, Segments), self.history.reason(anchor, Discrepancy)
-            frame = None if segments is None else self.history.reason(segments, CameraPicture)
+            segments, frame = self.history.chain(anchor, Segments, CameraPicture)
+            lost = self.history.reason(anchor, Discrepancy)
             found = f"; {anchor.value.evidence}" if anchor.value.evidence else ""
             picture = frame.id if frame is not None else "a picture"
             text = f"It found out anew where it was, in cycle {anchor.cycle}, from {picture}: at {begun}{found}."
@@ -269,8 +269,7 @@ class _Teller:
 
     def _match(self, fix: EntryRecord[PoseFix]) -> Iterator[Step]:
         """From pixels and model to a pose."""
-        match = self.history.reason(fix, LineMatch)
-        segments = None if match is None else self.history.reason(match, Segments)
+        match, segments = self.history.chain(fix, LineMatch, Segments)
         yield from self._one(fix.id, "matched", phrases.describe_line_match(self.history, fix), fix, match, segments)
         for text, refs in model.tell_model_lines(self.history, fix, self.world):
             if text not in self.told:

@@ -17,7 +17,7 @@ LINES = {
     "world_models": 9_880,
     "knowledge_sources": 22_300,
     "sim": 7_100,
-    "logs": 7_450,
+    "logs": 7_440,
     "harvey": 10_500,
     "experiments": 9_900,
     "tests": 33_900,
