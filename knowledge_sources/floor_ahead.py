@@ -14,7 +14,6 @@ from blackboard.board import View
 from blackboard.entry import Entry
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.seen_floor import (
-    MAX_HIDDEN_M,
     Costs,
     Lookout,
     SeenFloor,
@@ -130,8 +129,7 @@ class FloorAhead:
         actuator = self._robot.actuator
         costs = Costs(LOOK_TURN_RAD_PER_S, LOOK_PICTURE_S, actuator.turn_increment_rad,
                       1.0 / s.creep_speed_m_per_s - 1.0 / actuator.speed_m_per_s)
-        look = choose_look(self._robot, self._floor, self._here, self._list_poses_ahead(to_go_m), unseen, costs,
-                           MAX_HIDDEN_M)
+        look = choose_look(self._robot, self._floor, self._here, self._list_poses_ahead(to_go_m), unseen, costs)
         if look is None or self._was_tried(look.heading_rad):
             return None
         return look

@@ -46,8 +46,6 @@ class FeaturesSettings:
     line_systematic_px: float = setting(
         0.03, "px", "Error of a segment's place that does not average out along it, added in quadrature.",
         "measured: a lens not quite known, a renderer that places edges to a sixteenth of a pixel")
-    sigma_along_px: float = setting(
-        0.7, "px", "Standard deviation of a segment's end along the segment.", "measured on rendered corners")
     sigma_across_px: float = setting(
         0.7, "px", "Standard deviation of a segment's end across its model line, with the model's own errors.",
         "measured on rendered edges (tests/laws/features)")

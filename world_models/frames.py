@@ -121,6 +121,15 @@ class Pose2:
         """(2,) [m]."""
         return np.array([self.x_m, self.y_m])
 
+    @property
+    def vector(self) -> NDArray[np.float64]:
+        """(3,) x [m], y [m], heading [rad]."""
+        return np.array([self.x_m, self.y_m, self.heading_rad])
+
+    def minus(self, other: Pose2) -> NDArray[np.float64]:
+        """(3,) this vector less another's, the heading by the shorter way round."""
+        return np.array([self.x_m - other.x_m, self.y_m - other.y_m, wrap_angle(self.heading_rad - other.heading_rad)])
+
     def __matmul__(self, other: Pose2) -> Pose2:
         c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
         return Pose2(

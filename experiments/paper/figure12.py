@@ -8,7 +8,7 @@ from itertools import pairwise, zip_longest
 import numpy as np
 
 from experiments.report import Cell, Report
-from knowledge_sources.methods.matching import Match, Peak, TraceStep, format_trace, match_lines
+from knowledge_sources.methods.matching import Match, Peak, TraceStep, match_lines
 from knowledge_sources.settings import PAPER_MATCHING
 
 NAMES = "ABCD"
@@ -103,3 +103,17 @@ def _search(*, paper: bool) -> Match:
 def _format_pairs(step: TraceStep) -> str:
     """Format pairs as in the figure: A1 is model line A with data line 1."""
     return " ".join(f"{NAMES[model]}{data + 1}" for model, data in sorted(step.pairs))
+
+
+def format_trace(match: Match) -> str:
+    """The states of the search as a table like Figure 12(d): one row a state, its pairs and its evaluation."""
+    columns = sorted({pair for step in match.trace for pair in step.pairs})
+    head = " ".join(f"{m}-{d}" for m, d in columns)
+    rows = [f"{'step':>7}  {head}  evaluation"]
+    last = len(match.trace) - 1
+    for i, step in enumerate(match.trace):
+        name = "initial" if i == 0 else "final" if i == last else str(i)
+        have = set(step.pairs)
+        marks = " ".join(f"{'x' if c in have else '.':>{len(f'{c[0]}-{c[1]}')}}" for c in columns)
+        rows.append(f"{name:>7}  {marks}  {step.evaluation:10.2f}")
+    return "\n".join(rows)

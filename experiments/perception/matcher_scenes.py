@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.matching import Similarity2, match_in_space
-from knowledge_sources.methods.matching.image_pairs import (
+from knowledge_sources.methods.matching.image_matching import (
     PairTable,
     build_line_table,
     build_pair_table,

@@ -10,19 +10,20 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from experiments.perception.milestones import compute_calibration_error, compute_reliability, judge_floors
 from experiments.perception.milestones_trials import JudgedCase
 from experiments.report import Report
 from experiments.trials import campaign_folder
 from knowledge_sources.methods.verification.pose_confidence import (
+    EVIDENCE_NAMES,
     POSE_CONFIDENCE,
     TERMS,
     WEIGHTS_FILE,
     EvidenceWeights,
     PoseConfidence,
-    fit_weights,
-    remove_colors,
+    compute_terms,
 )
 
 Floats = NDArray[np.float64]
@@ -30,6 +31,8 @@ FIRST_FLOOR, FLOORS, EACH = 1000, 30, 180
 QUICK_FLOORS, QUICK_EACH = 1, 45
 MAX_FALSE_ACCEPTS, MAX_FALSE_REJECTS = 0.001, 0.002
 """Expected shares of wrong places accepted and of right places rejected, by the fitted probabilities."""
+FIT_RIDGE = 0.02
+"""Ridge penalty of the fit of evidence weights."""
 LIMITS = np.geomspace(1e-5, 0.1, 81)
 REFUTED = np.linspace(0.5, 0.999, 500)
 
@@ -99,3 +102,33 @@ def format_toml(confidence: PoseConfidence, how: str) -> str:
 def _table(weights: EvidenceWeights) -> str:
     return "".join(f"{name} = {value:.5f}\n" for name, value in zip((*TERMS, "bias"), (*weights.each, weights.bias),
                                                                   strict=True))
+
+
+def fit_weights(evidence: Floats, is_right: NDArray[np.bool_]) -> EvidenceWeights:
+    """Fit non-negative weights to evidence (n, k) of right and wrong poses (n,) by ridge logistic regression.
+
+    Right and wrong poses count the same in total. Solved by L-BFGS-B.
+    """
+    right, wrong = max(1, int(np.count_nonzero(is_right))), max(1, int(np.count_nonzero(~is_right)))
+    share = np.where(is_right, 0.5 / right, 0.5 / wrong)
+    sign = np.where(is_right, 1.0, -1.0)
+    rows = np.column_stack([compute_terms(evidence), np.ones(len(evidence))])
+
+    def cost(weights: Floats) -> tuple[float, Floats]:
+        margin = sign * (rows @ weights)
+        slope = -share * sign / (1.0 + np.exp(np.minimum(margin, 700.0)))
+        ridge = FIT_RIDGE * weights[:-1] / len(evidence)
+        value = float(np.sum(share * np.logaddexp(0.0, -margin)) + 0.5 * np.sum(ridge * weights[:-1]))
+        return value, np.asarray(rows.T @ slope + np.append(ridge, 0.0))
+
+    bounds = [(0.0, None)] * len(TERMS) + [(None, None)]
+    solution = minimize(cost, np.zeros(rows.shape[1]), jac=True, bounds=bounds, method="L-BFGS-B",
+                        options={"maxiter": 2000, "ftol": 1e-14, "gtol": 1e-9}).x
+    return EvidenceWeights(tuple(float(w) for w in solution[:-1]), float(solution[-1]))
+
+
+def remove_colors(evidence: Floats) -> Floats:
+    """Return the evidence (n, k) as it would be if no colors could be compared."""
+    lines_only = evidence.copy()
+    lines_only[:, [EVIDENCE_NAMES.index("color_agreement"), EVIDENCE_NAMES.index("color_count")]] = 0.0
+    return lines_only

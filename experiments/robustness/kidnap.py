@@ -32,7 +32,7 @@ from harvey.runner.world_port import build_scheduler
 from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.goal.relocalizer import Relocalizer
-from knowledge_sources.methods.localization.visibility_map import get_visibility_map
+from knowledge_sources.methods.localization.pose_candidates import get_visibility_map
 from knowledge_sources.methods.motion.routes import compute_free_space
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.settings import DEFAULT

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from knowledge_sources.methods.matching import Match, Peak, format_trace, match_lines
+from experiments.paper.figure12 import format_trace
+from knowledge_sources.methods.matching import Match, Peak, match_lines
 from knowledge_sources.settings import PAPER_MATCHING
 
 MODEL = np.array(

@@ -174,8 +174,6 @@ def compute_second_peak(
 ) -> float:
     """Correlation, -1 to 1, of the patch round a centre (u, v), to the next pixel, with the best other place near it.
 
-    The quick form of :func:`self_correlate` for choosing landmarks.
-
     Raises:
         ValueError: the patch does not lie in the image.
     """
@@ -189,21 +187,6 @@ def compute_second_peak(
     size = 2 * half_px + 1
     score = _compute_scores(np.ascontiguousarray(view[row : row + size, column : column + size]), view)
     return float(find_second_peak(score, row, column, PEAK_LOBE_PX, half_px // 2))
-
-
-def self_correlate(
-    image: Any, centre_px: Any, half_px: int, search_px: float
-) -> Correlation:
-    """Correlate a patch with its own image: `distinctiveness` and `covariance_px` rate it as a landmark.
-
-    Raises:
-        ValueError: the patch does not lie in the image.
-    """
-    template = extract_template(image, centre_px, half_px)
-    found = correlate(template, image, np.rint(np.asarray(centre_px, float)), search_px)
-    if found is None:
-        raise ValueError(f"expected a patch of half-width {half_px} inside the image, got centre {centre_px!r}")
-    return found
 
 
 def _compute_bounds(

@@ -14,8 +14,7 @@ edge is a chain of gradient peaks, column after column.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -242,8 +241,7 @@ _MAP_WIDTH = 1024
 """Columns of the maps given to OpenCV, which limits both sides of its result to 32767."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Strips:
+class _Strips(NamedTuple):
     """The bands side by side.
 
     Attributes:
@@ -258,8 +256,7 @@ class _Strips:
     usable: Mask
 
 
-@dataclass(frozen=True, slots=True)
-class BandSegments:
+class BandSegments(NamedTuple):
     """Rough segments found in bands.
 
     Attributes:
@@ -273,8 +270,7 @@ class BandSegments:
     predicted: Indices
 
 
-@dataclass(frozen=True, slots=True)
-class _Chains:
+class _Chains(NamedTuple):
     """Gradient peaks by chain: column (n,), sub-pixel row (n,) and number of the chain (n,)."""
 
     column: Indices

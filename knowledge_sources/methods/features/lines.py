@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -75,20 +75,10 @@ class LineSegments:
         """(n,) lengths [px]."""
         return np.asarray(np.linalg.norm(self.segments_px[:, 1] - self.segments_px[:, 0], axis=1))
 
-    def compute_end_sigmas(self, settings: FeaturesSettings = DEFAULT.features) -> Floats:
-        """(n, 2) standard deviation of an end along its segment and across it [px], the same for both ends."""
-        across = np.hypot(self.sigma_offset_px, 0.5 * self.lengths_px * self.sigma_angle_rad)
-        return np.stack([np.full(len(self), settings.sigma_along_px), across], axis=1)
-
     def take(self, index: Any) -> LineSegments:
         """Those that an index array or a mask chooses."""
-        return LineSegments(
-            self.segments_px[index],
-            self.sigma_offset_px[index],
-            self.sigma_angle_rad[index],
-            self.contrast[index],
-            self.predicted[index],
-        )
+        return LineSegments(self.segments_px[index], self.sigma_offset_px[index], self.sigma_angle_rad[index],
+                            self.contrast[index], self.predicted[index])
 
 
 def remove_duplicates(found: LineSegments, settings: FeaturesSettings = DEFAULT.features) -> LineSegments:
@@ -187,8 +177,7 @@ _SHIFT_PER_SKEW = (0.205, 0.26, 0.335, 0.51, 0.63)
 """Displacement of that peak over the third moment of bilinear interpolation, for each."""
 
 
-@dataclass(frozen=True, slots=True)
-class RefinedSegments:
+class RefinedSegments(NamedTuple):
     """Refined segments; their ends are ordered as they came.
 
     Attributes:

@@ -9,7 +9,6 @@ Source: [2]; J. Beveridge et al., Segmenting images using localized histograms a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -26,30 +25,10 @@ MAX_BORDER_STEP = 12.0  # grey levels; largest step across a sector's border bet
 Labels = NDArray[np.int32]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Regions:
-    """Connected regions of an image.
-
-    Attributes:
-        labels: (h, w), 0 .. n - 1.
-        areas_px: (n,) pixel counts.
-        means: (n,) mean grey level.
-        deviations: (n,) standard deviation of the grey level.
-    """
-
-    labels: Labels
-    areas_px: Ints
-    means: Floats
-    deviations: Floats
-
-    def __len__(self) -> int:
-        return len(self.areas_px)
-
-
 def segment_regions(
     image: Any, *, sector_px: int = 64, min_area_px: int = 60, settings: FeaturesSettings = DEFAULT.features
-) -> Regions:
-    """Segment an image (h, w) of grey levels into regions of like brightness.
+) -> Labels:
+    """Segment an image (h, w) of grey levels into connected regions of like brightness: labels (h, w), 0 .. n - 1.
 
     Args:
         sector_px: side of the sectors whose histograms are taken [px].
@@ -65,8 +44,7 @@ def segment_regions(
     smooth = np.asarray(cv2.medianBlur(levels, 3), np.uint8)
     labels = _label_sectors(smooth, sector_px, settings)
     labels = _merge_sectors(labels, smooth.astype(np.float32), sector_px, MAX_BORDER_STEP)
-    labels = _merge_small(labels, pixels, min_area_px)
-    return Regions(labels, *_compute_statistics(labels, pixels))
+    return _merge_small(labels, pixels, min_area_px)
 
 
 def find_histogram_valleys(levels: Image, settings: FeaturesSettings = DEFAULT.features) -> Floats:
@@ -121,7 +99,7 @@ def _merge_sectors(labels: Labels, levels: Floats32, side: int, max_step: float)
     """
     edges = [_find_border_pairs(labels, levels, side), _find_border_pairs(labels.T, levels.T, side)]
     a, b, difference = (np.concatenate(parts) for parts in zip(*edges, strict=True))
-    areas, means, _ = _compute_statistics(labels, levels)
+    areas, means = _compute_statistics(labels, levels)
     key, where = np.unique(a.astype(np.int64) * len(areas) + b, return_inverse=True)
     length = np.bincount(where, minlength=len(key))
     step = np.abs(np.bincount(where, difference, len(key))) / np.maximum(length, 1)
@@ -169,7 +147,7 @@ def _renumber(labels: Labels, root: Ints) -> Labels:
 
 def _merge_small(labels: Labels, pixels: Floats32, min_area: int) -> Labels:
     """Merge regions that are too small into the touching region of nearest brightness, in rounds until none is left."""
-    areas, means, _ = _compute_statistics(labels, pixels)
+    areas, means = _compute_statistics(labels, pixels)
     while len(areas) > 1 and areas.min() < min_area:
         a, b = _find_touching(labels)
         of_small = areas[a] < min_area
@@ -177,7 +155,7 @@ def _merge_small(labels: Labels, pixels: Floats32, min_area: int) -> Labels:
         order = np.lexsort((b, np.abs(means[a] - means[b]), a))
         nearest = order[np.unique(a[order], return_index=True)[1]]
         labels = _renumber(labels, _merge_pairs(a[nearest], b[nearest], areas, means, math.inf))
-        areas, means, _ = _compute_statistics(labels, pixels)
+        areas, means = _compute_statistics(labels, pixels)
     return labels
 
 
@@ -190,10 +168,8 @@ def _find_touching(labels: Labels) -> tuple[Ints, Ints]:
     return np.concatenate([a, b]), np.concatenate([b, a])
 
 
-def _compute_statistics(labels: Labels, pixels: Floats32) -> tuple[Ints, Floats, Floats]:
-    """Area, mean and standard deviation of each region."""
+def _compute_statistics(labels: Labels, pixels: Floats32) -> tuple[Ints, Floats]:
+    """Area and mean of each region."""
     flat, values = labels.ravel(), pixels.ravel().astype(np.float64)
     areas = np.bincount(flat)
-    means = np.bincount(flat, values) / areas
-    variance = np.bincount(flat, (values - means[flat]) ** 2) / areas
-    return areas, means, np.sqrt(variance)
+    return areas, np.bincount(flat, values) / areas

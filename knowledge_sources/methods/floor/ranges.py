@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -97,7 +97,7 @@ def see_ranges(
         _rounded(far), tuple(ends), _rounded(sigmas), (), ranges.when_s)
     is_new &= cones.away_m <= MAX_RANGE_THING_M
     things = _find_things(cones, is_new, floor, earlier, rooms, robot.world, place_m)
-    return _with_things(floor, tuple(things))
+    return replace(floor, things=tuple(things))
 
 
 def find_rooms_within(building: Building, locale: str, pose: Pose2, reach_m: float) -> tuple[str, ...]:
@@ -272,8 +272,3 @@ def _build_footprint(cones: Cones, group: Sequence[tuple[int, Floats]], depth_m:
 
 def _rounded(values: Floats) -> tuple[float, ...]:
     return tuple(round(float(value), 4) for value in values)
-
-
-def _with_things(floor: FreeFloor, things: tuple[FloorThing, ...]) -> FreeFloor:
-    return FreeFloor(floor.sense, floor.locale, floor.x_m, floor.y_m, floor.bearings_rad, floor.near_m, floor.far_m,
-                     floor.ends, floor.sigma_m, things, floor.seen_s)

@@ -33,6 +33,7 @@ from knowledge_sources.methods.floor.seen_floor import MAX_HIDDEN_M
 from knowledge_sources.methods.floor.standing_regions import (
     FOOT_PART_STEP,
     StandingRegion,
+    TwoPictures,
     compute_parallax_odds,
     find_footprint,
     find_regions,
@@ -268,11 +269,11 @@ def _build_thing(
         earlier_from_now = then.pose.inverse() @ pose
         before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera).astype(np.float32) @ GREY
         grey = picture.astype(np.float32) @ GREY
-        told = compute_parallax_odds(region, grid, grey, before, earlier_from_now, robot.camera, robot.mount)
+        both = TwoPictures(grid, grey, before, earlier_from_now, robot.camera, robot.mount)
+        told = compute_parallax_odds(region, both)
         odds *= told
         if not region.is_cut and told >= 1.0:
-            part = measure_foot_part(
-                region, grid, grey, before, earlier_from_now, robot.camera, robot.mount)
+            part = measure_foot_part(region, both)
         if part < 1.0:
             height_m, sigma_height_m = measure_height(region, grid, part)
         how += "" if told == 1.0 else " and stands up from it" if told > 1.0 else ", but lies flat on it"

@@ -64,10 +64,6 @@ class SeenFloor:
     discs: Floats
     taken: tuple[Floats, ...] = ()
 
-    def find_free(self, points: Floats) -> Mask:
-        """Which of the points (n, 2) are seen free."""
-        return self.ask(points)[0]
-
     def ask(self, points: Floats) -> tuple[Mask, Mask, Mask]:
         """Which of the points (n, 2) are seen free; and which scans, and which discs, tell that or the contrary."""
         free, open_ = np.zeros(len(points), bool), np.ones(len(points), bool)
@@ -198,23 +194,18 @@ def _compute_floor(building: Building, names: Sequence[str]) -> shapely.Geometry
     return shapely.difference(floor, shapely.union_all(things)) if things else floor
 
 
-def sees(
-    robot: RobotModel, floor: shapely.Geometry, pose: Pose2, points: Floats, max_hidden_m: float
-) -> Mask:
-    """Which points (n, 2) of the floor the camera sees from a pose, as far as the model tells.
-
-    ``max_hidden_m``: height up to which what stands on a point has to be in the picture too.
-    """
-    seen = _is_in_picture(robot, pose, points, max_hidden_m)
+def sees(robot: RobotModel, floor: shapely.Geometry, pose: Pose2, points: Floats) -> Mask:
+    """Which points (n, 2) of the floor the camera sees from a pose, with what may stand there, by the model."""
+    seen = _is_in_picture(robot, pose, points)
     rest = np.flatnonzero(seen)
     if len(rest):
         seen[rest] = _is_in_sight(robot, floor, pose, points[rest])
     return seen
 
 
-def _is_in_picture(robot: RobotModel, pose: Pose2, points: Floats, max_hidden_m: float) -> Mask:
+def _is_in_picture(robot: RobotModel, pose: Pose2, points: Floats) -> Mask:
     """Which points are before the camera; the robot stands on the floor that they are on."""
-    lifted = np.column_stack([pose.inverse().apply(points), np.full(len(points), max_hidden_m)])
+    lifted = np.column_stack([pose.inverse().apply(points), np.full(len(points), MAX_HIDDEN_M)])
     there = robot.mount.camera_from_robot.apply(lifted)
     inside = there[:, 2] > MIN_DEPTH_M
     inside[inside] = robot.camera.inside(robot.camera.project(there[inside]), BORDER_PX)
@@ -223,8 +214,8 @@ def _is_in_picture(robot: RobotModel, pose: Pose2, points: Floats, max_hidden_m:
 
 def _is_in_sight(robot: RobotModel, floor: shapely.Geometry, pose: Pose2, points: Floats) -> Mask:
     """To which points a straight line leads over the open floor."""
-    eye = np.array(pose.position) + robot.mount.forward_m * np.array([math.cos(pose.heading_rad),
-                                                                      math.sin(pose.heading_rad)])
+    ahead = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
+    eye = pose.position + robot.mount.forward_m * ahead
     lines = shapely.linestrings(np.stack([np.broadcast_to(eye, points.shape), points], axis=1))
     shapely.prepare(floor)
     return np.asarray(shapely.covers(floor, lines))
@@ -264,32 +255,29 @@ class Lookout(NamedTuple):
 
 def choose_look(
     robot: RobotModel, floor: shapely.Geometry, here: Pose2, ahead: Sequence[Pose2], unseen: Sweep, costs: Costs,
-    max_hidden_m: float,
 ) -> Lookout | None:
     """The look from here that is worth its time; None where there is none, or a better one from a place ahead.
 
     Args:
         ahead: poses on the way at which pictures will be taken anyway.
         unseen: what the robot is going to sweep and was not seen yet.
-        max_hidden_m: as of :func:`sees`.
     """
     rest = unseen
     for pose in (here, *ahead):  # these pictures cost nothing
         if len(rest.points):
-            rest = rest.only(~sees(robot, floor, pose, rest.points, max_hidden_m))
+            rest = rest.only(~sees(robot, floor, pose, rest.points))
     blind_m = measure_blind_m(rest)
     if blind_m * costs.creep_s_per_m <= 0.0:
         return None
-    best = _find_best(robot, floor, here, rest, blind_m, costs, max_hidden_m)
+    best = _find_best(robot, floor, here, rest, blind_m, costs)
     if best is None:
         return None
-    better = (_find_best(robot, floor, pose, rest, blind_m, costs, max_hidden_m) for pose in ahead)
+    better = (_find_best(robot, floor, pose, rest, blind_m, costs) for pose in ahead)
     return None if any(look is not None and look.gain_s > best.gain_s for look in better) else best
 
 
 def _find_best(
     robot: RobotModel, floor: shapely.Geometry, pose: Pose2, unseen: Sweep, blind_m: float, costs: Costs,
-    max_hidden_m: float,
 ) -> Lookout | None:
     """The look from a pose that saves the most time."""
     best: Lookout | None = None
@@ -298,7 +286,7 @@ def _find_best(
         cost_s = costs.look_s(wrap_angle(heading - pose.heading_rad))
         if blind_m * costs.creep_s_per_m <= cost_s + (0.0 if best is None else best.gain_s):
             continue
-        seen = sees(robot, floor, Pose2(pose.x_m, pose.y_m, heading), unseen.points, max_hidden_m)
+        seen = sees(robot, floor, Pose2(pose.x_m, pose.y_m, heading), unseen.points)
         if not seen.any():
             continue
         gain_s = (blind_m - measure_blind_m(unseen.only(~seen))) * costs.creep_s_per_m - cost_s

@@ -6,6 +6,7 @@ Two pictures tell the latter: what lies flat moves as the floor does, what stand
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -186,44 +187,69 @@ MIN_DEVIATION = 4.0
 """A patch with less contrast than this [grey levels] tells nothing."""
 
 
-def compute_parallax_odds(
-    region: StandingRegion, grid: FloorGrid, picture: NDArray[np.float32], earlier: NDArray[np.float32],
-    earlier_from_now: Pose2, camera: Camera, mount: CameraMount,
-) -> float:
+class TwoPictures(NamedTuple):
+    """A picture and an earlier one: (h, w) grey, reduced by STEP_PX; and the robot's pose now in its frame then."""
+
+    grid: FloorGrid
+    picture: NDArray[np.float32]
+    earlier: NDArray[np.float32]
+    earlier_from_now: Pose2
+    camera: Camera
+    mount: CameraMount
+
+    def cut(self, row: float, column: float) -> NDArray[np.float32]:
+        """The patch round a pixel of the grid."""
+        size, at = (2 * HALF + 1, 2 * HALF + 1), (float(column), float(self.grid.top + row))
+        return np.asarray(cv2.getRectSubPix(self.picture, size, at), np.float32)
+
+    def project(self, points_robot: Floats) -> Floats:
+        """Where points (n, 3) of the robot's frame now were in the earlier picture, reduced [px]; NaN behind it."""
+        flat = self.earlier_from_now.apply(points_robot[:, :2])
+        height = self.mount.height_m - self.grid.camera_height_m  # of the floor above the plan on which poses are
+        there = self.mount.camera_from_robot.apply(np.column_stack([flat, points_robot[:, 2] + height]))
+        ahead = there[:, 2] > NEAR_PLANE_M
+        pixels = self.camera.project(np.where(ahead[:, None], there, (0.0, 0.0, 1.0)))
+        pixels[~ahead] = np.nan
+        return np.asarray((pixels + 0.5) / STEP_PX - 0.5)
+
+    def move_along(self, points: Floats, depth: float) -> Floats:
+        """Where points on the rays to floor points (n, 2), so many times as far away, were in the earlier picture."""
+        height = np.full(len(points), self.grid.camera_height_m * (1.0 - depth))
+        eye = self.grid.eye_robot
+        return self.project(np.column_stack([eye + (points - eye) * depth, height]))
+
+
+def compute_parallax_odds(region: StandingRegion, both: TwoPictures) -> float:
     """The odds that a region is solid against flat or reflected, by an earlier picture; 1 where nothing tells.
 
     Points of the upper border are on the floor if the region is flat, above its foot if it is solid, and below the
     floor if a shiny floor mirrors what is elsewhere. Where they were in the earlier picture then differs; the patch
     round each tells which of these it is.
-
-    Args:
-        picture, earlier: (h, w) grey, reduced by STEP_PX.
-        earlier_from_now: the robot's pose now in its frame then.
     """
+    grid = both.grid
     rows, columns = _find_upper_border(region)
     if not len(rows):
         return 1.0
     points = grid.points_robot[rows, columns]
-    eye = np.array([mount.forward_m, 0.0])
+    eye = grid.eye_robot
     ranges = np.linalg.norm(points - eye, axis=1)
     foot_of = {int(column): float(grid.ranges_m[row, column]) for row, column in region.feet}
     foot_m = np.array([foot_of.get(int(column), min(foot_of.values())) for column in columns])
     part = np.minimum(foot_m / ranges, 1.0)
     flat = np.column_stack([points, np.zeros(len(points))])
-    then_flat = _project(flat, earlier_from_now, camera, mount, grid)
+    then_flat = both.project(flat)
     then_solid = []
     for share in PLACES:
         at = 1.0 - share * (1.0 - part)
         solid = np.column_stack([eye + (points - eye) * at[:, None], grid.camera_height_m * (1.0 - at)])
-        then_solid.append(_project(solid, earlier_from_now, camera, mount, grid))
-    then_mirrored = [_project(_below(points, eye, depth, grid), earlier_from_now, camera, mount, grid)
-                     for depth in DEPTHS]
+        then_solid.append(both.project(solid))
+    then_mirrored = [both.move_along(points, depth) for depth in DEPTHS]
     votes = 0
     for i in range(len(points)):
-        patch = _cut(picture, grid.top + int(rows[i]), int(columns[i]))
-        as_flat = _correlate(earlier, patch, then_flat[i])
+        patch = both.cut(int(rows[i]), int(columns[i]))
+        as_flat = _correlate(both.earlier, patch, then_flat[i])
         as_solid, as_mirrored = (
-            _correlate_best(earlier, patch, then_flat[i], [there[i] for there in then], MIN_PARALLAX_PX)
+            _correlate_best(both.earlier, patch, then_flat[i], [there[i] for there in then])
             for then in (then_solid, then_mirrored))
         as_solid = as_flat if as_solid is None else as_solid  # too near to each other to tell them apart
         lying = as_flat if as_mirrored is None else max(as_flat, as_mirrored)
@@ -235,30 +261,22 @@ def compute_parallax_odds(
     return float(PARALLAX_ODDS ** np.clip(votes / 2.0, -1.0, 1.0))
 
 
-def measure_foot_part(
-    region: StandingRegion, grid: FloorGrid, picture: NDArray[np.float32], earlier: NDArray[np.float32],
-    earlier_from_now: Pose2, camera: Camera, mount: CameraMount,
-) -> float:
+def measure_foot_part(region: StandingRegion, both: TwoPictures) -> float:
     """How far a region's lower border is, as a part of the distance at which it would stand on the floor; 1: it does.
 
     The lower border of what hangs over the floor, as a shelf on legs, hides floor that is further away: it moves
     otherwise between two pictures than floor does. All of the border is taken to be at one height.
-
-    Args:
-        picture, earlier: (h, w) grey, reduced by STEP_PX.
-        earlier_from_now: the robot's pose now in its frame then.
     """
+    grid = both.grid
     feet = region.feet[region.feet[:, 0] < grid.shape[0] - 2]
     if not len(feet):
         return 1.0
     feet = feet[np.unique(np.linspace(0, len(feet) - 1, min(COLUMNS, len(feet))).astype(int))]
     points = grid.points_robot[feet[:, 0], feet[:, 1]]
     parts = np.arange(1.0, MIN_FOOT_PART - 1e-9, -FOOT_PART_STEP)
-    eye = np.array([mount.forward_m, 0.0])
-    then = np.stack([_project(_below(points, eye, part, grid), earlier_from_now, camera, mount, grid)
-                     for part in parts])
-    patches = [_cut(picture, grid.top + row, column) for row, column in feet]
-    alike = np.array([[_correlate(earlier, patch, at) for patch, at in zip(patches, there, strict=True)]
+    then = np.stack([both.move_along(points, part) for part in parts])
+    patches = [both.cut(row, column) for row, column in feet]
+    alike = np.array([[_correlate(both.earlier, patch, at) for patch, at in zip(patches, there, strict=True)]
                       for there in then])
     shown = alike[0] > -1.0
     if np.count_nonzero(shown) < MIN_FOOT_COLUMNS:
@@ -270,12 +288,6 @@ def measure_foot_part(
     return float(parts[best]) if tells and mean[best] - mean[0] >= MIN_FOOT_MARGIN else 1.0
 
 
-def _below(points: Floats, eye: Floats, depth: float, grid: FloorGrid) -> Floats:
-    """(n, 3) points on the rays to floor points (n, 2), so many times as far away."""
-    height = np.full(len(points), grid.camera_height_m * (1.0 - depth))
-    return np.column_stack([eye + (points - eye) * depth, height])
-
-
 def _find_upper_border(region: StandingRegion) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Rows and columns of some pixels of the upper border, spread over the region."""
     if region.is_clipped:
@@ -283,23 +295,6 @@ def _find_upper_border(region: StandingRegion) -> tuple[NDArray[np.intp], NDArra
     columns = np.flatnonzero(region.mask.any(axis=0))
     some = np.unique(columns[np.linspace(0, len(columns) - 1, min(COLUMNS, len(columns))).astype(int)])
     return np.argmax(region.mask[:, some], axis=0), some
-
-
-def _project(points_robot: Floats, earlier_from_now: Pose2, camera: Camera, mount: CameraMount, grid: FloorGrid
-             ) -> Floats:
-    """Where points (n, 3) of the robot's frame now were in the earlier picture, reduced [px]; NaN behind it."""
-    flat = earlier_from_now.apply(points_robot[:, :2])
-    height = mount.height_m - grid.camera_height_m  # of the floor above the plan on which poses are
-    there = mount.camera_from_robot.apply(np.column_stack([flat, points_robot[:, 2] + height]))
-    ahead = there[:, 2] > NEAR_PLANE_M
-    pixels = camera.project(np.where(ahead[:, None], there, (0.0, 0.0, 1.0)))
-    pixels[~ahead] = np.nan
-    return np.asarray((pixels + 0.5) / STEP_PX - 0.5)
-
-
-def _cut(picture: NDArray[np.float32], row: float, column: float) -> NDArray[np.float32]:
-    size = (2 * HALF + 1, 2 * HALF + 1)
-    return np.asarray(cv2.getRectSubPix(picture, size, (float(column), float(row))), np.float32)
 
 
 def _correlate(earlier: NDArray[np.float32], patch: NDArray[np.float32], there: Floats) -> float:
@@ -315,8 +310,8 @@ def _correlate(earlier: NDArray[np.float32], patch: NDArray[np.float32], there: 
 
 
 def _correlate_best(
-    earlier: NDArray[np.float32], patch: NDArray[np.float32], flat: Floats, places: list[Floats], min_parallax_px: float
+    earlier: NDArray[np.float32], patch: NDArray[np.float32], flat: Floats, places: list[Floats]
 ) -> float | None:
     """The largest correlation at those places that differ enough from where a flat region was; None where none does."""
-    apart = [there for there in places if np.linalg.norm(there - flat) * STEP_PX >= min_parallax_px]
+    apart = [there for there in places if np.linalg.norm(there - flat) * STEP_PX >= MIN_PARALLAX_PX]
     return max((_correlate(earlier, patch, there) for there in apart), default=None)

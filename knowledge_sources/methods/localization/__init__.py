@@ -6,7 +6,6 @@ What was seen:
 
 Where may the robot be?
 
-* :mod:`visibility_map`: the points of model lines that are visible from each position of a room.
 * :mod:`pose_candidates`: oriented chamfer matching over rooms, hill climbing, non-maximum suppression.
 * :mod:`refinement`: from a candidate to a precise pose, and how likely all views are there.
 

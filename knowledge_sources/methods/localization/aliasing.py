@@ -191,6 +191,4 @@ def _sum_own(view: ScoredView, other: ScoredView) -> float:
 
 def _cover(lines_px: Floats, by_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
     """(n,) covered part of each line, 0 where it is not in view."""
-    if not len(lines_px) or not len(by_px):
-        return np.zeros(len(lines_px))
     return np.nan_to_num(compute_coverage(lines_px, by_px, tolerance_px, tolerance_rad))

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.matching.image_matching import Match
-from knowledge_sources.methods.matching.pose_matching import PoseMatch, match_in_space
+from knowledge_sources.methods.matching import Match, PoseMatch, match_in_space
 from knowledge_sources.methods.pose.with_camera import CameraEstimate, estimate_camera_and_pose
 from knowledge_sources.methods.verification.line_check import LINE_TOLERANCE_RAD, MAX_LINE_WEIGHT_PX, compute_coverage
 from knowledge_sources.settings import DEFAULT, Settings

@@ -163,8 +163,7 @@ def _build_distinct(
     found: list[PlaceCandidate] = []
     for room, pose in rough:
         refined = RefinedPose(room, *refine_pose(robot, views, pose, settings))
-        if all(are_distinct(refined.world_from_robot, c.world_from_robot)
-               for c in (*known, *found)):
+        if all(are_distinct(refined.world_from_robot, c.world_from_robot) for c in (*known, *found)):
             found.append(_build_candidate(robot, views, refined, settings))
     return found
 
@@ -197,15 +196,16 @@ def find_aliases(
     predicted = [replace(view, segments_px=seen.segments_px) for view, seen in zip(views, lines, strict=True)]
     look_alike = make_alias_test(robot, [view.now_from_then for view in views], settings)
     found: list[RefinedPose] = []
+
+    def is_alias(other: Pose2) -> bool:
+        known = (pose, *(alias.world_from_robot for alias in found))
+        return all(are_distinct(other, one) for one in known) and look_alike(pose, other)
+
     for refined in _find_refined(robot, predicted, rooms, settings):
-        known = (pose, *(alias.world_from_robot for alias in found))
-        is_new = all(are_distinct(refined.world_from_robot, one) for one in known)
-        if is_new and look_alike(pose, refined.world_from_robot):
+        if is_alias(refined.world_from_robot):
             found.append(refined)
-    room_of_pose = _find_room(robot, rooms[0], pose)
-    for room, other in find_repetitions(robot.world, room_of_pose, pose, rooms):
-        known = (pose, *(alias.world_from_robot for alias in found))
-        if all(are_distinct(other, one) for one in known) and look_alike(pose, other):
+    for room, other in find_repetitions(robot.world, _find_room(robot, rooms[0], pose), pose, rooms):
+        if is_alias(other):
             found.append(RefinedPose(room, *refine_pose(robot, predicted, other, settings)))
     return tuple(found)
 

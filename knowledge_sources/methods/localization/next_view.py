@@ -109,10 +109,6 @@ def _is_difference(differ: Sequence[float], lines: Sequence[int], clearly: float
 
 def _count_missing(one: Floats, other: Floats) -> float:
     """Number of lines of a view that are not in another; a line that is half there counts half."""
-    if not len(one):
-        return 0.0
-    if not len(other):
-        return float(len(one))
     covered = compute_coverage(one, other, SAME_LINE_PX, SAME_LINE_RAD)
     return float(np.sum(1.0 - np.nan_to_num(covered)))
 

@@ -21,7 +21,7 @@ from knowledge_sources.methods.localization.global_localization import (
     PlaceCandidate,
 )
 from knowledge_sources.settings import DEFAULT, LocalizationSettings
-from world_models.frames import Pose2, wrap_angle
+from world_models.frames import Pose2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +126,6 @@ def is_within_reach(
     settings: LocalizationSettings = DEFAULT.localization,
 ) -> bool:
     """Whether a pose may be where the robot was told to be, or was tracked to, by both covariances (3, 3)."""
-    off = np.array([pose.x_m - told.x_m, pose.y_m - told.y_m, wrap_angle(pose.heading_rad - told.heading_rad)])
+    off = pose.minus(told)
     beyond = np.diag(np.square([settings.told_sigma_m, settings.told_sigma_m, settings.told_sigma_rad]))
     return float(off @ np.linalg.solve(covariance + told_covariance + beyond, off)) <= settings.max_told_chi2

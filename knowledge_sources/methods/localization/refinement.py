@@ -17,14 +17,16 @@ from numba import njit
 from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.methods.localization.views import CameraView, find_lever, join_covariances
 from knowledge_sources.methods.pose import planar_from_lines
+from knowledge_sources.methods.pose.planar import to_pose2
 from knowledge_sources.methods.verification.line_check import (
+    DISPLACEMENT_M,
     LINE_TOLERANCE_RAD,
     compute_agreement,
     compute_coverage,
     predict_lines,
 )
 from knowledge_sources.settings import DEFAULT, LocalizationSettings, Settings
-from world_models.frames import Pose, Pose2, wrap_angle
+from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines
 
@@ -42,16 +44,14 @@ TURN_SEARCH_SIGMAS = 2.5  # reach of the search for an uncertain turn, in standa
 MAX_VIEW_SURPRISE = 11.3
 """Largest squared normalized error of a view by the others, with which they still agree; three unknowns, 99 %."""
 DETECTION_RATE = 0.85  # probability that a predicted line is found at the right pose: others are hidden or too faint
-MIN_CHANCE = 0.04  # lower bound of the probability of a match at a wrong pose
-MAX_CHANCE = 0.6  # upper bound of the probability of a match at a wrong pose
+CERTAINTY_BOUNDS = 0.04, 0.6  # of the chance of a match, as a line counts for or against a pose
 LINE_INDEPENDENCE = 0.5  # weight of a line: lines of one thing are seen or missed together (tempered likelihood)
 MIN_VIEW_LINES = 8  # fewest predicted lines by which a single view counts
 MIN_EXPLAINED_LENGTH_PX = 25.0  # shortest segment that should be explained by the model
 EXPLAINED_TOLERANCE_PX = 3.0  # distance of a segment from the model line that explains it
 MIN_EXPLAINING_LENGTH_PX = 4.0  # shortest model line that explains a segment
 MIN_EXPLAINING_CONTRAST = 0.01  # smallest contrast of a model line that explains a segment, 0..1
-DISPLACEMENT_M = 0.35  # shift of the nearer wrong poses at which chance is counted; the farther are at twice as much
-DISPLACEMENT_RAD = 0.1  # turn of the wrong poses at which chance is counted
+WRONG_TURN_RAD = 0.1  # turn of the wrong poses at which chance is counted
 
 
 @dataclass(slots=True, eq=False)
@@ -106,8 +106,7 @@ def refine_pose(
         solved, posterior = _solve(robot, views[k], then, prior, start, settings)
         if posterior is prior:
             continue
-        turned = wrap_angle(solved.heading_rad - then.heading_rad)
-        off = np.array([solved.x_m - then.x_m, solved.y_m - then.y_m, turned])
+        off = solved.minus(then)
         surprises.append(float(off @ np.linalg.pinv(prior - posterior, rcond=1e-9, hermitian=True) @ off))
         state.update(jacobian, off, prior, posterior)
     return state.pose, state.covariance[:3, :3] * _compute_birge_ratio(surprises[1:])
@@ -147,7 +146,7 @@ def _build_rotation(heading_rad: float) -> Floats:
 
 
 def _add(pose: Pose2, off: Floats) -> Pose2:
-    return Pose2(pose.x_m + float(off[0]), pose.y_m + float(off[1]), wrap_angle(pose.heading_rad + float(off[2])))
+    return to_pose2(pose.vector + off)
 
 
 def refine_view_motions(
@@ -301,7 +300,7 @@ def compute_pose_likelihood(
 
 def compute_log_ratio(matched: int, visible: int, chance: float) -> float:
     """Compute the tempered log likelihood ratio of so many matched lines at the right pose and at a wrong one."""
-    p, rate = min(max(chance, MIN_CHANCE), MAX_CHANCE), DETECTION_RATE
+    p, rate = min(max(chance, CERTAINTY_BOUNDS[0]), CERTAINTY_BOUNDS[1]), DETECTION_RATE
     found, missed = math.log(rate / p), math.log((1.0 - rate) / (1.0 - p))
     return LINE_INDEPENDENCE * (matched * found + (visible - matched) * missed)
 
@@ -317,8 +316,7 @@ def _displace(pose: Pose2) -> list[Pose2]:
     """Sixteen wrong poses around a pose: four directions, two distances, two turns."""
     shifts = [(by * x, by * y) for by in (DISPLACEMENT_M, 2.0 * DISPLACEMENT_M)
               for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-    return [pose @ Pose2(x, y, turn) for x, y in shifts for turn in (-DISPLACEMENT_RAD,
-                                                                     DISPLACEMENT_RAD)]
+    return [pose @ Pose2(x, y, turn) for x, y in shifts for turn in (-WRONG_TURN_RAD, WRONG_TURN_RAD)]
 
 
 def _explain(robot: RobotModel, view: CameraView, then: Pose2) -> tuple[float, float]:
@@ -331,6 +329,5 @@ def _explain(robot: RobotModel, view: CameraView, then: Pose2) -> tuple[float, f
         robot.world, robot.camera, robot.camera_from_world(then), min_length_px=MIN_EXPLAINING_LENGTH_PX,
         min_contrast=MIN_EXPLAINING_CONTRAST, min_separation_px=0.0)
     covered = compute_coverage(
-        view.segments_px[long], shown.segments_px, EXPLAINED_TOLERANCE_PX,
-        LINE_TOLERANCE_RAD)
+        view.segments_px[long], shown.segments_px, EXPLAINED_TOLERANCE_PX, LINE_TOLERANCE_RAD)
     return float(np.sum(length[long])), float(np.sum(length[long] * covered))

@@ -21,8 +21,7 @@ Three lines of a model, of which the data show two, moved by (5, -3) pixels, and
 [5, -3]
 """
 
-from knowledge_sources.methods.matching.image_matching import Match, format_trace, match_lines
-from knowledge_sources.methods.matching.image_pairs import Peak
+from knowledge_sources.methods.matching.image_matching import Match, Peak, match_lines
 from knowledge_sources.methods.matching.pose_matching import FloorMatch, PoseMatch, match_in_space, match_on_floor
 from knowledge_sources.methods.matching.search import Similarity2, TraceStep
 
@@ -33,7 +32,6 @@ __all__ = [
     "PoseMatch",
     "Similarity2",
     "TraceStep",
-    "format_trace",
     "match_in_space",
     "match_lines",
     "match_on_floor",

@@ -318,3 +318,14 @@ def _fit_turn(q: Floats, turn: float) -> tuple[float, float]:
         if bend > 1e-12:
             turn -= min(max(slope / bend, -0.5), 0.5)
     return math.cos(turn), math.sin(turn)
+
+
+@compiled
+def count_cover(masks: Mask, model: Indices, chosen: Mask, lines: int) -> Floats:
+    """(m, c) how many chosen data lines cover each cell."""
+    counts = np.zeros((lines, masks.shape[1]))
+    for p in range(len(model)):
+        if chosen[p]:
+            for c in range(masks.shape[1]):
+                counts[model[p], c] += masks[p, c]
+    return counts

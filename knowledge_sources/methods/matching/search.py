@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.matching.matching_kernels import (
@@ -22,6 +21,7 @@ from knowledge_sources.methods.matching.matching_kernels import (
     TermArrays,
     apply_move,
     compute_fits,
+    count_cover,
     search_locally,
 )
 from knowledge_sources.settings import MatchingSettings
@@ -54,14 +54,8 @@ class Similarity2:
         return np.asarray(self.scale * turned + self.centre_px + self.shift_px)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Fits:
-    """Best fits of k states.
-
-    Attributes:
-        errors: (k,) E_fit at the minimum.
-        placements: (k, 5) (cos, sin, T_u, T_v, s), or the steps (k, d) of a pose.
-    """
+class Fits(NamedTuple):
+    """Best fits of k states: E_fit (k,), and placements (k, 5) (cos, sin, T_u, T_v, s), or steps (k, d) of a pose."""
 
     errors: Floats
     placements: Floats
@@ -84,7 +78,7 @@ class Fitting(NamedTuple):
 
 
 POSE_STEP = Fitting(STEP, 0.0)
-"""As :func:`compute_step_fits`."""
+"""Forms (k, d + 1, d + 1) are minimised over the first d of (step, 1); ``placements`` are the steps (k, d)."""
 
 
 def compute_best_fits(forms: Floats, with_scale: bool, start: Floats) -> Fits:
@@ -99,11 +93,6 @@ def compute_best_fits(forms: Floats, with_scale: bool, start: Floats) -> Fits:
     turns = np.empty(len(forms))
     turns[:] = np.arctan2(start[..., 1], start[..., 0])
     return Fits(*compute_fits(np.ascontiguousarray(forms), SCALED if with_scale else RIGID, turns))
-
-
-def compute_step_fits(forms: Floats) -> Fits:
-    """Minimise k forms (k, d + 1, d + 1) over the first d of (step, 1); ``placements`` are the steps (k, d)."""
-    return POSE_STEP.fit(forms)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,22 +175,18 @@ def build_likelihood_terms(
     )
 
 
-STRATEGIES = ("first", "steepest")
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PairSpace:
     """The restricted space: p possible pairs of a model line and a data line. A state is a mask (p,) of chosen pairs.
 
     Attributes:
-        members: (p,) rows of the table of pairs. model, data: (p,) indices. forms: (p, d, d) shares of E_fit.
+        model, data: (p,) indices. forms: (p, d, d) shares of E_fit.
         masks: (p, c) cells of the model line that the data line covers.
         lines: number of model lines.
         anchor: (d, d) pull to the placement at which the space was formed.
         fitting: how a state is fitted.
     """
 
-    members: Indices
     model: Indices
     data: Indices
     forms: Floats
@@ -216,6 +201,29 @@ class PairSpace:
         return self.forms, self.masks, self.model, self.data, self.anchor
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Correspondence:
+    """The best correspondence found.
+
+    Attributes:
+        pairs: (p, 2) model index, data index, sorted; many data lines may go to one model line.
+        e_fit, e_omission: the two terms of the match error, the second with its weight.
+        coverage: (m,) share of each model line that data lines cover.
+        residuals_px: (p, 2) distances of the paired data ends to their model lines; of a pose, to first order.
+    """
+
+    pairs: Indices
+    e_fit: float
+    e_omission: float
+    coverage: Floats
+    residuals_px: Floats
+
+    @property
+    def e_match(self) -> float:
+        """The match error: smaller is better; only comparable under one objective and one model."""
+        return self.e_fit + self.e_omission
+
+
 @dataclass(frozen=True, slots=True)
 class TraceStep:
     """One state of the search: its pairs (model, data) and its match error, as a row of Figure 12(d)."""
@@ -224,8 +232,7 @@ class TraceStep:
     evaluation: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SearchResult:
+class SearchResult(NamedTuple):
     """Where a search ended: (p,) chosen pairs, E_match, moves made, and the states if kept."""
 
     chosen: Mask
@@ -253,7 +260,7 @@ def search_pairs(
     Raises:
         ValueError: an unknown strategy.
     """
-    if strategy not in STRATEGIES:
+    if strategy not in ("first", "steepest"):
         raise ValueError(f'expected strategy "first" or "steepest", got {strategy!r}')
     most = MAX_MOVES_PER_PAIR * len(start)
     chosen, moves, errors = search_locally(
@@ -276,7 +283,7 @@ def fit_state(space: PairSpace, chosen: Mask) -> Fits:
 
 def compute_coverage(space: PairSpace, chosen: Mask) -> Floats:
     """(m,) share of each model line that the chosen data lines cover."""
-    return np.asarray((_count_cover(space.masks, space.model, chosen, space.lines) > 0).mean(axis=1))
+    return np.asarray((count_cover(space.masks, space.model, chosen, space.lines) > 0).mean(axis=1))
 
 
 def build_masks(along: Floats, lengths: Floats, cells: int) -> Mask:
@@ -301,17 +308,6 @@ def list_pairs(space: PairSpace, chosen: Mask) -> tuple[Indices, Indices]:
     rows = np.flatnonzero(chosen)
     rows = rows[np.lexsort((space.data[rows], space.model[rows]))]
     return rows, np.stack([space.model[rows], space.data[rows]], axis=1)
-
-
-@njit(cache=True, error_model="numpy")
-def _count_cover(masks: Mask, model: Indices, chosen: Mask, lines: int) -> Floats:
-    """(m, c) how many chosen data lines cover each cell."""
-    counts = np.zeros((lines, masks.shape[1]))
-    for p in range(len(model)):
-        if chosen[p]:
-            for c in range(masks.shape[1]):
-                counts[model[p], c] += masks[p, c]
-    return counts
 
 
 def _list_states(

@@ -66,20 +66,3 @@ def compute_curvature_to(point: tuple[float, float], here: Pose2) -> float:
     """Curvature of the arc tangent to the robot's heading that leads through a point ahead [1/m]."""
     away = math.hypot(point[0] - here.x_m, point[1] - here.y_m)
     return 2.0 * math.sin(compute_bearing(point, here)) / max(away, 1e-6)
-
-
-def compute_error_bound_m(
-    *, increment_m: float, lookahead_m: float, place_m: float, heading_rad: float, curvature_per_m: float
-) -> float:
-    """Y of the law above: bound of the position error at the ends of increments [m].
-
-    Args:
-        place_m, heading_rad: largest error of the believed place, b, and of believed heading and turn together, h + t.
-        curvature_per_m: largest error of the estimated drift, k.
-
-    Raises:
-        ValueError: the look-ahead is shorter than an increment.
-    """
-    if not 0.0 < increment_m <= lookahead_m:
-        raise ValueError(f"expected a look-ahead of at least the increment of {increment_m} m, got {lookahead_m} m")
-    return place_m + lookahead_m * heading_rad + 0.5 * curvature_per_m * increment_m * lookahead_m

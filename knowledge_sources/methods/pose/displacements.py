@@ -13,14 +13,13 @@ Advances in Control Systems 3, 1966.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
-from knowledge_sources.methods.pose.levenberg_marquardt import cross
-from knowledge_sources.methods.pose.line_set import LineSet, build_line_set, compute_distance_slopes
+from knowledge_sources.methods.pose.line_set import LineSet, build_line_set, compute_distance_slopes, cross
 from knowledge_sources.methods.pose.planar import (
     PlanarPrior,
     compute_camera_poses,
@@ -42,8 +41,7 @@ DISPLACED_GATE_PX = 3.0  # px; and the segment's own error across its line
 DISPLACED_GATE_RAD = 0.15  # rad; and the segment's own error in direction
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DisplacedFit:
+class DisplacedFit(NamedTuple):
     """Model lines displaced so that segments lie on them.
 
     Attributes:
@@ -84,14 +82,13 @@ def compute_sigmas_px(
 
     The larger of a line's two ends; 0 where it is not in view.
     """
-    rotation, translation = compute_camera_poses(_to_state(pose), camera_from_robot)
+    rotation, translation = compute_camera_poses(pose.vector, camera_from_robot)
     projected, _ = camera.project_segments(np.array(lines_world, float), Pose(rotation, translation))
     sigmas = np.zeros(len(lines_world))
     seen = np.flatnonzero(np.isfinite(projected).all(axis=(1, 2)))
     if len(seen) and len(errors.displacement_modes):
         lines = build_line_set(lines_world[seen], projected[seen], camera, 1.0)
-        _, _, by_mode = compute_displaced_jacobian(
-            lines, errors.displacements[:, seen], _to_state(pose), camera_from_robot)
+        _, _, by_mode = compute_displaced_jacobian(lines, errors.displacements[:, seen], pose.vector, camera_from_robot)
         sigmas[seen] = np.sqrt(np.sum(by_mode**2, axis=2)).max(axis=1)
     return sigmas
 
@@ -116,7 +113,7 @@ def fit_displacements(
         pose: ``world_from_robot``. covariance: (3, 3) of it; ``None``: the pose stays.
     """
     lines, segments = np.asarray(lines_world, float), np.asarray(segments_px, float).reshape(-1, 2, 2)
-    state, start = _to_state(pose), _to_state(pose)
+    state, start = pose.vector, pose.vector
     which, data = _find_candidates(lines, errors, segments, camera, camera_from_robot, state, covariance, settings)
     amplitudes = np.zeros(len(errors.displacement_modes))
     if not len(which):
@@ -161,8 +158,7 @@ def _solve(slopes: Floats, distances: Floats, weights: Floats, information: Floa
 def _displace(lines: LineSet, shifts: Floats, amplitudes: Floats) -> LineSet:
     by_m = np.tensordot(amplitudes, shifts, axes=1)
     points = lines.points + by_m[:, None]
-    return LineSet(points, lines.directions, np.cross(points[:, 0], lines.directions), lines.rays, lines.normals,
-                   lines.lengths_px, lines.sigma_px, lines.focal_px)
+    return replace(lines, points=points, moments=np.cross(points[:, 0], lines.directions))
 
 
 def _find_candidates(
@@ -198,16 +194,11 @@ def _measure(segments_px: Floats) -> tuple[Floats, Floats]:
     return by / np.where(lengths > 0.0, lengths, np.nan)[:, None], lengths
 
 
-def _to_state(pose: Pose2) -> Floats:
-    return np.array([pose.x_m, pose.y_m, pose.heading_rad])
-
-
 def _subtract(state: Floats, start: Floats) -> Floats:
-    return np.array([state[0] - start[0], state[1] - start[1], wrap_angle(float(state[2] - start[2]))])
+    return np.array([*(state[:2] - start[:2]), wrap_angle(float(state[2] - start[2]))])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MarginalFit:
+class MarginalFit(NamedTuple):
     """A pose of greatest marginal likelihood.
 
     Attributes:

@@ -10,14 +10,14 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose import kernels
-from knowledge_sources.methods.pose.levenberg_marquardt import orthonormalise
-from knowledge_sources.methods.pose.line_set import LineSet, compute_image_jacobian, find_in_front, measure_lines
+from knowledge_sources.methods.pose.kernels import RigidMotion
+from knowledge_sources.methods.pose.line_set import LineSet, compute_image_jacobian, measure_lines
 from knowledge_sources.settings import PoseSettings
 from world_models.frames import Pose, Pose2, frozen
 
@@ -29,6 +29,7 @@ MIN_SCATTER_FREEDOM = 6  # degrees of freedom from which a larger scatter of the
 # largest ratio of the noise's variance to the stated one that is told from the inliers' scatter (engineering
 # judgement: four times the noise; then the cut on inliers hides the rest)
 MAX_SCATTER = 16.0
+MAX_ITERATIONS = 30  # levenberg-Marquardt steps for the six unknowns of a camera
 
 DISTANCE = "too far from the model line"
 BEHIND = "behind the camera"
@@ -171,38 +172,64 @@ MINORITY = "most lines do not fit the pose"
 FAR_LINES = "the lines lie further from the pose than their noise allows"
 NO_SUBSET = "no subset of lines agrees: the prior is returned"
 
-MIN_INLIERS = 3
+MIN_LINES = 3
 """Three lines decide six unknowns."""
 MIN_LENGTH_PX = 1e-9
 """A shorter segment has no direction."""
 
 
+@lru_cache(maxsize=1)
 def compute_weak_information() -> Floats:
     """(6, 6) information of a prior without a covariance: too little to move a pose that lines decide. Read-only."""
-    return _compute_weak_information(WEAK_ROTATION_RAD, WEAK_TRANSLATION_M)
+    return frozen(np.diag([WEAK_ROTATION_RAD**-2] * 3 + [WEAK_TRANSLATION_M**-2] * 3))
 
 
-@lru_cache(maxsize=8)
-def _compute_weak_information(rotation_rad: float, translation_m: float) -> Floats:
-    return frozen(np.diag([rotation_rad**-2] * 3 + [translation_m**-2] * 3))
+def knows_more(hessian: Floats, information: Floats) -> bool:
+    """Whether, in every direction, the lines of this ``hessian`` know more than the diagonal of ``information``."""
+    scale = 1.0 / np.sqrt(np.diag(information))
+    return bool(np.linalg.eigvalsh(hessian * scale[:, None] * scale)[0] >= 1.0)
 
 
-def has_open_direction(hessian: Floats) -> bool:
-    """Whether, in some direction, the lines know less than a weak prior."""
-    scale = 1.0 / np.sqrt(np.diag(compute_weak_information()))
-    return bool(np.linalg.eigvalsh(hessian * scale[:, None] * scale)[0] < 1.0)
+class Minimum(NamedTuple):
+    """Where a minimisation ended: R (3, 3), T (3,), the Hessian (6, 6), the cost, and the steps taken."""
+
+    rotation: Floats
+    translation: Floats
+    hessian: Floats
+    cost: float
+    iterations: int
+
+    @property
+    def state(self) -> RigidMotion:
+        """R, T."""
+        return self.rotation, self.translation
 
 
-def is_mostly_in_front(lines: LineSet, rotation: Floats, translation: Floats) -> bool:
+def minimise(
+    kind: int, lines: LineSet, start: RigidMotion, prior: Pose | None = None, information: Floats | None = None,
+    weights: Floats | None = None, iterations: int = MAX_ITERATIONS,
+) -> Minimum:
+    """:func:`kernels.minimise_pose`; the prior counts if its information (6, 6) is given, and lines count alike.
+
+    Arrays that may be read-only are copied: numba compiles a function anew for each kind of argument.
+    """
+    begin = np.array(start[0]), np.array(start[1])
+    towards = begin if prior is None else (np.array(prior.rotation), np.array(prior.translation))
+    known = np.zeros((6, 6)) if information is None or prior is None else np.array(information)
+    weights = np.ones(len(lines)) if weights is None else weights
+    return Minimum(*kernels.minimise_pose(kind, lines.arrays, weights, begin, towards, known, iterations))
+
+
+def is_mostly_in_front(lines: LineSet, state: RigidMotion) -> bool:
     """Whether more than half of the lines pass in front of the camera."""
-    return len(lines) == 0 or 2 * int(np.count_nonzero(find_in_front(lines, rotation, translation))) > len(lines)
+    return len(lines) == 0 or 2 * int(np.count_nonzero(measure_lines(lines, *state)[1])) > len(lines)
 
 
 def find_rejections(
-    lines: LineSet, rotation: Floats, translation: Floats, near: Mask, settings: PoseSettings
+    lines: LineSet, state: RigidMotion, near: Mask, settings: PoseSettings
 ) -> tuple[str | None, ...]:
     """Why each line is no inlier (n); ``near`` (n,) says which are near enough to their model line."""
-    _, front, overlap = measure_lines(lines, rotation, translation, settings.max_beside_px)
+    _, front, overlap = measure_lines(lines, *state, settings.max_beside_px)
     tests = (
         (lines.lengths_px <= MIN_LENGTH_PX, NO_LENGTH), (~near, DISTANCE), (~front, BEHIND), (~overlap, NO_OVERLAP)
     )
@@ -213,35 +240,53 @@ def find_rejections(
     return tuple(out)
 
 
-def reject_behind(lines: LineSet, rotation: Floats, translation: Floats) -> tuple[str | None, ...]:
+def reject_behind(lines: LineSet, state: RigidMotion) -> tuple[str | None, ...]:
     """Reasons of a solver that rejects only what lies behind the camera."""
-    return tuple(None if f else BEHIND for f in find_in_front(lines, rotation, translation))
+    return tuple(None if f else BEHIND for f in measure_lines(lines, *state)[1])
 
 
 def build_estimate(
-    lines: LineSet,
-    rotation: Floats,
-    translation: Floats,
-    covariance: Floats,
-    rejected: tuple[str | None, ...],
-    cost: float,
-    iterations: int,
-    reason: str | None,
-    settings: PoseSettings,
-    bound: float = math.inf,
+    lines: LineSet, end: Minimum, covariance: Floats, rejected: tuple[str | None, ...], settings: PoseSettings,
+    prior: Pose | None = None, known: Floats | None = None, reason: str | None = None, bound: float = math.inf,
+    kept: Mask | None = None,
 ) -> PoseEstimate:
-    """The estimate at a pose, with its residuals; its reason, if there is none yet, is :func:`find_doubt`'s."""
-    residuals = measure_lines(lines, rotation, translation)[0]
+    """The estimate at a pose, with its residuals; its reason, if there is none yet, is :func:`find_doubt`'s.
+
+    Where most of its lines (those ``kept``) lie behind the camera it is the ``prior``, of covariance ``known`` (6, 6).
+    """
+    rotation = orthonormalise(end.rotation)
+    if prior is not None and not is_mostly_in_front(
+        lines if kept is None else lines.take(kept), (rotation, end.translation)
+    ):
+        instead = build_prior_estimate(lines, prior, ALL_BEHIND, settings, known)
+        return replace(instead, iterations=end.iterations)
+    residuals = measure_lines(lines, *end.state)[0]
     return PoseEstimate(
-        camera_from_world=Pose(orthonormalise(rotation), translation),
+        camera_from_world=Pose(rotation, end.translation),
         covariance=0.5 * (covariance + covariance.T),
         inliers=np.array([r is None for r in rejected], dtype=bool),
         residuals_px=residuals,
         rejected=rejected,
-        cost=cost,
-        iterations=iterations,
+        cost=end.cost,
+        iterations=end.iterations,
         reason=reason or find_doubt(residuals / lines.sigma_px[:, None], rejected, settings, bound),
     )
+
+
+def build_prior_estimate(
+    lines: LineSet, prior: Pose, reason: str, settings: PoseSettings, covariance: Floats | None = None
+) -> PoseEstimate:
+    """The prior unchanged, with the reason why and its ``covariance`` (6, 6); lines behind it are no inliers."""
+    if covariance is None:
+        covariance = np.asarray(np.linalg.inv(compute_weak_information()), float)
+    end = Minimum(prior.rotation, prior.translation, np.zeros((6, 6)), math.inf, 0)
+    return build_estimate(lines, end, covariance, reject_behind(lines, end.state), settings, reason=reason)
+
+
+def orthonormalise(rotation: Floats) -> Floats:
+    """The rotation nearest to an almost orthonormal matrix (3, 3)."""
+    u, _, vt = np.linalg.svd(rotation)
+    return np.asarray(u @ vt)
 
 
 def find_doubt(
@@ -255,7 +300,7 @@ def find_doubt(
     """
     kept = np.array([r is None for r in rejected], bool)
     count = int(np.count_nonzero(kept))
-    if count < MIN_INLIERS:
+    if count < MIN_LINES:
         return FEW_INLIERS
     if 2 * count < len(rejected):
         return MINORITY
@@ -265,8 +310,8 @@ def find_doubt(
 
 
 def compute_covariance(
-    lines: LineSet, rotation: Floats, translation: Floats, rejected: tuple[str | None, ...],
-    gain: tuple[Floats, Floats], settings: PoseSettings, bound: float | None = None, doubtful: Mask | None = None,
+    lines: LineSet, state: RigidMotion, rejected: tuple[str | None, ...], gain: tuple[Floats, Floats],
+    settings: PoseSettings, bound: float | None = None, doubtful: Mask | None = None,
 ) -> Floats:
     """(6, 6) covariance from how the pose moves with the ends of the lines, see :func:`kernels.spread_errors`.
 
@@ -275,7 +320,7 @@ def compute_covariance(
     allows have more noise. And ``doubtful`` ones (n,) may be wrong by as much as an inlier can be.
     """
     kept = np.array([r is None for r in rejected], bool)
-    noise = measure_scatter(lines.take(kept), rotation, translation, settings)
+    noise = _measure_scatter(lines.take(kept), state, settings)
     if bound is not None:
         mean = noise if noise > 1.0 else compute_mean_square(1.0, bound)
         noise = compute_spread(mean, bound, MAX_SCATTER)
@@ -286,20 +331,20 @@ def compute_covariance(
     return covariance
 
 
-def measure_scatter(lines: LineSet, rotation: Floats, translation: Floats, settings: PoseSettings) -> float:
+def _measure_scatter(lines: LineSet, state: RigidMotion, settings: PoseSettings) -> float:
     """The lines' variance over the stated one, if that does not allow it; else 1.
 
     From what is left of the residuals when the pose, and the error that all lines share, are fitted to them: a pose
     that is not the likeliest one has larger residuals without more noise.
     """
     freedom = 2.0 * len(lines) - 6.0
-    distances = measure_lines(lines, rotation, translation)[0]
+    distances = measure_lines(lines, *state)[0]
     chi2 = float(np.sum((distances / lines.sigma_px[:, None]) ** 2))
     if freedom < MIN_SCATTER_FREEDOM or chi2 <= compute_max_chi2(freedom, settings):
         return 1.0
-    residuals, slopes = compute_image_jacobian(lines, rotation, translation)
+    residuals, slopes = compute_image_jacobian(lines, *state)
     normals_px = kernels.compute_gain(
-        lines.arrays, np.zeros(len(lines)), np.array(rotation), np.array(translation), np.eye(6))[1]
+        lines.arrays, np.zeros(len(lines)), np.array(state[0]), np.array(state[1]), np.eye(6))[1]
     places = np.concatenate([np.ones((*lines.rays.shape[:2], 1)), lines.rays[..., :2]], axis=2)
     shared = np.einsum("ia,iec->ieac", normals_px, places).reshape(len(lines), 2, 6) * (settings.shared_px > 0.0)
     sigma = np.repeat(lines.sigma_px, 2)
@@ -311,26 +356,3 @@ def measure_scatter(lines: LineSet, rotation: Floats, translation: Floats, setti
     left = float(np.sum((whitened - basis @ (basis.T @ whitened)) ** 2))
     is_more = freedom >= MIN_SCATTER_FREEDOM and left > compute_max_chi2(freedom, settings)
     return left / freedom if is_more else 1.0
-
-
-def build_prior_estimate(
-    lines: LineSet, prior: Pose, reason: str, settings: PoseSettings, covariance: Floats | None = None
-) -> PoseEstimate:
-    """The prior unchanged, with the reason why and its ``covariance`` (6, 6); lines behind it are no inliers."""
-    rejected = reject_behind(lines, prior.rotation, prior.translation)
-    if covariance is None:
-        covariance = np.asarray(np.linalg.inv(compute_weak_information()), float)
-    return build_estimate(
-        lines, prior.rotation, prior.translation, covariance, rejected, float("inf"), 0, reason, settings
-    )
-
-
-def check_in_front(
-    lines: LineSet, prior: Pose, estimate: PoseEstimate, settings: PoseSettings, kept: Mask | None = None,
-    covariance: Floats | None = None,
-) -> PoseEstimate:
-    """The estimate if most of its lines (those ``kept``) lie in front of the camera, else the prior."""
-    pose = estimate.camera_from_world
-    if is_mostly_in_front(lines if kept is None else lines.take(kept), pose.rotation, pose.translation):
-        return estimate
-    return replace(build_prior_estimate(lines, prior, ALL_BEHIND, settings, covariance), iterations=estimate.iterations)

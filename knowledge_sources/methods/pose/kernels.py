@@ -1,10 +1,10 @@
 """The inner loops of the pose solvers, compiled by numba.
 
-The same residuals and derivatives are written in plain numpy in `line_set`, `r_and_t` and `planar`, and the
-tests compare the two. The file is long because compiled functions must only call functions of their own file: numba's
-cache checks a function's own file, so that after a change in another one the old machine code would be used without a
-warning (numba 0.68). In this order: line preparation, minimisation, six unknowns, subsets, three unknowns on the floor
-from lines and from points, normal equations, linear algebra.
+The tests compare the residuals and derivatives with plain numpy and with finite differences. The file is long because
+compiled functions must only call functions of their own file: numba's cache checks a function's own file, so that after
+a change in another one the old machine code would be used without a warning (numba 0.68). In this order: line
+preparation, minimisation, six unknowns, subsets, three unknowns on the floor from lines and from points, normal
+equations, linear algebra.
 
 ``lines`` is :attr:`LineSet.arrays`. Rotations R (3, 3) and translations T (3,) [m] are ``camera_from_world``; a step is
 a left perturbation (rotation [rad], translation [m]) (6,). A state on the floor is (x [m], y [m], heading [rad]) of
@@ -27,7 +27,7 @@ RigidMotion = tuple[Floats, Floats]
 LineArrays = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats]
 """Points (n, 2, 3), directions, moments (n, 3), rays (n, 2, 3), normals (n, 3), lengths, sigmas (n,), focal (2,)."""
 PoseProblem = tuple[int, LineArrays, Floats, RigidMotion, Floats]
-"""PLANES or IMAGE, lines, their weights (n,), the prior and its information (6, 6)."""
+"""What is minimised, lines, their weights (n,), the prior and its information (6, 6)."""
 FloorArrays = tuple[LineArrays, Floats, Floats, RigidMotion]
 """Lines, the prior's mean (3,) and information (3, 3), the mount ``camera_from_robot``."""
 PointArrays = tuple[Floats, Floats, Floats, Floats, Floats, Floats, RigidMotion]
@@ -43,8 +43,9 @@ MIN_STEP, MIN_POINT_STEP = 1e-8, 1e-10
 MIN_RELATIVE_GAIN = 1e-12
 """A relative gain below this ends a minimisation: rounding, no setting."""
 
-PLANES, IMAGE = 0, 1
-"""What is minimised: E1 (§6.2.2), with T eliminated, or squared distances in the image over their variance."""
+PLANES, IMAGE, SINES, TURN = 0, 1, 2, 3
+"""What is minimised: E1 (§6.2.2), with T eliminated; squared distances in the image over their variance; E2, each
+distance of E1 over that of the end from the camera; or n . R d (§6.2.1), which is of R alone, with T as E1 has it."""
 
 FINE, NOT_FINITE, NO_LENGTH = 0, 1, 2
 """What is wrong with a row of a set of lines."""
@@ -133,7 +134,7 @@ def minimise_pose(
     """The pose (six unknowns) of least cost, by Levenberg-Marquardt from ``start``.
 
     Args:
-        kind: PLANES or IMAGE.
+        kind: PLANES, IMAGE, SINES or TURN.
         weights: (n,) of the lines; a line of weight 0 does not count.
         prior: counts as one more measurement with ``information`` (6, 6); all zero: no prior.
 
@@ -141,7 +142,7 @@ def minimise_pose(
         R, T, the Gauss-Newton Hessian (6, 6) there, the cost and the steps taken.
     """
     rotation, translation = start[0].copy(), start[1].copy()
-    if kind == PLANES:
+    if kind in (PLANES, TURN):
         _minimise_translation(lines, weights, rotation, translation)
     problem = kind, lines, weights, prior, information
     state, hessian, cost, done = _minimise_pose(problem, (rotation, translation), iterations)
@@ -152,7 +153,7 @@ def minimise_pose(
 def _move_pose(problem: PoseProblem, state: RigidMotion, step: Floats) -> RigidMotion:
     """E1 is quadratic in T: after each step T is eliminated exactly."""
     rotation, translation = _perturb(step, state[0], state[1])
-    if problem[0] == PLANES:
+    if problem[0] in (PLANES, TURN):
         _minimise_translation(problem[1], problem[2], rotation, translation)
     return rotation, translation
 
@@ -426,7 +427,7 @@ def solve_subsets(
             for w in range(rows.shape[1]):
                 if real[j, w] > 0.0:
                     i = rows[j, w]
-                    _add_plane_terms(points[i], normals[i], 1.0, rotation, translation, hessian, gradient)
+                    _add_plane_terms(PLANES, points[i], normals[i], 1.0, rotation, translation, hessian, gradient)
             _mirror_upper(hessian)
             largest = 1e-9
             for a in range(6):
@@ -505,15 +506,10 @@ def compute_floor_costs(floor: FloorArrays, states: Floats, bound: float) -> Flo
 @compiled
 def compute_floor_squares(floor: FloorArrays, state: Floats) -> Floats:
     """(n,) squared image distances over their variance."""
-    lines, _, _, mount = floor
-    _, directions, moments, rays, _, _, sigma, focal = lines
-    rotation, translation = _compute_camera_pose(state, mount)
-    out = np.empty(len(directions))
-    for i in range(len(directions)):
-        _, plane, reach = _project_line(directions[i], moments[i], focal, rotation, translation)
-        first, second = _dot(rays[i, 0], plane) / reach, _dot(rays[i, 1], plane) / reach
-        out[i] = (first * first + second * second) / (sigma[i] * sigma[i])
-    return out
+    rotation, translation = _compute_camera_pose(state, floor[3])
+    many = compute_squared_distances(floor[0], rotation.reshape(1, 3, 3), translation.reshape(1, 3))
+    squares: Floats = many[0]
+    return squares
 
 
 @compiled
@@ -680,8 +676,12 @@ def _linearise_pose(problem: PoseProblem, pose: RigidMotion, hessian: Floats, gr
     for i in range(len(points)):
         if weights[i] == 0.0:
             continue
-        if kind == PLANES:
-            cost += _add_plane_terms(points[i], normals[i], weights[i], rotation, translation, hessian, gradient)
+        if kind in (PLANES, SINES):
+            cost += _add_plane_terms(kind, points[i], normals[i], weights[i], rotation, translation, hessian, gradient)
+        elif kind == TURN:
+            turned = _rotate(rotation, directions[i])
+            by = _cross(turned, normals[i])
+            cost += _add_row(_dot(turned, normals[i]), by, (0.0, 0.0, 0.0), weights[i], hessian, gradient)
         else:
             weight = weights[i] / (sigma[i] * sigma[i])
             cost += _add_image_terms(
@@ -698,14 +698,22 @@ _minimise_pose = _build_minimiser(_linearise_pose, _move_pose, 6, MIN_STEP)
 
 @compiled
 def _add_plane_terms(
-    ends: Floats, normal: Floats, weight: float, rotation: Floats, translation: Floats, hessian: Floats,
+    kind: int, ends: Floats, normal: Floats, weight: float, rotation: Floats, translation: Floats, hessian: Floats,
     gradient: Floats,
 ) -> float:
-    """A line's two terms n . (R p + T) of E1; derivatives (q x n, n) with q = R p + T."""
+    """A line's two terms n . q of E1, q = R p + T, with derivatives (q x n, n); of E2 over the length of q."""
     cost = 0.0
     for e in range(2):
-        q = _transform(rotation, translation, ends[e])
-        cost += _add_row(_dot(q, normal), _cross(q, normal), normal, weight, hessian, gradient)
+        q, slope = _transform(rotation, translation, ends[e]), (normal[0], normal[1], normal[2])
+        miss = _dot(q, normal)
+        if kind == SINES:
+            square = max(_dot(q, q), TINY)
+            reach, part = math.sqrt(square), miss / square
+            miss = miss / reach
+            slope = (
+                (normal[0] - part * q[0]) / reach, (normal[1] - part * q[1]) / reach, (normal[2] - part * q[2]) / reach
+            )
+        cost += _add_row(miss, _cross(q, slope), slope, weight, hessian, gradient)
     return cost
 
 

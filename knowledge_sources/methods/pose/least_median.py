@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import combinations
 from typing import Any
 
@@ -12,16 +13,16 @@ from scipy.spatial.transform import Rotation
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.pose import kernels
 from knowledge_sources.methods.pose.estimate import (
+    MAX_ITERATIONS,
     MIN_LENGTH_PX,
     NO_SUBSET,
     PoseEstimate,
     build_estimate,
     build_prior_estimate,
-    check_in_front,
     compute_weak_information,
     find_rejections,
 )
-from knowledge_sources.methods.pose.levenberg_marquardt import invert_information
+from knowledge_sources.methods.pose.kernels import RigidMotion
 from knowledge_sources.methods.pose.line_set import (
     LandmarkIds,
     LineSet,
@@ -29,9 +30,9 @@ from knowledge_sources.methods.pose.line_set import (
     compute_image_jacobian,
     compute_squared_distances,
     group_by_landmark,
+    invert_information,
 )
-from knowledge_sources.methods.pose.r_and_t import MAX_ITERATIONS, NO_INFORMATION, PoseState
-from knowledge_sources.methods.pose.r_and_t_ml import (
+from knowledge_sources.methods.pose.r_and_t import (
     compute_likeliest_covariance,
     find_likeliest,
     invert_covariance,
@@ -97,47 +98,56 @@ def med_r_and_t(
         ValueError: as :func:`build_line_set`; ids that are not one a line; subsets must be drawn without ``rng``; a
             covariance of another shape.
     """
+    def choose(lines: LineSet, rotations: Floats, translations: Floats) -> tuple[RigidMotion, Mask, float]:
+        def rank(errors: Floats) -> Floats:
+            return np.median(errors, axis=1)
+
+        half = (len(lines) + SUBSET_SIZE) // 2
+        rotations, translations = _add_concentrated(lines, rotations, translations, rank, MED_CANDIDATES, half)
+        rotations, translations = _keep_possible(lines, prior, prior_covariance, rotations, translations)
+        errors = compute_squared_distances(lines, rotations, translations)
+        medians = rank(errors)
+        least = float(medians.min())
+        bound = 2.0 * (settings.outlier_sigmas * _compute_robust_scale(least, len(lines))) ** 2
+        tied = np.flatnonzero(medians <= max(least, _compute_tied_median()))
+        best = int(tied[np.argmin(np.minimum(errors[tied], bound).sum(axis=1))])
+        return (rotations[best], translations[best]), errors[best] <= bound, bound
+
+    return _solve(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px, probability,
+                  MED_DRAWN_OUTLIER_PART, rng, prior_covariance, settings, choose)
+
+
+Choose = Callable[[LineSet, Floats, Floats], tuple[RigidMotion, Mask, float]]
+
+
+def _solve(
+    model_lines_world: Any, segments_px: Any, camera: Camera, prior: Pose, landmark_ids: LandmarkIds, sigma_px: Any,
+    probability: float | None, outlier_part: float, rng: np.random.Generator | None, prior_covariance: Any,
+    settings: PoseSettings, choose: Choose,
+) -> PoseEstimate:
+    """The likeliest pose from the candidate that ``choose`` takes; of all lines, where they are 3 or fewer.
+
+    Args:
+        choose: from the lines and the poses (k, 3, 3), (k, 3) of the subsets: a pose, the lines (n,) near it, and the
+            bound on their squared distances over their variance.
+    """
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
-    outlier_part = MED_DRAWN_OUTLIER_PART
-    candidates = compute_candidates(lines, prior, landmark_ids, probability, outlier_part, rng)
-    if candidates is None:
-        return r_and_t_ml(
-            model_lines_world, segments_px, camera, prior, sigma_px=sigma_px, prior_covariance=prior_covariance,
-            settings=settings,
-        )
-    rotations, translations = _add_concentrated(lines, *candidates)
-    rotations, translations = keep_possible(lines, prior, prior_covariance, rotations, translations)
-    errors = compute_squared_distances(lines, rotations, translations)
-    medians = np.median(errors, axis=1)
-    least = float(medians.min())
-    bound = 2.0 * (settings.outlier_sigmas * _compute_robust_scale(least, len(lines))) ** 2
-    tied = np.flatnonzero(medians <= max(least, _compute_tied_median()))
-    best = int(tied[np.argmin(np.minimum(errors[tied], bound).sum(axis=1))])
-    start = rotations[best], translations[best]
-    near = errors[best] <= bound
-    return refine_on_inliers(lines, prior, prior_covariance, landmark_ids, start, near, bound, settings)
-
-
-def compute_candidates(
-    lines: LineSet,
-    prior: Pose,
-    landmark_ids: LandmarkIds,
-    probability: float | None,
-    outlier_part: float,
-    rng: np.random.Generator | None,
-) -> tuple[Floats, Floats] | None:
-    """Poses (k, 3, 3), (k, 3) of the subsets, or ``None`` if there are fewer than 4 lines."""
     groups = group_by_landmark(landmark_ids, len(lines))
     if len(groups) < SUBSET_SIZE:
         groups = group_by_landmark(None, len(lines))
     if len(lines) <= SUBSET_SIZE:
-        return None
+        return r_and_t_ml(
+            model_lines_world, segments_px, camera, prior, sigma_px=sigma_px, prior_covariance=prior_covariance,
+            settings=settings,
+        )
     needed = None if probability is None else count_subsets(SUBSET_SIZE, outlier_part, probability)
-    rows, real = pad_rows(groups, list_subsets(len(groups), SUBSET_SIZE, needed, rng))
-    return solve_subsets(lines, rows, real, prior)
+    rows, real = _pad_rows(groups, list_subsets(len(groups), SUBSET_SIZE, needed, rng))
+    starts = np.tile(prior.rotation, (len(rows), 1, 1)), np.tile(prior.translation, (len(rows), 1))
+    candidates = kernels.solve_subsets(lines.arrays, rows, real, *starts, SUBSET_ITERATIONS)
+    return _refine_on_inliers(lines, prior, prior_covariance, landmark_ids, *choose(lines, *candidates), settings)
 
 
-def keep_possible(
+def _keep_possible(
     lines: LineSet, prior: Pose, prior_covariance: Any, rotations: Floats, translations: Floats
 ) -> tuple[Floats, Floats]:
     """The candidates (k, 3, 3), (k, 3) that the prior does not exclude, and the prior itself; all if it is unknown.
@@ -158,7 +168,7 @@ def keep_possible(
     return rotations[possible], translations[possible]
 
 
-def find_doubtful(landmark_ids: LandmarkIds, kept: Mask) -> Mask:
+def _find_doubtful(landmark_ids: LandmarkIds, kept: Mask) -> Mask:
     """(n,) the kept lines of landmarks of which no more are kept than left out.
 
     A landmark is matched wrongly as a whole: a line of it may be near its model line by chance.
@@ -169,8 +179,8 @@ def find_doubtful(landmark_ids: LandmarkIds, kept: Mask) -> Mask:
     return out
 
 
-def refine_on_inliers(
-    lines: LineSet, prior: Pose, prior_covariance: Any, landmark_ids: LandmarkIds, start: PoseState, near: Mask,
+def _refine_on_inliers(
+    lines: LineSet, prior: Pose, prior_covariance: Any, landmark_ids: LandmarkIds, start: RigidMotion, near: Mask,
     bound: float, settings: PoseSettings,
 ) -> PoseEstimate:
     """The likeliest pose of the lines kept, with reasons for the others (§6.2.4, steps 3 and 4).
@@ -184,32 +194,38 @@ def refine_on_inliers(
     near = near & (lines.lengths_px > MIN_LENGTH_PX)
     if int(np.count_nonzero(near)) < SUBSET_SIZE:
         return build_prior_estimate(lines, prior, NO_SUBSET, settings, known)
-    for _ in range(max(MAX_REFINEMENTS, 1)):
+    for _ in range(MAX_REFINEMENTS):
         end, reason = find_likeliest(lines.take(near), prior, information, settings, start)
-        start = rotation, translation = end.state
-        fine = compute_squared_distances(lines, rotation, translation) <= bound
-        rejected = find_rejections(lines, rotation, translation, fine, settings)
+        start = end.state
+        fine = compute_squared_distances(lines, *start) <= bound
+        rejected = find_rejections(lines, start, fine, settings)
         again = np.array([r is None for r in rejected], bool)
         if np.array_equal(again, near) or int(np.count_nonzero(again)) < SUBSET_SIZE:
             break
         near = again
-    doubtful = find_doubtful(landmark_ids, near)
+    doubtful = _find_doubtful(landmark_ids, near)
     covariance = compute_likeliest_covariance(lines, end, near.astype(float), rejected, settings, bound, doubtful)
-    estimate = build_estimate(
-        lines, rotation, translation, covariance, rejected, end.normal.cost, end.iterations, reason, settings,
-        bound
-    )
-    return check_in_front(lines, prior, estimate, settings, near, known)
+    return build_estimate(lines, end, covariance, rejected, settings, prior, known, reason, bound, near)
 
 
 def _add_concentrated(
-    lines: LineSet, rotations: Floats, translations: Floats
+    lines: LineSet, rotations: Floats, translations: Floats, rank: Callable[[Floats], Floats], count: int, keep: int
 ) -> tuple[Floats, Floats]:
-    """The candidates, and those of least median solved again on the better half of all lines."""
-    medians = np.median(compute_squared_distances(lines, rotations, translations), axis=1)
-    few = np.argsort(medians, kind="stable")[: MED_CANDIDATES]
-    half = (len(lines) + SUBSET_SIZE) // 2
-    more = concentrate(lines, rotations[few], translations[few], half)
+    """The candidates, and the best ``count`` solved again, round by round, on the ``keep`` lines that fit each best.
+
+    Rousseeuw's concentration steps: a minimal subset amplifies the noise; half of all lines do not.
+
+    Args:
+        rank: of squared distances (k, n) over their variance, (k,), less is better.
+    """
+    errors = compute_squared_distances(lines, rotations, translations)
+    best = np.argsort(rank(errors), kind="stable")[:count]
+    more = rotations[best], translations[best]
+    for _ in range(CONCENTRATION_ROUNDS):
+        rows = np.argsort(compute_squared_distances(lines, *more), axis=1, kind="stable")[:, :keep]
+        more = kernels.solve_subsets(
+            lines.arrays, np.ascontiguousarray(rows), np.ones(rows.shape), *more, CONCENTRATION_ITERATIONS
+        )
     return np.concatenate([rotations, more[0]]), np.concatenate([translations, more[1]])
 
 
@@ -251,60 +267,34 @@ def trunc_r_and_t(
     Raises:
         ValueError: as :func:`med_r_and_t`.
     """
-    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
-    outlier_part = TRUNC_DRAWN_OUTLIER_PART
-    candidates = compute_candidates(lines, prior, landmark_ids, probability, outlier_part, rng)
-    if candidates is None:
-        return r_and_t_ml(
-            model_lines_world, segments_px, camera, prior, sigma_px=sigma_px, prior_covariance=prior_covariance,
-            settings=settings,
-        )
     bound = 2.0 * settings.outlier_sigmas**2
-    rotations, translations = _add_concentrated_by_loss(lines, *candidates, bound)
-    rotations, translations = keep_possible(lines, prior, prior_covariance, rotations, translations)
-    costs = _compute_costs(lines, rotations, translations, bound)
-    order = np.argsort(costs, kind="stable")[: TRUNC_FINALISTS].tolist()
-    information = NO_INFORMATION
-    if prior_covariance is not None:
-        information, order = np.linalg.inv(prior_covariance), [*order, len(rotations) - 1]
-    refined = [_refine(lines, prior, information, (rotations[i], translations[i]), bound, settings) for i in order]
-    state, _ = min(refined, key=lambda end: end[1])
-    near = _find_near(lines, state, bound, settings)
-    return refine_on_inliers(lines, prior, prior_covariance, landmark_ids, state, near, bound, settings)
 
+    def choose(lines: LineSet, rotations: Floats, translations: Floats) -> tuple[RigidMotion, Mask, float]:
+        def rank(errors: Floats) -> Floats:
+            return np.asarray(np.minimum(errors, bound).sum(axis=1))
 
-def _add_concentrated_by_loss(
-    lines: LineSet, rotations: Floats, translations: Floats, bound: float
-) -> tuple[Floats, Floats]:
-    """The candidates, and the best of them solved again on the few lines that fit them best."""
-    costs = _compute_costs(lines, rotations, translations, bound)
-    few = np.argsort(costs, kind="stable")[: TRUNC_CANDIDATES]
-    keep = max(SUBSET_SIZE + 1, int(len(lines) * TRUNC_INLIER_PART))
-    more = concentrate(lines, rotations[few], translations[few], keep)
-    return np.concatenate([rotations, more[0]]), np.concatenate([translations, more[1]])
+        few = max(SUBSET_SIZE + 1, int(len(lines) * TRUNC_INLIER_PART))
+        rotations, translations = _add_concentrated(lines, rotations, translations, rank, TRUNC_CANDIDATES, few)
+        rotations, translations = _keep_possible(lines, prior, prior_covariance, rotations, translations)
+        costs = rank(compute_squared_distances(lines, rotations, translations))
+        order = np.argsort(costs, kind="stable")[:TRUNC_FINALISTS].tolist()
+        information = np.zeros((6, 6))
+        if prior_covariance is not None:
+            information, order = np.linalg.inv(prior_covariance), [*order, len(rotations) - 1]
+        towards = np.array(prior.rotation), np.array(prior.translation)
+        ends = [
+            kernels.refine_truncated(
+                lines.arrays, (rotations[i].copy(), translations[i].copy()), towards, information,
+                np.array(compute_weak_information()), bound, settings.max_beside_px, SUBSET_SIZE, TRUNC_ROUNDS,
+                MAX_ITERATIONS)
+            for i in order
+        ]
+        rotation, translation, _ = min(ends, key=lambda end: end[2])
+        near = kernels.compute_truncated_costs(lines.arrays, rotation, translation, bound, settings.max_beside_px)
+        return (rotation, translation), near < bound, bound
 
-
-def _compute_costs(lines: LineSet, rotations: Floats, translations: Floats, bound: float) -> Floats:
-    return np.asarray(np.minimum(compute_squared_distances(lines, rotations, translations), bound).sum(axis=1))
-
-
-def _refine(
-    lines: LineSet, prior: Pose, information: Floats, state: PoseState, bound: float, settings: PoseSettings
-) -> tuple[PoseState, float]:
-    """Alternate inliers and likelihood until they agree; the state and its truncated cost, with the prior's share."""
-    rotation, translation, cost = kernels.refine_truncated(
-        lines.arrays, (np.array(state[0]), np.array(state[1])), (np.array(prior.rotation), np.array(prior.translation)),
-        np.array(information), np.array(compute_weak_information()), bound, settings.max_beside_px, SUBSET_SIZE,
-        TRUNC_ROUNDS, MAX_ITERATIONS,
-    )
-    return (rotation, translation), cost
-
-
-def _find_near(lines: LineSet, state: PoseState, bound: float, settings: PoseSettings) -> Mask:
-    costs = kernels.compute_truncated_costs(
-        lines.arrays, np.array(state[0]), np.array(state[1]), bound, settings.max_beside_px
-    )
-    return np.asarray(costs < bound)
+    return _solve(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px, probability,
+                  TRUNC_DRAWN_OUTLIER_PART, rng, prior_covariance, settings, choose)
 
 
 def count_subsets(size: int, outliers: float, probability: float) -> int:
@@ -337,7 +327,7 @@ def list_subsets(
     return np.unique(drawn, axis=0).astype(np.intp)
 
 
-def pad_rows(groups: list[Indices], subsets: Indices) -> tuple[Indices, Floats]:
+def _pad_rows(groups: list[Indices], subsets: Indices) -> tuple[Indices, Floats]:
     """Line indices (k, w) of each subset of groups, padded with 0, and weights (k, w) that are 0 on the padding."""
     width = max((len(g) for g in groups), default=0)
     table = np.zeros((len(groups), width), dtype=np.intp)
@@ -346,27 +336,3 @@ def pad_rows(groups: list[Indices], subsets: Indices) -> tuple[Indices, Floats]:
         table[i, : len(rows)] = rows
         real[i, : len(rows)] = 1.0
     return table[subsets].reshape(len(subsets), -1), real[subsets].reshape(len(subsets), -1)
-
-
-def solve_subsets(lines: LineSet, rows: Indices, real: Floats, start: Pose) -> tuple[Floats, Floats]:
-    """Poses (k, 3, 3), (k, 3) of least E1 on k padded subsets ``rows`` (k, w), weights ``real``, all from ``start``."""
-    rotations = np.tile(start.rotation, (len(rows), 1, 1))
-    translations = np.tile(start.translation, (len(rows), 1))
-    poses: tuple[Floats, Floats] = kernels.solve_subsets(
-        lines.arrays, rows, real, rotations, translations, SUBSET_ITERATIONS
-    )
-    return poses
-
-
-def concentrate(lines: LineSet, rotations: Floats, translations: Floats, keep: int) -> tuple[Floats, Floats]:
-    """Poses (k, 3, 3), (k, 3), each solved again, round by round, on the ``keep`` lines that fit it best.
-
-    Rousseeuw's concentration steps: a minimal subset amplifies the noise; half of all lines do not.
-    """
-    for _ in range(CONCENTRATION_ROUNDS):
-        errors = compute_squared_distances(lines, rotations, translations)
-        rows = np.ascontiguousarray(np.argsort(errors, axis=1, kind="stable")[:, :keep])
-        rotations, translations = kernels.solve_subsets(
-            lines.arrays, rows, np.ones(rows.shape), rotations, translations, CONCENTRATION_ITERATIONS
-        )
-    return rotations, translations

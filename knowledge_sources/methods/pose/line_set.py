@@ -24,7 +24,6 @@ from knowledge_sources.methods.pose.kernels import (
     LineArrays,
     prepare_lines,
 )
-from knowledge_sources.methods.pose.levenberg_marquardt import cross
 from world_models.camera import Camera
 
 LandmarkIds = Sequence[Any] | NDArray[Any] | None
@@ -66,16 +65,8 @@ class LineSet:
 
     def take(self, chosen: Mask | Indices) -> LineSet:
         """The lines named by a mask or by indices."""
-        return LineSet(
-            self.points[chosen],
-            self.directions[chosen],
-            self.moments[chosen],
-            self.rays[chosen],
-            self.normals[chosen],
-            self.lengths_px[chosen],
-            self.sigma_px[chosen],
-            self.focal_px,
-        )
+        points, directions, moments, rays, normals, lengths_px, sigma_px = (a[chosen] for a in self.arrays[:-1])
+        return LineSet(points, directions, moments, rays, normals, lengths_px, sigma_px, self.focal_px)
 
 
 def build_line_set(model_lines_world: Any, segments_px: Any, camera: Camera, sigma_px: Any) -> LineSet:
@@ -148,19 +139,10 @@ def _check_shape(values: Any, name: str, row: tuple[int, ...]) -> Floats:
     return np.array(array, order="C")
 
 
-def compute_image_distances(lines: LineSet, rotation: Floats, translation: Floats) -> Floats:
-    """(..., n, 2) signed distances of the observed ends to the projected infinite model lines [px].
-
-    ``rotation`` (..., 3, 3) and ``translation`` (..., 3) [m] of ``camera_from_world`` may have leading batch axes.
-    """
-    _, planes = _project_planes(lines, rotation, translation)
-    along = np.matmul(lines.rays, planes[..., None])[..., 0]
-    return np.asarray(along / _compute_reach(planes, lines.focal_px)[..., None])
-
-
 def compute_image_jacobian(lines: LineSet, rotation: Floats, translation: Floats) -> tuple[Floats, Floats]:
     """Distances (..., n, 2) [px] and their derivatives (..., n, 2, 6) by the left perturbation (rotation, translation).
 
+    ``rotation`` (..., 3, 3) and ``translation`` (..., 3) [m] of ``camera_from_world`` may have leading batch axes.
     A turn w moves a plane's normal m by w x m; a shift t moves it by t x d, d the model line's direction.
     """
     directions, planes = _project_planes(lines, rotation, translation)
@@ -204,11 +186,6 @@ def measure_lines(
     return measured
 
 
-def find_in_front(lines: LineSet, rotation: Floats, translation: Floats) -> Mask:
-    """(n,) which lines pass both observed ends in front of the camera."""
-    return measure_lines(lines, rotation, translation)[1]
-
-
 def _project_planes(lines: LineSet, rotation: Floats, translation: Floats) -> tuple[Floats, Floats]:
     """Model directions and moments (..., n, 3) in the camera frame; a moment is the projection plane's normal."""
     turned = np.swapaxes(rotation, -1, -2)
@@ -221,3 +198,22 @@ def _compute_reach(planes: Floats, focal_px: Floats) -> Floats:
     squares = planes * planes
     flat = squares[..., 0] / focal_px[0] ** 2 + squares[..., 1] / focal_px[1] ** 2
     return np.asarray(np.sqrt(flat + MIN_IMAGE_PART * np.sum(squares, axis=-1) + TINY**2))
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """a x b over the last axis, broadcast; faster than ``np.cross`` on small batches."""
+    return np.stack(
+        [
+            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
+            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
+            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
+        ],
+        axis=-1,
+    )
+
+
+def invert_information(hessian: Floats) -> Floats:
+    """Inverse of a positive semi-definite matrix; directions without information get a huge but finite variance."""
+    values, vectors = np.linalg.eigh(0.5 * (hessian + hessian.T))
+    floor = max(float(values[-1]) * 1e-15, 1e-12)
+    return np.asarray((vectors / np.maximum(values, floor)) @ vectors.T)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,9 +15,14 @@ from knowledge_sources.methods.pose.estimate import (
     PlanarEstimate,
     compute_spread,
 )
-from knowledge_sources.methods.pose.kernels import PointArrays, RigidMotion
-from knowledge_sources.methods.pose.levenberg_marquardt import cross, invert_information
-from knowledge_sources.methods.pose.line_set import LineSet, check_sigma, compute_distance_slopes
+from knowledge_sources.methods.pose.kernels import RigidMotion
+from knowledge_sources.methods.pose.line_set import (
+    LineSet,
+    check_sigma,
+    compute_distance_slopes,
+    cross,
+    invert_information,
+)
 from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2, wrap_angle
@@ -31,10 +35,12 @@ MAX_POINT_ROUNDS = 6  # rounds in which inliers and pose may still change each o
 
 FEW = "too few measurements: the prior decides the rest"
 NOT_BETTER = "no pose fits better than the prior"
+TOO_FAR = "too far from the predicted point"
+MIN_POINTS = 2
+"""Two points decide three unknowns."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PlanarPrior:
+class PlanarPrior(NamedTuple):
     """The belief before the measurement: a Gaussian over (x, y, heading).
 
     Attributes:
@@ -54,7 +60,7 @@ def build_planar_prior(prior: Pose2, covariance: Any) -> PlanarPrior:
     Raises:
         ValueError: a covariance of another shape.
     """
-    mean = np.array([prior.x_m, prior.y_m, prior.heading_rad])
+    mean = prior.vector
     if covariance is None:
         weak = np.diag([WEAK_POSITION_M**-2] * 2 + [WEAK_HEADING_RAD**-2])
         return PlanarPrior(mean, weak, False)
@@ -120,15 +126,16 @@ def compute_line_jacobian(
 
 
 def compute_point_jacobian(
-    points: Floats, focal_px: Floats, state: Floats, camera_from_robot: Pose
+    points: Floats, camera: Camera, pose: Pose2, camera_from_robot: Pose
 ) -> tuple[Floats, Floats, Floats]:
     """Points in the camera frame (n, 3) [m], pixels (n, 2) from the principal point and derivatives (n, 2, 3).
 
     Without lens distortion: compare with undistorted pixels.
     """
     mount = camera_from_robot.rotation
-    into = _rotate_into_robot(state[2])
-    p_robot = (points - np.array([state[0], state[1], 0.0])) @ into.T
+    into = _rotate_into_robot(pose.vector[2])
+    p_robot = (points - np.array([pose.x_m, pose.y_m, 0.0])) @ into.T
+    focal_px = np.array([camera.fx, camera.fy])
     p = p_robot @ mount.T + camera_from_robot.translation
     axes = -(mount @ into)[:, :2].T
     moves = np.concatenate(
@@ -153,11 +160,6 @@ def _rotate_into_robot(headings_rad: Floats) -> Floats:
 def _turn_clockwise(vectors: Floats) -> Floats:
     """-z x v: how points in the robot's frame move when the robot turns left."""
     return np.stack([vectors[..., 1], -vectors[..., 0], np.zeros_like(vectors[..., 0])], axis=-1)
-
-
-TOO_FAR = "too far from the predicted point"
-MIN_POINTS = 2
-"""Two points decide three unknowns."""
 
 
 def planar_from_points(
@@ -190,63 +192,37 @@ def planar_from_points(
     focal = np.array([camera.fx, camera.fy])
     observed = camera.undistort(pixels) - (camera.cx, camera.cy)
     mount = to_rigid_motion(camera_from_robot)
-    problem = _Problem((world, observed, sigma, focal, belief.mean, belief.information, mount), belief, settings)
-    state, _ = problem.minimise(belief.mean, np.ones(len(world), bool), MAX_FLOOR_ITERATIONS)
-    near = problem.find_near(state)
+    points = world, observed, sigma, focal, belief.mean, belief.information, mount
+    bound = settings.point_outlier_sigmas**2
+
+    def minimise(state: Floats, chosen: Mask, iterations: int = MAX_FLOOR_ITERATIONS) -> tuple[Floats, float]:
+        end, _, loss, _ = kernels.minimise_points(points, state, chosen, HUBER_SIGMAS, NEAR_PLANE_M, iterations)
+        return end, float(loss)
+
+    def find_near(state: Floats) -> Mask:
+        depth, residuals, _ = kernels.project_points(points, state)
+        return np.asarray((depth > NEAR_PLANE_M) & (np.sum(residuals**2, axis=1) <= bound))
+
+    state, _ = minimise(belief.mean, np.ones(len(world), bool))
+    near = find_near(state)
     for _ in range(MAX_POINT_ROUNDS):
-        state, _ = problem.minimise(state, near, MAX_FLOOR_ITERATIONS)
-        again = problem.find_near(state)
+        state, _ = minimise(state, near)
+        again = find_near(state)
         if np.array_equal(again, near):
             break
         near = again
-    return _build_estimate(problem, state, near)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Problem:
-    """The data of one call."""
-
-    points: PointArrays
-    prior: PlanarPrior
-    settings: PoseSettings
-
-    def minimise(self, state: Floats, chosen: Mask, iterations: int) -> tuple[Floats, float]:
-        """The state (3,) of least loss over the chosen points (n,), with the prior's share; and that loss."""
-        end, _, loss, _ = kernels.minimise_points(
-            self.points, np.array(state), chosen, HUBER_SIGMAS, NEAR_PLANE_M, iterations
-        )
-        return end, float(loss)
-
-    def project(self, state: Floats) -> tuple[Floats, Floats, Floats]:
-        """See :func:`kernels.project_points`."""
-        projected: tuple[Floats, Floats, Floats] = kernels.project_points(self.points, np.array(state))
-        return projected
-
-    def find_near(self, state: Floats) -> Mask:
-        """(n,) the points in front of the camera that are no outliers."""
-        depth, residuals, _ = self.project(state)
-        bound = self.settings.point_outlier_sigmas**2
-        return np.asarray((depth > NEAR_PLANE_M) & (np.sum(residuals**2, axis=1) <= bound))
-
-
-def _build_estimate(problem: _Problem, state: Floats, near: Mask) -> PlanarEstimate:
-    depth, residuals, jacobian = problem.project(state)
-    rejected = tuple(
-        None if n else (BEHIND if d <= NEAR_PLANE_M else TOO_FAR) for n, d in zip(near, depth, strict=True)
-    )
-    j = jacobian[near].reshape(-1, 3)
-    few = not problem.prior.given and int(np.count_nonzero(near)) < MIN_POINTS
-    bound = problem.settings.point_outlier_sigmas**2
+    depth, residuals, slopes = kernels.project_points(points, state)
+    j = slopes[near].reshape(-1, 3)
     scatter = compute_scatter(float(np.sum(residuals[near] ** 2)), residuals[near].size, bound)
-    sigma = problem.points[2]
     return PlanarEstimate(
         world_from_robot=to_pose2(state),
-        covariance=invert_information(j.T @ j + problem.prior.information) * scatter,
+        covariance=invert_information(j.T @ j + belief.information) * scatter,
         inliers=near,
         residuals_px=residuals * sigma[:, None],
-        rejected=rejected,
-        cost=problem.minimise(state, near, 0)[1],
-        reason=FEW if few else None,
+        rejected=tuple(
+            None if n else (BEHIND if d <= NEAR_PLANE_M else TOO_FAR) for n, d in zip(near, depth, strict=True)),
+        cost=minimise(state, near, 0)[1],
+        reason=FEW if not belief.given and int(np.count_nonzero(near)) < MIN_POINTS else None,
     )
 
 

@@ -17,15 +17,16 @@ from knowledge_sources.methods.pose.estimate import (
     PlanarEstimate,
     compute_max_chi2,
     find_rejections,
+    knows_more,
     solve_near_prior,
 )
 from knowledge_sources.methods.pose.kernels import FloorArrays
-from knowledge_sources.methods.pose.levenberg_marquardt import invert_information
 from knowledge_sources.methods.pose.line_set import (
     LandmarkIds,
     LineSet,
     build_line_set,
     group_by_landmark,
+    invert_information,
     measure_lines,
 )
 from knowledge_sources.methods.pose.planar import (
@@ -106,7 +107,8 @@ def planar_from_lines(
         return _finish(floor, np.ones(len(lines), bool), state, NO_BOUND)
     candidates = _compute_candidates(floor, groups)
     order = np.argsort(floor.compute_costs(candidates, bound), kind="stable")[: FLOOR_FINALISTS]
-    finalists = _refine(floor, candidates[order], bound)
+    finalists = kernels.refine_floor_states(
+        floor.arrays, candidates[order], _max_step(), bound, np.array(settings.floor_widenings))
     best = int(np.argmin(floor.compute_costs(finalists, bound)))
     state, near = _alternate(floor, finalists[best], bound)
     return _finish(floor, near, state, bound)
@@ -128,11 +130,9 @@ def _solve_inexact(
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     belief = build_planar_prior(prior, prior_covariance)
     if not belief.given:
-        belief = replace(belief, information=np.zeros((3, 3)))
-    pose = first.world_from_robot
+        belief = belief._replace(information=np.zeros((3, 3)))
     found = maximise_marginal(
-        lines, errors.displacements, sigma_px, camera_from_robot, belief,
-        np.array([pose.x_m, pose.y_m, pose.heading_rad]),
+        lines, errors.displacements, sigma_px, camera_from_robot, belief, first.world_from_robot.vector,
         first.inliers, settings)
     rejected = tuple(None if near else reason or DISTANCE
                      for near, reason in zip(found.near, first.rejected, strict=True))
@@ -197,15 +197,6 @@ def _compute_candidates(floor: _Floor, groups: list[Indices]) -> Floats:
     return np.concatenate([base, states])
 
 
-def _refine(floor: _Floor, states: Floats, bound: float) -> Floats:
-    """States (k, 3) moved by Gauss-Newton on each one's own inliers, all at once; the first rounds let more in."""
-    settings = floor.settings
-    moved: Floats = kernels.refine_floor_states(
-        floor.arrays, states, _max_step(), bound, np.array(settings.floor_widenings)
-    )
-    return moved
-
-
 def _max_step() -> Floats:
     return np.array([MAX_FLOOR_STEP_M, MAX_FLOOR_STEP_M, MAX_FLOOR_STEP_RAD])
 
@@ -230,12 +221,12 @@ def _finish(floor: _Floor, near: Mask, state: Floats, bound: float) -> PlanarEst
     if not floor.prior.given:
         alone = replace(kept, prior=PlanarPrior(mean, np.zeros((3, 3)), True))
         _, hessian = alone.minimise(state, 0)
-        reason = None if _is_decided(hessian, floor.prior) else FEW
+        reason = None if knows_more(hessian, floor.prior.information) else FEW
         if reason is None and len(kept.lines) > MAX_FEW_LINES:
             state, _ = alone.minimise(state, MAX_FLOOR_ITERATIONS)
         else:
             state = _solve_near_prior(kept)
-    rejected = find_rejections(floor.lines, *compute_camera_poses(state, floor.mount), near, settings)
+    rejected = find_rejections(floor.lines, compute_camera_poses(state, floor.mount), near, settings)
     if bound == NO_BOUND:
         rejected = tuple(r if r == BEHIND else None for r in rejected)
     costs = floor.compute_costs(np.stack([state, mean]), bound)
@@ -249,7 +240,7 @@ def _solve_near_prior(floor: _Floor) -> Floats:
     prior, settings = floor.prior, floor.settings
 
     def solve(weight: float) -> Floats:
-        pulled = replace(floor, prior=replace(prior, information=weight * prior.information))
+        pulled = replace(floor, prior=prior._replace(information=weight * prior.information))
         return pulled.minimise(prior.mean, MAX_FLOOR_ITERATIONS)[0]
 
     def compute_chi2(state: Floats) -> float:
@@ -257,12 +248,6 @@ def _solve_near_prior(floor: _Floor) -> Floats:
 
     max_chi2 = compute_max_chi2(2.0 * len(floor.lines), settings)
     return solve_near_prior(prior.mean, solve, compute_chi2, max_chi2)
-
-
-def _is_decided(hessian: Floats, prior: PlanarPrior) -> bool:
-    """Whether in every direction the lines know more than the weak prior."""
-    scale = 1.0 / np.sqrt(np.diag(prior.information))
-    return bool(np.linalg.eigvalsh(hessian * scale[:, None] * scale)[0] >= 1.0)
 
 
 def _build_estimate(

@@ -16,9 +16,9 @@ import cv2
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Image, Ints, Mask
-from knowledge_sources.methods.pose.planar import compute_point_jacobian
+from knowledge_sources.methods.pose.planar import compute_point_jacobian, to_pose2
 from knowledge_sources.settings import DEFAULT, TrackingSettings
-from world_models.frames import Pose2, wrap_angle
+from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
 EDGE_SMOOTHING_PX = 1.0  # standard deviation of the smoothing before edges are located
@@ -104,14 +104,12 @@ class _Edges:
 def _find_edges(robot: RobotModel, image: Image, lines: Floats, pose: Pose2, reach_px: float) -> _Edges | None:
     """The steepest place across each line, every few pixels along it, where it is the only one."""
     camera = robot.camera
-    state = np.array([pose.x_m, pose.y_m, pose.heading_rad])
     ends_px = camera.project(robot.camera_from_world(pose).apply(lines.reshape(-1, 3))).reshape(-1, 2, 2)
     line, part = _choose_places(ends_px)
     if not len(line):
         return None
     world = _intersect_lines(robot, lines[line], pose, part)
-    p, at_px, jacobian = compute_point_jacobian(
-        world, np.array([camera.fx, camera.fy]), state, robot.mount.camera_from_robot)
+    p, at_px, jacobian = compute_point_jacobian(world, camera, pose, robot.mount.camera_from_robot)
     along = ends_px[line, 1] - ends_px[line, 0]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
@@ -173,7 +171,7 @@ def _solve(
     sigma_px, cutoff_px = EDGE_SIGMA_PX, MAX_EDGE_RESIDUAL_PX
     inflation = np.diag([PRIOR_SIGMA_M**2, PRIOR_SIGMA_M**2, PRIOR_SIGMA_RAD**2])
     information = np.linalg.inv(covariance + inflation)
-    away = np.array([at.x_m - prior.x_m, at.y_m - prior.y_m, wrap_angle(at.heading_rad - prior.heading_rad)])
+    away = at.minus(prior)
     per_line = np.bincount(edges.line, minlength=int(edges.line.max(initial=0)) + 1)[edges.line]
     weight = np.minimum(1.0, EDGES_PER_LINE / np.maximum(per_line, 1)) / sigma_px**2
     step = np.zeros(3)
@@ -181,9 +179,9 @@ def _solve(
         residual = np.abs(edges.offsets_px - edges.slopes @ step)
         w = weight * (1.0 / np.maximum(1.0, residual / sigma_px) if number == 0 else residual <= cutoff_px)
         hessian = edges.slopes.T @ (w[:, None] * edges.slopes) + information
-        step = np.linalg.solve(hessian, edges.slopes.T @ (w * edges.offsets_px) - information @ away)
+        pull = edges.slopes.T @ (w * edges.offsets_px) - information @ away
+        step = np.asarray(np.linalg.solve(hessian, pull), float)
     lines = len(np.unique(edges.line[np.abs(edges.offsets_px - edges.slopes @ step) <= cutoff_px]))
     if lines < max(settings.min_edge_lines, MIN_EDGE_LINE_SHARE * len(np.unique(edges.line))):
         return None
-    pose = Pose2(at.x_m + float(step[0]), at.y_m + float(step[1]), wrap_angle(at.heading_rad + float(step[2])))
-    return EdgeAlignment(pose, np.linalg.inv(hessian), lines)
+    return EdgeAlignment(to_pose2(at.vector + step), np.linalg.inv(hessian), lines)

@@ -161,9 +161,7 @@ def select_landmarks(
 
 def _predict(robot: RobotModel, points: Floats, pose: Pose2, covariance: Floats) -> tuple[Floats, Floats, Floats]:
     """Depths (n,) [m], pixels (n, 2) and the standard deviation (n,) of the pixels [px] of points (n, 3), world."""
-    state = np.array([pose.x_m, pose.y_m, pose.heading_rad])
-    focal = np.array([robot.camera.fx, robot.camera.fy])
-    p, _, jacobian = compute_point_jacobian(points, focal, state, robot.mount.camera_from_robot)
+    p, _, jacobian = compute_point_jacobian(points, robot.camera, pose, robot.mount.camera_from_robot)
     ahead = np.where(p[:, 2:] > NEAR_PLANE_M, p, [0.0, 0.0, 1.0])
     spread = np.einsum("nij,jk,nik->ni", jacobian, covariance, jacobian)
     return p[:, 2], robot.camera.project(ahead), np.sqrt(np.max(spread, axis=1))

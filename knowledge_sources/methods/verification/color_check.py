@@ -74,8 +74,7 @@ def check_colors(
     parts = (pixels[inside] + 0.5) / (robot.lens.width, robot.lens.height)
     side = REGION_IMAGE_PX
     tiny = cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA).mean(axis=2)
-    labels = segment_regions(
-        tiny, sector_px=side, min_area_px=MIN_REGION_AREA_PX, settings=settings.features).labels
+    labels = segment_regions(tiny, sector_px=side, min_area_px=MIN_REGION_AREA_PX, settings=settings.features)
     smooth = np.asarray(cv2.blur(image, (3, 3)), np.float64)
     colors = np.array([color for color, _ in face_colors])
     return _measure(_sample(smooth, parts), _sample(labels, parts), face[inside], colors)

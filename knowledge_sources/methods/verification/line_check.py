@@ -33,8 +33,7 @@ MIN_COVERED_FRACTION = 0.5  # covered part from which a line is matched
 TEST_COUNT = 1e3
 """Resolvable poses within the matcher's reach: the number of tests of the a-contrario count (Desolneux, Moisan and
 Morel 2008, ch. 3)."""
-MIN_CHANCE = 0.02  # lower bound of the probability that a line is matched at a wrong pose
-MAX_CHANCE = 0.95  # upper bound of the probability that a line is matched at a wrong pose
+CHANCE_BOUNDS = 0.02, 0.95  # of the probability that a line is matched at a wrong pose
 DISPLACEMENT_M = 0.35  # shift of the nearer wrong poses at which chance is counted; the farther are at twice as much
 DISPLACEMENT_RAD = 0.07  # turn of the nearer wrong poses at which chance is counted; the farther are at twice as much
 LINE_TOLERANCE_RAD = 0.06  # largest angle between a segment and the line that it covers
@@ -100,7 +99,7 @@ def compute_agreement(
     visible_there, matched_there = _count(displaced, MIN_COVERED_FRACTION)
     seen = visible_there > 0
     rate = float(np.mean(matched_there[seen] / visible_there[seen])) if np.any(seen) else 1.0
-    chance = min(MAX_CHANCE, max(MIN_CHANCE, rate))
+    chance = min(CHANCE_BOUNDS[1], max(CHANCE_BOUNDS[0], rate))
     p_false = compute_p_false(int(matched), int(visible), chance)
     return Agreement(coverage, int(visible), int(matched), chance, p_false)
 
@@ -186,8 +185,8 @@ def check_lines(
     Where the model is inexact, by ``errors``, its lines are displaced as they fit best: at this pose, and as freely at
     the wrong ones at which chance is counted.
     """
-    state = np.array([world_from_robot.x_m, world_from_robot.y_m, world_from_robot.heading_rad])
-    states = np.concatenate([state[None], _displace(state, DISPLACEMENT_M, DISPLACEMENT_RAD)])
+    state = world_from_robot.vector
+    states = np.concatenate([state[None], _displace(state)])
     if errors is None or errors.is_exact:
         projected = _project(robot, lines_world, states)
     else:
@@ -224,12 +223,12 @@ def _take_few(states: Floats) -> Floats:
     return states[[4 * k + k % 4 for k in range(8)]]
 
 
-def _displace(state: Floats, shift_m: float, turn_rad: float) -> Floats:
+def _displace(state: Floats) -> Floats:
     """(32, 3) wrong states around a state (x, y, heading): four directions, two distances, four turns."""
     c, s = np.cos(state[2]), np.sin(state[2])
-    away = np.array([(by * x, by * y) for by in (shift_m, 2.0 * shift_m)
+    away = np.array([(by * x, by * y) for by in (DISPLACEMENT_M, 2.0 * DISPLACEMENT_M)
                      for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))])
-    turns = turn_rad * np.array([-2.0, -1.0, 1.0, 2.0])
+    turns = DISPLACEMENT_RAD * np.array([-2.0, -1.0, 1.0, 2.0])
     shifts = np.repeat(away @ np.array([[c, s], [-s, c]]), len(turns), axis=0)
     return np.asarray(state + np.column_stack([shifts, np.tile(turns, len(away))]))
 
@@ -263,9 +262,7 @@ def compute_view_quality(
     n = len(lines_world)
     if n == 0:
         return ViewQuality(math.inf, math.inf, 0)
-    state = np.array([world_from_robot.x_m, world_from_robot.y_m, world_from_robot.heading_rad])
-    focal = np.array([camera.fx, camera.fy])
-    _, pixels, slopes = compute_point_jacobian(lines_world.reshape(-1, 3), focal, state, camera_from_robot)
+    _, pixels, slopes = compute_point_jacobian(lines_world.reshape(-1, 3), camera, world_from_robot, camera_from_robot)
     along = np.diff(pixels.reshape(n, 2, 2), axis=1)[:, 0]
     across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
     rows = np.einsum("nj,nejk->nek", across, slopes.reshape(n, 2, 2, 3)).reshape(-1, 3) / sigma_px

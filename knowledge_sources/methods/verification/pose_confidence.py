@@ -29,7 +29,7 @@ from knowledge_sources.methods.verification.line_check import (
     compute_coverage,
 )
 from knowledge_sources.settings import DEFAULT, VerificationSettings
-from world_models.frames import Pose2, wrap_angle
+from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
 SHARP_TOLERANCE_PX = 1.0  # distance within which a covered line is sharp; chance spreads over the whole tolerance
@@ -37,7 +37,6 @@ PROBE_TURN_RAD = 0.4  # turn that is weighed like one metre of motion in the wea
 MAX_LINE_MOTION_PX = 400.0  # motion of a line in the picture, by one metre, from which it weighs no more
 MAX_BELIEF_SIGMAS = 6.0  # mahalanobis distance from the belief from which a pose gets no credit for being near it
 MIN_P_FALSE = 1e-12  # probability of chance agreement that counts as certainty
-FIT_RIDGE = 0.02  # ridge penalty of the fit of evidence weights
 
 NEAR_M = 0.1
 """Lines with an end nearer to the camera than this have no defined motion in the picture."""
@@ -151,9 +150,8 @@ def _compute_motion(robot: RobotModel, lines_world: Floats, pose: Pose2, directi
 
 def _compute_slopes(robot: RobotModel, lines_world: Floats, pose: Pose2) -> tuple[Mask, Floats]:
     """Which lines (m,) lie before the camera, and how their ends (m, 2, 3) move across them by (x, y, heading) [px]."""
-    state, focal = np.array([pose.x_m, pose.y_m, pose.heading_rad]), np.array([robot.camera.fx, robot.camera.fy])
-    mount = robot.mount.camera_from_robot
-    points, pixels, slopes = compute_point_jacobian(lines_world.reshape(-1, 3), focal, state, mount)
+    points, pixels, slopes = compute_point_jacobian(
+        lines_world.reshape(-1, 3), robot.camera, pose, robot.mount.camera_from_robot)
     ends = pixels.reshape(-1, 2, 2)
     along = ends[:, 1] - ends[:, 0]
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
@@ -163,7 +161,7 @@ def _compute_slopes(robot: RobotModel, lines_world: Floats, pose: Pose2) -> tupl
 
 def _mahalanobis(pose: Pose2, belief: Pose2, covariance: Floats) -> float:
     """The distance of two poses in standard deviations of a covariance (3, 3)."""
-    off = np.array([pose.x_m - belief.x_m, pose.y_m - belief.y_m, wrap_angle(pose.heading_rad - belief.heading_rad)])
+    off = pose.minus(belief)
     return math.sqrt(max(0.0, float(off @ np.linalg.solve(covariance + 1e-12 * np.eye(3), off))))
 
 
@@ -238,35 +236,3 @@ def compute_terms(evidence: Floats) -> Floats:
 
 POSE_CONFIDENCE = PoseConfidence.from_table(tomllib.loads(WEIGHTS_FILE.read_text("utf-8")))
 """The fitted weights and limits."""
-
-
-def fit_weights(evidence: Floats, is_right: Mask) -> EvidenceWeights:
-    """Fit non-negative weights to evidence (n, k) of right and wrong poses (n,) by ridge logistic regression.
-
-    Right and wrong poses count the same in total. Solved by L-BFGS-B.
-    """
-    from scipy.optimize import minimize  # loaded when first used: missions have their weights
-
-    right, wrong = max(1, int(np.count_nonzero(is_right))), max(1, int(np.count_nonzero(~is_right)))
-    share = np.where(is_right, 0.5 / right, 0.5 / wrong)
-    sign = np.where(is_right, 1.0, -1.0)
-    rows = np.column_stack([compute_terms(evidence), np.ones(len(evidence))])
-
-    def cost(weights: Floats) -> tuple[float, Floats]:
-        margin = sign * (rows @ weights)
-        slope = -share * sign / (1.0 + np.exp(np.minimum(margin, 700.0)))
-        ridge = FIT_RIDGE * weights[:-1] / len(evidence)
-        value = float(np.sum(share * np.logaddexp(0.0, -margin)) + 0.5 * np.sum(ridge * weights[:-1]))
-        return value, np.asarray(rows.T @ slope + np.append(ridge, 0.0))
-
-    bounds = [(0.0, None)] * len(TERMS) + [(None, None)]
-    solution = minimize(cost, np.zeros(rows.shape[1]), jac=True, bounds=bounds, method="L-BFGS-B",
-                        options={"maxiter": 2000, "ftol": 1e-14, "gtol": 1e-9}).x
-    return EvidenceWeights(tuple(float(w) for w in solution[:-1]), float(solution[-1]))
-
-
-def remove_colors(evidence: Floats) -> Floats:
-    """Return the evidence (n, k) as it would be if no colors could be compared."""
-    lines_only = evidence.copy()
-    lines_only[:, [EVIDENCE_NAMES.index("color_agreement"), EVIDENCE_NAMES.index("color_count")]] = 0.0
-    return lines_only

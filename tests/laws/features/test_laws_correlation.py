@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.features.correlation import (
+    Correlation,
     compute_second_peak,
     correlate,
     extract_template,
     measure_corner_strengths,
-    self_correlate,
 )
 
 SIZE = 96
@@ -23,6 +23,14 @@ few = settings(deadline=None, max_examples=25)
 seeds = st.integers(0, 10_000)
 fractions = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
 shifts = st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0))
+
+
+def self_correlate(image: Any, centre_px: Any, half_px: int, search_px: float) -> Correlation:
+    """A patch correlated with its own image."""
+    template = extract_template(image, centre_px, half_px)
+    found = correlate(template, image, np.rint(np.asarray(centre_px, float)), search_px)
+    assert found is not None
+    return found
 
 
 def pattern(seed: int, shift: Any = (0.0, 0.0), scale: float = 1.0) -> Floats:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -29,25 +28,20 @@ def boxes(seed: int, noise: float = 2.0) -> Image:
 
 @few
 @given(seeds)
-def test_regions_part_the_image_into_connected_pieces_with_true_statistics(seed: int) -> None:
+def test_regions_part_the_image_into_connected_pieces(seed: int) -> None:
     image = boxes(seed)
-    regions = segment_regions(image)
-    assert regions.labels.shape == image.shape
-    assert regions.areas_px.sum() == image.size
-    assert np.array_equal(np.unique(regions.labels), np.arange(len(regions)))
-    for k in range(len(regions)):
-        mask = regions.labels == k
-        assert cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)[0] == 2
-        assert regions.areas_px[k] == mask.sum()
-        assert regions.means[k] == pytest.approx(image[mask].mean(), abs=1e-6)
-        assert regions.deviations[k] == pytest.approx(image[mask].std(), abs=1e-4)
+    labels = segment_regions(image)
+    assert labels.shape == image.shape
+    assert np.array_equal(np.unique(labels), np.arange(labels.max() + 1))
+    for k in range(labels.max() + 1):
+        assert cv2.connectedComponents((labels == k).astype(np.uint8), connectivity=4)[0] == 2
 
 
 @few
 @given(seeds, st.integers(1, 300))
 def test_no_region_is_smaller_than_asked(seed: int, least: int) -> None:
-    regions = segment_regions(boxes(seed), min_area_px=least)
-    assert regions.areas_px.min() >= least or len(regions) == 1
+    areas = np.bincount(segment_regions(boxes(seed), min_area_px=least).ravel())
+    assert areas.min() >= least or len(areas) == 1
 
 
 @few
@@ -59,10 +53,9 @@ def test_a_box_on_a_plain_ground_is_one_region(
     truth = np.zeros((128, 160), bool)
     truth[v : v + height, u : u + width] = True
     image = np.where(truth, 170.0, 70.0) + noise * np.random.default_rng(seed).standard_normal(truth.shape)
-    regions = segment_regions(image)
-    inside = np.bincount(regions.labels[truth]).argmax()
-    both = np.sum((regions.labels == inside) & truth)
-    assert both / np.sum((regions.labels == inside) | truth) > 0.9
+    labels = segment_regions(image)
+    mine = labels == np.bincount(labels[truth]).argmax()
+    assert np.sum(mine & truth) / np.sum(mine | truth) > 0.9
 
 
 @few
@@ -72,8 +65,9 @@ def test_a_brighter_image_has_the_same_regions(seed: int, level: int) -> None:
     a = segment_regions(image)
     b = segment_regions((image.astype(int) + level).astype(float))
     # Bins are four levels wide, so the same regions up to their thin borders.
-    assert len(a) == len(b)
-    np.testing.assert_allclose(np.sort(b.means - level), np.sort(a.means), atol=1.0)
+    assert a.max() == b.max()
+    means = [np.sort([image[labels == k].mean() for k in range(a.max() + 1)]) for labels in (a, b)]
+    np.testing.assert_allclose(means[1], means[0], atol=1.0)
 
 
 @few

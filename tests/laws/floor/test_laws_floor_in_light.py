@@ -15,7 +15,7 @@ from experiments.generated.scenes import Patch, PatchFace, box_faces
 from knowledge_sources.methods.floor.appearance import compute_looks, default_covariance, find_floor_in_shade
 from knowledge_sources.methods.floor.model_floor import STEP_PX, ModelFloor, build_floor_grid
 from knowledge_sources.methods.floor.see_floor import GREY, find_unlike
-from knowledge_sources.methods.floor.standing_regions import compute_parallax_odds, find_regions
+from knowledge_sources.methods.floor.standing_regions import TwoPictures, compute_parallax_odds, find_regions
 from sim.render.light.lamps import Room
 from sim.render.light.lighting import Lighting
 from sim.render.light.lights import Lights
@@ -118,7 +118,7 @@ def test_mirrored_lamps_do_not_stand_on_the_floor_and_a_box_does(gloss: float, t
     assert grid is not None and now.shape == (512 // STEP_PX, 512 // STEP_PX)
     near = (grid.ranges_m < 7.0) & (np.abs(grid.points_robot[..., 1]) < 1.8)
     regions = find_regions(unlike & near, near, grid)
-    odds = [compute_parallax_odds(region, grid, now, before, moved, CAMERA, MOUNT) for region in regions]
+    odds = [compute_parallax_odds(region, TwoPictures(grid, now, before, moved, CAMERA, MOUNT)) for region in regions]
     assert regions
     if thing:
         assert max(odds) > 1.0

@@ -15,6 +15,7 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.model_floor import STEP_PX, build_floor_grid
 from knowledge_sources.methods.floor.standing_regions import (
     FOOT_PART_STEP,
+    TwoPictures,
     find_footprint,
     find_regions,
     measure_foot_part,
@@ -54,7 +55,7 @@ def measure(seed: int, at_m: float, low_m: float, moved_m: float) -> tuple[float
     if board[-2:].any():
         return None
     (region,) = find_regions(board[GRID.top:], np.ones(GRID.shape, bool), GRID)
-    part = measure_foot_part(region, GRID, now, earlier, Pose2(moved_m, 0.0, 0.0), CAMERA, MOUNT)
+    part = measure_foot_part(region, TwoPictures(GRID, now, earlier, Pose2(moved_m, 0.0, 0.0), CAMERA, MOUNT))
     return part, float(find_footprint(region, GRID, part)[:, 0].min())
 
 
@@ -91,4 +92,4 @@ def test_without_motion_nothing_is_told(seed: int, at_m: float) -> None:
     noise = np.random.default_rng(seed).uniform(0.0, 255.0, (40, 40))
     picture, board = draw(cv2.resize(noise, (200, 200)), at_m, 0.2, 0.0)
     (region,) = find_regions(board[GRID.top:], np.ones(GRID.shape, bool), GRID)
-    assert measure_foot_part(region, GRID, picture, picture, Pose2(0.0, 0.0, 0.0), CAMERA, MOUNT) == 1.0
+    assert measure_foot_part(region, TwoPictures(GRID, picture, picture, Pose2(0.0, 0.0, 0.0), CAMERA, MOUNT)) == 1.0

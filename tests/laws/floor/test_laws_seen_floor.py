@@ -74,7 +74,7 @@ def draw_taken(scan: FreeFloor) -> shapely.Geometry:
 @given(scans(), st.integers(0, 2**32 - 1))
 def test_the_newest_scan_that_tells_of_a_point_holds(seen: list[FreeFloor], seed: int) -> None:
     points = np.random.default_rng(seed).uniform((-3.2, -2.2), (3.2, 2.2), (80, 2))
-    free = SeenFloor(tuple(seen), np.zeros((0, 3))).find_free(points)
+    free = SeenFloor(tuple(seen), np.zeros((0, 3))).ask(points)[0]
     for point, is_free in zip(points, free, strict=True):
         expected, is_clear = False, True
         for scan in reversed(seen):
@@ -93,8 +93,8 @@ def test_the_newest_scan_that_tells_of_a_point_holds(seen: list[FreeFloor], seed
 def test_more_scans_of_an_empty_floor_show_no_less(seen: list[FreeFloor], seed: int) -> None:
     points = np.random.default_rng(seed).uniform((-3.0, -2.0), (3.0, 2.0), (60, 2))
     empty = [scan for scan in seen if "thing" not in scan.ends]
-    fewer = SeenFloor(tuple(empty[:-1]), np.zeros((0, 3))).find_free(points)
-    more = SeenFloor(tuple(empty), np.zeros((0, 3))).find_free(points)
+    fewer = SeenFloor(tuple(empty[:-1]), np.zeros((0, 3))).ask(points)[0]
+    more = SeenFloor(tuple(empty), np.zeros((0, 3))).ask(points)[0]
     assert not (fewer & ~more).any()
 
 
@@ -120,11 +120,11 @@ def test_what_is_driven_at_full_speed_was_seen(seen: list[FreeFloor], here: Pose
     end = here @ Pose2(move_m, 0.0, 0.0)
     floor = SeenFloor(tuple(seen), np.array([[here.x_m, here.y_m, 0.38]]))
     sweep = sample_sweep([here.position, end.position], 0.38, move_m)
-    caution = limit_move(sweep.only(~floor.find_free(sweep.points)), move_m, DEFAULT.action)
+    caution = limit_move(sweep.only(~floor.ask(sweep.points)[0]), move_m, DEFAULT.action)
     assert 0.0 < caution.move_m <= move_m
     gone = here @ Pose2(caution.move_m, 0.0, 0.0)
     swept = sample_sweep([here.position, gone.position], 0.38, caution.move_m)
-    unseen = swept.only(~floor.find_free(swept.points))
+    unseen = swept.only(~floor.ask(swept.points)[0])
     if caution.creeps:
         assert caution.move_m <= DEFAULT.action.max_creep_m
     else:
@@ -143,15 +143,15 @@ def test_free_way_ends_where_three_unseen_points_are_together(at: list[float], l
 def test_what_stands_on_the_floor_is_not_free() -> None:
     scan = scan_floor(ROOM, Pose2(-2.5, 0.0, 0.0), near_m=0.3)
     points = np.array([[-0.5, 0.0], [0.5, 0.0]])
-    assert SeenFloor((scan,), np.zeros((0, 3))).find_free(points).all()
+    assert SeenFloor((scan,), np.zeros((0, 3))).ask(points)[0].all()
     box = np.array([[0.3, -0.2], [0.7, -0.2], [0.7, 0.2], [0.3, 0.2]])
-    assert SeenFloor((scan,), np.zeros((0, 3)), (box,)).find_free(points).tolist() == [True, False]
+    assert SeenFloor((scan,), np.zeros((0, 3)), (box,)).ask(points)[0].tolist() == [True, False]
 
 
 def test_a_newer_scan_that_sees_a_thing_overrules_an_older_one() -> None:
     older = scan_floor(ROOM, Pose2(-2.5, 0.0, 0.0), near_m=0.3)
     newer = scan_floor(ROOM, Pose2(-2.5, 0.0, 0.0), near_m=0.3, seen_s=1.0, things=[shapely.box(0.0, -0.3, 0.2, 0.3)])
     before, behind = np.array([[-0.2, 0.0]]), np.array([[0.1, 0.0]])
-    assert SeenFloor((older, newer), np.zeros((0, 3))).find_free(before).all()
-    assert not SeenFloor((older, newer), np.zeros((0, 3))).find_free(behind).any()
-    assert SeenFloor((newer, older), np.zeros((0, 3))).find_free(behind).all()
+    assert SeenFloor((older, newer), np.zeros((0, 3))).ask(before)[0].all()
+    assert not SeenFloor((older, newer), np.zeros((0, 3))).ask(behind)[0].any()
+    assert SeenFloor((newer, older), np.zeros((0, 3))).ask(behind)[0].all()

@@ -9,8 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization.pose_candidates import compute_chamfer_maps, compute_chamfer_scores
-from knowledge_sources.methods.localization.visibility_map import sample_lines
+from knowledge_sources.methods.localization.pose_candidates import (
+    compute_chamfer_maps,
+    compute_chamfer_scores,
+    sample_lines,
+)
 from knowledge_sources.methods.verification.line_check import compute_agreement, compute_coverage, compute_view_quality
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2

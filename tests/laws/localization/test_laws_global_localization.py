@@ -24,10 +24,9 @@ from knowledge_sources.methods.localization.next_view import (
     make_safety_check,
     normalize_log_likelihoods,
 )
-from knowledge_sources.methods.localization.pose_candidates import are_distinct
+from knowledge_sources.methods.localization.pose_candidates import are_distinct, get_visibility_map
 from knowledge_sources.methods.localization.refinement import PoseLikelihood, refine_pose, refine_view_motions
 from knowledge_sources.methods.localization.views import CameraView, align_headings, propagate_pose
-from knowledge_sources.methods.localization.visibility_map import get_visibility_map
 from knowledge_sources.methods.verification.line_check import predict_lines
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.generated.floors import generated_floor
+from experiments.perception.milestones_calibrate import fit_weights, remove_colors
 from knowledge_sources.methods.verification.color_check import (
     NOT_TESTED,
     ColorCheck,
@@ -26,8 +27,6 @@ from knowledge_sources.methods.verification.pose_confidence import (
     compute_evidence,
     compute_motion_tolerance_px,
     compute_terms,
-    fit_weights,
-    remove_colors,
 )
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.plan.milestone_selector import predict_milestone

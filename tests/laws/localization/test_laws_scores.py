@@ -61,6 +61,6 @@ def test_a_view_promises_the_bound_of_its_lines_by_finite_differences(seed: int,
 @given(visible=st.integers(0, 60), part=st.floats(0.0, 1.0), chance=st.floats(0.0, 1.0))
 def test_matched_lines_are_worth_their_binomial_odds(visible: int, part: float, chance: float) -> None:
     matched = round(part * visible)
-    p = min(max(chance, refinement.MIN_CHANCE), refinement.MAX_CHANCE)
+    p = float(np.clip(chance, *refinement.CERTAINTY_BOUNDS))
     odds = binom.logpmf(matched, visible, refinement.DETECTION_RATE) - binom.logpmf(matched, visible, p)
     assert math.isclose(compute_log_ratio(matched, visible, chance), refinement.LINE_INDEPENDENCE * odds, abs_tol=1e-7)

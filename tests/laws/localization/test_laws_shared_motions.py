@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from knowledge_sources.methods.localization.pose_candidates import get_visibility_map
 from knowledge_sources.methods.localization.refinement import refine_pose
 from knowledge_sources.methods.localization.views import CameraView, align_headings, join_covariances, propagate_pose
-from knowledge_sources.methods.localization.visibility_map import get_visibility_map
 from knowledge_sources.methods.verification.line_check import predict_lines
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount

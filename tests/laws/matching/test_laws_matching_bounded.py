@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from experiments.perception.matcher_scenes import CAMERA, generate_large
 from knowledge_sources.methods.matching import match_in_space, pose_matching
-from knowledge_sources.methods.matching.pose_pairs import PosePairs, keep_longest
+from knowledge_sources.methods.matching.pose_matching import PosePairs, keep_longest
 from knowledge_sources.settings import DEFAULT
 from world_models.frames import Pose
 

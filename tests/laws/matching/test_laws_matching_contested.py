@@ -59,7 +59,7 @@ def draw_space(seed: int, fitting: Fitting) -> tuple[PairSpace, Terms, np.random
     tuning = MatchingSettings()
     terms = (build_paper_terms(lengths, rng.uniform(10.0, 80.0, DATA)) if seed % 2
              else build_likelihood_terms(lengths, DATA, 1.0, 5.0, tuning))
-    return PairSpace(np.arange(len(model)), model, data, forms, masks, LINES, anchor, fitting), terms, rng
+    return PairSpace(model, data, forms, masks, LINES, anchor, fitting), terms, rng
 
 
 def fit_by_hand(form: Array, fitting: Fitting) -> float:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching.pose_pairs import (
+from knowledge_sources.methods.matching.pose_matching import (
     GRID_PX,
     GRID_SIGMAS,
     MAX_GRID_STEPS,
@@ -20,7 +20,7 @@ from knowledge_sources.methods.matching.pose_pairs import (
     build_scene,
     linearise_pairs,
 )
-from knowledge_sources.methods.matching.search import compute_step_fits
+from knowledge_sources.methods.matching.search import POSE_STEP
 from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian
 from knowledge_sources.methods.pose.planar import compute_line_jacobian
 from world_models.camera import Camera, CameraMount
@@ -119,7 +119,7 @@ def test_the_compiled_pairs_are_those_of_the_pose_solvers(seed: int) -> None:
 def test_the_closed_fit_is_the_least_squares_solution(seed: int, unknowns: int) -> None:
     rng = np.random.default_rng(seed)
     rows = rng.normal(size=(5, 4 + unknowns, unknowns + 1))
-    fits = compute_step_fits(np.swapaxes(rows, 1, 2) @ rows)
+    fits = POSE_STEP.fit(np.swapaxes(rows, 1, 2) @ rows)
     for k in range(5):
         step, rest, *_ = np.linalg.lstsq(rows[k, :, :-1], -rows[k, :, -1], rcond=None)
         np.testing.assert_allclose(fits.placements[k], step, rtol=1e-6, atol=1e-8)

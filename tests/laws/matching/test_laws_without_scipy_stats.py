@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom, norm, qmc
 
-from knowledge_sources.methods.matching.pose_pairs import _spread_normal
+from knowledge_sources.methods.matching.pose_matching import _spread_normal
 from knowledge_sources.methods.verification.line_check import TEST_COUNT, compute_p_false
 
 

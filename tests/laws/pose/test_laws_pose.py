@@ -13,12 +13,7 @@ from hypothesis import strategies as st
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose.estimate import compute_weak_information
-from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian, find_in_front
-from knowledge_sources.methods.pose.r_and_t import (
-    compute_camera_ends,
-    compute_plane_distances,
-    compute_plane_jacobian,
-)
+from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian, measure_lines
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -149,7 +144,7 @@ def test_a_pose_behind_the_camera_is_never_returned(solver: Solver, scene: PoseS
     found = solve(solver, scene, scene.segments_px, prior)
     lines = build_line_set(scene.lines_world, scene.segments_px, scene.camera, SIGMA_PX)
     pose = found.camera_from_world
-    front = find_in_front(lines, pose.rotation, pose.translation)
+    front = measure_lines(lines, pose.rotation, pose.translation)[1]
     assert not np.any(found.inliers & ~front)
     assert not found.ok or 2 * front.sum() > len(scene) or 2 * found.inliers.sum() <= len(scene)
     assert found.ok or found.reason
@@ -208,16 +203,12 @@ def test_derivatives_are_those_of_the_residuals(scene: PoseScene, seed: int) -> 
     lines = build_line_set(scene.lines_world, end_noise(scene.segments_px, 2.0, rng), scene.camera, 1.0)
     pose = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
     _, image = compute_image_jacobian(lines, pose.rotation, pose.translation)
-    plane = compute_plane_jacobian(lines, compute_camera_ends(lines, pose.rotation, pose.translation))
     for k in range(6):
         step = np.zeros(6)
         step[k] = 1e-6
         sides = [pose.perturbed(sign * step[:3], sign * step[3:]) for sign in (1.0, -1.0)]
         far, near = (compute_image_jacobian(lines, p.rotation, p.translation)[0] for p in sides)
         np.testing.assert_allclose((far - near) / 2e-6, image[..., k], rtol=1e-4, atol=1e-3)
-        ends = (compute_camera_ends(lines, p.rotation, p.translation) for p in sides)
-        far, near = (compute_plane_distances(lines, q) for q in ends)
-        np.testing.assert_allclose((far - near) / 2e-6, plane[..., k], rtol=1e-4, atol=1e-5)
 
 
 @by_solver

@@ -14,12 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.pose import kernels
-from knowledge_sources.methods.pose.line_set import (
-    LineSet,
-    build_line_set,
-    compute_image_distances,
-    compute_image_jacobian,
-)
+from knowledge_sources.methods.pose.line_set import LineSet, build_line_set, compute_image_jacobian
 from knowledge_sources.methods.pose.planar import (
     compute_camera_poses,
     compute_line_jacobian,
@@ -80,7 +75,7 @@ def test_normal_equations_of_lines_on_the_floor(seed: int) -> None:
     s = Scene(seed)
 
     def residuals(state: Array) -> Array:
-        return s.weigh_pose(compute_image_distances(s.lines, *compute_camera_poses(state, s.mount)))
+        return s.weigh_pose(compute_image_jacobian(s.lines, *compute_camera_poses(state, s.mount))[0])
 
     at = s.state + s.rng.normal(0.0, 0.03, 3)
     _, hessian, cost, _ = kernels.minimise_floor_pose(s.floor, s.weights, at, 0)
@@ -118,7 +113,7 @@ def test_normal_equations_of_points_on_the_floor(seed: int) -> None:
     depths, found, slopes = kernels.project_points(points, at)
     np.testing.assert_allclose(found, residuals(at), atol=1e-9)
     np.testing.assert_allclose(slopes, differentiate(residuals, at), rtol=1e-4, atol=1e-3)
-    camera, image, by_numpy = compute_point_jacobian(s.points, focal, at, s.mount)
+    camera, image, by_numpy = compute_point_jacobian(s.points, CAMERA, Pose2(*at), s.mount)
     np.testing.assert_allclose(depths, camera[:, 2])
     np.testing.assert_allclose((image - observed) / s.sigma[:, None], found, atol=1e-9)
     np.testing.assert_allclose(by_numpy / s.sigma[:, None, None], slopes, rtol=1e-9, atol=1e-9)
@@ -131,11 +126,11 @@ def test_normal_equations_of_points_on_the_floor(seed: int) -> None:
     np.testing.assert_allclose(hessian, np.einsum("n,nea,neb->ab", weight, slopes, slopes) + s.information)
 
 
-@pytest.mark.parametrize("kind", [kernels.PLANES, kernels.IMAGE])
+@pytest.mark.parametrize("kind", [kernels.PLANES, kernels.IMAGE, kernels.SINES, kernels.TURN])
 @few
 @given(seed=seeds)
 def test_normal_equations_of_a_camera(kind: int, seed: int) -> None:
-    """Six unknowns, both objectives: finite differences over the left perturbation, and numpy."""
+    """Six unknowns, each objective: finite differences over the left perturbation, and numpy."""
     s = Scene(seed)
     pose = perturb(s.camera_from_world, s.rng.normal(0.0, 0.02, 6))
     root = s.rng.normal(0.0, 1.0, (6, 6)) + 3.0 * np.eye(6)
@@ -144,9 +139,13 @@ def test_normal_equations_of_a_camera(kind: int, seed: int) -> None:
     def residuals(step: Array) -> Array:
         moved = perturb(pose, step)
         if kind == kernels.IMAGE:
-            return s.weigh_pose(compute_image_distances(s.lines, moved.rotation, moved.translation))
+            return s.weigh_pose(compute_image_jacobian(s.lines, moved.rotation, moved.translation)[0])
+        root = np.sqrt(s.weights)[:, None]
+        if kind == kernels.TURN:
+            return root * np.sum(s.lines.normals * (s.lines.directions @ moved.rotation.T), axis=1, keepdims=True)
         ends = moved.apply(s.model)
-        return np.sqrt(s.weights)[:, None] * np.einsum("nek,nk->ne", ends, s.lines.normals)
+        reach = np.linalg.norm(ends, axis=-1) if kind == kernels.SINES else 1.0
+        return root * np.einsum("nek,nk->ne", ends, s.lines.normals) / reach
 
     def find_prior_cost(step: Array) -> float:
         moved = perturb(pose, step)
@@ -182,7 +181,7 @@ def test_the_numpy_derivatives_on_the_floor(seed: int) -> None:
     distances, slopes = compute_line_jacobian(s.lines.points[:, 0], s.lines.directions, s.lines, s.state, s.mount)
 
     def measure(state: Array) -> Array:
-        return compute_image_distances(s.lines, *compute_camera_poses(state, s.mount))
+        return compute_image_jacobian(s.lines, *compute_camera_poses(state, s.mount))[0]
 
     np.testing.assert_allclose(distances, measure(s.state), atol=1e-6)
     expected = differentiate(measure, s.state)
@@ -195,7 +194,7 @@ def test_costs_and_squares_of_lines(seed: int) -> None:
     """Squared distances, truncated costs and those on the floor, one by one."""
     s = Scene(seed)
     pose = s.camera_from_world
-    distances = compute_image_distances(s.lines, pose.rotation, pose.translation)
+    distances = compute_image_jacobian(s.lines, pose.rotation, pose.translation)[0]
     squares = np.sum(distances**2, axis=1) / s.sigma**2
     found = kernels.compute_squared_distances(s.lines.arrays, pose.rotation[None], pose.translation[None])
     np.testing.assert_allclose(found[0], squares)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from knowledge_sources.methods.pose import planar_from_lines, planar_from_points
-from knowledge_sources.methods.pose.line_set import LineSet, build_line_set, compute_image_distances
+from knowledge_sources.methods.pose.line_set import LineSet, build_line_set, compute_image_jacobian
 from knowledge_sources.methods.pose.planar import build_planar_prior, compute_camera_poses, compute_line_jacobian
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
@@ -48,7 +48,7 @@ def observe(truth: Pose2, seed: int) -> tuple[Array, Array, np.random.Generator]
 
 
 def compute_distances(lines: LineSet, state: Array) -> Array:
-    return compute_image_distances(lines, *compute_camera_poses(state, MOUNT))
+    return compute_image_jacobian(lines, *compute_camera_poses(state, MOUNT))[0]
 
 
 def compute_error(found: Pose2, truth: Pose2) -> Array:
@@ -74,7 +74,7 @@ def test_lines_agree_with_scipy_s_least_squares(heading: float, seed: int) -> No
     root = np.linalg.cholesky(np.linalg.inv(PRIOR)).T
 
     def residuals(state: Any) -> Array:
-        image = compute_image_distances(prepared, *compute_camera_poses(np.asarray(state), MOUNT)) / SIGMA_PX
+        image = compute_image_jacobian(prepared, *compute_camera_poses(np.asarray(state), MOUNT))[0] / SIGMA_PX
         belief = root @ compute_error(Pose2(*state), prior)
         return np.concatenate([image.ravel(), belief])
 

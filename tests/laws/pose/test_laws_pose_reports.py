@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, NO_LENGTH, NO_OVERLAP
-from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_distances, measure_lines
+from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian, measure_lines
 from knowledge_sources.settings import DEFAULT
 
 SOLVERS = [r_then_t, r_and_t, r_and_t_ml, med_r_and_t, trunc_r_and_t]
@@ -47,7 +47,7 @@ def test_residuals_are_those_of_the_pose(solver: Solver, scene: PoseScene, seed:
     segments, _ = wrong_landmarks(scene, end_noise(scene.segments_px, SIGMA_PX, rng), 6, rng)
     found = solve(solver, scene, segments, rng)
     lines, pose = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX), found.camera_from_world
-    expected = compute_image_distances(lines, pose.rotation, pose.translation)
+    expected = compute_image_jacobian(lines, pose.rotation, pose.translation)[0]
     np.testing.assert_allclose(np.abs(found.residuals_px), np.abs(expected), atol=1e-6, rtol=1e-6)
 
 

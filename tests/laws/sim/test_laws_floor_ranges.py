@@ -140,8 +140,8 @@ def test_what_touches_the_robot_ends_the_floor_there() -> None:
     floor = see_ranges(ROBOT, name, pose, 0.01, 0.002, reading, ())
     ahead = int(np.argmin(np.abs(floor.bearings_rad)))
     assert floor.ends[ahead] == "thing" and floor.far_m[ahead] <= 0.36
-    assert not SeenFloor((floor,), np.array([[pose.x_m, pose.y_m, 0.5]])).find_free(
-        np.array([[pose.x_m + 0.42, pose.y_m]])).any()
+    assert not SeenFloor((floor,), np.array([[pose.x_m, pose.y_m, 0.5]])).ask(
+        np.array([[pose.x_m + 0.42, pose.y_m]]))[0].any()
 
 
 def test_without_an_echo_nothing_is_free() -> None:

@@ -14,8 +14,8 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 9_880,
-    "knowledge_sources": 22_300,
+    "world_models": 9_890,
+    "knowledge_sources": 19_900,
     "sim": 7_100,
     "logs": 7_440,
     "harvey": 10_500,

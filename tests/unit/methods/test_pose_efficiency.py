@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, fragment
 from knowledge_sources.methods.pose import PoseEstimate, r_and_t, r_and_t_ml, r_then_t
-from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_distances, compute_image_jacobian
+from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian
 
 SIGMA_PX = 0.5
 TRIALS = 150
@@ -95,7 +95,7 @@ def test_maximum_likelihood_agrees_with_scipy_s_least_squares() -> None:
 
     def residuals(step: Array) -> Array:
         pose = scene.camera_from_world.perturbed(step[:3], step[3:])
-        return compute_image_distances(lines, pose.rotation, pose.translation).ravel() / SIGMA_PX
+        return compute_image_jacobian(lines, pose.rotation, pose.translation)[0].ravel() / SIGMA_PX
 
     oracle = least_squares(residuals, np.zeros(6), xtol=1e-13, ftol=1e-13, gtol=1e-13)
     expected = scene.camera_from_world.perturbed(oracle.x[:3], oracle.x[3:])

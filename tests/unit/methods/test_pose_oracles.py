@@ -15,7 +15,6 @@ from knowledge_sources.methods.pose import med_r_and_t, planar_from_points, r_an
 from knowledge_sources.methods.pose.least_median import count_subsets, list_subsets
 from knowledge_sources.methods.pose.line_set import LineSet, build_line_set, compute_squared_distances
 from knowledge_sources.methods.pose.planar import build_planar_prior, compute_point_jacobian
-from knowledge_sources.methods.pose.r_and_t import compute_camera_ends, compute_plane_distances
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2, wrap_angle
 
@@ -44,18 +43,22 @@ def assert_same(found: Pose, expected: Pose) -> None:
     assert np.abs(found.translation - expected.translation).max() < 1e-4
 
 
+def measure_plane_distances(lines: LineSet, pose: Pose) -> Array:
+    """n . (R p + T), (n, 2) [m]."""
+    return np.asarray(np.einsum("nek,nk->ne", pose.apply(lines.points), lines.normals))
+
+
 def e1(lines: LineSet) -> Residuals:
     def residuals(pose: Pose) -> Array:
-        ends = compute_camera_ends(lines, pose.rotation, pose.translation)
-        return compute_plane_distances(lines, ends).ravel()
+        return measure_plane_distances(lines, pose).ravel()
 
     return residuals
 
 
 def e2(lines: LineSet) -> Residuals:
     def residuals(pose: Pose) -> Array:
-        ends = compute_camera_ends(lines, pose.rotation, pose.translation)
-        return np.asarray((compute_plane_distances(lines, ends) / np.linalg.norm(ends, axis=-1)).ravel())
+        reach = np.linalg.norm(pose.apply(lines.points), axis=-1)
+        return np.asarray((measure_plane_distances(lines, pose) / reach).ravel())
 
     return residuals
 
@@ -142,11 +145,11 @@ def test_points_agree_with_scipy_s_least_squares() -> None:
     pixels = camera.project((mount @ truth.lifted().inverse()).apply(world)) + rng.uniform(-0.2, 0.2, (20, 2))
     prior, covariance = Pose2(4.1, -2.1, 0.72), np.diag([0.2, 0.2, 0.05]) ** 2
     found = planar_from_points(world, pixels, camera, mount, prior, covariance, sigma_px=0.3)
-    belief, focal = build_planar_prior(prior, covariance), np.array([camera.fx, camera.fy])
+    belief = build_planar_prior(prior, covariance)
     observed, root = pixels - (camera.cx, camera.cy), np.linalg.cholesky(np.linalg.inv(covariance)).T
 
     def residuals(state: Array) -> Array:
-        image = (compute_point_jacobian(world, focal, state, mount)[1] - observed) / 0.3
+        image = (compute_point_jacobian(world, camera, Pose2(*state), mount)[1] - observed) / 0.3
         return np.concatenate([image.ravel(), root @ (state - belief.mean)])
 
     oracle = least_squares(residuals, belief.mean, x_scale=(1.0, 1.0, 0.1), xtol=1e-14, ftol=1e-14, gtol=1e-14).x
