@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from world_models.actuator import arc
@@ -41,11 +41,12 @@ def test_the_way_is_turned_by_the_yaw_s_error_and_by_nothing_else(
 
 
 @given(poses, st.floats(-0.1, 0.1), st.floats(0.2, 0.7))
+@example(Pose2(0.0, 0.0, 0.0), 2.0**-24, 0.21875)  # the true arc's own rounding: 1 - cos of next to nothing
 def test_what_the_wheels_drift_is_no_yaw(start: Pose2, bend: float, move: float) -> None:
     travel, end = drive(start, [(0.0, move)] * 4, 0.0, bend)
     came = end.position - start.position
     off = wrap_angle(math.atan2(travel.y_m, travel.x_m) - math.atan2(came[1], came[0]))
-    assert abs(off) < 2e-3 * abs(bend) + 1e-9
+    assert abs(off) < 2e-3 * abs(bend) + 1e-8
 
 
 @given(poses, st.floats(-0.2, 0.2), st.floats(-0.3, 0.3))
