@@ -13,10 +13,10 @@ from typing import Any
 
 from harvey.errors import BadInput
 from knowledge_sources.settings import DEFAULT, Row, Settings, list_rows, replace_value
-from world_models.actuator import BOUNDS, ActuatorModel
+from world_models.actuator import ActuatorModel
 from world_models.entries.robot_state import CameraState, Footprint, Wheels
 from world_models.files.toml.settings_reader import parse_value, spellings, suggest_keys
-from world_models.units import Bounds
+from world_models.units import Bounds, bounds_of
 
 BY_MISSION = "by the mission"
 """Instead of a value that has no default."""
@@ -66,7 +66,7 @@ def _value(
 
 
 def _wheels(field: str, unit: str, what: str) -> RobotValue:
-    return _value(_WHEELS, field, field, BOUNDS[field], unit, what, getattr(ActuatorModel(), field))
+    return _value(_WHEELS, field, field, bounds_of(ActuatorModel)[field], unit, what, getattr(ActuatorModel(), field))
 
 
 _FOCAL, _CENTRE = Bounds(1.0, MAX_PX), Bounds(-MAX_PX, MAX_PX)

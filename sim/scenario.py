@@ -14,18 +14,18 @@ from sim.body.wheel_errors import ActuatorParameters
 from sim.faults.fault import Fault
 from sim.faults.fault_registry import read_fault
 from sim.ground_truth.inexact import TrueInexact
-from sim.ground_truth.table import NO_DIFFERENCES, TrueCamera, TruthTable, read_truth
+from sim.ground_truth.table import NO_DIFFERENCES, TrueCamera, TruthTable
 from sim.ground_truth.things import MovedThing
-from sim.render.light.lighting import Lighting
+from sim.render.lighting import Lighting
 from sim.render.optics import check_lens
 from sim.render.rasterizer import sample_offsets
 from sim.render.sensor import SensorParameters
 from sim.scenario_names import SCENARIOS, list_scenarios
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.mission import ROOT, TABLES, Limits, Mission, MissionFormat, named_file
-from world_models.files.toml.settings_reader import MAX_NUMBER, read_settings, suggest_keys
+from world_models.files.toml.settings_reader import MAX_NUMBER, read_all, read_settings, suggest_keys
 from world_models.files.toml.source import Key, Source, WorldError
-from world_models.units import Bounds, check_bounds
+from world_models.units import Bounded, bounded
 
 MAX_DISTORTION = 1e4
 """Largest distortion coefficient: those of real lenses are about 1, of long ones some hundreds."""
@@ -36,7 +36,7 @@ class ScenarioError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class CameraSettings:
+class CameraSettings(Bounded):
     """The camera and its mounting.
 
     Attributes:
@@ -48,20 +48,16 @@ class CameraSettings:
         distortion: none, or OpenCV's coefficients k1, k2, p1, p2[, k3].
     """
 
-    width_px: int = 512
-    height_px: int = 512
-    field_of_view_rad: float = math.radians(65.0)
-    mount_height_m: float = 1.0
-    mount_forward_m: float = 0.1
-    mount_tilt_rad: float = 0.0
+    width_px: int = bounded(512, 16, 4096)
+    height_px: int = bounded(512, 16, 4096)
+    field_of_view_rad: float = bounded(math.radians(65.0), 0.05, 2.6)
+    mount_height_m: float = bounded(1.0, 0.0, 5.0, above=True)
+    mount_forward_m: float = bounded(0.1, -2.0, 2.0)
+    mount_tilt_rad: float = bounded(0.0, -math.pi / 2.0, math.pi / 2.0)
     distortion: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        side = Bounds(16, 4096)
-        check_bounds(self, {"width_px": side, "height_px": side, "field_of_view_rad": Bounds(0.05, 2.6),
-                            "mount_height_m": Bounds(0.0, 5.0, above=True),
-                            "mount_forward_m": Bounds(-2.0, 2.0),
-                            "mount_tilt_rad": Bounds(-math.pi / 2.0, math.pi / 2.0)})
+        Bounded.__post_init__(self)
         largest = max((abs(k) for k in self.distortion), default=0.0)
         if largest > MAX_DISTORTION:
             raise ValueError(
@@ -102,12 +98,8 @@ class ScenarioLimits(Limits):
         max_collisions: more of them end the run.
     """
 
-    max_path_m: float = 150.0
-    max_collisions: int = 3
-
-    def __post_init__(self) -> None:
-        Limits.__post_init__(self)
-        check_bounds(self, {"max_path_m": Bounds(0.0, MAX_NUMBER, above=True), "max_collisions": Bounds(0, MAX_NUMBER)})
+    max_path_m: float = bounded(150.0, 0.0, MAX_NUMBER, above=True)
+    max_collisions: int = bounded(3, 0, MAX_NUMBER)
 
 
 FORMAT = MissionFormat(
@@ -204,9 +196,9 @@ def _scenario(source: Source, name: str, folder: Path) -> Scenario:
     return Scenario(
         details=tuple(named_file(text, ROOT / "sim" / "buildings", folder) for text in details),
         faults=tuple(read_fault(item) for item in node["faults"].items()) if "faults" in node else (),
-        moved=tuple(read_settings(item, MovedThing) for item in node["moved"].items()) if "moved" in node else (),
-        rides=tuple(read_settings(item, Helper) for item in node["rides"].items()) if "rides" in node else (),
-        truth=read_truth(node["truth"]) if "truth" in node else NO_DIFFERENCES,
+        moved=read_all(node, "moved", MovedThing),
+        rides=read_all(node, "rides", Helper),
+        truth=read_settings(node["truth"], TruthTable) if "truth" in node else NO_DIFFERENCES,
         light=read_settings(node["light"], Lighting) if "light" in node else None,
         **shared,
     )

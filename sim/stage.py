@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 
@@ -15,8 +13,7 @@ from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import Elevators, SimulatedBuilding
 from sim.ground_truth.table import AS_TOLD
 from sim.ground_truth.true_changes import ChangingFaces, State
-from sim.render.light.lamps import Room
-from sim.render.light.lights import Lights
+from sim.render.lights import Lights, Room, check_light
 from sim.scenario import Scenario
 from sim.scenario_changes import (
     check_names,
@@ -38,8 +35,6 @@ from world_models.files.toml.mission import Arrival
 from world_models.files.world_files import WorldError
 from world_models.frames import Pose2
 
-PATH_TRACED = Path("runs") / "path-traced"
-"""Where path-traced pictures are kept: one of the same building, light and pose is traced once."""
 MAX_FLOOR_STEP_M = 0.5
 """Rooms whose floors differ by less are on one storey [m]."""
 
@@ -216,9 +211,11 @@ def _lights(scenario: Scenario, world: World, around: str) -> Lights | None:
     """What lights the building; None without ``[light]``. Raises ScenarioError where it needs what is not installed."""
     if scenario.light is None:
         return None
-    if scenario.light.traced_paths and find_spec("mitsuba") is None:
-        raise scenario.refused(("light", "traced_paths"), "expected Mitsuba to be installed, as by 'harvey[photo]'")
-    return Lights(scenario.light, _lit_rooms(world, around), PATH_TRACED)
+    try:
+        check_light(scenario.light)
+    except ValueError as error:
+        raise scenario.refused(("light",), str(error)) from None
+    return Lights(scenario.light, _lit_rooms(world, around))
 
 
 def _lit_rooms(world: World, around: str) -> tuple[Room, ...]:

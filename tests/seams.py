@@ -5,14 +5,23 @@ from __future__ import annotations
 import shlex
 from argparse import ArgumentParser
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from experiments.generated.scenes import box_room
 from fake_cases import fake_cases, work_on
 from harvey.campaign.case_work import CaseAnswer, Killed
 from harvey.campaign.workers import ClusterWorkers
 from harvey.commands.command import CliCommand, add_parser
 from harvey.errors import BadInput
+from sim.render.lighting import Lighting
+from sim.render.lights import LitRenderers, Room, hang_lamps
+from sim.render.renderer import Renderer
+from world_models.camera import Camera, CameraMount
+from world_models.frames import Pose2
 
 
 def check_command(command: CliCommand, of: str = "") -> None:
@@ -47,3 +56,24 @@ def check_cluster(workers: ClusterWorkers, cluster: str, folder: Path) -> None:
 
 def divide(case: float) -> float:
     return 1.0 / case
+
+
+def check_lit_renderers(renderers: LitRenderers) -> None:
+    """Renderers of light: even light is as the core draws it, lamps add to it, and it comes out the same again."""
+    room = Room(np.array([(0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0)]), 0.0, 2.6)
+    pose = CameraMount(1.0, 0.1).camera_from_robot @ Pose2(1.0, 1.0, 0.4).lifted().inverse()
+    camera = Camera.from_field_of_view(1.1, 96, 80)
+
+    def see(**light: Any) -> NDArray[np.float32]:
+        lighting = Lighting(**{"lamps": 0.0, "bounces": 1, "rays": 16, **light})
+        renderers.check(lighting)
+        lamps = hang_lamps([room], lighting) if lighting.lamps else ()
+        return renderers.build(box_room(), lighting, [room], lamps, 4).radiance(camera, pose)
+
+    dark, even, lit, brighter = see(), see(flat=1.0), see(lamps=0.4), see(lamps=0.8)
+    for picture in (dark, even, lit, brighter):
+        assert picture.shape == (80, 96, 3) and picture.dtype == np.float32 and np.isfinite(picture).all()
+    np.testing.assert_allclose(even, Renderer.of_faces(box_room(), 4).radiance(camera, pose), atol=1.0 / 1024)
+    assert not dark.any() and not see(lamps=0.8, lamps_off=1.0).any()
+    assert np.all(brighter >= lit) and brighter.mean() > 1.2 * lit.mean() > 0.0
+    assert np.array_equal(see(lamps=0.4), lit)

@@ -7,36 +7,20 @@ A MOVE drifts along a circular arc, tangent to the intended line at its start, a
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from world_models.frames import Pose2
-from world_models.units import Bounds, check_bounds
-
-BOUNDS: Mapping[str, Bounds] = {
-    "reach": Bounds(0.1, 2.0),
-    "reach_sigma": Bounds(1e-6, 1.0),
-    "curvature_sigma_per_m": Bounds(1e-6, 10.0),
-    "bend_sigma_per_m": Bounds(1e-6, 10.0),
-    "turn_sigma": Bounds(1e-6, 1.0),
-    "turn_sigma_rad": Bounds(1e-6, math.pi / 2.0),
-    "skitter_m": Bounds(1e-6, 1.0),
-    "increment_m": Bounds(0.01, 10.0),
-    "turn_increment_rad": Bounds(0.01, math.pi),
-    "speed_m_per_s": Bounds(0.001, 10.0),
-    "brake_m_per_s2": Bounds(0.001, 100.0),
-}
-"""Wide enough for any wheels, narrow enough that all results are finite and every leg ends."""
+from world_models.units import Bounded, bounded
 
 MAX_INNOVATION_SIGMAS = 4.0
 """Gate of the drift filter: a curvature further off than this is a push or a slip and is ignored."""
 
 
 @dataclass(frozen=True, slots=True)
-class ActuatorModel:
+class ActuatorModel(Bounded):
     """Motion model of one kind of wheels; all sigmas are standard deviations.
 
     Attributes:
@@ -51,23 +35,20 @@ class ActuatorModel:
         speed_m_per_s: of a motion corrected on the move; brake_m_per_s2: smallest deceleration when stopping.
 
     Raises:
-        OutOfBoundsError: a value outside BOUNDS.
+        OutOfBoundsError: a value outside its bounds.
     """
 
-    reach: float = 228.3 / 240.0
-    reach_sigma: float = 0.012
-    curvature_sigma_per_m: float = 0.011
-    bend_sigma_per_m: float = 0.002
-    turn_sigma: float = 0.025
-    turn_sigma_rad: float = math.radians(0.2)
-    skitter_m: float = 0.004
-    increment_m: float = 0.6096
-    turn_increment_rad: float = math.radians(20.0)
-    speed_m_per_s: float = 0.4
-    brake_m_per_s2: float = 0.5
-
-    def __post_init__(self) -> None:
-        check_bounds(self, BOUNDS)
+    reach: float = bounded(228.3 / 240.0, 0.1, 2.0)
+    reach_sigma: float = bounded(0.012, 1e-6, 1.0)
+    curvature_sigma_per_m: float = bounded(0.011, 1e-6, 10.0)
+    bend_sigma_per_m: float = bounded(0.002, 1e-6, 10.0)
+    turn_sigma: float = bounded(0.025, 1e-6, 1.0)
+    turn_sigma_rad: float = bounded(math.radians(0.2), 1e-6, math.pi / 2.0)
+    skitter_m: float = bounded(0.004, 1e-6, 1.0)
+    increment_m: float = bounded(0.6096, 0.01, 10.0)
+    turn_increment_rad: float = bounded(math.radians(20.0), 0.01, math.pi)
+    speed_m_per_s: float = bounded(0.4, 0.001, 10.0)
+    brake_m_per_s2: float = bounded(0.5, 0.001, 100.0)
 
     def compute_command_m(self, distance_m: float) -> float:
         """The MOVE to command [m] so that about ``distance_m`` is driven."""

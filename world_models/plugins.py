@@ -9,6 +9,8 @@
 ``harvey.pages``              a ``harvey.runner.page_kind.PageKind``, named ``live``
 ``harvey.workers``            a ``harvey.campaign.workers.ClusterWorkers``, named ``dask``
 ``harvey.commands``           a ``harvey.commands.command.CliCommand``; of a verb: ``world.import``
+``harvey.renderers``          a ``sim.render.lights.LitRenderers``, named ``lit``
+``harvey.experiments``        the ``run`` of an experiment, by its name
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
 ``harvey.exporters``          a ``harvey_buildings.exporters.Exporter``
 ``harvey.experiments``        a module as those of ``experiments``
@@ -26,17 +28,15 @@ from typing import Any
 SOURCES_GROUP = "harvey.knowledge_sources"
 """The group of knowledge sources: named in ``run.json`` and put round the board, so it is said once, here."""
 
-COMMANDS_GROUP = "harvey.commands"
-PAGES_GROUP = "harvey.pages"
-WORKERS_GROUP = "harvey.workers"
+COMMANDS_GROUP, PAGES_GROUP = "harvey.commands", "harvey.pages"
+WORKERS_GROUP, RENDERERS_GROUP = "harvey.workers", "harvey.renderers"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
     COMMANDS_GROUP: {"serve": "harvey-serve", "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
-    "harvey.experiments": dict.fromkeys(("imported-building", "rosmaps"), "harvey-buildings") | {
-        "watchers": "harvey-serve"},
-    PAGES_GROUP: {"live": "harvey-serve"},
-    WORKERS_GROUP: {"dask": "harvey-cluster"},
-    "harvey.bases": {"p2os": "harvey-bases", "create2": "harvey-bases"},
-    "harvey.emulators": {"p2os": "harvey-bases", "create2": "harvey-bases"},
+    "harvey.experiments": {
+        "imported-building": "harvey-buildings", "rosmaps": "harvey-buildings", "watchers": "harvey-serve"},
+    PAGES_GROUP: {"live": "harvey-serve"}, WORKERS_GROUP: {"dask": "harvey-cluster"},
+    RENDERERS_GROUP: {"lit": "harvey-light"},
+    **{group: {"p2os": "harvey-bases", "create2": "harvey-bases"} for group in ("harvey.bases", "harvey.emulators")},
 }
 """By group: the names that extras of this project have, each with its extra."""
 

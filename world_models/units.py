@@ -6,12 +6,13 @@ A number out of its bounds is an error that file readers can restate in the file
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar
+
+Value = TypeVar("Value", int, float)
 
 FOOT_M = 0.3048
 """One foot [m]."""
-
 INCH_M = 0.0254
 """One inch [m]."""
 
@@ -52,3 +53,22 @@ def check_bounds(settings: Any, bounds: Mapping[str, Bounds]) -> None:
         value = getattr(settings, key)
         if not allowed.contains(value):
             raise OutOfBoundsError(key, allowed, value)
+
+
+def bounded(default: Value, low: float, high: float, *, above: bool = False) -> Value:
+    """A field of a :class:`Bounded` settings class, with its :class:`Bounds`."""
+    return field(default=default, metadata={"bounds": Bounds(low, high, above)})
+
+
+def bounds_of(kind: type[Any]) -> Mapping[str, Bounds]:
+    """The bounds of the fields of a settings class that have any, by name."""
+    return {known.name: known.metadata["bounds"] for known in fields(kind) if "bounds" in known.metadata}
+
+
+class Bounded:
+    """A base of settings dataclasses whose fields have to be within their bounds: raises OutOfBoundsError."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        check_bounds(self, bounds_of(type(self)))

@@ -21,11 +21,12 @@ from blackboard.entry import Ref
 from blackboard.journal import Decision
 from experiments import drives
 from experiments.drives import Claim, Driven, End, Trial
+from experiments.generated.free_floor import find_free_floor, find_shortest_way
 from experiments.generated.missions import write_cluttered_mission
 from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
 from experiments.trials import RESULTS, at_least, at_most
 from harvey.campaign.campaign import Task, run_task
-from sim.body.collision import Obstacles, find_free_floor, find_shortest_way
+from sim.body.collision import Obstacles
 from sim.ground_truth.table import NO_DIFFERENCES
 from sim.stage import Stage, build_stage
 from world_models.building.locale_frame import LocaleFrame

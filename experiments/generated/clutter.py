@@ -15,7 +15,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from sim.body.collision import ROBOT_RADIUS_M, Obstacles, find_free_floor, has_way, take_from_floor
+from experiments.generated.free_floor import find_free_floor, has_way, take_from_floor
+from sim.body.collision import ROBOT_RADIUS_M, Obstacles
 from sim.ground_truth.table import ExtraThing
 from sim.ground_truth.things import SHAPES, build_thing, footprint
 from sim.stage import Stage

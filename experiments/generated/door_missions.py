@@ -13,8 +13,9 @@ import numpy as np
 import shapely
 
 from experiments.generated.floors import Floor, generated_floor
+from experiments.generated.free_floor import find_free_floor, find_shortest_way, has_way, take_from_floor
 from experiments.generated.missions import ROOM_M, ROOMS, draw_ends, draw_heading_deg, draw_rooms, format_mission
-from sim.body.collision import Obstacles, find_free_floor, find_shortest_way, has_way, take_from_floor
+from sim.body.collision import Obstacles
 from sim.ground_truth.table import TrueDoor
 from sim.ground_truth.true_changes import build_leaf
 from sim.scenario import parse_scenario

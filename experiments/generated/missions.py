@@ -15,7 +15,8 @@ import numpy as np
 
 from experiments.generated.clutter import KEPT_FREE_M, ClutterMaker
 from experiments.generated.floors import Floor, generated_floor
-from sim.body.collision import Obstacles, find_free_floor, has_way
+from experiments.generated.free_floor import find_free_floor, has_way
+from sim.body.collision import Obstacles
 from sim.ground_truth.inexact import TrueInexact
 from sim.scenario import parse_scenario
 from sim.stage import build_stage

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from sim.body.simulated_building import SimulatedBuilding
 from sim.body.wheel_errors import ContinuousMotion
-from sim.render.light.auto_exposure import AutoExposure, vignette
-from sim.render.light.lighting import Lighting
+from sim.render.auto_exposure import AutoExposure, vignette
+from sim.render.lighting import Lighting
 from sim.render.optics import Optics
 from sim.render.sensor import Occluder, SensorParameters, compress_jpeg, expose, skip_noise_draws
 from sim.truth import Truth

@@ -11,21 +11,18 @@ from numpy.typing import NDArray
 from sim.body.collision import ROBOT_RADIUS_M
 from world_models.entries.obstacle import Contact, Ranges
 from world_models.frames import Pose2
-from world_models.units import Bounds, check_bounds
+from world_models.units import Bounded, bounded
 
 
 @dataclass(frozen=True, slots=True)
-class Bumper:
+class Bumper(Bounded):
     """A ring of switches round the robot; the first sector has its middle straight ahead.
 
     Attributes:
         sectors: how many; 0 for a robot without a bumper.
     """
 
-    sectors: int = 12
-
-    def __post_init__(self) -> None:
-        check_bounds(self, {"sectors": Bounds(0, 360)})
+    sectors: int = bounded(12, 0, 360)
 
     def feel(self, direction_rad: float, when_s: float) -> Contact:
         """What is felt of a touch in this direction from the robot's heading; the touch may be anywhere in its sector.
@@ -41,7 +38,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class RangeRing:
+class RangeRing(Bounded):
     """Sonars on the robot's rim that face outward, the first one straight ahead.
 
     Attributes:
@@ -53,17 +50,12 @@ class RangeRing:
         dropout: the part of those that do.
     """
 
-    sensors: int = 0
-    half_beam_rad: float = math.radians(12.5)
-    reach_m: float = 6.0
-    sigma_m: float = 0.02
-    specular_rad: float = math.radians(30.0)
-    dropout: float = 0.5
-
-    def __post_init__(self) -> None:
-        check_bounds(self, {
-            "sensors": Bounds(0, 24), "half_beam_rad": Bounds(0.001, math.pi / 3.0), "reach_m": Bounds(0.1, 50.0),
-            "sigma_m": Bounds(0.0, 1.0), "specular_rad": Bounds(0.0, math.pi / 2.0), "dropout": Bounds(0.0, 1.0)})
+    sensors: int = bounded(0, 0, 24)
+    half_beam_rad: float = bounded(math.radians(12.5), 0.001, math.pi / 3.0)
+    reach_m: float = bounded(6.0, 0.1, 50.0)
+    sigma_m: float = bounded(0.02, 0.0, 1.0)
+    specular_rad: float = bounded(math.radians(30.0), 0.0, math.pi / 2.0)
+    dropout: float = bounded(0.5, 0.0, 1.0)
 
     def measure(self, segments_world: Floats, pose: Pose2, rng: np.random.Generator, when_s: float) -> Ranges | None:
         """A reading at a pose among solid segments (n, 2, 2); None without sensors. Two random numbers a sensor."""

@@ -21,20 +21,11 @@ from sim.body.wheel_errors import (
     arc_steps,
 )
 from sim.faults.fault import DeviceFault, Fault, FaultSchedule
-from sim.render.light.lighting import Lighting
+from sim.render.lighting import Lighting
 from sim.render.sensor import Occluder, SensorParameters
 from sim.truth import Truth
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import (
-    BodyFault,
-    CameraPicture,
-    Course,
-    MotionReport,
-    MotorCommand,
-    Odometry,
-    Ride,
-    RideReport,
-)
+from world_models.entries.body import BodyFault, CameraPicture, Course, MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.location import Place
 from world_models.entries.obstacle import Contact, Ranges
 from world_models.frames import Pose2
@@ -87,7 +78,6 @@ class SimulatedBody:
         self._touching_rad: float | None = None
         self._contact: Contact | None = None
         self._motion = ContinuousMotion()
-        self._odometry = Pose2(0.0, 0.0, 0.0)
         self._truth = Truth(start, locale=building.locale_at(start))
         there = self._draw_put_down(put_down_rng, put_down_sigma_m, put_down_sigma_rad)
         self._truth = Truth(there, locale=building.locale_at(there))
@@ -155,7 +145,6 @@ class SimulatedBody:
         self._turn(command.turn_rad)
         done = self._move(command.move_m, command.speed_m_per_s)
         turn, move = self._wheels.quantize(command.turn_rad, command.move_m * done)
-        self._add_odometry(turn, move)
         now_s = self._truth.time_s
         return MotionReport(turn_rad=turn, move_m=move, duration_s=now_s - began_s, sim_time_s=now_s)
 
@@ -193,20 +182,6 @@ class SimulatedBody:
         pose = self._truth.world_from_robot @ sensor
         return self._ring.hear(self._building.obstacles.segments_world, pose, self._range_rng)
 
-    def stop(self) -> None:
-        """Nothing to do: it stands between commands."""
-
-    def odometry(self) -> Odometry:
-        """The pose by the encoders, from where it was put down."""
-        there = self._odometry
-        return Odometry(there.x_m, there.y_m, there.heading_rad, self._truth.time_s)
-
-    def heartbeat(self) -> None:
-        """Nothing to do: it needs no heartbeat."""
-
-    def close(self) -> None:
-        """Nothing to do: it holds no resource."""
-
     def roll(self, turn_rad: float, move_m: float, duration_s: float) -> tuple[float, float]:
         """A short part of a motion that an emulated base drives: a turn in place or a move; both 0 to stand.
 
@@ -227,7 +202,6 @@ class SimulatedBody:
             self._advance_time(duration_s)
             return 0.0, 0.0
         self._drive_to(there, duration_s)
-        self._add_odometry(turn_rad, move_m)
         return turn_rad, move_m
 
     def steer(self, course: Course) -> tuple[MotionReport, CameraPicture] | BodyFault:
@@ -349,9 +323,6 @@ class SimulatedBody:
         direction_rad = self._building.obstacles.nearest_direction_rad(there)
         self._contact = self._bumper.feel(direction_rad, self._truth.time_s)
         return direction_rad
-
-    def _add_odometry(self, turn_rad: float, move_m: float) -> None:
-        self._odometry = self._odometry @ Pose2(0.0, 0.0, turn_rad) @ Pose2(move_m, 0.0, 0.0)
 
     def _drive_to(self, there: Pose2, duration_s: float) -> None:
         """Drive to a near pose: time and path count."""

@@ -14,11 +14,11 @@ from world_models.building.locales import Link
 from world_models.entries.body import Ride
 from world_models.entries.location import LocalePoses, Place
 from world_models.frames import Pose2, flattened
-from world_models.units import Bounds, check_bounds
+from world_models.units import Bounded, bounded
 
 
 @dataclass(frozen=True, slots=True)
-class Helper:
+class Helper(Bounded):
     """One of a scenario's ``[[rides]]``: a person who presses the button that the robot asks for.
 
     Attributes:
@@ -30,14 +30,10 @@ class Helper:
     """
 
     passage: str = ""
-    comes_s: float = 4.0
-    takes_s: float = 12.0
+    comes_s: float = bounded(4.0, 0.0, 1e6)
+    takes_s: float = bounded(12.0, 0.0, 1e6)
     presses: str = ""
-    times: int = 1000
-
-    def __post_init__(self) -> None:
-        duration = Bounds(0.0, 1e6)
-        check_bounds(self, {"comes_s": duration, "takes_s": duration, "times": Bounds(0, 10**9)})
+    times: int = bounded(1000, 0, 10**9)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,40 +10,20 @@ A motion that is steered while it goes on keeps its speed, its arc, its errors, 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from world_models.frames import Pose2
-from world_models.units import Bounds, check_bounds
+from world_models.units import Bounded, bounded
 
 STEP_M = 0.02
 """Largest step of the integration of a motion [m]."""
 
-BOUNDS: Mapping[str, Bounds] = {
-    "turn_scale_sigma": Bounds(0.0, 1.0),
-    "turn_sigma_rad": Bounds(0.0, math.pi / 2.0),
-    "skitter_sigma_m": Bounds(0.0, 1.0),
-    "curvature_low_per_m": Bounds(0.0, 10.0),
-    "curvature_high_per_m": Bounds(0.0, 10.0),
-    "curvature_sigma_per_m": Bounds(0.0, 10.0),
-    "shortfall_low": Bounds(0.0, 0.99),
-    "shortfall_high": Bounds(0.0, 0.99),
-    "distance_sigma": Bounds(0.0, 1.0),
-    "encoder_step_m": Bounds(0.0, 1.0),
-    "encoder_step_rad": Bounds(0.0, math.pi),
-    "speed_m_per_s": Bounds(0.001, 10.0),
-    "turn_speed_rad_per_s": Bounds(0.001, 100.0),
-    "acceleration_m_per_s2": Bounds(0.001, 100.0),
-    "increment_m": Bounds(0.001, 100.0),
-    "command_s": Bounds(0.0, 3600.0),
-}
-"""Far beyond any real wheels, but a run with them still ends."""
-
 
 @dataclass(frozen=True, slots=True)
-class ActuatorParameters:
+class ActuatorParameters(Bounded):
     """Errors, speeds and encoders of the wheels.
 
     Attributes:
@@ -61,25 +41,25 @@ class ActuatorParameters:
         command_s: time that every command takes in addition.
     """
 
-    turn_scale_sigma: float = 0.02
-    turn_sigma_rad: float = math.radians(0.1)
-    skitter_sigma_m: float = 0.003
-    curvature_low_per_m: float = 0.0045
-    curvature_high_per_m: float = 0.0145
-    curvature_sigma_per_m: float = 0.0015
-    shortfall_low: float = 0.04
-    shortfall_high: float = 0.06
-    distance_sigma: float = 0.003
-    encoder_step_m: float = 0.001
-    encoder_step_rad: float = math.radians(0.05)
-    speed_m_per_s: float = 0.4
-    turn_speed_rad_per_s: float = math.radians(45.0)
-    acceleration_m_per_s2: float = 0.8
-    increment_m: float = 0.6096
-    command_s: float = 0.1
+    turn_scale_sigma: float = bounded(0.02, 0.0, 1.0)
+    turn_sigma_rad: float = bounded(math.radians(0.1), 0.0, math.pi / 2.0)
+    skitter_sigma_m: float = bounded(0.003, 0.0, 1.0)
+    curvature_low_per_m: float = bounded(0.0045, 0.0, 10.0)
+    curvature_high_per_m: float = bounded(0.0145, 0.0, 10.0)
+    curvature_sigma_per_m: float = bounded(0.0015, 0.0, 10.0)
+    shortfall_low: float = bounded(0.04, 0.0, 0.99)
+    shortfall_high: float = bounded(0.06, 0.0, 0.99)
+    distance_sigma: float = bounded(0.003, 0.0, 1.0)
+    encoder_step_m: float = bounded(0.001, 0.0, 1.0)
+    encoder_step_rad: float = bounded(math.radians(0.05), 0.0, math.pi)
+    speed_m_per_s: float = bounded(0.4, 0.001, 10.0)
+    turn_speed_rad_per_s: float = bounded(math.radians(45.0), 0.001, 100.0)
+    acceleration_m_per_s2: float = bounded(0.8, 0.001, 100.0)
+    increment_m: float = bounded(0.6096, 0.001, 100.0)
+    command_s: float = bounded(0.1, 0.0, 3600.0)
 
     def __post_init__(self) -> None:
-        check_bounds(self, BOUNDS)
+        Bounded.__post_init__(self)
         ordered = self.curvature_low_per_m <= self.curvature_high_per_m and self.shortfall_low <= self.shortfall_high
         if not ordered:
             raise ValueError("expected low <= high bounds of curvature and shortfall, got "

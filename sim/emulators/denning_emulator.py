@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import binascii
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -31,46 +32,36 @@ class Claim:
     time_s: float = 0.0
 
 
-class BaseMotors(Protocol):
+class BaseMotors(ABC):
     """The motors of a base.
 
     Attributes:
         turn_rate, speed: of every motion [rad/s, m/s].
+        ended: "" while it moves, else "ok", "stalled" or "halted".
+        claim: of the last command; contact: what it touched.
     """
 
-    turn_rate: float
-    speed: float
+    turn_rate, speed = math.radians(45.0), 0.4
 
+    def __init__(self, time_s: float = 0.0) -> None:
+        self.ended, self.claim = "ok", Claim(time_s=time_s)
+        self.contact: Contact | None = None
+
+    @abstractmethod
     def begin(self, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> None:
         """Begin a command: TURN, then MOVE."""
-        ...
 
+    @abstractmethod
     def advance(self, duration_s: float) -> None:
         """Let time pass."""
-        ...
 
+    @abstractmethod
     def halt(self) -> None:
         """Break the command off."""
-        ...
 
-    @property
-    def ended(self) -> str:
-        """"" while it moves, else "ok" or "stalled"."""
-        ...
-
-    @property
-    def claim(self) -> Claim:
-        """Of the last command."""
-        ...
-
-    @property
-    def contact(self) -> Contact | None:
-        """What the last command touched."""
-        ...
-
+    @abstractmethod
     def ranges(self) -> Ranges | None:
         """What its sonars measure now."""
-        ...
 
 
 class CommandExecutor(Protocol):
@@ -83,20 +74,17 @@ class CommandExecutor(Protocol):
     def ranges(self) -> Ranges | None: ...
 
 
-class InstantMotion:
+class InstantMotion(BaseMotors):
     """Executes a command at once, in the time of the body: no state in between is visible."""
 
-    turn_rate, speed = math.radians(45.0), 0.4
-
     def __init__(self, body: CommandExecutor) -> None:
+        super().__init__()
         self._body = body
-        self._claim = Claim()
-        self._contact: Contact | None = None
 
     def begin(self, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> None:
         report = self._body.execute(MotorCommand(turn_rad, move_m, speed_m_per_s))
-        self._contact = self._body.take_contact()
-        self._claim = Claim(report.turn_rad, report.move_m, report.duration_s, report.sim_time_s)
+        self.contact = self._body.take_contact()
+        self.claim = Claim(report.turn_rad, report.move_m, report.duration_s, report.sim_time_s)
 
     def advance(self, duration_s: float) -> None:
         """Nothing to do: the body's time passes only in commands."""
@@ -104,68 +92,39 @@ class InstantMotion:
     def halt(self) -> None:
         """Nothing to do: it stands between commands."""
 
-    @property
-    def ended(self) -> str:
-        return "ok"
-
-    @property
-    def claim(self) -> Claim:
-        return self._claim
-
-    @property
-    def contact(self) -> Contact | None:
-        return self._contact
-
     def ranges(self) -> Ranges | None:
         return self._body.ranges()
 
 
-class ConstantSpeedMotion:
+class ConstantSpeedMotion(BaseMotors):
     """Turns and moves at constant speeds, and ends exactly where it was commanded to.
 
     Wheels that are held for half a second are stalled.
     """
 
-    turn_rate, speed = math.radians(45.0), 0.4
     max_held_s = 0.5
 
     def __init__(self, ground: Ground) -> None:
+        super().__init__(ground.time_s)
         self._ground = ground
-        self._turn = self._move = 0.0
-        self._speed = self.speed
-        self._began_s = ground.time_s
-        self._claim = Claim(time_s=ground.time_s)
-        self._ended = "ok"
-        self._held_s = 0.0
-        self._contact: Contact | None = None
+        self._turn = self._move = self._held_s = 0.0
+        self._speed, self._began_s = self.speed, ground.time_s
 
     def begin(self, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> None:
         self._turn, self._move, self._began_s = turn_rad, move_m, self._ground.time_s
         self._speed = self.speed if speed_m_per_s is None else min(self.speed, speed_m_per_s)
-        self._claim = Claim(time_s=self._began_s)
-        self._ended, self._held_s, self._contact = "", 0.0, None
+        self.claim = Claim(time_s=self._began_s)
+        self.ended, self._held_s, self.contact = "", 0.0, None
 
     def advance(self, duration_s: float) -> None:
         left_s = duration_s
-        while left_s > 0.0 and not self._ended:
+        while left_s > 0.0 and not self.ended:
             left_s -= self._step(left_s)
         if left_s > 0.0:
             self._ground.roll(0.0, 0.0, left_s)
 
     def halt(self) -> None:
-        self._ended = self._ended or "halted"
-
-    @property
-    def ended(self) -> str:
-        return self._ended
-
-    @property
-    def claim(self) -> Claim:
-        return self._claim
-
-    @property
-    def contact(self) -> Contact | None:
-        return self._contact
+        self.ended = self.ended or "halted"
 
     def ranges(self) -> Ranges | None:
         axes = [math.remainder(math.tau * number / RING.sensors, math.tau) for number in range(RING.sensors)]
@@ -176,10 +135,10 @@ class ConstantSpeedMotion:
 
     def _step(self, max_s: float) -> float:
         """Roll for at most this time, or to the end of the turn or move; returns the time that it took [s]."""
-        turning = self._claim.turn_rad != self._turn
-        to_go = self._turn - self._claim.turn_rad if turning else self._move - self._claim.move_m
+        turning = self.claim.turn_rad != self._turn
+        to_go = self._turn - self.claim.turn_rad if turning else self._move - self.claim.move_m
         if to_go == 0.0:
-            self._ended = "ok"
+            self.ended = "ok"
             return 0.0
         rate = self.turn_rate if turning else self._speed
         step_s = min(max_s, abs(to_go) / rate)
@@ -187,20 +146,20 @@ class ConstantSpeedMotion:
         rolled = self._ground.roll(step if turning else 0.0, 0.0 if turning else step, step_s)
         self._held_s = self._held_s + step_s if rolled == (0.0, 0.0) else 0.0
         if self._held_s > self.max_held_s:
-            self._ended = "stalled"
+            self.ended = "stalled"
             touching_rad, now_s = self._ground.touching_rad, self._ground.time_s
-            self._contact = (Contact.of_stall(now_s, turning=turning) if touching_rad is None
+            self.contact = (Contact.of_stall(now_s, turning=turning) if touching_rad is None
                              else Bumper().feel(touching_rad, now_s))
         self._add(*rolled, finished=step == to_go and rolled != (0.0, 0.0), turning=turning)
         return max(step_s, 1e-9)
 
     def _add(self, turn_rad: float, move_m: float, *, finished: bool, turning: bool) -> None:
         """Add a step to the claim; a finished turn or move claims exactly what was commanded."""
-        turn, move = self._claim.turn_rad + turn_rad, self._claim.move_m + move_m
+        turn, move = self.claim.turn_rad + turn_rad, self.claim.move_m + move_m
         if finished:
             turn, move = (self._turn, move) if turning else (turn, self._move)
         now_s = self._ground.time_s
-        self._claim = Claim(turn, move, now_s - self._began_s, now_s)
+        self.claim = Claim(turn, move, now_s - self._began_s, now_s)
 
 
 WATCHDOG_S = 0.5

@@ -21,7 +21,7 @@ from world_models.building.world import World
 from world_models.files.construction.builder import MAX_WALL_M, build_world, compute_world_poses
 from world_models.files.construction.specs import DoorSpec, LocaleSpec, ThingSpec, WorldSpec
 from world_models.frames import Pose
-from world_models.units import Bounds, check_bounds
+from world_models.units import Bounded, bounded
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ MARGIN_M, NEAR_DOOR_M, OUTSIDE_M = 0.3, 0.05, 0.15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrueInexact:
+class TrueInexact(Bounded):
     """How far the true building is from its model: ``[truth.inexact]``.
 
     Attributes:
@@ -52,15 +52,10 @@ class TrueInexact:
         seed: of the random numbers.
     """
 
-    sigma_m: float = 0.0
-    missing: float = 0.0
-    extra: float = 0.0
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        share = Bounds(0.0, 1.0)
-        check_bounds(self, {"sigma_m": Bounds(0.0, 0.3), "missing": share, "extra": share,
-                            "seed": Bounds(0, 2**31)})
+    sigma_m: float = bounded(0.0, 0.0, 0.3)
+    missing: float = bounded(0.0, 0.0, 1.0)
+    extra: float = bounded(0.0, 0.0, 1.0)
+    seed: int = bounded(0, 0, 2**31)
 
 
 EXACT = TrueInexact()

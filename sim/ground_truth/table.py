@@ -4,26 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 from sim.ground_truth.inexact import EXACT, TrueInexact
 from sim.ground_truth.things import SHAPES
 from world_models.camera import Camera, CameraMount
-from world_models.files.toml.settings_reader import MAX_NUMBER, read_settings, suggest_keys
-from world_models.files.toml.source import Node
-from world_models.units import Bounds, check_bounds
+from world_models.files.toml.settings_reader import MAX_NUMBER, suggest_keys
+from world_models.units import Bounded, Bounds, bounded, check_bounds
 
-T = TypeVar("T")
 DOOR_STATES = ("shut", "ajar", "open")
 NEVER_S = float(MAX_NUMBER)
 """End of what never ends [s]."""
-COORDINATE = Bounds(-1e5, 1e5)
-SHIFT = Bounds(-1000.0, 1000.0)
-TURN = Bounds(-2.0 * math.pi, 2.0 * math.pi)
+FAR_M, SHIFT_M, TURN = 1e5, 1000.0, 2.0 * math.pi
+"""Largest coordinate and displacement along an axis [m], and largest angle [rad]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Lasting:
+class Lasting(Bounded):
     """Something that is so for a while.
 
     Attributes:
@@ -31,11 +27,12 @@ class Lasting:
         until_s: when it ends.
     """
 
-    at_s: float = 0.0
+    at_s: float = bounded(0.0, 0.0, NEVER_S)
     until_s: float = NEVER_S
 
     def __post_init__(self) -> None:
-        check_bounds(self, {"at_s": Bounds(0.0, NEVER_S), "until_s": Bounds(self.at_s, NEVER_S, above=True)})
+        Bounded.__post_init__(self)
+        check_bounds(self, {"until_s": Bounds(self.at_s, NEVER_S, above=True)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,13 +49,12 @@ class TrueDoor(Lasting):
 
     name: str = ""
     state: str = "shut"
-    open_rad: float = math.radians(45.0)
+    open_rad: float = bounded(math.radians(45.0), 0.0, math.pi, above=True)
     into: str = ""
     hinge: str = "left"
 
     def __post_init__(self) -> None:
         Lasting.__post_init__(self)
-        check_bounds(self, {"open_rad": Bounds(0.0, math.pi, above=True)})
         _check_choice("state", self.state, DOOR_STATES)
         _check_choice("hinge", self.hinge, ("left", "right"))
 
@@ -76,13 +72,12 @@ class TrueThing(Lasting):
 
     thing: str = ""
     missing: bool = False
-    x_m: float = 0.0
-    y_m: float = 0.0
-    heading_rad: float = 0.0
+    x_m: float = bounded(0.0, -SHIFT_M, SHIFT_M)
+    y_m: float = bounded(0.0, -SHIFT_M, SHIFT_M)
+    heading_rad: float = bounded(0.0, -TURN, TURN)
 
     def __post_init__(self) -> None:
         Lasting.__post_init__(self)
-        check_bounds(self, {"x_m": SHIFT, "y_m": SHIFT, "heading_rad": TURN})
         if self.missing == any((self.x_m, self.y_m, self.heading_rad)):
             raise ValueError(f"expected either missing = true or a displacement x_m, y_m or a turn heading_rad of "
                              f"{self.thing or 'a thing'}, got {'both' if self.missing else 'neither'}")
@@ -102,12 +97,11 @@ class TrueWall(Lasting):
 
     wall: str = ""
     missing: bool = False
-    x_m: float = 0.0
-    y_m: float = 0.0
+    x_m: float = bounded(0.0, -SHIFT_M, SHIFT_M)
+    y_m: float = bounded(0.0, -SHIFT_M, SHIFT_M)
 
     def __post_init__(self) -> None:
         Lasting.__post_init__(self)
-        check_bounds(self, {"x_m": SHIFT, "y_m": SHIFT})
         if self.missing == any((self.x_m, self.y_m)):
             raise ValueError(f"expected either missing = true or a displacement x_m, y_m of {self.wall or 'a wall'}, "
                              f"got {'both' if self.missing else 'neither'}")
@@ -124,18 +118,17 @@ class ExtraThing(Lasting):
 
     kind: str = ""
     locale: str = ""
-    x_m: float = 0.0
-    y_m: float = 0.0
-    heading_rad: float = 0.0
+    x_m: float = bounded(0.0, -FAR_M, FAR_M)
+    y_m: float = bounded(0.0, -FAR_M, FAR_M)
+    heading_rad: float = bounded(0.0, -TURN, TURN)
 
     def __post_init__(self) -> None:
         Lasting.__post_init__(self)
-        check_bounds(self, {"x_m": COORDINATE, "y_m": COORDINATE, "heading_rad": TURN})
         _check_choice("kind", self.kind, tuple(SHAPES))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrueCamera:
+class TrueCamera(Bounded):
     """By how much the true camera differs from the one that the robot believes in: ``[truth.camera]``.
 
     Attributes:
@@ -143,16 +136,11 @@ class TrueCamera:
         height_m: of its mounting; focal_px: of its focal length.
     """
 
-    tilt_rad: float = 0.0
-    roll_rad: float = 0.0
-    yaw_rad: float = 0.0
-    height_m: float = 0.0
-    focal_px: float = 0.0
-
-    def __post_init__(self) -> None:
-        angle = Bounds(-0.5, 0.5)
-        check_bounds(self, {"tilt_rad": angle, "roll_rad": angle, "yaw_rad": angle, "height_m": Bounds(-1.0, 1.0),
-                            "focal_px": Bounds(-2000.0, 2000.0)})
+    tilt_rad: float = bounded(0.0, -0.5, 0.5)
+    roll_rad: float = bounded(0.0, -0.5, 0.5)
+    yaw_rad: float = bounded(0.0, -0.5, 0.5)
+    height_m: float = bounded(0.0, -1.0, 1.0)
+    focal_px: float = bounded(0.0, -2000.0, 2000.0)
 
     def mounted(self, camera: Camera, mount: CameraMount) -> tuple[Camera, CameraMount]:
         """The true camera and mounting. Raises ValueError where there is no such camera."""
@@ -172,7 +160,7 @@ AS_BELIEVED = TrueCamera()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TrueStart:
+class TrueStart(Bounded):
     """Where the robot is put down, where that is not the place that it is told: ``[truth.start]``.
 
     Attributes:
@@ -180,12 +168,9 @@ class TrueStart:
     """
 
     locale: str = ""
-    x_m: float = 0.0
-    y_m: float = 0.0
-    heading_rad: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_bounds(self, {"x_m": COORDINATE, "y_m": COORDINATE, "heading_rad": TURN})
+    x_m: float = bounded(0.0, -FAR_M, FAR_M)
+    y_m: float = bounded(0.0, -FAR_M, FAR_M)
+    heading_rad: float = bounded(0.0, -TURN, TURN)
 
 
 AS_TOLD = TrueStart()
@@ -205,22 +190,6 @@ class TruthTable:
 
 
 NO_DIFFERENCES = TruthTable()
-
-
-def read_truth(node: Node) -> TruthTable:
-    """The table of a file. Raises WorldError."""
-    node.table((), ("doors", "things", "walls", "extra", "camera", "start", "inexact"))
-    return TruthTable(
-        doors=_read_all(node, "doors", TrueDoor), things=_read_all(node, "things", TrueThing),
-        walls=_read_all(node, "walls", TrueWall), extra=_read_all(node, "extra", ExtraThing),
-        camera=read_settings(node["camera"], TrueCamera) if "camera" in node else AS_BELIEVED,
-        start=read_settings(node["start"], TrueStart) if "start" in node else AS_TOLD,
-        inexact=read_settings(node["inexact"], TrueInexact) if "inexact" in node else EXACT,
-    )
-
-
-def _read_all(node: Node, key: str, kind: type[T]) -> tuple[T, ...]:
-    return tuple(read_settings(item, kind) for item in node[key].items()) if key in node else ()
 
 
 def _check_choice(key: str, value: str, known: tuple[str, ...]) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from world_models.building.geometry.faces import Face, Finish, Region
 from world_models.building.geometry.solids import Box, Range, Solid
 from world_models.frames import Pose
-from world_models.units import Bounds, check_bounds
+from world_models.units import Bounded, bounded
 
 CARDBOARD = Finish((0.58, 0.46, 0.32), "speckle", 0.1)
 TAPE = Finish((0.72, 0.63, 0.44))
@@ -124,7 +124,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class MovedThing:
+class MovedThing(Bounded):
     """One of a scenario's ``[[moved]]``.
 
     Attributes:
@@ -133,11 +133,8 @@ class MovedThing:
     """
 
     thing: str
-    x_m: float = 0.0
-    y_m: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_bounds(self, {"x_m": Bounds(-1000.0, 1000.0), "y_m": Bounds(-1000.0, 1000.0)})
+    x_m: float = bounded(0.0, -1000.0, 1000.0)
+    y_m: float = bounded(0.0, -1000.0, 1000.0)
 
 
 def move_things(faces: Sequence[Face], moved: Sequence[MovedThing]) -> tuple[Face, ...]:

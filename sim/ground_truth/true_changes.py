@@ -11,7 +11,7 @@ import numpy as np
 from sim.body.collision import Obstacles
 from sim.ground_truth.table import Lasting, TrueDoor
 from sim.ground_truth.things import OAK, STEEL
-from sim.render.light.lights import Lights
+from sim.render.lights import Lights
 from sim.render.renderer import Renderer
 from world_models.building.geometry.faces import Face
 from world_models.building.geometry.solids import Box, Range, Solid

@@ -39,26 +39,28 @@ class Renderer:
         light: (P, 3) colour times illumination of each patch, 0..1.
         noise: the table of the textures' value noise.
         samples: samples per pixel, 1, 4, 8 or 16.
+        brightness: factor on all light, as seen.
     """
 
     mesh: Mesh
     light: NDArray[np.float64]
     noise: NDArray[np.float32]
     samples: int = 8
+    brightness: float = 1.0
 
     @staticmethod
-    def of_faces(faces: Iterable[FaceLike], samples: int = 8) -> Renderer:
+    def of_faces(faces: Iterable[FaceLike], samples: int = 8, brightness: float = 1.0) -> Renderer:
         """The renderer of these faces. Raises ValueError for a bad region or number of samples."""
         sample_offsets(samples)
         mesh = build_mesh(faces)
-        return Renderer(mesh, _light(mesh), build_noise_table(), samples)
+        return Renderer(mesh, _light(mesh, brightness), build_noise_table(), samples, brightness)
 
     def with_faces(self, faces: Sequence[FaceLike]) -> Renderer:
         """The renderer of the same building with more faces. Raises ValueError for a bad region."""
         if not faces:
             return self
         more = build_mesh(faces)
-        light = np.concatenate([self.light, _light(more)])
+        light = np.concatenate([self.light, _light(more, self.brightness)])
         return replace(self, mesh=join_meshes((self.mesh, more)), light=light)
 
     def radiance(self, camera: Camera, camera_from_world: Pose) -> NDArray[np.float32]:
@@ -83,8 +85,8 @@ class Renderer:
         return np.concatenate(columns, axis=1)
 
 
-def _light(mesh: Mesh) -> NDArray[np.float64]:
-    return np.asarray(mesh.colours * illumination(mesh.planes_world[:, :3])[:, None])
+def _light(mesh: Mesh, brightness: float) -> NDArray[np.float64]:
+    return np.asarray(mesh.colours * (brightness * illumination(mesh.planes_world[:, :3])[:, None]))
 
 
 def illumination(normals_world: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from world_models.units import Bounds, check_bounds
+from world_models.units import Bounded, bounded
 
 MIN_SHADE, MAX_SHADE = 0.05, 0.6
 """Range of its brightness, 0..1."""
@@ -59,22 +58,9 @@ MEAN, INVERSE_SIGMA = np.float32(510.0), np.float32(1.0 / np.sqrt((256.0**2 - 1.
 """Mean and reciprocal standard deviation of the sum of four random bytes."""
 MIN_LEVEL, HALF, MAX_LEVEL = np.float32(0.0), np.float32(0.5), np.float32(255.0)
 
-BOUNDS: Mapping[str, Bounds] = {
-    "gain": Bounds(0.0, 1000.0),
-    "gain_sigma": Bounds(0.0, 10.0),
-    "blur_px": Bounds(0.0, 50.0),
-    "read_noise": Bounds(0.0, 1000.0),
-    "shot_noise": Bounds(0.0, 1000.0),
-    "jpeg_quality": Bounds(1, 100),
-    "frames_per_s": Bounds(1.0, 1000.0),
-    "exposure_s": Bounds(0.0, 10.0),
-    "lights_off_gain": Bounds(0.0, 1000.0),
-}
-"""Up to values at which a picture shows nothing any more."""
-
 
 @dataclass(frozen=True, slots=True)
-class SensorParameters:
+class SensorParameters(Bounded):
     """Exposure, noise and compression of the sensor.
 
     Attributes:
@@ -89,18 +75,15 @@ class SensorParameters:
         lights_off_gain: factor on the brightness while the lights are off.
     """
 
-    gain: float = 1.25
-    gain_sigma: float = 0.005
-    blur_px: float = 0.5
-    read_noise: float = 1.0
-    shot_noise: float = 0.015
-    jpeg_quality: int = 92
-    frames_per_s: float = 30.0
-    exposure_s: float = 0.0
-    lights_off_gain: float = 0.02
-
-    def __post_init__(self) -> None:
-        check_bounds(self, BOUNDS)
+    gain: float = bounded(1.25, 0.0, 1000.0)
+    gain_sigma: float = bounded(0.005, 0.0, 10.0)
+    blur_px: float = bounded(0.5, 0.0, 50.0)
+    read_noise: float = bounded(1.0, 0.0, 1000.0)
+    shot_noise: float = bounded(0.015, 0.0, 1000.0)
+    jpeg_quality: int = bounded(92, 1, 100)
+    frames_per_s: float = bounded(30.0, 1.0, 1000.0)
+    exposure_s: float = bounded(0.0, 0.0, 10.0)
+    lights_off_gain: float = bounded(0.02, 0.0, 1000.0)
 
 
 def expose(

@@ -1,28 +1,18 @@
-"""The floor in light and shade, in tinted pictures, and as a mirror: what stands on it is told from what does not."""
+"""The floor in light and shade and in tinted pictures: what stands on it is told from what does not."""
 
 from __future__ import annotations
 
 import math
 
-import cv2
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from experiments.generated.scenes import Patch, PatchFace, box_faces
 from knowledge_sources.methods.floor.appearance import compute_looks, default_covariance, find_floor_in_shade
-from knowledge_sources.methods.floor.model_floor import STEP_PX, ModelFloor, build_floor_grid
-from knowledge_sources.methods.floor.see_floor import GREY, find_unlike
-from knowledge_sources.methods.floor.standing_regions import TwoPictures, compute_parallax_odds, find_regions
-from sim.render.light.lamps import Room
-from sim.render.light.lighting import Lighting
-from sim.render.light.lights import Lights
-from world_models.camera import Camera, CameraMount
-from world_models.frames import Pose2
+from knowledge_sources.methods.floor.model_floor import ModelFloor
+from knowledge_sources.methods.floor.see_floor import find_unlike
 
-CAMERA, MOUNT = Camera.from_field_of_view(math.radians(65.0), 512, 512), CameraMount(1.0, 0.1)
 FLOOR = np.array([110.0, 104.0, 98.0])
 SHAPE = (90, 160)
 
@@ -84,43 +74,3 @@ def test_white_balance_that_changes_little_by_little_is_followed(red: float, blu
         gains = (red**part, 1.0, blue**part)
         unlike, tells, light = find_unlike((shaded(np.ones(SHAPE)) * gains).astype(np.uint8), model, None, light)
         assert tells.all() and unlike.mean() < 0.02
-
-
-def views(gloss: float, thing: bool) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], Pose2]:
-    """Grey pictures now and before, reduced, what is unlike floor now, and the pose now in that before."""
-    faces = [f for f in box_faces((0, 0, 0), (9, 4, 2.6), "room", inside=True, texture="plain", texture_scale_m=1e6,
-                                  colour=(0.7, 0.7, 0.7)) if f.front[0].name != "room-bottom"]
-    faces.append(PatchFace((Patch("floor", [(0, 0, 0), (9, 0, 0), (9, 4, 0), (0, 4, 0)], (0.4, 0.39, 0.37), "carpet",
-                                  0.05, 3),)))
-    if thing:
-        faces += box_faces((3.6, 1.8, 0.0), (3.9, 2.2, 0.4), "box", texture="plain", texture_scale_m=1e6,
-                           colour=(0.1, 0.1, 0.1))
-    room = Room(np.array([(0.0, 0.0), (9.0, 0.0), (9.0, 4.0), (0.0, 4.0)]), 0.0, 2.6)
-    lighting = Lighting(flat=0.6 if thing else 0.0, lamps=0.0 if thing else 0.8, floor_gloss=gloss, lamp_spacing_m=2.6)
-    renderer = Lights(lighting, (room,)).renderer(faces)
-    before, now = Pose2(0.5, 2.0, 0.0), Pose2(1.1, 2.0, 0.0)
-    pictures = []
-    for pose in (now, before):
-        image = renderer.image(CAMERA, MOUNT.camera_from_robot @ pose.lifted().inverse())
-        pictures.append(cv2.resize(image, (256, 256), interpolation=cv2.INTER_AREA))
-    grid = build_floor_grid(CAMERA, MOUNT, 1.0, 9.0)
-    assert grid is not None
-    model = ModelFloor(np.zeros(grid.shape, np.int64), np.array([(0.4, 0.39, 0.37)]), np.ones(grid.shape, bool))
-    unlike, _, _ = find_unlike(pictures[0][grid.top :], model, None)
-    grey = [picture.astype(np.float32) @ GREY for picture in pictures]
-    return grey[0], grey[1], unlike, before.inverse() @ now
-
-
-@pytest.mark.parametrize(("gloss", "thing"), [(1.0, False), (0.0, True)])
-def test_mirrored_lamps_do_not_stand_on_the_floor_and_a_box_does(gloss: float, thing: bool) -> None:
-    now, before, unlike, moved = views(gloss, thing)
-    grid = build_floor_grid(CAMERA, MOUNT, 1.0, 9.0)
-    assert grid is not None and now.shape == (512 // STEP_PX, 512 // STEP_PX)
-    near = (grid.ranges_m < 7.0) & (np.abs(grid.points_robot[..., 1]) < 1.8)
-    regions = find_regions(unlike & near, near, grid)
-    odds = [compute_parallax_odds(region, TwoPictures(grid, now, before, moved, CAMERA, MOUNT)) for region in regions]
-    assert regions
-    if thing:
-        assert max(odds) > 1.0
-    else:
-        assert min(odds) < 1.0 and max(odds) <= 1.0

@@ -13,8 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.generated.clutter import KEPT_FREE_M, MAX_THINGS, ClutterMaker
+from experiments.generated.free_floor import find_free_floor, find_shortest_way, has_way
 from experiments.generated.missions import write_cluttered_mission
-from sim.body.collision import ROBOT_RADIUS_M, Obstacles, find_free_floor, find_shortest_way, has_way
+from sim.body.collision import ROBOT_RADIUS_M, Obstacles
 from sim.scenario import load_scenario, parse_scenario
 from sim.stage import Stage, build_stage
 from world_models.frames import Pose2

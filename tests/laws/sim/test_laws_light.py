@@ -1,11 +1,11 @@
-"""Laws of light in the simulated building, against integrals and pictures computed here by other means."""
+"""Laws of light that is even, of the lamps, and of a camera that adapts; of baked light: extras/harvey-light/tests."""
 
 from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,20 +13,11 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from experiments.generated.scenes import Patch, PatchFace, box_faces, box_room
-from sim.render.light.auto_exposure import MAX_GAIN, MIN_GAIN, TARGET, AutoExposure, vignette
-from sim.render.light.irradiance import SUN_COLOUR, compute_irradiance
-from sim.render.light.lamps import Lamp, Room, hang_lamps
-from sim.render.light.light_map import lay_light_map
-from sim.render.light.lighting import GAMMA, Lighting
-from sim.render.light.lights import Lights
-from sim.render.light.mirrored_camera import mirror_camera
-from sim.render.light.panes import find_panes
-from sim.render.light.rays import build_ray_tree, first_hits
-from sim.render.light.sun_patches import find_sun_patches
-from sim.render.mesh import Pinhole, build_mesh
+from experiments.generated.scenes import box_room
+from sim.render.auto_exposure import MAX_GAIN, MIN_GAIN, TARGET, AutoExposure, vignette
+from sim.render.lighting import GAMMA, UNEVEN, Lighting
+from sim.render.lights import Lights, Room, hang_lamps
 from sim.render.renderer import Renderer
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
@@ -41,12 +32,6 @@ def camera_at(place: tuple[float, float, float]) -> Pose:
     return MOUNT.camera_from_robot @ Pose2(*place).lifted().inverse()
 
 
-def pane(x: float = 0.02) -> PatchFace:
-    """A window pane before the wall at x = 0, that looks into the room."""
-    corners = [(x, 1.0, 0.8), (x, 2.2, 0.8), (x, 2.2, 2.0), (x, 1.0, 2.0)]
-    return PatchFace((Patch("room/window/0", corners, (0.72, 0.84, 0.93), "plain", 1e6),))
-
-
 def test_without_light_pictures_are_as_they_were_before_there_was_light() -> None:
     camera = Camera.from_field_of_view(math.radians(65.0), 256, 256)
     pose = CameraMount(1.0, 0.1).camera_from_robot @ Pose2(1.0, 1.0, 0.4).lifted().inverse()
@@ -56,140 +41,16 @@ def test_without_light_pictures_are_as_they_were_before_there_was_light() -> Non
 
 
 @settings(deadline=None, max_examples=15)
-@given(places_of_robot)
-def test_with_flat_light_alone_a_picture_is_that_without_light(place: tuple[float, float, float]) -> None:
-    flat = Lights(Lighting(flat=1.0, lamps=0.0, exposure_lag_s=0.0), (ROOM,)).renderer(box_room())
-    plain, lit = (r.radiance(CAMERA, camera_at(place)) for r in (Renderer.of_faces(box_room()), flat))
-    np.testing.assert_allclose(lit, plain, atol=1.0 / 1024)
+@given(places_of_robot, st.floats(0.0, 1.0))
+def test_flat_light_dims_the_picture_without_light(place: tuple[float, float, float], flat: float) -> None:
+    dim = Lights(Lighting(flat=flat, lamps=0.0), (ROOM,)).renderer(box_room()[:-2]).with_faces(box_room()[-2:])
+    plain, lit = (r.radiance(CAMERA, camera_at(place)) for r in (Renderer.of_faces(box_room()), dim))
+    np.testing.assert_allclose(lit, plain * flat ** (1.0 / GAMMA), atol=1e-4)
 
 
-@settings(deadline=None, max_examples=20)
-@given(st.integers(0, 10**6))
-def test_rays_meet_what_trying_all_patches_meets(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    lows = rng.uniform((0.5, 0.5, 0.0), (5.0, 3.0, 1.5), (6, 3))
-    clutter = [f for i, low in enumerate(lows) for f in box_faces(low, low + rng.uniform(0.1, 0.9, 3), f"box{i}")]
-    mesh = build_mesh([*box_room(), *clutter])
-    origins, directions = rng.uniform((0.2, 0.2, 0.2), (5.8, 3.8, 2.4), (200, 3)), rng.standard_normal((200, 3))
-    _, lengths = first_hits(build_ray_tree(mesh), origins, directions, np.full(200, 1e9))
-    normals, offsets = mesh.planes_world[:, :3], mesh.planes_world[:, 3]
-    nearest = np.full(200, np.inf)
-    for p in range(len(mesh)):
-        reach = (offsets[p] - origins @ normals[p]) / (directions @ normals[p])
-        flat = (origins + reach[:, None] * directions) @ mesh.axes_world[p].T
-        outline = shapely.Polygon(mesh.vertices_world[mesh.first[p] : mesh.first[p + 1]] @ mesh.axes_world[p].T)
-        hit = (reach > 1e-4) & shapely.contains_xy(outline, flat[:, 0], flat[:, 1])
-        nearest = np.where(hit, np.minimum(nearest, reach), nearest)
-    np.testing.assert_allclose(lengths, nearest, rtol=1e-9)
-
-
-def bake(lighting: Lighting, lamps: tuple[Lamp, ...], room: float = 0.5) -> tuple[float, float, NDArray[np.float64]]:
-    """Light that a closed room of reflectance ``room`` receives, light that its lamps give, and the irradiance."""
-    grey = room ** (1.0 / GAMMA)
-    mesh = build_mesh(box_faces((0, 0, 0), (6, 4, 2.6), "room", inside=True, texture="plain", texture_scale_m=1e6,
-                                colour=(grey, grey, grey)))
-    places = lay_light_map(mesh, 0.2)
-    no = np.zeros(len(mesh), bool)
-    irradiance = compute_irradiance(mesh, places, lighting, lamps, no, no)
-    given = sum(float(lamp.radiosity.mean()) * 1.2 * 0.3 for lamp in lamps)
-    return float((irradiance.mean(axis=1) * places.areas_m2).sum()), given, irradiance
-
-
-@settings(deadline=None, max_examples=10)
-@given(st.floats(0.0, 0.8), st.integers(0, 6), st.floats(0.0, 1.0), st.integers(0, 99))
-def test_light_is_not_negative_and_no_more_than_the_lamps_give(
-    albedo: float, bounces: int, off: float, seed: int
-) -> None:
-    lighting = Lighting(lamps=1.0, lamps_off=off, bounces=bounces, seed=seed)
-    received, given, irradiance = bake(lighting, hang_lamps((ROOM,), lighting), albedo)
-    assert irradiance.min() >= 0.0
-    bound = given * (1.0 - albedo ** (bounces + 1)) / (1.0 - albedo)
-    assert received <= 1.1 * bound + 1e-9, "the light is reflected no more often than it may be"
-    assert received >= 0.8 * bound, "none of it leaves a closed room"
-
-
-def test_a_small_lamp_gives_what_the_law_of_cosines_says() -> None:
-    square = np.array([(-1, -1, 0), (-1, 1, 0), (1, 1, 0), (1, -1, 0)])
-    corners = 0.02 * square + np.array([3.0, 2.0, 2.4])
-    lamp = Lamp(corners, np.full(3, 1000.0))
-    mesh = build_mesh(box_faces((0, 0, 0), (6, 4, 2.6), "room", inside=True, texture="plain", texture_scale_m=1e6))
-    places, no = lay_light_map(mesh, 0.2), np.zeros(len(mesh), bool)
-    found = compute_irradiance(mesh, places, Lighting(bounces=0), (lamp,), no, no)[:, 0]
-    way = lamp.polygon_world.mean(axis=0) - places.points_world
-    r2 = np.sum(way**2, axis=1)
-    expected = 1000.0 * 0.04**2 * np.maximum(0, np.sum(places.normals_world * way, axis=1)) * np.maximum(0, way[:, 2])
-    far = r2 > 1.0
-    np.testing.assert_allclose(found[far], (expected / (math.pi * r2**2))[far], rtol=0.025, atol=1e-6)
-
-
-@settings(deadline=None, max_examples=12)
-@given(places_of_robot, st.floats(-0.15, 0.15), st.floats(-0.2, 0.1))
-def test_a_mirror_image_is_the_mirrored_building(place: tuple[float, float, float], tilt: float, level: float) -> None:
-    room = [face for face in box_room() if face.front[0].name not in ("carpet", "bricks")]
-    sheet = replace(room[0].front[0], name="sheet", polygon_world=[(0, 0, 0), (6, 0, 0), (6, 4, 0), (0, 4, 0)])
-    faces = [*room, PatchFace((sheet,))]
-    plain = [PatchFace(tuple(replace(r, texture="plain", texture_scale_m=1e6) for r in f.front)) for f in faces]
-    turned = [PatchFace(tuple(replace(r, polygon_world=_mirrored(r.polygon_world, level)) for r in f.front))
-              for f in plain]
-    pose = CameraMount(1.0, 0.1, tilt).camera_from_robot @ Pose2(*place).lifted().inverse()
-    rotation, translation = np.array(pose.rotation), np.array(pose.translation)
-    lens, turn, move = mirror_camera(Pinhole.of(CAMERA), rotation, translation, np.array([0.0, 0.0, 1.0, level]))
-    seen = Camera(lens.fx, lens.fy, lens.cx, lens.cy, lens.width, lens.height)
-    as_mirrored = _shadeless(plain).radiance(seen, Pose(turn, move))[::-1]
-    expected = _shadeless(turned).radiance(CAMERA, pose)
-    differs = np.abs(as_mirrored - expected).max(axis=2)
-    assert np.median(differs) < 1e-5
-    assert (differs > 0.02).mean() < 0.03, "only borders differ, by the places of their samples"
-
-
-def _mirrored(polygon: object, level: float) -> NDArray[np.float64]:
-    return (np.array(polygon, float) * (1, 1, -1) + (0, 0, 2 * level))[::-1]
-
-
-def _shadeless(faces: list[PatchFace]) -> Renderer:
-    """Without shading by direction, which a mirror turns round."""
-    renderer = Renderer.of_faces(faces, 16)
-    return replace(renderer, light=renderer.mesh.colours)
-
-
-@settings(deadline=None, max_examples=25)
-@given(st.floats(-0.9, 0.9), st.floats(0.25, 1.1), st.integers(0, 10**6))
-def test_sun_patches_are_the_places_that_see_the_sun_through_the_pane(
-    azimuth: float, elevation: float, seed: int
-) -> None:
-    rng = np.random.default_rng(seed)
-    faces = [*box_room(), pane(), *box_faces((1.0, 1.4, 0.0), (1.5, 2.0, rng.uniform(0.3, 1.2)), "box")]
-    mesh, panes = build_mesh(faces), find_panes(faces)
-    lighting = Lighting(sun=5.0, sun_azimuth_rad=math.pi + azimuth, sun_elevation_rad=elevation)
-    towards = np.array(lighting.towards_sun)
-    patches = find_sun_patches(mesh, panes, towards)
-    tree = build_ray_tree(mesh)
-    for p in range(len(mesh)):
-        if mesh.planes_world[p, :3] @ towards <= 0.02:
-            continue
-        polygon = mesh.vertices_world[mesh.first[p] : mesh.first[p + 1]]
-        own = shapely.union_all([shapely.Polygon(s.polygon_world @ mesh.axes_world[p].T) for s in patches
-                                 if s.patch == p] or [shapely.Polygon()])
-        outline = shapely.Polygon(polygon @ mesh.axes_world[p].T)
-        low, high = np.reshape(outline.bounds, (2, 2))
-        spots = rng.uniform(low, high, (300, 2))
-        spots = spots[shapely.contains_xy(outline, spots[:, 0], spots[:, 1])]
-        certain = shapely.distance(own.boundary, shapely.points(spots)) > 0.05
-        points = spots @ mesh.axes_world[p] + (mesh.planes_world[p, 3] + 1e-3) * mesh.planes_world[p, :3]
-        met, _ = first_hits(tree, points, np.tile(towards, (len(points), 1)), np.full(len(points), 1e9))
-        lit = (met >= 0) & panes[met]
-        inside = shapely.contains_xy(own, spots[:, 0], spots[:, 1])
-        np.testing.assert_array_equal(inside[certain], lit[certain])
-
-
-def test_the_sun_through_a_pane_adds_its_light_where_it_falls() -> None:
-    faces = [f for f in box_room() if not f.front[0].name.startswith(("desk", "cabinet"))] + [pane()]
-    sunny, plain = (Lights(Lighting(flat=0.3, lamps=0.0, sun=sun, bounces=0, sun_azimuth_rad=math.pi,
-                                    sun_elevation_rad=0.5, exposure_lag_s=0.0)).renderer(faces) for sun in (0.5, 0.0))
-    above = len(plain.baked.seen_light)
-    added = sunny.baked.seen_light[above:].astype(float) ** GAMMA
-    np.testing.assert_array_equal(sunny.baked.seen_light[:above], plain.baked.seen_light)
-    assert len(added) and np.all(added.max(axis=0) <= 0.3 + 0.5 * SUN_COLOUR + 1e-3)
+@given(st.fixed_dictionaries({key: st.sampled_from([0, 1]) for key in UNEVEN}))
+def test_light_is_uneven_by_what_it_has_besides_flat_light(values: dict[str, Any]) -> None:
+    assert set(Lighting(flat=1.0, **values).uneven) == {key for key, value in values.items() if value}
 
 
 @settings(deadline=None, max_examples=30)

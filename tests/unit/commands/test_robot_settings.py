@@ -21,9 +21,10 @@ from harvey.agent_settings import (
 from harvey.cli import main
 from harvey.errors import BadInput
 from knowledge_sources.settings import DEFAULT
-from world_models.actuator import BOUNDS, ActuatorModel
+from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.robot_state import CameraState, Footprint, Wheels
+from world_models.units import bounds_of
 
 ENTRIES = (CameraState(Camera(500.0, 500.0, 255.5, 255.5, 512, 512), CameraMount(1.0, 0.1)), Wheels(ActuatorModel()),
            Footprint(0.35))
@@ -59,7 +60,7 @@ def test_what_is_so_already_is_the_same_object(value: RobotValue) -> None:
 
 def test_all_of_the_wheels_can_be_set() -> None:
     names = {value.field for value in VALUES if value.kind is Wheels}
-    assert names == set(BOUNDS) == {f.name for f in fields(ActuatorModel)}
+    assert names == set(bounds_of(ActuatorModel)) == {f.name for f in fields(ActuatorModel)}
 
 
 def test_units() -> None:

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from harvey.hardware.drivers import capture as captures
 from harvey.hardware.drivers.capture import CameraFault, CapturedPicture, is_file, open_in_time, picture_of, prepare
 from harvey.hardware.drivers.video_camera import Health, LatestPictureThread, VideoCamera, _Pace, _Video
-from harvey.hardware.drivers.video_file import write_video
+from video_file import write_video
 
 MAIN = threading.main_thread()
 

@@ -8,11 +8,8 @@ from typing import Any
 
 import pytest
 
-from experiments.generated.scenes import box_room
-from harvey.hardware.drivers.base_driver import Base, BaseFault, SerialLink
+from harvey.hardware.drivers.base_driver import BaseFault, SerialLink
 from harvey.hardware.drivers.denning import BAUD, DenningBase
-from sim.body.simulated_body import SimulatedBody
-from sim.body.simulated_building import SimulatedBuilding
 from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator, InstantMotion
 from sim.emulators.emulator import IdealGround
 from sim.emulators.line import PseudoTerminal, PseudoTerminalLink
@@ -25,9 +22,7 @@ from tests.serial_bench import (
     over_line_in_memory,
     over_terminal,
 )
-from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotionReport, MotorCommand
-from world_models.frames import Pose2
 
 
 @pytest.mark.parametrize("check", ON_TERMINAL)
@@ -132,21 +127,3 @@ def test_a_terminal_that_nobody_reads_does_not_hold_the_base_up() -> None:
 def test_a_fault_has_one_of_the_known_kinds(kind: Any) -> None:
     with pytest.raises(ValueError, match="kind of fault"):
         BaseFault(kind, "what happened")
-
-
-def simulated() -> SimulatedBody:
-    room, lens = SimulatedBuilding.of_faces(box_room()), Camera.from_field_of_view(1.1, 64, 64)
-    return SimulatedBody(room, Pose2(1.0, 2.0, 0.0), lens,
-                         CameraMount(1.0, 0.1, 0.0), seed=3)
-
-
-def test_the_simulators_body_is_a_base_too() -> None:
-    body: Base = simulated()
-    body.turn(0.2)
-    report = body.move(0.5)
-    there = body.odometry()
-    assert math.hypot(there.x_m, there.y_m) == pytest.approx(report.move_m)
-    assert there.heading_rad == pytest.approx(0.2, abs=0.001) and there.time_s == report.sim_time_s
-    body.heartbeat()
-    body.stop()
-    body.close()

@@ -15,7 +15,7 @@ import pytest
 
 from harvey.hardware.drivers.capture import CameraFault, open_capture, picture_of
 from harvey.hardware.drivers.video_camera import LatestPictureThread, VideoCamera, _Pace
-from harvey.hardware.drivers.video_file import write_video
+from video_file import write_video
 
 SIZE = (64, 48)
 

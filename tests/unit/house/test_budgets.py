@@ -16,12 +16,12 @@ LINES = {
     "blackboard": 2_200,
     "world_models": 9_890,
     "knowledge_sources": 19_900,
-    "sim": 7_100,
+    "sim": 5_830,
     "logs": 7_440,
     "harvey": 10_500,
-    "experiments": 9_900,
+    "experiments": 10_000,
     "tests": 33_900,
-    "extras": 13_520,
+    "extras": 14_910,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}

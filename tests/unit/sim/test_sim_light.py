@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
-import numpy as np
 import pytest
 
 from experiments.generated.scenes import box_room
+from harvey.cli import main
 from sim.body.collision import Obstacles
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
-from sim.render.light.lamps import Room
-from sim.render.light.lighting import Lighting
-from sim.render.light.lights import Lights
-from sim.render.light.lit_renderer import LitRenderer
+from sim.render.lighting import Lighting
+from sim.render.lights import Lights
 from sim.scenario import ScenarioError, parse_scenario, with_settings
 from sim.stage import build_stage
+from world_models import plugins
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 
 MINIMAL = 'world = "research_center"\ngoal = "(ptrans (hallway (4,4,0)) (hallway (24,4,0)))"\n'
-LIGHTING = Lighting(lamps=0.3, lamp_colour=(1.2, 1.0, 0.8), exposure_lag_s=0.5, white_balance_lag_s=0.5, vignetting=0.3)
-ROOM = Room(np.array([(0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0)]), 0.0, 2.6)
+LIGHTING = Lighting(flat=0.1, lamps=0.0, exposure_lag_s=0.5, white_balance_lag_s=0.5, vignetting=0.3)
 
 
 def lit_body() -> SimulatedBody:
-    building = SimulatedBuilding(Lights(LIGHTING, (ROOM,)).renderer(box_room(), 4), Obstacles.of_faces(box_room()))
+    building = SimulatedBuilding(Lights(LIGHTING).renderer(box_room(), 4), Obstacles.of_faces(box_room()))
     return SimulatedBody(building, Pose2(1.5, 2.0, 0.0), Camera.from_field_of_view(math.radians(65.0), 128, 128),
                          CameraMount(1.0, 0.1), seed=3, lighting=LIGHTING)
 
@@ -72,10 +71,21 @@ def test_bad_light_is_refused(line: str, told: str) -> None:
         parse_scenario(f"{MINIMAL}[light]\n{line}\n")
 
 
-def test_a_lit_stage_has_lamps_in_its_rooms() -> None:
-    stage = build_stage(parse_scenario(MINIMAL + "[light]\nrays = 4\ncell_m = 1.0\nbounces = 1\n"))
-    renderer = stage.building.renderer
-    assert isinstance(renderer, LitRenderer)
-    plain = build_stage(parse_scenario(MINIMAL)).building.renderer
-    assert len(renderer.mesh) > len(plain.mesh)
-    assert np.isfinite(renderer.baked.seen_light).all()
+@pytest.mark.parametrize(("line", "asked"), [("", "lamps"), ("lamps = 0\nsun = 5.0\nglass = 1.0", "sun, glass")])
+def test_without_the_extra_light_that_is_uneven_says_what_to_install(
+    line: str, asked: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(plugins, "entry_points", lambda group: ())
+    path = tmp_path / "lit.toml"
+    path.write_text(f"{MINIMAL}[light]\n{line}\n", encoding="utf-8")
+    assert main(["run", str(path)]) == 2
+    assert capsys.readouterr().err.endswith(f"\nharvey: {path}:3: light: with {asked} it needs harvey-light:"
+                                            " pip install ./extras/harvey-light\n")
+
+
+def test_light_that_is_even_needs_no_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plugins, "entry_points", lambda group: ())
+    dim, plain = (build_stage(parse_scenario(MINIMAL + light)).building.renderer
+                  for light in ("[light]\nflat = 0.2\nlamps = 0.0\n", ""))
+    assert dim.brightness == 0.2 ** (1.0 / 2.2) and plain.brightness == 1.0
+    assert len(dim.mesh) == len(plain.mesh)

@@ -22,24 +22,25 @@ from world_models.files.toml.settings_reader import (
     MAX_NUMBER,
     known_keys,
     parse_value,
+    read_all,
     read_settings,
     replace_value,
     suggest_keys,
 )
 from world_models.files.toml.source import WORLDS, Node, Source, WorldError
-from world_models.units import Bounds, check_bounds
+from world_models.units import Bounded, Bounds, bounded, check_bounds
 
 ROOT = WORLDS.parents[1]
 """The folder of the packages: files that come with the project are named relative to it."""
 OBSTACLE = re.compile(r".+/obstacle-\d+")
 """How an obstacle that the robot found is called."""
-TURN = Bounds(-2.0 * math.pi, 2.0 * math.pi)
+TURN = 2.0 * math.pi  # largest heading that may be written [rad]
 MIN_SIGMA = 0.005
 """Floor of the start's standard deviations [m, rad]: nobody puts a robot down better."""
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class Start(Bounded):
     """How the robot is put down.
 
     Attributes:
@@ -47,13 +48,9 @@ class Start:
         put_down_sigma_m, put_down_sigma_rad: standard deviations of the placing, along each axis and of the heading.
     """
 
-    heading_rad: float = 0.0
-    put_down_sigma_m: float = 0.0
-    put_down_sigma_rad: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_bounds(self, {"heading_rad": TURN, "put_down_sigma_m": Bounds(0.0, 2.0),
-                            "put_down_sigma_rad": Bounds(0.0, math.pi)})
+    heading_rad: float = bounded(0.0, -TURN, TURN)
+    put_down_sigma_m: float = bounded(0.0, 0.0, 2.0)
+    put_down_sigma_rad: float = bounded(0.0, 0.0, math.pi)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +65,7 @@ class Arrival:
 
     def __post_init__(self) -> None:
         if self.matters:
-            check_bounds(self, {"heading_rad": TURN})
+            check_bounds(self, {"heading_rad": Bounds(-TURN, TURN)})
 
     @property
     def matters(self) -> bool:
@@ -76,7 +73,7 @@ class Arrival:
 
 
 @dataclass(frozen=True, slots=True)
-class Telling:
+class Telling(Bounded):
     """What somebody tells the robot on the way, of the building or to go elsewhere: one of the file's ``[[told]]``.
 
     Attributes:
@@ -86,13 +83,13 @@ class Telling:
         goal: where to go instead, as "Go to the library"; then ``what`` and ``state`` are left out.
     """
 
-    at_s: float = 0.0
+    at_s: float = bounded(0.0, 0.0, MAX_NUMBER)
     what: str = ""
     state: str = ""
     goal: str = ""
 
     def __post_init__(self) -> None:
-        check_bounds(self, {"at_s": Bounds(0.0, MAX_NUMBER)})
+        Bounded.__post_init__(self)
         if self.goal:
             if self.what or self.state:
                 raise ValueError("expected either goal, or what and state, got both")
@@ -155,7 +152,7 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class Limits(Bounded):
     """When to give up.
 
     Attributes:
@@ -163,12 +160,8 @@ class Limits:
         max_cycles: of the blackboard.
     """
 
-    max_time_s: float = 3600.0
-    max_cycles: int = 20000
-
-    def __post_init__(self) -> None:
-        some = Bounds(0.0, MAX_NUMBER, above=True)
-        check_bounds(self, {"max_time_s": some, "max_cycles": some})
+    max_time_s: float = bounded(3600.0, 0.0, MAX_NUMBER, above=True)
+    max_cycles: int = bounded(20000, 0, MAX_NUMBER, above=True)
 
 
 TABLES: Mapping[str, type[Any]] = {
@@ -227,8 +220,7 @@ class MissionFormat:
 
     def keys(self) -> tuple[str, ...]:
         """Every key that :meth:`with_settings` understands."""
-        named = (*self.tables.items(), *self.inner.items())
-        return (*TEXTS, *(f"{name}.{key}" for name, kind in named for key in known_keys(kind)))
+        return (*TEXTS, *(f"{name}.{key}" for name, kind in self._kinds.items() for key in known_keys(kind)))
 
     def with_settings(self, source: Source, settings: Mapping[str, Any]) -> Source:
         """The file with some values replaced, as ``{"servo.action": "off", "start.heading_deg": 90}``.
@@ -249,10 +241,9 @@ class MissionFormat:
         """The attributes of a :class:`Mission`, and the other tables of the format. Raises WorldError."""
         node = source.root.table(("world", "goal"), ("description", "told", *self.others, *self.tables))
         tables = {key: read_settings(node[key], kind) if key in node else kind() for key, kind in self.tables.items()}
-        told = [read_settings(item, Telling) for item in node["told"].items()] if "told" in node else []
         return {
-            "told": tuple(told),
-            "name": name, "description": node["description"].text() if "description" in node else "",
+            "told": read_all(node, "told", Telling), "name": name,
+            "description": node["description"].text() if "description" in node else "",
             "world": named_file(node["world"].text(), WORLDS, folder), "goal": _goal(node["goal"]),
             "folder": folder, "source": source, **tables,
         }
@@ -261,13 +252,13 @@ class MissionFormat:
         """Whether a key holds a text: then ``--set`` does not read its value as TOML."""
         if len(path) == 1:
             return True
-        kind = self._kind(path)
+        kind = self._kinds[".".join(path[:-1])]
         return get_type_hints(kind)[known_keys(kind)[path[-1]][0]] is str
 
-    def _kind(self, path: tuple[str, ...]) -> type[Any]:
-        """The settings class of the table that a key is in."""
-        table = ".".join(path[:-1])
-        return self.tables[table] if table in self.tables else self.inner[table]
+    @property
+    def _kinds(self) -> Mapping[str, type[Any]]:
+        """The settings class of each table whose keys can be set."""
+        return {**self.tables, **self.inner}
 
     def _without_other_spellings(self, data: Mapping[str, Any], path: tuple[str, ...]) -> Mapping[str, Any]:
         """The tables without the same setting in another unit."""
@@ -276,7 +267,7 @@ class MissionFormat:
             table = table.get(step) if isinstance(table, Mapping) else None
         if len(path) == 1 or not isinstance(table, Mapping):
             return data
-        known = known_keys(self._kind(path))
+        known = known_keys(self._kinds[".".join(path[:-1])])
         others = {key for key in table if key in known and known[key][0] == known[path[-1]][0]}
         return replace_value(data, path[:-1], {key: value for key, value in table.items() if key not in others})
 

@@ -10,8 +10,8 @@ import difflib
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
-from typing import Any, TypeVar, get_type_hints
+from dataclasses import fields, is_dataclass
+from typing import Any, TypeVar, get_args, get_type_hints
 
 from world_models.files.toml.source import Node, WorldError
 from world_models.units import FOOT_M, INCH_M, OutOfBoundsError
@@ -37,7 +37,7 @@ def known_keys(kind: type[Any]) -> dict[str, tuple[str, float]]:
 
 
 def read_settings(node: Node, kind: type[T]) -> T:
-    """A table as an object of a settings class; absent keys keep their defaults.
+    """A table as an object of a settings class; absent keys keep their defaults. Its fields may be tables themselves.
 
     Raises:
         WorldError: unknown key, wrong type, or values that do not go together.
@@ -67,7 +67,15 @@ def read_settings(node: Node, kind: type[T]) -> T:
         raise WorldError(f"{node.place}: {error}") from None
 
 
+def read_all(table: Node, key: str, kind: type[T]) -> tuple[T, ...]:
+    """The objects of an array of tables; none where the key is absent. Raises WorldError."""
+    return tuple(read_settings(item, kind) for item in table[key].items()) if key in table else ()
+
+
 def _value(item: Node, hint: Any, factor: float) -> Any:
+    inner = get_args(hint)[0] if get_args(hint) else hint
+    if isinstance(inner, type) and is_dataclass(inner):
+        return read_settings(item, hint) if inner is hint else tuple(read_settings(one, inner) for one in item.items())
     if hint is bool:
         return item.flag()
     if hint is str:

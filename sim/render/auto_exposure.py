@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.render.light.lighting import GAMMA, Lighting
+from sim.render.lighting import GAMMA, Lighting
 
 TARGET = 0.45
 """Mean level of a well exposed picture, 0..1."""

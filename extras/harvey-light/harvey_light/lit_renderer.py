@@ -1,4 +1,8 @@
-"""Draws a building under light: baked irradiance, and mirror images in shiny floors and panes."""
+"""Draws a building under light: baked irradiance, and mirror images in shiny floors and panes.
+
+What a shiny floor or a pane shows is the building, seen by the camera's mirror image. A mirrored camera is left-handed.
+So it is turned upside down too, which makes it right-handed, and so is its picture.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.render.light.light_map import LightMap
-from sim.render.light.lit_shading import NO_MIRROR, shade_lit
-from sim.render.light.mirrored_camera import before_plane, mirror_camera
+from harvey_light.light_map import LightMap
+from harvey_light.lit_shading import NO_MIRROR, shade_lit
 from sim.render.mesh import MeshView, Pinhole, project_mesh
 from sim.render.pieces import Pieces, split_pieces
 from sim.render.rasterizer import find_visible_patches, sample_offsets
@@ -25,6 +28,7 @@ MAX_MIRRORS, MIN_MIRROR_PIECES = 3, 60
 """Mirror images in a picture at most, of planes that make up so many pieces of it."""
 MIRROR_BLUR_PX = 1.2
 """Standard deviation of a mirror image's blur: polish is not a mirror."""
+UPSIDE_DOWN = np.diag([1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,3 +105,26 @@ class LitRenderer(Renderer):
         shade_lit(pieces, colours, appearances[:, :11], grid, baked.places.first, baked.seen_light, image, glossy,
                   baked.gloss, view.reaches, stack, rays.astype(np.float32))
         return image
+
+
+def mirror_camera(
+    lens: Pinhole, rotation: Floats, translation: Floats, plane: Floats
+) -> tuple[Pinhole, Floats, Floats]:
+    """The camera whose picture, with its rows in reverse, shows the building mirrored in a plane (n, d), n . p = d.
+
+    Args:
+        rotation, translation: camera_from_world, (3, 3) and (3,) [m].
+
+    Returns its lens, rotation and translation.
+    """
+    normal, offset = plane[:3], plane[3]
+    householder = np.eye(3) - 2.0 * np.outer(normal, normal)
+    moved = rotation @ (2.0 * offset * normal) + translation
+    upside_down = replace(lens, cy=lens.height - 1.0 - lens.cy)
+    return upside_down, UPSIDE_DOWN @ rotation @ householder, UPSIDE_DOWN @ moved
+
+
+def before_plane(vertices_world: Floats, first: NDArray[np.int64], plane: Floats) -> NDArray[np.bool_]:
+    """(P,) which patches reach before a plane by more than a millimetre: only these are seen in it."""
+    heights = vertices_world @ plane[:3] - plane[3]
+    return np.asarray(np.maximum.reduceat(heights, first[:-1]) > 1e-3)

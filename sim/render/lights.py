@@ -1,17 +1,26 @@
-"""Lamps: panels that hang below the ceilings of rooms, in rows."""
+"""Lights: lamps in rows below the ceilings of rooms, and what draws a building under them.
+
+Light that is even is drawn as a building without ``[light]`` is. All else is drawn by an extra (``harvey.renderers``).
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from sim.render.light.lighting import Lighting
+from sim.render.lighting import GAMMA, Lighting
+from sim.render.mesh import FaceLike
+from sim.render.renderer import Renderer
+from world_models.plugins import RENDERERS_GROUP, list_absent, load_plugins
 
+LIT = "lit"
+"""The name of the renderers of buildings under light, as an entry point."""
 PANEL_M = (1.2, 0.3)
 """Length and width of a panel; its length is along the world's x axis where there is room, or else along y [m]."""
 BELOW_CEILING_M = 0.02
@@ -45,6 +54,64 @@ class Lamp:
 
     polygon_world: NDArray[np.float64]
     radiosity: NDArray[np.float64]
+
+
+@runtime_checkable
+class LitRenderers(Protocol):
+    """Renderers of buildings under light: an extra brings them."""
+
+    def check(self, lighting: Lighting) -> None:
+        """Raises ValueError, which says what to install, where this light cannot be drawn."""
+        ...
+
+    def build(self, faces: Sequence[FaceLike], lighting: Lighting, rooms: Sequence[Room], lamps: Sequence[Lamp],
+              samples: int) -> Renderer:
+        """A renderer of these faces under this light; the same for the same arguments.
+
+        Args:
+            rooms: whose floors can be shiny and whose walls can be coloured.
+            lamps: all that hang in them; those that are off have no radiosity.
+            samples: per pixel.
+
+        Raises:
+            ValueError: a region or the number of samples is bad.
+        """
+        ...
+
+
+def check_light(lighting: Lighting) -> None:
+    """Raises ValueError, which says what to install, where nothing that is installed can draw this light."""
+    if lighting.uneven:
+        if needs := list_absent(RENDERERS_GROUP).get(LIT):
+            raise ValueError(f"with {', '.join(lighting.uneven)} it needs {needs}")
+        find_lit_renderers().check(lighting)
+
+
+def find_lit_renderers() -> LitRenderers:
+    """Those that are installed. Raises KeyError where none are, and PluginError."""
+    found: LitRenderers = load_plugins(RENDERERS_GROUP, LitRenderers, LIT)[LIT]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Lights:
+    """What lights a building: makes renderers of its faces.
+
+    Attributes:
+        lighting: the light.
+        rooms: where lamps hang, and which floors there are.
+    """
+
+    lighting: Lighting
+    rooms: tuple[Room, ...] = ()
+
+    def renderer(self, faces: Iterable[FaceLike], samples: int = 8) -> Renderer:
+        """The renderer of these faces under this light. Raises ValueError for a bad region or number of samples."""
+        lighting = self.lighting
+        if not lighting.uneven:
+            return Renderer.of_faces(faces, samples, lighting.flat ** (1.0 / GAMMA))
+        lamps = hang_lamps(self.rooms, lighting) if lighting.lamps > 0.0 else ()
+        return find_lit_renderers().build(tuple(faces), lighting, self.rooms, lamps, samples)
 
 
 def hang_lamps(rooms: Sequence[Room], lighting: Lighting) -> tuple[Lamp, ...]:

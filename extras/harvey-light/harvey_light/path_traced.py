@@ -1,4 +1,4 @@
-"""The reference: the same building and light by a path tracer (Mitsuba 3, extra ``photo``), its pictures kept by pose.
+"""The reference: the same building and light by a path tracer (Mitsuba 3), its pictures kept by pose.
 
 What the fast renderer simplifies is traced here: soft shadows of all lamps, all bounces, blurred reflections. What it
 has and this has not: textures of surfaces, and the sun, for which the walls behind the window panes are in the way.
@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.render.light.irradiance import SKY_COLOUR
-from sim.render.light.lamps import Lamp
-from sim.render.light.lighting import GAMMA, Lighting
-from sim.render.light.lit_renderer import LitRenderer
+from harvey_light.irradiance import SKY_COLOUR
+from harvey_light.lit_renderer import LitRenderer
+from sim.render.lighting import GAMMA, Lighting
+from sim.render.lights import Lamp
 from sim.render.mesh import Mesh, Pinhole
 from sim.render.renderer import HAZE_PER_M
 from world_models.camera import Camera

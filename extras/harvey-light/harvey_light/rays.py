@@ -161,7 +161,7 @@ def direct_light(tree: Any, points: Any, normals: Any, sources: Any, reach_m: fl
 def gather_hits(tree: Any, points: Any, normals: Any, grid: Any, first: Any, axes: Any, rays: int) -> Any:
     """The places (n, rays), by number, that cosine-distributed rays from points meet first; -1: none, or a back.
 
-    ``grid`` (P, 6), ``first`` (P,) and ``axes`` (P, 2, 3) are those of :class:`~sim.render.light.light_map.LightMap`.
+    ``grid`` (P, 6), ``first`` (P,) and ``axes`` (P, 2, 3) are those of :class:`~harvey_light.light_map.LightMap`.
     """
     hits = np.empty((len(points), rays), np.int32)
     stack = np.empty(128, np.int64)

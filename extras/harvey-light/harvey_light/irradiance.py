@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.render.light.lamps import Lamp
-from sim.render.light.light_map import LightMap
-from sim.render.light.lighting import GAMMA, Lighting
-from sim.render.light.rays import RayTree, build_ray_tree, direct_light, first_hits, gather_hits
+from harvey_light.light_map import LightMap
+from harvey_light.rays import RayTree, build_ray_tree, direct_light, first_hits, gather_hits
+from sim.render.lighting import GAMMA, Lighting
+from sim.render.lights import Lamp
 from sim.render.mesh import Mesh
 from sim.render.renderer import illumination
 
@@ -56,7 +56,7 @@ def compute_irradiance(
 
 
 def _parts(polygon: Floats, radiosity: Floats) -> Floats:
-    """A rectangle (4, 3) as small sources for :func:`~sim.render.light.rays.direct_light`."""
+    """A rectangle (4, 3) as small sources for :func:`~harvey_light.rays.direct_light`."""
     along, across = polygon[1] - polygon[0], polygon[3] - polygon[0]
     counts = [max(1, round(float(np.linalg.norm(side)) / PART_M)) for side in (along, across)]
     i, j = np.meshgrid((np.arange(counts[0]) + 0.5) / counts[0], (np.arange(counts[1]) + 0.5) / counts[1])

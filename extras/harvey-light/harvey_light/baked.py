@@ -5,21 +5,21 @@ from __future__ import annotations
 import colorsys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from sim.render.light.irradiance import SKY_COLOUR, SUN_COLOUR, compute_irradiance
-from sim.render.light.lamps import Lamp, Room, hang_lamps
-from sim.render.light.light_map import LightMap, lay_light_map
-from sim.render.light.lighting import GAMMA, Lighting
-from sim.render.light.lit_renderer import BakedLight, LitRenderer
-from sim.render.light.lit_shading import NO_MIRROR
-from sim.render.light.panes import find_panes
-from sim.render.light.path_traced import PathTracedRenderer
-from sim.render.light.sun_patches import SunPatch, find_sun_patches
+from harvey_light.irradiance import SKY_COLOUR, SUN_COLOUR, compute_irradiance
+from harvey_light.light_map import LightMap, lay_light_map
+from harvey_light.lit_renderer import BakedLight, LitRenderer
+from harvey_light.lit_shading import NO_MIRROR
+from harvey_light.path_traced import PathTracedRenderer
+from harvey_light.sun_patches import SunPatch, find_sun_patches
+from sim.render.lighting import GAMMA, Lighting
+from sim.render.lights import Lamp, Room
 from sim.render.mesh import FaceLike, Mesh, build_mesh, join_meshes, plane_of
 from sim.render.noise_table import build_noise_table
 from sim.render.rasterizer import sample_offsets
@@ -31,29 +31,54 @@ LEVEL_M = 0.02
 """A level patch within this height of a room's floor is floor."""
 WALL_AREA_M2, WALL_GREY = 0.3, 0.2
 """Upright patches of more area and less difference between their colours are walls."""
+MIN_BLUE = 0.8
+"""Of a pane's colour; frames are darker."""
+PATH_TRACED = Path("runs") / "path-traced"
+"""Where path-traced pictures are kept: one of the same building, light and pose is traced once."""
+
+
+@dataclass(frozen=True, slots=True)
+class BakedRenderers:
+    """A :class:`~sim.render.lights.LitRenderers`.
+
+    Attributes:
+        folder: where path-traced pictures are kept; None: nowhere.
+    """
+
+    folder: Path | None = PATH_TRACED
+
+    def check(self, lighting: Lighting) -> None:
+        """Raises ValueError where paths are to be traced and Mitsuba is not installed."""
+        if lighting.traced_paths and find_spec("mitsuba") is None:
+            raise ValueError("with traced_paths it needs Mitsuba: pip install './extras/harvey-light[photo]'")
+
+    def build(self, faces: Sequence[FaceLike], lighting: Lighting, rooms: Sequence[Room], lamps: Sequence[Lamp],
+              samples: int = 8) -> LitRenderer:
+        """The renderer of these faces under this light. Raises ValueError for a bad region or number of samples."""
+        return _Bake(lighting, rooms, self.folder).renderer(faces, lamps, samples)
+
+
+BAKED = BakedRenderers()
+
+
+def find_panes(faces: Iterable[FaceLike]) -> NDArray[np.bool_]:
+    """(P,) which patches of the mesh of these faces are window panes: bright regions of things named "window"."""
+    regions = [region for face in faces for side in (face.front, face.back) for region in side]
+    return np.array(["window" in r.name and r.colour[2] > MIN_BLUE for r in regions], dtype=bool)
 
 
 @dataclass(frozen=True, eq=False)
-class Lights:
-    """What lights a building: makes renderers of its faces.
-
-    Attributes:
-        lighting: the light.
-        rooms: where lamps hang, and which floors there are.
-        folder: where path-traced pictures are kept.
-    """
+class _Bake:
+    """The light and the rooms of one building."""
 
     lighting: Lighting
-    rooms: tuple[Room, ...] = ()
-    folder: Path | None = None
+    rooms: Sequence[Room]
+    folder: Path | None
 
-    def renderer(self, faces: Iterable[FaceLike], samples: int = 8) -> LitRenderer:
-        """The renderer of these faces under this light. Raises ValueError for a bad region or number of samples."""
+    def renderer(self, faces: Sequence[FaceLike], lamps: Sequence[Lamp], samples: int) -> LitRenderer:
         sample_offsets(samples)
-        faces = tuple(faces)
         bare, panes = build_mesh(faces), find_panes(faces)
         bare = replace(bare, colours=self._paint(bare, panes))
-        lamps = hang_lamps(self.rooms, self.lighting) if self.lighting.lamps > 0.0 else ()
         solid = join_meshes((bare, _mesh_of_lamps(lamps))) if lamps else bare
         panes = np.concatenate([panes, np.zeros(len(lamps), bool)])
         sources = panes | (np.arange(len(solid)) >= len(bare))

@@ -1,4 +1,4 @@
-"""The fast renderer against the path tracer, which needs the extra ``photo``."""
+"""The fast renderer against the path tracer, which needs Mitsuba."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from experiments.generated.scenes import box_room
-from sim.render.light.lamps import Room
-from sim.render.light.lighting import Lighting
-from sim.render.light.lights import Lights
+from harvey_light.baked import BakedRenderers
+from sim.render.lighting import Lighting
+from sim.render.lights import Room, hang_lamps
 from sim.scenario import ScenarioError, parse_scenario
 from sim.stage import build_stage
 from world_models.camera import Camera, CameraMount
@@ -26,19 +26,19 @@ HAS_MITSUBA = importlib.util.find_spec("mitsuba") is not None
 
 
 def test_a_scenario_that_needs_the_path_tracer_is_refused_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sim.stage.find_spec", lambda name: None)
-    with pytest.raises(ScenarioError, match=r"traced_paths: expected Mitsuba to be installed"):
+    monkeypatch.setattr("harvey_light.baked.find_spec", lambda name: None)
+    with pytest.raises(ScenarioError, match=r"light: with traced_paths it needs Mitsuba: pip install"):
         build_stage(parse_scenario(MINIMAL + "[light]\ntraced_paths = 8\n"))
 
 
-@pytest.mark.skipif(not HAS_MITSUBA, reason="the extra photo is not installed")
+@pytest.mark.skipif(not HAS_MITSUBA, reason="Mitsuba is not installed")
 @pytest.mark.parametrize("gloss", [0.0, 1.0])
 def test_the_fast_renderer_is_as_bright_as_the_path_tracer(tmp_path: Path, gloss: float) -> None:
     pose = CameraMount(1.0, 0.1).camera_from_robot @ Pose2(0.6, 1.5, 0.1).lifted().inverse()
     pictures = []
     for paths in (0, 24):
         lighting = Lighting(lamps=0.8, floor_gloss=gloss, bounces=6, rays=256, cell_m=0.2, traced_paths=paths)
-        renderer = Lights(lighting, (ROOM,), tmp_path).renderer(box_room())
+        renderer = BakedRenderers(tmp_path).build(box_room(), lighting, [ROOM], hang_lamps([ROOM], lighting))
         pictures.append(renderer.radiance(CAMERA, pose))
         assert np.array_equal(renderer.radiance(CAMERA, pose), pictures[-1]), "a picture that is kept is the same"
     fast, traced = (np.minimum(cv2.GaussianBlur(picture, (0, 0), 3.0), 1.0) for picture in pictures)

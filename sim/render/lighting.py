@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from world_models.units import Bounds, check_bounds
+from world_models.units import Bounded, bounded
 
 GAMMA = 2.2
 """Colours are as seen: light is their power of this, relative to a white surface at full light."""
-SHARE = Bounds(0.0, 1.0)
-BOUNDS: Mapping[str, Bounds] = {
-    "flat": SHARE, "lamps": Bounds(0.0, 100.0), "lamps_off": SHARE, "lamp_spacing_m": Bounds(0.7, 20.0),
-    "sky": Bounds(0.0, 100.0), "sun": Bounds(0.0, 100.0), "sun_azimuth_rad": Bounds(-2.0 * math.pi, 2.0 * math.pi),
-    "sun_elevation_rad": Bounds(0.0, math.pi / 2.0), "floor_gloss": SHARE, "glass": SHARE, "wall_colours": SHARE,
-    "bounces": Bounds(0, 10), "rays": Bounds(1, 4096), "cell_m": Bounds(0.05, 10.0), "seed": Bounds(0, 10**9),
-    "exposure_lag_s": Bounds(0.0, 100.0), "white_balance_lag_s": Bounds(0.0, 100.0), "vignetting": SHARE,
-    "traced_paths": Bounds(0, 65536),
-}
 MAX_LAMP_COLOUR = 4.0
+UNEVEN = ("lamps", "sky", "sun", "floor_gloss", "glass", "wall_colours", "traced_paths")
+"""With one of these light differs from place to place, or is reflected."""
 
 
 @dataclass(frozen=True, slots=True)
-class Lighting:
+class Lighting(Bounded):
     """Where light comes from, what it falls on, and how the camera adapts.
 
     Light is relative: a white surface at irradiance 1 is seen at full brightness by a camera of gain 1.
@@ -48,35 +40,40 @@ class Lighting:
         exposure_lag_s: time constant of auto exposure; 0: the exposure is fixed.
         white_balance_lag_s: time constant of auto white balance; 0: it is fixed.
         vignetting: how much darker the corners of the picture are, as a share of the light.
-        traced_paths: paths per pixel of the reference, a path tracer (extra ``photo``); 0: the fast renderer.
+        traced_paths: paths per pixel of the reference, a path tracer; 0: the fast renderer.
     """
 
-    flat: float = 0.0
-    lamps: float = 1.0
-    lamps_off: float = 0.0
-    lamp_spacing_m: float = 2.4
+    flat: float = bounded(0.0, 0.0, 1.0)
+    lamps: float = bounded(1.0, 0.0, 100.0)
+    lamps_off: float = bounded(0.0, 0.0, 1.0)
+    lamp_spacing_m: float = bounded(2.4, 0.7, 20.0)
     lamp_colour: tuple[float, ...] = (1.0, 1.0, 1.0)
-    sky: float = 0.0
-    sun: float = 0.0
-    sun_azimuth_rad: float = 0.0
-    sun_elevation_rad: float = 0.6
-    floor_gloss: float = 0.0
-    glass: float = 0.0
-    wall_colours: float = 0.0
-    bounces: int = 3
-    rays: int = 48
-    cell_m: float = 0.35
-    seed: int = 0
-    exposure_lag_s: float = 0.4
-    white_balance_lag_s: float = 0.0
-    vignetting: float = 0.0
-    traced_paths: int = 0
+    sky: float = bounded(0.0, 0.0, 100.0)
+    sun: float = bounded(0.0, 0.0, 100.0)
+    sun_azimuth_rad: float = bounded(0.0, -2.0 * math.pi, 2.0 * math.pi)
+    sun_elevation_rad: float = bounded(0.6, 0.0, math.pi / 2.0)
+    floor_gloss: float = bounded(0.0, 0.0, 1.0)
+    glass: float = bounded(0.0, 0.0, 1.0)
+    wall_colours: float = bounded(0.0, 0.0, 1.0)
+    bounces: int = bounded(3, 0, 10)
+    rays: int = bounded(48, 1, 4096)
+    cell_m: float = bounded(0.35, 0.05, 10.0)
+    seed: int = bounded(0, 0, 10**9)
+    exposure_lag_s: float = bounded(0.4, 0.0, 100.0)
+    white_balance_lag_s: float = bounded(0.0, 0.0, 100.0)
+    vignetting: float = bounded(0.0, 0.0, 1.0)
+    traced_paths: int = bounded(0, 0, 65536)
 
     def __post_init__(self) -> None:
-        check_bounds(self, BOUNDS)
+        Bounded.__post_init__(self)
         if len(self.lamp_colour) != 3 or not all(0.0 <= part <= MAX_LAMP_COLOUR for part in self.lamp_colour):
             raise ValueError(f"expected lamp_colour of three numbers from 0 to {MAX_LAMP_COLOUR:g},"
                              f" got {list(self.lamp_colour)}")
+
+    @property
+    def uneven(self) -> tuple[str, ...]:
+        """Which of its keys make light differ from place to place; none where it is flat."""
+        return tuple(key for key in UNEVEN if getattr(self, key))
 
     @property
     def towards_sun(self) -> tuple[float, float, float]:
