@@ -40,7 +40,7 @@ ALIAS_MIN_COLORS = 0.8  # part of the colors that another place must show to loo
 MAX_COLOR_DIFFERENCE = 0.08  # largest difference of two colors, 0..1, that are the same
 
 PLANNING_SOURCES = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "elevator_rider",
-               "mission_monitor")
+                    "floor_changer", "mission_monitor")
 MAX_CYCLES = 20_000
 FIX_SIGMA_M, FIX_SIGMA_RAD = 0.003, 0.001
 """Standard deviations of the pose after a milestone is verified in the dry run [m, rad]."""

@@ -19,14 +19,19 @@ from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.action.dependency_withdrawer import DependencyWithdrawer
 from knowledge_sources.action.door_watcher import DoorWatcher
 from knowledge_sources.action.elevator_rider import ElevatorRider
+from knowledge_sources.action.fault_closer import FaultCloser
 from knowledge_sources.action.fault_handler import FaultHandler
+from knowledge_sources.action.floor_changer import FloorChanger
 from knowledge_sources.action.floor_watcher import FloorWatcher
 from knowledge_sources.action.goal_changer import GoalChanger
+from knowledge_sources.action.landmark_chooser import LandmarkChooser
 from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.action.motor import Motor
 from knowledge_sources.action.obstacle_finder import ObstacleFinder
 from knowledge_sources.action.path_follower import PathFollower
 from knowledge_sources.action.range_watcher import RangeWatcher
+from knowledge_sources.action.recovery_retrier import RecoveryRetrier
+from knowledge_sources.action.travel_breaker import TravelBreaker
 from knowledge_sources.action.yaw_calibrator import YawCalibrator
 from knowledge_sources.goal.interpreter import Interpreter
 from knowledge_sources.goal.mission_monitor import MissionMonitor
@@ -56,8 +61,10 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     Motor,
     PathFollower,
     ElevatorRider,
+    FloorChanger,
     DeadReckoner,
     CorrelatorTracker,
+    LandmarkChooser,
     LineFinder,
     ObstructionFinder,
     Matcher,
@@ -65,11 +72,14 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     MilestoneJudge,
     CameraCalibrator,
     YawCalibrator,
+    TravelBreaker,
     PlanAdjuster,
     DiscrepancyRaiser,
     Relocalizer,
     AliasMonitor,
     FaultHandler,
+    RecoveryRetrier,
+    FaultCloser,
     ModelReviser,
     GoalChanger,
     FloorWatcher,

@@ -21,6 +21,7 @@ from knowledge_sources.questions import (
     current_leg,
     deepest_sketch,
     find_belief,
+    find_building,
     find_robot,
     find_robot_in,
     is_in_doubt,
@@ -70,19 +71,20 @@ class Belief:
         """The same, with what is known to stand before its camera."""
         return find_robot_in(self.view, self.locale)
 
-    @property
+    @cached_property
     def world(self) -> Building:
-        return self.robot.world
+        """The building as far as its frames are on the board."""
+        return find_building(self.view)
 
     @cached_property
     def pose(self) -> Pose2:
         """World frame."""
-        return self.entry.value.world_from_robot(self.robot.world)
+        return self.entry.value.world_from_robot(self.world)
 
     @cached_property
     def covariance(self) -> Floats:
         """(3, 3) over (x, y, heading), world frame."""
-        return self.entry.value.covariance_world(self.robot.world)
+        return self.entry.value.covariance_world(self.world)
 
 
 def find_held(view: View) -> Belief | None:
@@ -107,6 +109,11 @@ def _find_lost(view: View) -> Entry[Discrepancy] | None:
     return open_discrepancy(view, Level.GOAL)
 
 
+def _list_doubts_above(view: View) -> list[Entry[Discrepancy]]:
+    found = (open_discrepancy(view, level) for level in (Level.PLAN, Level.GOAL))
+    return [entry for entry in found if entry is not None]
+
+
 def _tell_motion(view: View) -> str:
     course = rolling_course(view)
     if course is not None:
@@ -119,20 +126,22 @@ def _tell_doubt(view: View) -> str:
     return ", ".join(f"{entry.ref} was open at the {entry.value.level} level" for entry in found if entry is not None)
 
 
-GOING_ON = Condition("a mission that goes on", lambda view: not is_over(view), "it had ended")
+GOING_ON = Condition("not over", lambda view: not is_over(view), "it had ended")
 HELD = Condition("a belief", find_held, "none was held")
 PICTURE: Condition[Entry[CameraPicture]] = Condition(
     "a picture", lambda view: view.latest(CameraPicture), "none was taken")
-UP_TO_DATE = Condition("every motion in the belief", is_up_to_date, "the last one was not reported yet, or not in it")
+UP_TO_DATE = Condition("belief up to date", is_up_to_date, "the last one was not reported yet, or not in it")
 STANDING = Condition("standing", is_standing, _tell_motion)
-SURE = Condition("nothing in doubt", lambda view: not is_in_doubt(view), _tell_doubt)
-MEASURED = Condition("no doubt that is not measured yet", _none_open(unmeasured_doubt),
+SURE = Condition("no doubt", lambda view: not is_in_doubt(view), _tell_doubt)
+MEASURED = Condition("no unmeasured doubt", _none_open(unmeasured_doubt),
                      _tell_open(unmeasured_doubt, "not measured yet"))
 NOT_LOST = Condition("not lost", _none_open(_find_lost), _tell_open(_find_lost, "open at the goal level"))
+NO_DOUBT_ABOVE = Condition("no doubt above", lambda view: not _list_doubts_above(view), lambda view: (
+    f"{', '.join(str(entry.ref) for entry in _list_doubts_above(view))} was open"))
 LOST = Condition("lost", _find_lost, "nothing was open at the goal level")
-SOUND = Condition("no fault of the body", _none_open(open_fault), _tell_open(open_fault, "open"))
+SOUND = Condition("no fault", _none_open(open_fault), _tell_open(open_fault, "open"))
 MILESTONE = Condition("a milestone awaited", open_milestone, "none was")
 NO_MILESTONE = Condition("no milestone awaited", _none_open(open_milestone), _tell_open(open_milestone, "awaited"))
 GOAL = Condition("a goal", active_goal, "none was pursued")
-SKETCH = Condition("a sketch that is carried out", deepest_sketch, "there was none")
-LEG = Condition("a leg under way", current_leg, "none was")
+SKETCH = Condition("a sketch", deepest_sketch, "there was none")
+LEG = Condition("a leg", current_leg, "none was")

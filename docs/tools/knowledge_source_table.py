@@ -9,6 +9,7 @@ from collections.abc import Iterable
 
 from blackboard.knowledge_source import KnowledgeSource
 from harvey.wiring import KNOWLEDGE_SOURCES, foreign_sources
+from knowledge_sources.priority import Priority
 from world_models.building.locale_frame import FrameRequest
 
 EVERYBODY_WRITES = (FrameRequest,)
@@ -17,17 +18,24 @@ EVERYBODY_WRITES = (FrameRequest,)
 
 def rows(sources: Iterable[type[KnowledgeSource]]) -> list[str]:
     """The table in markdown, a line an element."""
-    head = ["| knowledge source | level | wakes on | writes | what it does |", "|---|---|---|---|---|"]
+    head = ["| knowledge source | watches | needs | priority | writes |", "|---|---|---|---|---|"]
     return head + [_row(source) for source in sources]
 
 
 def _row(source: type[KnowledgeSource]) -> str:
-    what = (source.__doc__ or "").strip().split("\n\n")[0]
-    wakes = ", ".join(dict.fromkeys(watch.value_type.__name__ for watch in source.on))
+    watches = ", ".join(dict.fromkeys(watch.value_type.__name__ for watch in source.on))
+    needs = ", ".join(need.name for need in source.needs)
     writes = ", ".join(kind.__name__ for kind in source.writes if kind not in EVERYBODY_WRITES)
-    level = str(source.level) + ("" if source.closes is None else ", closes it")
+    closes = "" if source.closes is None else ", closes"
     name = source.__module__.rpartition(".")[2]
-    return f"| `{name}` | {level} | {wakes} | {writes} | {' '.join(what.split())} |"
+    return f"| `{name}` {source.level}{closes} | {watches} | {needs} | {_tell_priority(source)} | {writes} |"
+
+
+def _tell_priority(source: type[KnowledgeSource]) -> str:
+    """The name of its priority; where its own ``rate`` tells it by the case, that."""
+    if source.rate is not KnowledgeSource.rate:
+        return "by the case"
+    return source.priority.name.lower() if isinstance(source.priority, Priority) else f"{source.priority:g}"
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from blackboard.board import View
-from blackboard.change import Change
 from blackboard.effect import Effect
 from blackboard.journal import Decision
 from blackboard.knowledge_source import KnowledgeSource
@@ -30,7 +29,7 @@ DRIVES = 6
 load on the machine counts less. The first drive compiles."""
 DRIVES_ON_THE_MOVE = 2
 """Of the same mission on the move: 870 pictures each."""
-TRACK, NEW_LANDMARKS = "correlator_tracker", "correlator_tracker, new landmarks"
+TRACK, NEW_LANDMARKS = "correlator_tracker", "landmark_chooser"
 MILESTONE = ("line_finder", "matcher", "med_r_and_t", "milestone_judge")
 FLOOR = "floor_watcher"
 ON_THE_MOVE = (("motion.continuous", "true"),)
@@ -49,27 +48,17 @@ Times = dict[str, list[float]]
 
 
 def _timed(source: KnowledgeSource, times: Times) -> KnowledgeSource:
-    """A knowledge source whose acts are timed, by what triggered them."""
-    bind, act, last = source.bind, source.act, list[Change]()
-
-    def watched(view: View, trigger: Change) -> Any:
-        last[:] = [trigger]
-        return bind(view, trigger)
+    """A knowledge source whose acts are timed."""
+    act = source.act
 
     def timed(view: View, case: Any) -> Iterable[Effect]:
         began_s = time.thread_time()
         effects = tuple(act(view, case))
-        times.setdefault(_act(source.name, last[0]), []).append(1000.0 * (time.thread_time() - began_s))
+        times.setdefault(source.name, []).append(1000.0 * (time.thread_time() - began_s))
         return effects
 
-    object.__setattr__(source, "bind", watched)
     object.__setattr__(source, "act", timed)
     return source
-
-
-def _act(name: str, trigger: Change) -> str:
-    """Name an act; the tracker also takes new landmarks, when no frame is tracked."""
-    return NEW_LANDMARKS if name == TRACK and not isinstance(trigger.entry.value, CameraPicture) else name
 
 
 def run(quick: bool, seed: int) -> Report:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,14 @@ from numpy.typing import NDArray
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.camera_knowledge import compute_camera_covariance, find_camera
-from knowledge_sources.questions import find_belief, find_contact, find_robot
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.conditions import HELD, Belief
+from knowledge_sources.priority import Priority
+from knowledge_sources.questions import find_contact
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.camera import YAW
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand, PictureRequest
@@ -29,34 +33,41 @@ UNSEEN = ("command", "relocalization")
 """What a belief rests on that no way is measured from."""
 
 
-class DeadReckoner(OlderSource):
+class Case(NamedTuple):
+    """A report of the odometry, and the belief before it."""
+
+    report: Entry[MotionReport]
+    belief: Belief
+
+
+class DeadReckoner(RobotKnowledgeSource):
     """Moves the belief by the odometry's report, corrected for drift, and asks for a picture to check it.
 
     Of a motion that was broken off, the unreported rest may have been driven in part or whole: it is added to the
     covariance; and so is that the camera may look aside of where the robot heads by its picture.
     """
 
-    level = Level.ACTION
+    level, priority = Level.ACTION, Priority.ENTER
     on = (Watch(MotionReport, (Posted,)),)
+    needs = (HELD,)
     writes = (Hypothesis, Drift, Travel, PictureRequest, Discrepancy)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        belief = find_belief(view)
-        return None if belief is None or belief.value.motion == trigger.entry.id else 1.0
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """A report that the belief does not include yet."""
+        belief = HELD.of(view)
+        return None if belief.value.motion == trigger.entry.id else Case(trigger.entry, belief)
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief = find_belief(view)
-        if belief is None:
-            return
-        robot, report = find_robot(view), trigger.entry.value
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        told, held = case
+        belief, report = held.entry, told.value
+        robot, before = held.robot, held.pose
         world, actuator = robot.world, robot.actuator
-        before = belief.value.world_from_robot(world)
         known = view.latest(Drift)
         drift = Drift.unknown(actuator, before.heading_rad) if known is None else known.value
-        request = view.get(trigger.entry.because[0].id)
+        request = view.get(told.because[0].id)
         on_the_move = request is not None and isinstance(request.value, Course)
         pose, covariance = (actuator.propagate_course if on_the_move else actuator.propagate_move)(
-            before, belief.value.covariance_world(world), report.turn_rad, report.move_m, drift.curvature_per_m
+            before, held.covariance, report.turn_rad, report.move_m, drift.curvature_per_m
         )
         camera = find_camera(view)
         yaw_variance = float(compute_camera_covariance(camera, self._settings.camera_state)[YAW, YAW])
@@ -67,20 +78,19 @@ class DeadReckoner(OlderSource):
         if request is not None and fault is not None:
             missing = _compute_missing_motion(request.value, report, actuator)
             covariance = covariance + _compute_partial_covariance(pose, *missing)
-        moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=trigger.entry.id)
-        step = Revise(belief, moved, (trigger.entry, belief) if fault is None else (trigger.entry, belief, fault))
+        moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=told.id)
+        step = Revise(belief, moved, (told, belief) if fault is None else (told, belief, fault))
         yield step
         rolled = drift.after_motion(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)
-        yield Post(rolled, (trigger.entry,)) if known is None else Revise(known, rolled, (trigger.entry, known))
+        yield Post(rolled, (told,)) if known is None else Revise(known, rolled, (told, known))
         travel = view.latest(Travel)
         if travel is None or belief.value.basis in UNSEEN:
-            known_to = belief.value.covariance_world(world)
-            way = begin_travel(before, known_to, camera.mount.yaw_rad, yaw_variance)
+            way = begin_travel(before, held.covariance, camera.mount.yaw_rad, yaw_variance)
         else:
             way = travel.value
         slip_m = actuator.skitter_m * min(1.0, abs(report.turn_rad) / (math.pi / 2.0))
         way = way.after_motion(before, pose, slip_m)
-        yield Post(way, (trigger.entry,)) if travel is None else Revise(travel, way, (trigger.entry, travel))
+        yield Post(way, (told,)) if travel is None else Revise(travel, way, (told, travel))
         if not on_the_move or fault is not None:  # on the move a picture was taken
             yield Post(PictureRequest("track"), (step,))
         if request is None or fault is not None:
@@ -92,7 +102,7 @@ class DeadReckoner(OlderSource):
         if contact is not None or is_short:
             bound_px = self._settings.plan.max_deviation_px
             stopped = Discrepancy(Level.ACTION, what, math.inf, (bound_px, bound_px), "px")
-            yield Post(stopped, (trigger.entry,) if contact is None else (trigger.entry, contact))
+            yield Post(stopped, (told,) if contact is None else (told, contact))
 
 
 def _compute_aside_covariance(before: Pose2, after: Pose2, yaw_variance: float) -> NDArray[np.float64]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 import shapely
 
@@ -13,19 +13,30 @@ from blackboard.change import Change, Revised, Watch
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.methods.motion.footprints import build_polygon
+from knowledge_sources.methods.motion.footprints import build_polygon, measure_approach_m
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import active_goal, find_belief, find_robot
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import Settings
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.obstacle import Obstacle
-from world_models.entries.percepts import Tracks
+from world_models.entries.percepts import Track, Tracks
 from world_models.entries.task import Milestone, PlanSketch
 
 LEG_SLACK_M = 0.03  # an obstacle that is nearer to a leg than the least clearance by so much blocks it
 
 
-class DependencyWithdrawer(OlderSource):
+class Case(NamedTuple):
+    """A frame that was revised, and what rested on what it no longer says; ``unverified``: sketches, to be verified."""
+
+    frame: Entry[LocaleFrame]
+    milestones: tuple[Entry[Milestone], ...]
+    superseded: tuple[Entry[PlanSketch], ...]
+    unverified: tuple[Entry[PlanSketch], ...]
+    tracks: Entry[Tracks] | None
+
+
+class DependencyWithdrawer(RobotKnowledgeSource):
     """Withdraws milestones, plan sketches and tracks that rested on what a frame no longer says.
 
     A milestone that waits to be judged is withdrawn where its prediction rested on the frame; one that was verified,
@@ -34,38 +45,47 @@ class DependencyWithdrawer(OlderSource):
     obstacle blocks: it stands within the robot's radius and the least clearance of what is left of a leg.
     """
 
-    level = Level.ACTION
+    level, priority = Level.ACTION, Priority.ENTER
     on = (Watch(LocaleFrame, (Revised,)),)
     writes = (Milestone, PlanSketch, Tracks)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        return 1.0 if any(True for _ in _withdrawals(view, trigger.entry, self._settings)) else None
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """What rested on what the frame no longer says."""
+        frame: Entry[LocaleFrame] = trigger.entry
+        superseded = _find_misled(view, frame, self._settings)
+        misled = {sketch.id for sketch in superseded}
+        gone = tuple(entry for entry in view.all(Milestone) if _is_overtaken(entry, frame, misled))
+        unverified = {m.sketch for m in (entry.value for entry in gone) if m.status == "verified" and _holds(view, m)}
+        tracks = view.latest(Tracks)
+        is_lost = tracks is not None and len(_list_kept(tracks.value, frame.value)) < len(tracks.value.items)
+        left = tuple(view[id] for id in sorted(unverified - misled))
+        case = Case(frame, gone, superseded, left, tracks if is_lost else None)
+        return case if any(case[1:]) else None
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        yield from _withdrawals(view, trigger.entry, self._settings)
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        frame = case.frame
+        for milestone in case.milestones:
+            yield Revise(milestone, replace(milestone.value, status="withdrawn"), (frame,))
+        for sketch in case.superseded:
+            yield Revise(sketch, replace(sketch.value, status="superseded"), (frame,))
+        for sketch in case.unverified:
+            yield Revise(sketch, replace(sketch.value, verified=False), (frame,))
+        if case.tracks is not None:
+            tracks = case.tracks
+            yield Revise(tracks, replace(tracks.value, items=_list_kept(tracks.value, frame.value)), (frame,))
 
 
-def _withdrawals(view: View, frame: Entry[LocaleFrame], settings: Settings) -> Iterable[Effect]:
-    """What is to be withdrawn after a frame was revised."""
-    superseded = _find_misled(view, frame, settings)
-    unverified: set[str] = set()
-    for milestone in view.all(Milestone):
-        m = milestone.value
-        is_overtaken = m.is_open and (_rests_on(milestone, frame) or m.sketch in superseded)
-        if is_overtaken or (m.status == "verified" and _is_any_gone(m.landmarks, frame.value)):
-            yield Revise(milestone, replace(m, status="withdrawn"), (frame,))
-            unverified |= {m.sketch} if m.status == "verified" and _holds(view, m) else set()
-    for id in superseded:
-        sketch = view[id]
-        yield Revise(sketch, replace(sketch.value, status="superseded"), (frame,))
-    for id in sorted(unverified - set(superseded)):
-        sketch = view[id]
-        yield Revise(sketch, replace(sketch.value, verified=False), (frame,))
-    tracks = view.latest(Tracks)
-    if tracks is not None:
-        kept = tuple(track for track in tracks.value.items if not _is_any_gone((track.landmark,), frame.value))
-        if len(kept) < len(tracks.value.items):
-            yield Revise(tracks, replace(tracks.value, items=kept), (frame,))
+def _is_overtaken(entry: Entry[Milestone], frame: Entry[LocaleFrame], misled: Collection[str]) -> bool:
+    """Whether a milestone that is awaited was predicted by what is otherwise, or a verified one has lost a landmark."""
+    m = entry.value
+    if m.is_open and (_rests_on(entry, frame) or m.sketch in misled):
+        return True
+    return m.status == "verified" and _is_any_gone(m.landmarks, frame.value)
+
+
+def _list_kept(tracks: Tracks, frame: LocaleFrame) -> tuple[Track, ...]:
+    """The tracks of landmarks that a frame still has."""
+    return tuple(track for track in tracks.items if not _is_any_gone((track.landmark,), frame))
 
 
 def _rests_on(entry: Entry[Milestone], frame: Entry[LocaleFrame]) -> bool:
@@ -88,17 +108,17 @@ def _holds(view: View, milestone: Milestone) -> bool:
     return s.is_active and s.verified and s.at == milestone.index
 
 
-def _find_misled(view: View, frame: Entry[LocaleFrame], settings: Settings) -> dict[str, None]:
-    """The ids of the active sketches, all of them, where one leads through what has changed."""
+def _find_misled(view: View, frame: Entry[LocaleFrame], settings: Settings) -> tuple[Entry[PlanSketch], ...]:
+    """The active sketches, all of them, where one leads through what has changed."""
     if active_goal(view) is None:
-        return {}
+        return ()
     active = view.where(PlanSketch, lambda sketch: sketch.is_active)
     changed = _list_changed(view, frame)
     if changed:
         misled = any(_meets(view, sketch, obstacle, settings) for sketch in active for obstacle in changed)
     else:
         misled = any(_leads_there(sketch.value, frame.value) for sketch in active)
-    return dict.fromkeys(sketch.id for sketch in active) if misled else {}
+    return active if misled else ()
 
 
 def _list_changed(view: View, frame: Entry[LocaleFrame]) -> list[Obstacle]:
@@ -128,24 +148,12 @@ def _meets(view: View, sketch: Entry[PlanSketch], obstacle: Obstacle, settings: 
         if not obstacle.is_there:
             near_m = min(start.distance(footprint), end.distance(footprint))
         elif subgoal.primitive:
-            near_m = _approach_m(shapely.LineString([here if index == 0 else start, end]), footprint, reach_m)
+            near_m = measure_approach_m(shapely.LineString([here if index == 0 else start, end]), footprint, reach_m)
         else:
             near_m = end.distance(footprint)
         if near_m < reach_m:
             return True
     return False
-
-
-def _approach_m(
-    way: shapely.LineString, footprint: shapely.Polygon, reach_m: float, step_m: float = 0.05
-) -> float:
-    """How near a way comes to a footprint; where it begins nearer than ``reach_m``, not counting how it leads away."""
-    steps = max(2, math.ceil(way.length / step_m))
-    distances = [way.interpolate(step / steps, normalized=True).distance(footprint) for step in range(steps + 1)]
-    first = 0
-    while first < steps and distances[first] < reach_m and distances[first + 1] > distances[first] + 0.5 * step_m:
-        first += 1
-    return float(min(distances[first:]))
 
 
 def _leads_there(sketch: PlanSketch, frame: LocaleFrame) -> bool:

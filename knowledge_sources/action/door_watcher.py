@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
+from knowledge_sources.conditions import GOING_ON, HELD, PICTURE, SURE, UP_TO_DATE, Belief
 from knowledge_sources.doors_in_view import (
     MAX_SIGMA_M,
     MAX_SIGMA_RAD,
@@ -23,23 +25,24 @@ from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.doors.belief import update_door
 from knowledge_sources.methods.doors.leaf import describe, measure_opening, predict_opening, weigh_leaf
 from knowledge_sources.methods.features.picture import read_picture
-from knowledge_sources.questions import (
-    find_belief,
-    find_frames,
-    find_robot_in,
-    is_in_doubt,
-    is_over,
-    is_up_to_date,
-)
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.priority import Priority
+from knowledge_sources.questions import find_frames
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.body import CameraPicture
 from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.location import Hypothesis
 from world_models.entries.task import Milestone
 
 
-class DoorWatcher(OlderSource):
+class Case(NamedTuple):
+    """Doors in view, and the belief by which the newest picture shows them."""
+
+    doors: tuple[Watched, ...]
+    belief: Belief
+    frame: Entry[CameraPicture]
+
+
+class DoorWatcher(RobotKnowledgeSource):
     """Looks whether the doors in view are open or shut, and puts what it finds into the frames of both their rooms.
 
     It looks at pictures as long as the belief is trusted: at those that track landmarks, and at those by which a
@@ -48,43 +51,35 @@ class DoorWatcher(OlderSource):
     One that is believed to be shut and shows what is beyond is open again.
     """
 
-    level = Level.ACTION
+    level, priority = Level.ACTION, Priority.SEE
     on = (
         Watch(CameraPicture, (Posted,), lambda f: f.purpose == "track"),
         Watch(Milestone, (Revised,), lambda m: m.status == "verified"),
     )
+    needs = (GOING_ON, HELD, PICTURE, UP_TO_DATE, SURE)
     writes = (DoorState, LocaleFrame)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        belief, frame = find_belief(view), view.latest(CameraPicture)
-        if belief is None or frame is None or not self._is_trusted(view, belief.value):
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """Doors that the newest picture may show, and a belief that is sharp enough to look at them."""
+        belief, frame = HELD.of(view), PICTURE.of(view)
+        if belief.value.sigma_m > MAX_SIGMA_M or belief.value.sigma_rad > MAX_SIGMA_RAD:
             return None
-        return 0.8 if any(True for _ in list_doors_in_view(view, belief.value)) else None
+        doors = tuple(list_doors_in_view(view, belief.value))
+        return Case(doors, belief, frame) if doors else None
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, frame = find_belief(view), view.latest(CameraPicture)
-        if belief is None or frame is None:
-            return
-        picture = read_picture(frame.value.jpeg)
-        for watched in list(list_doors_in_view(view, belief.value)):
-            yield from self._watch(view, watched, belief, frame, picture.half)
-
-    def _is_trusted(self, view: View, belief: Hypothesis) -> bool:
-        """Whether the belief includes every motion, nothing doubts it, and it is precise enough to look at doors."""
-        if is_over(view) or is_in_doubt(view) or not is_up_to_date(view):
-            return False
-        return belief.sigma_m <= MAX_SIGMA_M and belief.sigma_rad <= MAX_SIGMA_RAD
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        picture = read_picture(case.frame.value.jpeg)
+        for watched in case.doors:
+            yield from self._watch(view, watched, case.belief, case.frame, picture.half)
 
     def _watch(
-        self, view: View, watched: Watched, belief: Entry[Hypothesis], frame: Entry[CameraPicture], image: Image
+        self, view: View, watched: Watched, held: Belief, frame: Entry[CameraPicture], image: Image
     ) -> Iterable[Effect]:
         """Weigh what a picture shows of a door, and revise what is believed of it."""
-        door, locale = watched.doorway, belief.value.locale
-        robot = find_robot_in(view, locale)
-        pose, covariance = belief.value.world_from_robot(robot.world), belief.value.covariance_world(robot.world)
+        door, belief, robot, pose = watched.doorway, held.entry, held.seeing, held.pose
         frames = find_frames(view, door.between)
         beyond = with_door_open(view, door.name, frames) if watched.is_shut else robot.world
-        opening = predict_opening(robot, pose, covariance, door, locale, beyond)
+        opening = predict_opening(robot, pose, held.covariance, door, held.locale, beyond)
         evidence = None if opening is None else measure_opening(robot, opening, image)
         if opening is None or evidence is None:
             return

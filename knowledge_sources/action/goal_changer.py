@@ -4,21 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.questions import active_goal, find_belief, find_building, open_discrepancy, open_milestone
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.conditions import GOAL, HELD, Belief
+from knowledge_sources.priority import Priority
+from knowledge_sources.questions import find_building, open_discrepancy, open_milestone
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.commands import read_destination
 from world_models.entries.location import Place
 from world_models.entries.task import Goal, Milestone
 from world_models.entries.user_reports import Redirection
 
 
-class GoalChanger(OlderSource):
+class Case(NamedTuple):
+    """What was asked last, what it overtakes, the goal that it replaces, and where the robot is."""
+
+    asked: Entry[Redirection]
+    overtaken: tuple[Entry[Redirection], ...]
+    goal: Entry[Goal]
+    belief: Belief
+
+
+class GoalChanger(RobotKnowledgeSource):
     """Abandons the goal for the one that somebody asks for, from where the robot believes to be.
 
     A milestone that waits to be judged is withdrawn; the sketcher supersedes the sketches of the old goal. A robot that
@@ -27,19 +39,19 @@ class GoalChanger(OlderSource):
     when there is one. Of what was asked meanwhile the last counts.
     """
 
-    level = Level.ACTION
+    level, priority = Level.ACTION, Priority.ENTER
     on = (Watch(Redirection, (Posted,)), Watch(Goal, (Posted,), lambda goal: goal.is_active))
+    needs = (GOAL, HELD)
     writes = (Redirection, Goal, Milestone)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        is_ready = active_goal(view) is not None and find_belief(view) is not None
-        return 1.0 if is_ready and _list_unanswered(view) else None
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """What was asked and is not answered yet."""
+        asked = view.where(Redirection, lambda redirection: not redirection.answer)
+        return Case(asked[-1], asked[:-1], GOAL.of(view), HELD.of(view)) if asked else None
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        goal, belief, building = active_goal(view), find_belief(view), find_building(view)
-        if goal is None or belief is None:
-            return
-        *overtaken, asked = _list_unanswered(view)
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        asked, overtaken, goal, belief = case
+        building = find_building(view)
         for earlier in overtaken:
             yield Revise(earlier, replace(earlier.value, answer="but was asked again since"), (earlier, asked))
         try:
@@ -57,9 +69,4 @@ class GoalChanger(OlderSource):
             yield Revise(waiting, replace(waiting.value, status="withdrawn"), (asked, waiting))
         yield Revise(goal, replace(goal.value, status="abandoned"), (asked, goal))
         here = belief.value.locale_from_robot
-        yield Post(Goal(Place(belief.value.locale, here.x_m, here.y_m), destination), (asked, goal, belief))
-
-
-def _list_unanswered(view: View) -> tuple[Entry[Redirection], ...]:
-    """What was asked and not taken up yet, in the order in which it was."""
-    return view.where(Redirection, lambda asked: not asked.answer)
+        yield Post(Goal(Place(belief.locale, here.x_m, here.y_m), destination), (asked, goal, belief.entry))

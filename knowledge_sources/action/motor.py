@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
@@ -13,47 +12,58 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.conditions import GOING_ON, HELD, SOUND, STANDING, Belief
 from knowledge_sources.floor_ahead import MIN_CREEP_M, FloorAhead
-from knowledge_sources.methods.motion.pure_pursuit import (
-    compute_bearing,
-    compute_chord_turn,
-    find_aim_point,
-    measure_progress,
-    update_leg,
+from knowledge_sources.methods.motion.increments import (
+    MAX_HEADING_ERROR_RAD,
+    MAX_LOOK_ERROR_RAD,
+    find_aim,
+    plan_increment,
+    plan_turn,
 )
+from knowledge_sources.methods.motion.pure_pursuit import update_leg
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import (
     current_leg,
     deepest_sketch,
-    find_belief,
-    find_building,
-    find_robot,
     is_in_doubt,
-    is_over,
-    is_standing,
     open_discrepancy,
-    open_fault,
     open_milestone,
     unmeasured_doubt,
 )
-from knowledge_sources.robot_knowledge_source import OlderSource
-from world_models.actuator import ActuatorModel
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import BodyFault, MotorCommand
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot_state import Drift
 from world_models.entries.task import Leg, Milestone, PlanSketch
-from world_models.frames import Pose2, wrap_angle
 
-MAX_HEADING_ERROR_RAD = math.radians(3.0)  # the motor moves when it faces its aim to within this; else it turns
-MAX_ARRIVAL_HEADING_ERROR_RAD = math.radians(0.5)  # largest error of a heading that the goal states
 MAX_START_OFFSET_M = 0.15
 """From nearer than this the robot returns to the planned line; from further off it draws a new one."""
-AIM_AT_END_M = 0.25  # with less than this to go, the motor steers at the end of the leg itself
-ARRIVAL_PART = 0.8  # part of a leg's tolerance within which it has arrived
-MAX_LOOK_ERROR_RAD = math.radians(6.0)
-"""The robot looks where the floor is to be seen when it faces there to within this."""
 
 
-class Motor(OlderSource):
+class Turn(NamedTuple):
+    """A milestone that the robot has to turn to, and by which increment it does."""
+
+    milestone: Entry[Milestone]
+    belief: Belief
+    command: MotorCommand
+
+
+class Begin(NamedTuple):
+    """A verified sketch, the first step of which is primitive: its leg is to begin."""
+
+    sketch: Entry[PlanSketch]
+    belief: Belief
+
+
+class Drive(NamedTuple):
+    """A leg under way."""
+
+    leg: Entry[Leg]
+    belief: Belief
+
+
+class Motor(RobotKnowledgeSource):
     """Commands the next increment of a leg, steered from the believed pose by pure pursuit.
 
     It begins a leg when a verified sketch has a primitive subgoal, and turns to where a milestone is to be looked for.
@@ -63,7 +73,7 @@ class Motor(OlderSource):
     It does not creep to where something may stand: there it halts the leg.
     """
 
-    level = Level.ACTION
+    level, priority = Level.ACTION, Priority.MOVE
     on = (
         Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and s.verified),
         Watch(Leg, (Posted,)),
@@ -72,67 +82,46 @@ class Motor(OlderSource):
         Watch(Discrepancy, (Revised,)),
         Watch(BodyFault, (Revised,)),
     )
+    needs = (GOING_ON, HELD, SOUND, STANDING)
     writes = (MotorCommand, Leg, Discrepancy)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        if is_over(view) or open_fault(view) is not None or not is_standing(view):
-            return None
-        milestone = open_milestone(view)
+    def bind(self, view: View, trigger: Change) -> Turn | Begin | Drive | None:
+        """A milestone to turn to, else a leg under way, else one to begin; in doubt only one that is to end it."""
+        belief, milestone = HELD.of(view), open_milestone(view)
         if is_in_doubt(view) and (milestone is None or not _ends_doubt(view, milestone)):
             return None
         if milestone is not None:
-            return 0.3 if milestone.value.status == "turning" and self._look_error(view, milestone.value) else None
-        if current_leg(view) is not None:
-            return 0.3
-        return 0.3 if _sketch_for_leg(view) is not None else None
+            if milestone.value.status != "turning":
+                return None
+            heading_rad, most_rad = milestone.value.look_heading_rad, MAX_HEADING_ERROR_RAD
+            turn = plan_turn(heading_rad, belief.pose, belief.robot.actuator, most_rad)
+            return None if turn is None else Turn(milestone, belief, turn)
+        driving, sketch = current_leg(view), _sketch_for_leg(view)
+        if driving is not None:
+            return Drive(driving[0], belief)
+        return None if sketch is None else Begin(sketch, belief)
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, milestone = find_belief(view), open_milestone(view)
-        if belief is None:
-            return
-        if milestone is not None:
-            turn = _limit_turn(self._look_error(view, milestone.value) or 0.0, find_robot(view).actuator)
-            yield Post(MotorCommand(turn, 0.0), (milestone, belief))
-            return
-        driving = current_leg(view)
-        if driving is None:
-            yield from self._begin_leg(view, belief)
-            return
-        yield from self._command_increment(view, driving[0], belief)
+    def act(self, view: View, case: Turn | Begin | Drive) -> Iterable[Effect]:
+        match case:
+            case Turn():
+                yield Post(case.command, (case.milestone, case.belief.entry))
+            case Begin():
+                yield Post(_lay_leg(case.sketch, case.belief), (case.sketch, case.belief.entry))
+            case Drive():
+                yield from self._command_increment(view, case.leg, case.belief)
 
-    def _look_error(self, view: View, milestone: Milestone) -> float | None:
-        """The turn to face a milestone's landmarks [rad]; None when the robot faces them."""
-        belief = find_belief(view)
-        if belief is None:
-            return None
-        here = belief.value.world_from_robot(find_building(view))
-        error = wrap_angle(milestone.look_heading_rad - here.heading_rad)
-        return error if abs(error) > MAX_HEADING_ERROR_RAD else None
-
-    def _begin_leg(self, view: View, belief: Entry[Hypothesis]) -> Iterable[Effect]:
-        sketch = _sketch_for_leg(view)
-        if sketch is None or sketch.value.current is None:
-            return
-        subgoal, world = sketch.value.current, find_building(view)
-        here, end = belief.value.world_from_robot(world), subgoal.destination.in_world(world)
-        planned = subgoal.origin.in_world(world)
-        start = planned if planned.distance_to(here) <= MAX_START_OFFSET_M else here
-        heading = None if subgoal.destination.heading_rad is None else end.heading_rad
-        leg = Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m, subgoal.tolerance_m, heading)
-        yield Post(leg, (sketch, belief))
-
-    def _command_increment(self, view: View, leg: Entry[Leg], belief: Entry[Hypothesis]) -> Iterable[Effect]:
-        robot, drift = find_robot(view), view.latest(Drift)
-        here = belief.value.world_from_robot(robot.world)
+    def _command_increment(self, view: View, leg: Entry[Leg], held: Belief) -> Iterable[Effect]:
+        (robot, here, belief), drift = (held.robot, held.pose, held.entry), view.latest(Drift)
         curvature_per_m = 0.0 if drift is None else drift.value.curvature_per_m
-        seen = update_leg(leg.value, here, self._aim(leg.value, here))
+        lookahead_m = self._settings.action.lookahead_m
+        seen = update_leg(leg.value, here, find_aim(leg.value, here, lookahead_m))
         told: tuple[Entry[Any], ...] = ()
-        command = self._go_on_looking(seen, here, robot.actuator)
+        command = plan_turn(seen.looking_rad, here, robot.actuator, MAX_LOOK_ERROR_RAD)
         if command is None:
             seen = replace(seen, looking_rad=None)
-            command = self._plan_increment(robot.actuator, seen, here, curvature_per_m)
+            command = plan_increment(robot.actuator, seen, here, curvature_per_m, lookahead_m)
             if command is not None and command.move_m > 0.0 and self._settings.action.keeps_to_seen_floor:
-                seen, command, told = self._keep_to_seen_floor(view, seen, belief, command)
+                seen, command, told = self._keep_to_seen_floor(view, seen, held, command)
                 if command is None:
                     yield Revise(leg, replace(seen, status="halted"), (leg, belief, *told))
                     return
@@ -146,30 +135,21 @@ class Motor(OlderSource):
         yield step
         yield Post(command, (step, belief, *(() if drift is None else (drift,)), *told))
 
-    def _go_on_looking(self, leg: Leg, here: Pose2, actuator: ActuatorModel) -> MotorCommand | None:
-        """The turn to where the floor is to be seen; None when the robot faces there, or looks for none."""
-        if leg.looking_rad is None:
-            return None
-        turn = wrap_angle(leg.looking_rad - here.heading_rad)
-        most = MAX_LOOK_ERROR_RAD
-        return MotorCommand(_limit_turn(turn, actuator), 0.0) if abs(turn) > most else None
-
     def _keep_to_seen_floor(
-        self, view: View, leg: Leg, belief: Entry[Hypothesis], command: MotorCommand
+        self, view: View, leg: Leg, belief: Belief, command: MotorCommand
     ) -> tuple[Leg, MotorCommand | None, tuple[Entry[Any], ...]]:
         """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
 
         Returns the leg, the command, and what of the floor both rest on. The command is None where something may
         stand in floor that is not seen, right before the robot.
         """
-        s, actuator = self._settings.action, find_robot(view).actuator
-        floor = FloorAhead(view, leg, belief, self._settings)
-        here = belief.value.world_from_robot(find_building(view))
+        s, actuator, here = self._settings.action, belief.robot.actuator, belief.pose
+        floor = FloorAhead(view, leg, belief.entry, self._settings)
         look = floor.choose_look()
         if look is not None:
             looking = replace(leg, looking_rad=look.heading_rad, looked_at=(
                 *leg.looked_at, (here.x_m, here.y_m, look.heading_rad)))
-            turned = self._go_on_looking(looking, here, actuator)
+            turned = plan_turn(look.heading_rad, here, actuator, MAX_LOOK_ERROR_RAD)
             if turned is not None:
                 return looking, turned, floor.because
         wanted_m = actuator.reach * command.move_m
@@ -180,40 +160,14 @@ class Motor(OlderSource):
         slowly = s.creep_speed_m_per_s if caution.creeps else None
         return leg, MotorCommand(command.turn_rad, move_m, slowly), floor.because
 
-    def _plan_increment(
-        self, actuator: ActuatorModel, leg: Leg, here: Pose2, curvature_per_m: float
-    ) -> MotorCommand | None:
-        """The next increment; None on arrival. A move is an arc whose chord points at the aim."""
-        along, left = measure_progress(leg, here)
-        within_m = leg.tolerance_m * ARRIVAL_PART
-        away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
-        if away <= within_m or (along <= 0.0 and abs(left) <= within_m):
-            return self._final_turn(leg, here, actuator)
-        turn = compute_bearing(self._aim(leg, here), here)
-        if abs(turn) > MAX_HEADING_ERROR_RAD:
-            return MotorCommand(_limit_turn(turn, actuator), 0.0)
-        distance = min(actuator.increment_m, actuator.compute_command_m(away))
-        turn = compute_chord_turn(turn, curvature_per_m, actuator.reach * distance)
-        return MotorCommand(turn if abs(turn) > MAX_ARRIVAL_HEADING_ERROR_RAD / 10 else 0.0, distance)
 
-    def _aim(self, leg: Leg, here: Pose2) -> tuple[float, float]:
-        """The point of the line to steer at [m, world]: ahead by ``lookahead_m``, near the end the end itself."""
-        along, _ = measure_progress(leg, here)
-        if along < AIM_AT_END_M:
-            return leg.x1_m, leg.y1_m
-        return find_aim_point(leg, along, self._settings.action.lookahead_m)
-
-    def _final_turn(self, leg: Leg, here: Pose2, actuator: ActuatorModel) -> MotorCommand | None:
-        if leg.heading_rad is None:
-            return None
-        turn = wrap_angle(leg.heading_rad - here.heading_rad)
-        most = MAX_ARRIVAL_HEADING_ERROR_RAD
-        return MotorCommand(_limit_turn(turn, actuator), 0.0) if abs(turn) > most else None
-
-
-def _limit_turn(turn_rad: float, actuator: ActuatorModel) -> float:
-    """One increment of a turn; a long turn is divided equally, so that landmarks stay in view."""
-    return turn_rad / max(1, math.ceil(abs(turn_rad) / actuator.turn_increment_rad))
+def _lay_leg(sketch: Entry[PlanSketch], belief: Belief) -> Leg:
+    """The leg of a sketch's current subgoal, from the planned line or from where the robot is."""
+    subgoal, here = sketch.value.subgoals[sketch.value.at], belief.pose
+    end, planned = subgoal.destination.in_world(belief.world), subgoal.origin.in_world(belief.world)
+    start = planned if planned.distance_to(here) <= MAX_START_OFFSET_M else here
+    heading = None if subgoal.destination.heading_rad is None else end.heading_rad
+    return Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m, subgoal.tolerance_m, heading)
 
 
 def _ends_doubt(view: View, milestone: Entry[Milestone]) -> bool:

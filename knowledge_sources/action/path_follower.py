@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
@@ -13,6 +13,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.conditions import HELD, SOUND, Belief
 from knowledge_sources.floor_ahead import FloorAhead
 from knowledge_sources.methods.motion.pure_pursuit import (
     compute_bearing,
@@ -21,26 +22,23 @@ from knowledge_sources.methods.motion.pure_pursuit import (
     measure_progress,
     update_leg,
 )
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import (
     current_leg,
-    find_belief,
-    find_robot,
     is_in_doubt,
     is_over,
     is_standing,
     is_up_to_date,
     open_discrepancy,
-    open_fault,
     open_milestone,
     rolling_course,
 )
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import Course
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot_state import Drift
 from world_models.entries.task import Leg, Milestone, PlanSketch
-from world_models.frames import Pose2
 
 ROLLING_LOOKAHEAD_M = 0.75  # distance ahead on the line at which the path follower steers (pure pursuit)
 MIN_ROLLING_LEG_M = 0.3  # shortest rest of a leg, beyond the stopping distance, that is driven without stopping
@@ -50,7 +48,16 @@ MAX_ROLLING_ERROR_RAD = math.radians(12.0)  # the path follower stops when its a
 MAX_CURVATURE_PER_M = 1.0  # largest curvature that is steered on the move
 
 
-class PathFollower(OlderSource):
+class Case(NamedTuple):
+    """The course that is driven, None where the robot stands; the leg, if one is under way; where the robot is."""
+
+    course: Entry[Course] | None
+    leg: Entry[Leg] | None
+    belief: Belief
+    must_stop: bool
+
+
+class PathFollower(RobotKnowledgeSource):
     """Drives a leg without stopping at each increment, and corrects the course by each picture.
 
     It stops at once when anything is in doubt, above the action level or beyond the action level's bound. It also stops
@@ -66,32 +73,45 @@ class PathFollower(OlderSource):
         Watch(Milestone, (Posted,)),
         Watch(PlanSketch, (Revised,)),
     )
+    needs = (HELD, SOUND)
     writes = (Course, Leg, Discrepancy)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        if open_fault(view) is not None:
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """A course to stop or to correct; or a leg that is long enough, where the robot stands and faces along it."""
+        belief, course, driving = HELD.of(view), rolling_course(view), current_leg(view)
+        leg = None if driving is None else driving[0]
+        if course is not None:
+            if not is_up_to_date(view):
+                return None
+            goes_on = leg is not None and not _is_hindered(view) and self._is_on_line(
+                view, leg.value, belief, MAX_ROLLING_ERROR_RAD)
+            return Case(course, leg, belief, not goes_on)
+        if leg is None or leg.value.looking_rad is not None or not belief.robot.continuous:
             return None
-        if rolling_course(view) is not None:
-            return (1.0 if self._must_stop(view) else 0.3) if is_up_to_date(view) else None
-        return 0.4 if self._may_start(view) else None
+        if _is_hindered(view) or not is_standing(view):
+            return None
+        is_ready = self._is_on_line(view, leg.value, belief, MAX_ROLLING_START_ERROR_RAD)
+        return Case(None, leg, belief, False) if is_ready else None
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        belief, course, driving = find_belief(view), rolling_course(view), current_leg(view)
-        if belief is None:
-            return
-        if course is not None and (driving is None or self._must_stop(view)):
-            reasons = () if driving is None else self._look_ahead(
-                view, driving[0].value, belief, find_robot(view).actuator)[1]
-            yield Revise(course, replace(course.value, speed_m_per_s=0.0), (course, belief, *_reasons(view), *reasons))
-        elif driving is not None:
-            yield from self._steer(view, course, driving[0], belief)
+    def rate(self, case: Case) -> float:
+        if case.must_stop:
+            return Priority.ENTER
+        return Priority.STEER if case.course is None else Priority.MOVE
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        course, leg, held, must_stop = case
+        if course is not None and must_stop:
+            reasons = () if leg is None else self._look_ahead(view, leg.value, held)[1]
+            yield Revise(course, replace(course.value, speed_m_per_s=0.0),
+                         (course, held.entry, *_reasons(view), *reasons))
+        elif leg is not None:
+            yield from self._steer(view, course, leg, held)
 
     def _steer(
-        self, view: View, course: Entry[Course] | None, leg: Entry[Leg], belief: Entry[Hypothesis]
+        self, view: View, course: Entry[Course] | None, leg: Entry[Leg], held: Belief
     ) -> Iterable[Effect]:
         """Steer an arc to the point of the line ahead, less the curvature that the wheels add."""
-        robot, drift = find_robot(view), view.latest(Drift)
-        here = belief.value.world_from_robot(robot.world)
+        (robot, here, belief), drift = (held.robot, held.pose, held.entry), view.latest(Drift)
         along, _ = measure_progress(leg.value, here)
         point = find_aim_point(leg.value, along, ROLLING_LOOKAHEAD_M)
         discrepancy = open_discrepancy(view, Level.ACTION)
@@ -102,7 +122,7 @@ class PathFollower(OlderSource):
         yield step
         wanted = compute_curvature_to(point, here) - (0.0 if drift is None else drift.value.curvature_per_m)
         curvature = min(max(wanted, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
-        free_m, reasons = self._look_ahead(view, leg.value, belief, robot.actuator)
+        free_m, reasons = self._look_ahead(view, leg.value, held)
         new = Course(leg.id, self._choose_speed(free_m, robot.actuator), curvature)
         because = (step, belief, *(() if drift is None else (drift,)), *reasons)
         yield Post(new, because) if course is None else Revise(course, new, (course, *because))
@@ -113,54 +133,26 @@ class PathFollower(OlderSource):
         fastest = math.sqrt(2.0 * actuator.brake_m_per_s2 * room_m)
         return min(actuator.speed_m_per_s, max(fastest, self._settings.action.creep_speed_m_per_s))
 
-    def _look_ahead(
-        self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel
-    ) -> tuple[float, tuple[Entry[Any], ...]]:
+    def _look_ahead(self, view: View, leg: Leg, belief: Belief) -> tuple[float, tuple[Entry[Any], ...]]:
         """How far ahead the floor is seen to be free, as far as that matters at full speed; and what tells that."""
-        most_m = actuator.stopping_distance_m() + MIN_ROLLING_LEG_M
+        most_m = belief.robot.actuator.stopping_distance_m() + MIN_ROLLING_LEG_M
         if not self._settings.action.keeps_to_seen_floor:
             return most_m, ()
-        floor = FloorAhead(view, leg, belief, self._settings)
+        floor = FloorAhead(view, leg, belief.entry, self._settings)
         return floor.measure_free_m(most_m), floor.because
 
-    def _is_floor_ahead(self, view: View, leg: Leg, belief: Entry[Hypothesis], actuator: ActuatorModel) -> bool:
-        """Whether enough floor ahead is seen to be free to roll on."""
-        free_m, _ = self._look_ahead(view, leg, belief, actuator)
-        return free_m > 2.0 * ROLLING_STOP_MARGIN_M
-
-    def _may_start(self, view: View) -> bool:
-        """Whether the robot stands before a leg that is long enough, and faces along it."""
-        belief, driving, robot = find_belief(view), current_leg(view), find_robot(view)
-        if not robot.continuous or belief is None or driving is None:
+    def _is_on_line(self, view: View, leg: Leg, belief: Belief, most_rad: float) -> bool:
+        """Whether the robot can roll along a leg, and stop before its end: it faces its aim, and the floor is free."""
+        along, _ = measure_progress(leg, belief.pose)
+        if along <= belief.robot.actuator.stopping_distance_m() + MIN_ROLLING_LEG_M:
             return False
-        if is_over(view) or not is_standing(view) or is_in_doubt(view) or open_milestone(view) is not None:
-            return False
-        here = belief.value.world_from_robot(robot.world)
-        leg = driving[0].value
-        is_long = self._is_long_enough(leg, here, robot.actuator)
-        is_ready = is_long and abs(self._aim_error(leg, here)) <= MAX_ROLLING_START_ERROR_RAD
-        return is_ready and leg.looking_rad is None and self._is_floor_ahead(view, leg, belief, robot.actuator)
+        aside_rad = compute_bearing(find_aim_point(leg, along, ROLLING_LOOKAHEAD_M), belief.pose)
+        return abs(aside_rad) <= most_rad and self._look_ahead(view, leg, belief)[0] > 2.0 * ROLLING_STOP_MARGIN_M
 
-    def _must_stop(self, view: View) -> bool:
-        belief, driving = find_belief(view), current_leg(view)
-        if belief is None or driving is None or is_over(view) or is_in_doubt(view) or open_milestone(view) is not None:
-            return True
-        robot = find_robot(view)
-        here = belief.value.world_from_robot(robot.world)
-        leg = driving[0].value
-        is_long = self._is_long_enough(leg, here, robot.actuator)
-        is_astray = not is_long or abs(self._aim_error(leg, here)) > MAX_ROLLING_ERROR_RAD
-        return is_astray or not self._is_floor_ahead(view, leg, belief, robot.actuator)
 
-    def _is_long_enough(self, leg: Leg, here: Pose2, actuator: ActuatorModel) -> bool:
-        """Whether the robot can drive and still stop before the end of the leg."""
-        least_m = actuator.stopping_distance_m() + MIN_ROLLING_LEG_M
-        return measure_progress(leg, here)[0] > least_m
-
-    def _aim_error(self, leg: Leg, here: Pose2) -> float:
-        """Angle from the robot's heading to the point that it steers at, to the left [rad]."""
-        along, _ = measure_progress(leg, here)
-        return compute_bearing(find_aim_point(leg, along, ROLLING_LOOKAHEAD_M), here)
+def _is_hindered(view: View) -> bool:
+    """Whether the mission has ended, something is in doubt, or a milestone is awaited."""
+    return is_over(view) or is_in_doubt(view) or open_milestone(view) is not None
 
 
 def _reasons(view: View) -> tuple[Entry[Discrepancy], ...]:

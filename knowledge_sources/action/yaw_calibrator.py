@@ -10,19 +10,19 @@ from typing import NamedTuple
 import numpy as np
 
 from blackboard.board import View
-from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.change import Change, Revised, Watch
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.camera_knowledge import compute_camera_covariance, find_camera, to_tuples
-from knowledge_sources.questions import find_belief, find_building, is_standing
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.camera_knowledge import compute_camera_covariance, to_tuples
+from knowledge_sources.conditions import HELD, STANDING, Belief
+from knowledge_sources.priority import Priority
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.camera import CAMERA_UNKNOWNS, YAW
 from world_models.entries.location import Hypothesis, Travel, begin_travel, turn_about_camera
 from world_models.entries.robot_state import CameraState, Drift
 from world_models.entries.task import Milestone
-from world_models.frames import Pose2, wrap_angle
+from world_models.frames import wrap_angle
 
 
 class Measured(NamedTuple):
@@ -32,7 +32,16 @@ class Measured(NamedTuple):
     variance: float
 
 
-class YawCalibrator(OlderSource):
+class Case(NamedTuple):
+    """The way that the robot came, the camera, where it is now, and what that tells of the yaw, if anything."""
+
+    travel: Entry[Travel]
+    camera: Entry[CameraState]
+    belief: Belief
+    measured: Measured | None
+
+
+class YawCalibrator(RobotKnowledgeSource):
     """Learns the camera's yaw on the robot from the direction in which the robot came from one milestone to another.
 
     No single picture can tell it from the robot's heading. Where the heading is wrong by the yaw, the robot comes to a
@@ -40,39 +49,29 @@ class YawCalibrator(OlderSource):
     own direction is what is known. A way on which something pushed or stopped the robot, or it was lost, tells nothing.
     """
 
-    level = Level.ACTION
+    level, priority = Level.ACTION, Priority.ENTER
     on = (
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),
-        Watch(Discrepancy, (Posted,), lambda d: d.level is Level.GOAL or d.magnitude == math.inf),
     )
+    needs = (HELD, STANDING)
     writes = (CameraState, Hypothesis, Drift, Travel)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        travel, belief = view.latest(Travel), find_belief(view)
-        if isinstance(trigger.entry.value, Discrepancy):
-            return None if travel is None or travel.value.is_broken else 0.95
-        if travel is None or belief is None or not is_standing(view):
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """A way that tells of the yaw more than is known, or that is spent, so that another begins."""
+        travel, camera, milestone = view.latest(Travel), view.latest(CameraState), view.latest(Milestone)
+        if travel is None or camera is None:
             return None
-        milestone = view.latest(Milestone)
-        # an inexact model bends the way more than the yaw does
-        if milestone is not None and milestone.value.displacement_modes:
+        if milestone is not None and milestone.value.displacement_modes:  # an inexact model bends the way
             return None
-        if self._is_spent(travel.value):
-            return 1.0
-        measured = self._measure(view, travel.value, belief)
-        if measured is None:
-            return None
-        known = compute_camera_covariance(find_camera(view), self._settings.camera_state)[YAW, YAW]
-        return 1.0 if measured.variance < (1.0 - self._settings.camera_state.min_learnt) * known else None
+        belief, s = HELD.of(view), self._settings.camera_state
+        measured = self._measure(camera.value, travel.value, belief)
+        known = compute_camera_covariance(camera.value, s)[YAW, YAW]
+        is_told = measured is not None and measured.variance < (1.0 - s.min_learnt) * known
+        return Case(travel, camera, belief, measured) if is_told or self._is_spent(travel.value) else None
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        travel, belief, camera = view.latest(Travel), find_belief(view), view.latest(CameraState)
-        if travel is not None and isinstance(trigger.entry.value, Discrepancy):
-            yield Revise(travel, replace(travel.value, is_broken=True), (travel, trigger.entry))
-            return
-        if travel is None or belief is None or camera is None:
-            return
-        measured, pose = self._measure(view, travel.value, belief), _find_pose(view, belief.value)
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        travel, camera, held, measured = case
+        belief, pose = held.entry, held.pose
         step_rad, way = 0.0, travel.value
         if measured is not None:
             step_rad = measured.step_rad
@@ -83,12 +82,12 @@ class YawCalibrator(OlderSource):
             step[YAW] = step_rad
             learnt = replace(camera.value.moved(step), covariance=to_tuples(covariance))
             yield Revise(camera, learnt, (travel, belief, camera))
-            yield from self._turn(view, belief, camera.value, -step_rad, pose)
+            yield from _turn(view, held, camera.value, -step_rad)
             way = way.turned(-step_rad, camera.value.mount.forward_m)
         if self._is_spent(way):
             here = turn_about_camera(pose, -step_rad, camera.value.mount.forward_m)
             variance = float(compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW])
-            way = begin_travel(here, belief.value.covariance_world(find_building(view)),
+            way = begin_travel(here, held.covariance,
                                camera.value.mount.yaw_rad + step_rad,
                                variance if measured is None else measured.variance)
         yield Revise(travel, way, (travel, belief))
@@ -99,15 +98,14 @@ class YawCalibrator(OlderSource):
         return travel.is_broken or travel.gone_m > s.max_travel_m or (
             travel.gone_m > s.min_travel_m and travel.net_m < s.min_straightness * travel.gone_m)
 
-    def _measure(self, view: View, travel: Travel, held: Entry[Hypothesis]) -> Measured | None:
+    def _measure(self, camera: CameraState, travel: Travel, belief: Belief) -> Measured | None:
         """The yaw by the whole way, from what was known when it began; None where the way tells too little.
 
         Nor does a way tell anything that ends where no likely yaw leads: something else has moved the robot.
         """
-        s, belief = self._settings.camera_state, held.value
+        s, pose = self._settings.camera_state, belief.pose
         if travel.is_broken:
             return None
-        pose = _find_pose(view, belief)
         way = travel.seen(pose.heading_rad)
         came = pose.position - travel.began.position
         net_m = way.net_m
@@ -115,31 +113,25 @@ class YawCalibrator(OlderSource):
             return None
         off_rad = wrap_angle(math.atan2(came[1], came[0]) - math.atan2(way.y_m, way.x_m))
         aside = np.array([-way.y_m, way.x_m]) / net_m
-        ends = np.array(travel.covariance)[:2, :2] + belief.covariance_world(find_building(view))[:2, :2]
+        ends = np.array(travel.covariance)[:2, :2] + belief.covariance[:2, :2]
         noise = (float(aside @ ends @ aside) + way.slip_m2) / net_m**2 + travel.covariance[2][2]
         noise += s.heading_sigma_rad**2 / net_m
         gain = travel.yaw_variance / (travel.yaw_variance + noise)
         # The heading is too large by as much as the yaw is too small: the robot came to the right of it.
-        believed = find_camera(view).mount.yaw_rad
+        believed = camera.mount.yaw_rad
         step_rad = believed - off_rad - travel.yaw_rad
         if step_rad**2 > s.max_yaw_sigmas**2 * (travel.yaw_variance + noise):
             return None
         yaw = travel.yaw_rad + gain * step_rad
         return Measured(yaw - believed, (1.0 - gain) * travel.yaw_variance)
 
-    def _turn(
-        self, view: View, belief: Entry[Hypothesis], camera: CameraState, turn_rad: float, pose: Pose2
-    ) -> Iterable[Effect]:
-        """Turn the believed heading, and the one that the drift is measured from."""
-        b, building = belief.value, find_building(view)
-        here = turn_about_camera(pose, turn_rad, camera.mount.forward_m)
-        turned = Hypothesis.of_world(building, b.locale, here, b.covariance_world(building), b.basis, motion=b.motion)
-        yield Revise(belief, turned, (belief,))
-        drift = view.latest(Drift)
-        if drift is not None:
-            yield Revise(drift, replace(drift.value, heading_rad=drift.value.heading_rad + turn_rad), (drift,))
 
-
-def _find_pose(view: View, belief: Hypothesis) -> Pose2:
-    """The believed pose [world]."""
-    return belief.world_from_robot(find_building(view))
+def _turn(view: View, belief: Belief, camera: CameraState, turn_rad: float) -> Iterable[Effect]:
+    """Turn the believed heading, and the one that the drift is measured from."""
+    b = belief.value
+    here = turn_about_camera(belief.pose, turn_rad, camera.mount.forward_m)
+    turned = Hypothesis.of_world(belief.world, b.locale, here, belief.covariance, b.basis, motion=b.motion)
+    yield Revise(belief.entry, turned, (belief.entry,))
+    drift = view.latest(Drift)
+    if drift is not None:
+        yield Revise(drift, replace(drift.value, heading_rad=drift.value.heading_rad + turn_rad), (drift,))

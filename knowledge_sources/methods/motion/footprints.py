@@ -126,3 +126,15 @@ def _find_directions(shape: shapely.Geometry, eye: Any) -> tuple[float, float, f
     middle = to.mean(axis=0)
     aside = np.arctan2(middle[0] * to[:, 1] - middle[1] * to[:, 0], to @ middle)
     return math.atan2(middle[1], middle[0]), float(aside.min()), float(aside.max())
+
+
+def measure_approach_m(
+    way: shapely.LineString, footprint: shapely.Polygon, reach_m: float, step_m: float = 0.05
+) -> float:
+    """How near a way comes to a footprint; where it begins nearer than ``reach_m``, not counting how it leads away."""
+    steps = max(2, math.ceil(way.length / step_m))
+    distances = [way.interpolate(step / steps, normalized=True).distance(footprint) for step in range(steps + 1)]
+    first = 0
+    while first < steps and distances[first] < reach_m and distances[first + 1] > distances[first] + 0.5 * step_m:
+        first += 1
+    return float(min(distances[first:]))

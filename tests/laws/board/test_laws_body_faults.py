@@ -16,7 +16,9 @@ from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
 from harvey.runner.ports import BodyPort
+from knowledge_sources.action.fault_closer import FaultCloser
 from knowledge_sources.action.fault_handler import FaultHandler
+from knowledge_sources.action.recovery_retrier import RecoveryRetrier
 from knowledge_sources.settings import DEFAULT
 from strategies import Note, Scripted
 from world_models.entries.body import (
@@ -76,14 +78,15 @@ def asking(_view: View, trigger: Change) -> Iterable[Effect]:
 
 
 def drive(requests: list[str], body: ScriptedBody) -> tuple[Scheduler, list[Any]]:
-    """The fault_handler, and somebody who asks for the next request when the one before is answered; what was told."""
+    """What handles faults, and somebody who asks for the next request when the one before is answered."""
     told: list[Any] = []
 
     def listen(decision: Decision) -> None:
         told.extend(change.entry for change in (*decision.observed, *decision.made))
 
     scheduler = Scheduler(
-        [FaultHandler(), Scripted("asker", Note, asking, writes=(MotorCommand, PictureRequest))],
+        [FaultHandler(), RecoveryRetrier(), FaultCloser(),
+         Scripted("asker", Note, asking, writes=(MotorCommand, PictureRequest))],
         ports=(BodyPort(body),), sinks=(listen,),
     )
     for request in requests:

@@ -48,8 +48,8 @@ from world_models.files.world_files import load_world
 from world_models.robot import RobotModel
 
 ACTION_PX, PLAN_PX = 6.0, DEFAULT.plan.max_deviation_px
-PERCEIVERS = {"correlator_tracker", "line_finder", "matcher", "med_r_and_t", "milestone_judge", "relocalizer",
-              "floor_watcher", "door_watcher", "shut_door_explainer"}
+PERCEIVERS = {"correlator_tracker", "landmark_chooser", "line_finder", "matcher", "med_r_and_t", "milestone_judge",
+              "relocalizer", "floor_watcher", "door_watcher", "shut_door_explainer"}
 SURE = diagonal(0.002, 0.001)
 
 

@@ -1,0 +1,43 @@
+"""Landmark chooser (§5): once the robot knows anew where it is, it follows other landmarks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from blackboard.board import View
+from blackboard.change import Change, Revised, Watch
+from blackboard.effect import Effect, Revise
+from blackboard.level import Level
+from knowledge_sources.conditions import HELD, MEASURED, NOT_LOST, PICTURE
+from knowledge_sources.followed_landmarks import Following, post_or_revise, rectify, take_new
+from knowledge_sources.priority import Priority
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries.location import Hypothesis
+from world_models.entries.percepts import Tracks
+from world_models.entries.robot_state import Drift
+
+
+class LandmarkChooser(RobotKnowledgeSource):
+    """Takes all landmarks anew after a milestone or a relocalization."""
+
+    level, priority = Level.ACTION, Priority.CORRECT
+    closes = Level.ACTION
+    on = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in ("milestone", "relocalization")),)
+    needs = (HELD, PICTURE, NOT_LOST, MEASURED)
+    writes = (Tracks, Hypothesis, Drift)
+
+    def bind(self, view: View, trigger: Change) -> Following:
+        return Following(PICTURE.of(view), HELD.of(view), view.latest(Tracks))
+
+    def act(self, view: View, case: Following) -> Iterable[Effect]:
+        frame, held, old = case
+        belief, robot = held.entry, held.seeing
+        fresh = take_new(robot, frame.id, rectify(held.robot, frame), (), (), belief.value, self._settings)
+        tracks = post_or_revise(old, fresh.tracks, (frame, belief))
+        yield tracks
+        drift = view.latest(Drift)
+        if drift is not None:
+            heading = fresh.hypothesis.world_from_robot(robot.world).heading_rad
+            yield Revise(drift, drift.value.restart(heading), (tracks,))
+        if fresh.hypothesis is not belief.value:
+            yield Revise(belief, fresh.hypothesis, (frame, belief, tracks))
