@@ -13,6 +13,7 @@ import pytest
 
 from blackboard.board import View
 from blackboard.change import Change, Watch
+from blackboard.condition import Condition
 from blackboard.effect import Effect
 from blackboard.level import Level
 from harvey.simulation.simulated_run import build_robot_model
@@ -82,7 +83,7 @@ def find_alien(source: object) -> list[object]:
     """What a knowledge source holds that is neither a plain value, nor a setting, nor code."""
     own = type(source)
     return [thing for thing in find_held(source) if thing is not source and not isinstance(
-        thing, (*PLAIN, *CODE, *CONTAINERS, Watch, own)) and not type(thing).__module__.startswith(SETTINGS)]
+        thing, (*PLAIN, *CODE, *CONTAINERS, Condition, Watch, own)) and not type(thing).__module__.startswith(SETTINGS)]
 
 
 @pytest.mark.parametrize("kind", KNOWLEDGE_SOURCES, ids=lambda kind: kind.called())

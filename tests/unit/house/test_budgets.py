@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 9_890,
-    "knowledge_sources": 19_900,
+    "knowledge_sources": 20_060,
     "sim": 5_830,
     "logs": 7_440,
     "harvey": 10_500,
