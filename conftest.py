@@ -1,8 +1,7 @@
 """Property tests try the same examples every time, so that what holds on one machine holds on the next.
 
 ``pytest --hypothesis-profile=search`` looks further: other examples at every run. What it finds is mended, and kept as
-an ``@example`` beside its law; it alone also draws constants of our modules, which hang on what was imported before.
-``mutants`` does not look for the smallest example that fails.
+an ``@example`` beside its law. ``mutants`` does not look for the smallest example that fails.
 None asks how long an example takes: the first one may compile what it calls.
 """
 
@@ -13,7 +12,6 @@ from typing import Any
 
 import pytest
 from hypothesis import Phase, settings
-from hypothesis.internal.conjecture import providers
 
 import harvey  # noqa: F401  # before numpy: it tells the libraries how to calculate
 
@@ -25,9 +23,6 @@ settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("search", derandomize=False, print_blob=True, deadline=None)
 settings.register_profile("mutants", derandomize=True, deadline=None, phases=(Phase.explicit, Phase.generate))
 settings.load_profile("same")
-
-_is_local = providers.is_local_module_file
-providers.is_local_module_file = lambda file: not settings.default.derandomize and _is_local(file)
 
 
 @pytest.fixture(scope="session")

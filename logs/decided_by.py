@@ -36,10 +36,14 @@ DIGITS = 16
 @cache
 def deciding_code() -> str:
     """The first digits of a SHA-256 of what decides; it takes some milliseconds, once a process."""
-    root, board = Path(__file__).parents[1], Path(blackboard.__file__).parents[1]
+    return read_code_in(Path(__file__).parents[1], Path(blackboard.__file__).parents[1])
+
+
+def read_code_in(root: Path, board: Path | None = None) -> str:
+    """The same of a program elsewhere, whose board may be somewhere else again. Raises OSError."""
     files = {WIRING: f"{root}/{WIRING}"}
     for package, endings in DECIDING.items():
-        files |= files_in(board if package == "blackboard" else root, package, endings)
+        files |= files_in(board if board and package == "blackboard" else root, package, endings)
     return digest_of(files)
 
 

@@ -119,7 +119,7 @@ def _suggest(name: str, sources: Sequence[str], elements: Set[str]) -> str:
     return f"{names}, or as 'CameraPicture-88 segment 12'"
 
 
-SEGMENT = re.compile(r"frame[- ](\d{1,9})[ ,-]+segment[- ](\d{1,9})", re.IGNORECASE | re.ASCII)
+SEGMENT = re.compile(r"camerapicture[- ](\d{1,9})[ ,-]+segment[- ](\d{1,9})", re.IGNORECASE | re.ASCII)
 MAX_LISTED = 12
 """So many frames are listed."""
 

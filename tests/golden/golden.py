@@ -25,15 +25,7 @@ import harvey
 FINGERPRINTS = Path(__file__).parent / "fingerprints.json"
 DIGITS = 6
 
-RENAMED: dict[str, str] = {
-    "PictureRequest": "Look", "CameraPicture": "Frame", "UserReport": "Told",
-    "discrepancy_raiser": "escalator", "dependency_withdrawer": "withdrawer", "shut_door_explainer": "door_doubter",
-    "goal_changer": "redirector", "alias_monitor": "twin_watcher",
-    "face_colors": "looks", "lookout_count": "looks", "looked_at": "looks", "log_odds_so_far": "told",
-    "displacement_modes": "modes", "displacements": "shifts",
-    "recovery_retrier": "fault_handler", "fault_closer": "fault_handler", "floor_changer": "elevator_rider",
-    "travel_breaker": "yaw_calibrator", "landmark_chooser": "correlator_tracker",
-}
+RENAMED: dict[str, str] = {}
 """New name of a kind, field, knowledge source or value: the name that it had when the fingerprints were made."""
 
 LEFT_OUT: frozenset[str] = frozenset()

@@ -12,13 +12,13 @@ from seams import check_command
 from world_models import plugins
 
 MODULE = '''
-from harvey.commands.command import Command
+from harvey.commands.command import CliCommand
 
 def say(args):
     print("hello", args.name)
     return 1
 
-HELLO = Command("hello", "say hello", (("harvey hello you", "to you"),), lambda p: p.add_argument("name"), say)
+HELLO = CliCommand("hello", "say hello", (("harvey hello you", "to you"),), lambda p: p.add_argument("name"), say)
 '''
 META = "Metadata-Version: 2.1\nName: harvey-hello\nVersion: 0.1\n"
 
