@@ -297,7 +297,7 @@ def registry_of(
 def _rate(source: KnowledgeSource, view: View, trigger: Change) -> float | None:
     try:
         case = source.find_case(view, trigger)
-        return None if case is None else source.rate(case)
+        return None if case is None else float(source.rate(case))  # a member of an enum is written as its name
     except MissingEntryError:
         return MISSING_RATING
 

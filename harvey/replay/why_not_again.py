@@ -157,7 +157,8 @@ def _ask_rating(source: KnowledgeSource, board: Blackboard, change: Change) -> I
                f" it {sentence(missing.request)}.")
         return
     if case is not None:
-        yield f"{ref} woke the {name}; asked again, it says that it could have acted, rated {source.rate(case):.2f}."
+        rating = float(source.rate(case))
+        yield f"{ref} woke the {name}; asked again, it says that it could have acted, rated {rating:.2f}."
         return
     yield f"{ref} woke the {name}, but it could not act. What it asked of the board, and found:"
     yield from (f"  {question}: {', '.join(dict.fromkeys(answers)) or 'nothing'}" for question, answers in view.asked)

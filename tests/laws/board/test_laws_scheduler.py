@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from enum import Enum
 from itertools import pairwise
 from typing import Any
 
@@ -68,6 +69,17 @@ def test_a_cycle_goes_in_order() -> None:
     decision = scheduler.step()
     assert decision.chosen.source is source
     assert heard == ["rate", "rate", "act", "sink", ("port", "Tally-2")]
+
+
+class Urgency(float, Enum):
+    HIGH = 0.9
+
+
+def test_a_rating_is_a_plain_number_whatever_scale_it_is_named_on() -> None:
+    scheduler = Scheduler([Scripted("first", Note, post_tally, rate=lambda _v, _t: Urgency.HIGH)])
+    post(scheduler, Note("a"))
+    decision = scheduler.step()
+    assert type(decision.chosen.rating) is float and f"{decision.chosen.rating:.1f}" == "0.9"
 
 
 def test_changes_made_now_wait_a_cycle() -> None:
