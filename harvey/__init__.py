@@ -7,7 +7,7 @@ The Python interface. Everything below is loaded when it is first used:
 - poses from matched lines: :func:`med_r_and_t`, :func:`trunc_r_and_t`, :func:`r_and_t_ml`, :func:`planar_from_lines`
   (``knowledge_sources.methods.pose`` says which to use when), :class:`Camera`, :class:`Pose`, :class:`Pose2`
 - the blackboard by itself: :class:`Scheduler`, :class:`KnowledgeSource`, :class:`Watch`, :class:`Posted`,
-  :class:`Revised`, :class:`Retracted`, :class:`Post`, :class:`Revise`, :class:`Retract`, :class:`View`,
+  :class:`Revised`, :class:`Retracted`, :class:`Post`, :class:`Revise`, :class:`Retract`, :class:`View`, :class:`Entry`,
   :class:`Change`, :class:`Decision`, :class:`Effect`, :class:`Level`, and the marks :func:`request`,
   :func:`observation`, :func:`inference`
 - errors: :class:`BadInput`
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from blackboard.board import View
     from blackboard.change import Change, Posted, Retracted, Revised, Watch
     from blackboard.effect import Effect, Post, Retract, Revise
+    from blackboard.entry import Entry
     from blackboard.journal import Decision
     from blackboard.kinds import inference, observation, request
     from blackboard.knowledge_source import KnowledgeSource
@@ -59,6 +60,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "blackboard.board": ("View",),
     "blackboard.change": ("Change", "Posted", "Retracted", "Revised", "Watch"),
     "blackboard.effect": ("Effect", "Post", "Retract", "Revise"),
+    "blackboard.entry": ("Entry",),
     "blackboard.journal": ("Decision",),
     "blackboard.kinds": ("inference", "observation", "request"),
     "blackboard.knowledge_source": ("KnowledgeSource",),
@@ -78,11 +80,11 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
 _MODULE_OF: Mapping[str, str] = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
-    "BadInput", "Camera", "CameraMount", "Change", "Decision", "Effect", "KnowledgeSource", "Level", "MissionResult",
-    "PlanarEstimate", "Pose", "Pose2", "PoseEstimate", "Post", "Posted", "RecordedRun", "Retract", "Retracted",
-    "Revise", "Revised", "RunPicture", "Scheduler", "TrackPoint", "View", "Watch", "World", "build_world", "inference",
-    "load_scenario", "load_world", "med_r_and_t", "observation", "open_run", "planar_from_lines", "r_and_t_ml",
-    "request", "run", "trunc_r_and_t",
+    "BadInput", "Camera", "CameraMount", "Change", "Decision", "Effect", "Entry", "KnowledgeSource", "Level",
+    "MissionResult", "PlanarEstimate", "Pose", "Pose2", "PoseEstimate", "Post", "Posted", "RecordedRun", "Retract",
+    "Retracted", "Revise", "Revised", "RunPicture", "Scheduler", "TrackPoint", "View", "Watch", "World",
+    "build_world", "inference", "load_scenario", "load_world", "med_r_and_t", "observation", "open_run",
+    "planar_from_lines", "r_and_t_ml", "request", "run", "trunc_r_and_t",
 ]
 
 
