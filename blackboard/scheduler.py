@@ -240,7 +240,7 @@ class Scheduler:
     def _reasoned(self, chosen: Activation, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
         """Effects that name no reasons rest on all that the act read: it is pure, so it is watched doing it again."""
         view = TracedView(self.board, None)
-        case = chosen.source.bind(view, chosen.trigger)
+        case = chosen.source.find_case(view, chosen.trigger)
         tuple(chosen.source.act(view, case))
         trigger = chosen.trigger.entry.ref
         read = (trigger, *sorted(view.used - {trigger}, key=_by_number))

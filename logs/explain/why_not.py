@@ -21,7 +21,7 @@ from world_models import words
 from world_models.words import count
 
 LEVELS = ("action", "plan", "goal")
-REVISED = re.compile(r"newer trigger|is now|no longer held")
+REVISED = re.compile(r"is now|no longer held")
 """Reasons that only say that the same entry has changed again."""
 SHOWN = 12
 """So many occasions are told."""
