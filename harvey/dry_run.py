@@ -25,7 +25,12 @@ from knowledge_sources.methods.verification.color_check import predict_color_che
 from knowledge_sources.methods.verification.line_check import check_lines, compute_view_quality, predict_lines
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, compute_evidence
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from knowledge_sources.plan.milestone_selector import CHECK_TOLERANCE_M, MAX_SIGMA_PART, MAX_SIGMA_RAD, MIN_LINES
+from knowledge_sources.methods.verification.view_quality import (
+    CHECK_TOLERANCE_M,
+    MAX_SIGMA_PART,
+    MAX_SIGMA_RAD,
+    MIN_LINES,
+)
 from knowledge_sources.questions import find_belief, find_robot
 from knowledge_sources.settings import DEFAULT, Settings, VerificationSettings
 from world_models.building.world import World
@@ -39,8 +44,9 @@ ALIAS_MIN_COVERAGE = 0.8  # part of the lines that another place must show to lo
 ALIAS_MIN_COLORS = 0.8  # part of the colors that another place must show to look like a milestone
 MAX_COLOR_DIFFERENCE = 0.08  # largest difference of two colors, 0..1, that are the same
 
-PLANNING_SOURCES = ("interpreter", "sketcher", "milestone_selector", "motor", "dead_reckoner", "elevator_rider",
-                    "floor_changer", "mission_monitor")
+PLANNING_SOURCES = ("interpreter", "goal_sketcher", "refiner", "view_chooser", "view_predictor", "milestone_passer",
+                    "sketch_advancer", "goal_closer", "motor", "dead_reckoner", "elevator_rider", "floor_changer",
+                    "mission_monitor")
 MAX_CYCLES = 20_000
 FIX_SIGMA_M, FIX_SIGMA_RAD = 0.003, 0.001
 """Standard deviations of the pose after a milestone is verified in the dry run [m, rad]."""

@@ -33,21 +33,35 @@ from knowledge_sources.action.range_watcher import RangeWatcher
 from knowledge_sources.action.recovery_retrier import RecoveryRetrier
 from knowledge_sources.action.travel_breaker import TravelBreaker
 from knowledge_sources.action.yaw_calibrator import YawCalibrator
+from knowledge_sources.goal.goal_closer import GoalCloser
+from knowledge_sources.goal.goal_renewer import GoalRenewer
 from knowledge_sources.goal.interpreter import Interpreter
+from knowledge_sources.goal.localizer import Localizer
 from knowledge_sources.goal.mission_monitor import MissionMonitor
-from knowledge_sources.goal.relocalizer import Relocalizer
+from knowledge_sources.goal.panorama_builder import PanoramaBuilder
+from knowledge_sources.goal.pose_adopter import PoseAdopter
+from knowledge_sources.goal.probe_photographer import ProbePhotographer
+from knowledge_sources.goal.prober import Prober
 from knowledge_sources.plan.alias_monitor import AliasMonitor
+from knowledge_sources.plan.belief_checker import BeliefChecker
 from knowledge_sources.plan.camera_calibrator import CameraCalibrator
+from knowledge_sources.plan.detour_finder import DetourFinder
 from knowledge_sources.plan.discrepancy_raiser import DiscrepancyRaiser
+from knowledge_sources.plan.goal_sketcher import GoalSketcher
 from knowledge_sources.plan.line_finder import LineFinder
+from knowledge_sources.plan.lookout_planner import LookoutPlanner
 from knowledge_sources.plan.matcher import Matcher
 from knowledge_sources.plan.med_r_and_t import MedRAndT
 from knowledge_sources.plan.milestone_judge import MilestoneJudge
-from knowledge_sources.plan.milestone_selector import MilestoneSelector
+from knowledge_sources.plan.milestone_passer import MilestonePasser
 from knowledge_sources.plan.obstruction_finder import ObstructionFinder
 from knowledge_sources.plan.plan_adjuster import PlanAdjuster
+from knowledge_sources.plan.refiner import Refiner
 from knowledge_sources.plan.shut_door_explainer import ShutDoorExplainer
-from knowledge_sources.plan.sketcher import Sketcher
+from knowledge_sources.plan.sketch_advancer import SketchAdvancer
+from knowledge_sources.plan.view_chooser import ViewChooser
+from knowledge_sources.plan.view_predictor import ViewPredictor
+from knowledge_sources.plan.view_updater import ViewUpdater
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries.entry_kinds import KINDS
@@ -56,8 +70,16 @@ from world_models.plugins import SOURCES_GROUP, PluginError, load_plugin_classes
 
 KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     Interpreter,
-    Sketcher,
-    MilestoneSelector,
+    GoalSketcher,
+    Refiner,
+    MilestonePasser,
+    SketchAdvancer,
+    DetourFinder,
+    LookoutPlanner,
+    ViewChooser,
+    BeliefChecker,
+    ViewPredictor,
+    ViewUpdater,
     Motor,
     PathFollower,
     ElevatorRider,
@@ -75,7 +97,12 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     TravelBreaker,
     PlanAdjuster,
     DiscrepancyRaiser,
-    Relocalizer,
+    ProbePhotographer,
+    PanoramaBuilder,
+    Localizer,
+    Prober,
+    PoseAdopter,
+    GoalRenewer,
     AliasMonitor,
     FaultHandler,
     RecoveryRetrier,
@@ -88,6 +115,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     DoorWatcher,
     ShutDoorExplainer,
     DependencyWithdrawer,
+    GoalCloser,
     MissionMonitor,
 )
 """Every knowledge source. The order does not matter: control comes from triggers, ratings and levels."""

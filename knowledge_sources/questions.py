@@ -17,7 +17,7 @@ from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Contact, Obstruction
 from world_models.entries.percepts import Tracks
 from world_models.entries.robot_state import CameraState, Footprint, Wheels
-from world_models.entries.task import Goal, Leg, Milestone, Outcome, PlanSketch
+from world_models.entries.task import Goal, Impasse, Leg, Milestone, Outcome, PlanSketch
 from world_models.frame_building import FrameBuilding
 from world_models.robot import RobotModel
 
@@ -179,5 +179,10 @@ def open_fault(view: View) -> Entry[BodyFault] | None:
 
 
 def is_over(view: View) -> bool:
-    """Whether the mission has ended."""
-    return view.latest(Outcome) is not None
+    """Whether the mission has ended, or does unless somebody sees a way on."""
+    return view.latest(Outcome) is not None or open_impasse(view) is not None
+
+
+def open_impasse(view: View) -> Entry[Impasse] | None:
+    """What ends the mission unless somebody sees a way on."""
+    return view.latest(Impasse, lambda impasse: impasse.is_open)

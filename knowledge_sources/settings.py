@@ -399,7 +399,7 @@ class PlanSettings:
     max_deviation_px: float = setting(
         30.0, "px", "Bound of the plan level: how far the matcher looks for what is expected.", "§6.1.4")
 
-    # Sketcher
+    # Sketchers
     clearances_m: tuple[float, ...] = setting(
         (0.12, 0.06, 0.03), "m", "Margins round the robot's disc, tried in this order; the last must always be kept.")
     overhang_m: float = setting(

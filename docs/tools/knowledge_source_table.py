@@ -1,4 +1,4 @@
-"""The table of knowledge sources in ARCHITECTURE.md, made from the classes.
+"""The table of docs/knowledge-sources.md, made from the classes.
 
 ``python -m docs.tools.knowledge_source_table`` prints it.
 """

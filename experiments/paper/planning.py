@@ -1,7 +1,7 @@
 """Planning time of Figure 17's mission: its sketches with all milestones (§7: about 5 minutes, 21 milestones).
 
 The mission is a dry run, as in ``harvey run --check``: every milestone is verified at once, and the wheels do exactly
-what is asked. Timed are the decisions of interpreter, sketcher and milestone selector.
+what is asked. Timed are the decisions of interpreter, sketchers, view chooser and predictor.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from world_models.files.world_files import load_world
 PAPER_MS = 5 * 60 * 1000.0
 MAX_MS = 100.0
 REPETITIONS, QUICK_REPETITIONS = 40, 10
-PLANNERS = ("interpreter", "sketcher", "milestone_selector")
+PLANNERS = ("interpreter", "goal_sketcher", "refiner", "milestone_passer", "sketch_advancer", "view_chooser",
+            "view_predictor")
 
 
 class Clock:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.generated.floors import Floor, generated_floor
-from knowledge_sources.plan.milestone_selector import choose_heading, predict_milestone
+from knowledge_sources.methods.verification.view_quality import choose_heading, predict_milestone
 from knowledge_sources.settings import DEFAULT
 from sim.body.simulated_building import SimulatedBuilding
 from sim.render.sensor import Occluder, SensorParameters, compress_jpeg, expose

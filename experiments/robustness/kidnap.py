@@ -1,9 +1,9 @@
 """1,000 kidnaps to anywhere on floors of forty rooms: does the robot find where it is?
 
-Each time it stands at a random pose and believes to be at another. Line finder, dead reckoner, relocalizer and mission
-monitor share a board with a simulated body; the goal level is in doubt, and they act until it is not, or until they
-give up. In addition there are corridors that look the same from both ends, where the only right answer is that the
-place is ambiguous.
+Each time it stands at a random pose and believes to be at another. Line finder, dead reckoner, the sources of a lost
+robot and mission monitor share a board with a simulated body; the goal level is in doubt, and they act until it is
+not, or until they give up. In addition there are corridors that look the same from both ends, where the only right
+answer is that the place is ambiguous.
 """
 
 from __future__ import annotations
@@ -30,8 +30,13 @@ from harvey.runner.ports import BodyPort
 from harvey.runner.run import run_to_outcome
 from harvey.runner.world_port import build_scheduler
 from knowledge_sources.action.dead_reckoner import DeadReckoner
+from knowledge_sources.goal.goal_renewer import GoalRenewer
+from knowledge_sources.goal.localizer import Localizer
 from knowledge_sources.goal.mission_monitor import MissionMonitor
-from knowledge_sources.goal.relocalizer import Relocalizer
+from knowledge_sources.goal.panorama_builder import PanoramaBuilder
+from knowledge_sources.goal.pose_adopter import PoseAdopter
+from knowledge_sources.goal.probe_photographer import ProbePhotographer
+from knowledge_sources.goal.prober import Prober
 from knowledge_sources.methods.localization.pose_candidates import get_visibility_map
 from knowledge_sources.methods.motion.routes import compute_free_space
 from knowledge_sources.plan.line_finder import LineFinder
@@ -176,7 +181,8 @@ class _TimedBody(FaultyBody):
 
 def _build_lost_agent(scene: Scene, body: FaultyBody, belief: Place) -> Scheduler:
     """Build a scheduler whose goal level is in doubt."""
-    sources = (LineFinder(DEFAULT), DeadReckoner(DEFAULT), Relocalizer(DEFAULT), MissionMonitor(DEFAULT))
+    finders = (ProbePhotographer, PanoramaBuilder, Localizer, Prober, PoseAdopter, GoalRenewer)
+    sources = [source(DEFAULT) for source in (LineFinder, DeadReckoner, *finders, MissionMonitor)]
     scheduler = build_scheduler(sources, scene.floor.world, scene.robot, ports=(BodyPort(body),), servoing=Servoing(),
                                 kinds=KINDS)
     held = Hypothesis(belief.locale, Pose2(belief.x_m, belief.y_m, belief.heading_rad or 0.0), diagonal(0.05, 0.02),

@@ -145,7 +145,7 @@ WHY = CliCommand(
         ("harvey why runs/lab-to-allens-office-0 allens-office/desk", "who expected it, from which frame and line"),
         ("harvey why runs/lab-to-allens-office-0 --at 88", "what cycle 88 did, and why"),
         ("harvey why runs/lab-to-allens-office-0 --milestone 'M1 of hallway'", "what was expected, seen and judged"),
-        ("harvey why runs/lab-to-allens-office-0 --not relocalizer --at 88", "why a knowledge source did not act then"),
+        ("harvey why runs/lab-to-allens-office-0 --not prober --at 88", "why a knowledge source did not act then"),
         ("harvey why runs/lab-to-allens-office-0 --not Hypothesis-1.20", "what came of an entry, and what instead"),
         ("harvey why runs/hallway-kidnap-0 'when was it lost?'", "where and why too, and how it was found"),
         ("harvey why runs/hallway-kidnap-0 'where did it touch anything?'", "what it felt, and what the simulator saw"),

@@ -134,7 +134,7 @@ class RunCounts:
                 self.probes += value.purpose == PROBE and isinstance(change, Posted)
             elif isinstance(value, PlanSketch):
                 self.sketches += revision == 0
-                self.replans += value.adjustments > 0 and value.verified and change.entry.author == "sketcher"
+                self.replans += value.adjustments > 0 and value.verified and change.entry.author == "milestone_passer"
             elif isinstance(value, Goal):
                 self.replans += value.status == "abandoned"
             elif isinstance(value, Hypothesis) and value.is_held:

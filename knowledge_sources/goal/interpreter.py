@@ -14,7 +14,7 @@ from knowledge_sources.questions import find_building
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.commands import read_places
 from world_models.entries.location import Hypothesis, Place
-from world_models.entries.task import Command, Goal, Outcome
+from world_models.entries.task import Command, Goal, Impasse
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 
@@ -28,7 +28,7 @@ class Interpreter(RobotKnowledgeSource):
 
     level = Level.GOAL
     on = (Watch(Command, (Posted,)),)
-    writes = (Goal, Hypothesis, Outcome)
+    writes = (Goal, Hypothesis, Impasse)
 
     def bind(self, view: View, trigger: Change) -> Entry[Command]:
         return trigger.entry
@@ -38,7 +38,7 @@ class Interpreter(RobotKnowledgeSource):
         try:
             origin, destination = _read_places(find_building(view), command)
         except ValueError as error:
-            yield Post(Outcome("failed", f"the command was not understood: {error}"), (case,))
+            yield Post(Impasse("failed", f"the command was not understood: {error}"), (case,))
             return
         pose = Pose2(origin.x_m, origin.y_m, command.start_heading_rad)
         yield Post(Hypothesis(origin.locale, pose, command.start_covariance, "command"), (case,))

@@ -3,48 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Quiescence, Revised, Watch
 from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.questions import is_over, open_discrepancy, open_milestone
-from knowledge_sources.robot_knowledge_source import OlderSource
+from knowledge_sources.priority import Priority
+from knowledge_sources.questions import open_discrepancy, open_impasse, open_milestone
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis, Place
-from world_models.entries.task import Goal, Outcome
+from world_models.entries.task import Goal, Impasse, Outcome
 
 
-class MissionMonitor(OlderSource):
-    """Declares ``reached`` when the goal is, and ``lost`` or ``failed`` when nothing is left to do before that."""
+class Case(NamedTuple):
+    """How the mission ends, and by what."""
 
-    level = Level.GOAL
+    outcome: Outcome
+    because: tuple[Entry[Any], ...]
+
+
+class MissionMonitor(RobotKnowledgeSource):
+    """Declares how the mission ends: the goal is reached, somebody sees no way on, or nothing is left to do."""
+
+    level, priority = Level.GOAL, Priority.ENTER
     on = (
         Watch(Goal, (Revised,), lambda goal: goal.status == "reached"),
+        Watch(Impasse, (Posted,), lambda impasse: impasse.is_open),
         Watch(Quiescence, (Posted,)),
     )
     writes = (Outcome,)
 
-    def judge(self, view: View, trigger: Change) -> float | None:
-        return None if is_over(view) else 1.0
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        if view.latest(Outcome) is not None:
+            return None
+        reached, impasse = view.latest(Goal, lambda goal: goal.status == "reached"), open_impasse(view)
+        if reached is not None:
+            why = f"every milestone on the way to {reached.value.destination} was verified"
+            return Case(Outcome("reached", why), (reached,))
+        if impasse is not None:
+            return Case(Outcome(impasse.value.kind, impasse.value.reason), (impasse,))
+        return _find_what_is_left(view, trigger.entry)
 
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        if isinstance(trigger.entry.value, Goal):
-            reason = f"every milestone on the way to {trigger.entry.value.destination} was verified"
-            yield Post(Outcome("reached", reason), (trigger.entry,))
-            return
-        lost = open_discrepancy(view, Level.GOAL)
-        if lost is not None:
-            perhaps = view.where(Hypothesis, lambda h: h.status == "candidate")
-            reason = f"{lost.value.what}, {_describe_places(perhaps)}"
-            yield Post(Outcome("lost", reason), (trigger.entry, lost, *perhaps))
-            return
-        waiting, goal = open_milestone(view), view.latest(Goal)
-        what = "nobody had anything left to do"
-        if waiting is not None:
-            what = f"nobody answered for {waiting.id} ({waiting.value.what})"
-        unmet = tuple(entry for entry in (waiting, goal) if entry is not None)
-        yield Post(Outcome("failed", what), (trigger.entry, *unmet))
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        yield Post(case.outcome, case.because)
+
+
+def _find_what_is_left(view: View, still: Entry[Quiescence]) -> Case:
+    """How a mission ends in which nothing is left to do."""
+    lost = open_discrepancy(view, Level.GOAL)
+    if lost is not None:
+        perhaps = view.where(Hypothesis, lambda h: h.status == "candidate")
+        return Case(Outcome("lost", f"{lost.value.what}, {_describe_places(perhaps)}"), (still, lost, *perhaps))
+    waiting, goal = open_milestone(view), view.latest(Goal)
+    what = "nobody had anything left to do"
+    if waiting is not None:
+        what = f"nobody answered for {waiting.id} ({waiting.value.what})"
+    return Case(Outcome("failed", what), (still, *(entry for entry in (waiting, goal) if entry is not None)))
 
 
 def _describe_places(perhaps: Sequence[Entry[Hypothesis]]) -> str:

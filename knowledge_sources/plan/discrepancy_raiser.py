@@ -14,17 +14,17 @@ from blackboard.servoing import Discrepancy, last_escalated
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import deepest_sketch, is_over
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.task import Outcome, PlanSketch
+from world_models.entries.task import Impasse, PlanSketch
 
 GIVEN_UP: Mapping[Level, tuple[str, str]] = {
     Level.PLAN: ("blocked", "on the way to one place it was not as expected {times} times, the last one:"),
     Level.GOAL: ("lost", "lost {times} times, the last one:"),
 }
-"""The outcome when a level was asked too often, and its reason."""
+"""How the mission ends when a level was asked too often, and its reason."""
 
 
 class DiscrepancyRaiser(RobotKnowledgeSource):
-    """Closes a discrepancy beyond its bound and posts it one level up; after too many, it ends the mission.
+    """Closes a discrepancy beyond its bound and posts it one level up; after too many, it sees no way on.
 
     The level above measures it by its own means. As each level is asked only so often, the same failure is not answered
     in the same way for ever.
@@ -32,7 +32,7 @@ class DiscrepancyRaiser(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.ENTER
     on = (Watch(Discrepancy, where=lambda d: d.exceeds),)
-    writes = (Discrepancy, Outcome)
+    writes = (Discrepancy, Impasse)
 
     def bind(self, view: View, trigger: Change) -> Entry[Discrepancy]:
         return trigger.entry
@@ -50,7 +50,7 @@ class DiscrepancyRaiser(RobotKnowledgeSource):
         most = s.max_checks_per_subgoal if raised.level is Level.PLAN else s.max_lost_per_mission
         if times >= most and not is_over(view):
             kind, why = GIVEN_UP[raised.level]
-            yield Post(Outcome(kind, f"{why.format(times=times)} {closed.what}"), (close,))
+            yield Post(Impasse(kind, f"{why.format(times=times)} {closed.what}"), (close,))
 
 
 def _describe_attempt(sketch: Entry[PlanSketch] | None) -> str:

@@ -30,7 +30,7 @@ class ObstructionFinder(RobotKnowledgeSource):
     """Finds what is at the same place in pictures taken in several directions: it is before the camera.
 
     It acts when a milestone was not testable or the belief is in doubt, before the new picture is judged. While the
-    robot is lost, the relocalizer does the same with its own pictures.
+    robot is lost, the panorama builder does the same with its own pictures.
     """
 
     level, priority = Level.PLAN, Priority.REVISE

@@ -23,15 +23,16 @@ from knowledge_sources.doors_in_view import (
 )
 from knowledge_sources.methods.doors.belief import (
     MAX_LOG_ODDS,
+    MIN_FEW_LINES,
     MIN_LOG_RATIO,
     PRIOR_LOG_ODDS,
     SHUT_LOG_ODDS,
-    Explanation,
     explain_picture,
+    is_explained,
+    is_near,
 )
 from knowledge_sources.methods.doors.leaf import describe, measure_opening, predict_opening, weigh_leaf
 from knowledge_sources.methods.features.picture import read_picture
-from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import (
     find_belief,
@@ -48,15 +49,10 @@ from world_models.entries.door_state import DoorPicture, DoorState
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Segments
 from world_models.entries.task import Milestone
-from world_models.frames import Pose2, wrap_angle
 
 MAX_DOUBTED_SIGMA_M = 0.3  # largest standard deviation of the place at which a shut door may explain a picture
 MAX_DOUBTED_SIGMA_RAD = 0.07  # largest standard deviation of the believed heading at which it may
-MAX_DOUBTED_SIGMAS = 3.0  # standard deviations of the belief within which the explained pose must be
-MIN_EXPLAINED_BETTER = 10.0  # least ratio by which the pose is likelier to be wrong with the door open
 REFUTED_LOG_RATIO = 4.6  # what a milestone that is refuted at a trusted place adds for a door that explains it
-MIN_FEW_LINES = 3  # fewest lines by which a frame is told, where they are too few to tell the place by
-MIN_FEW_SHARE = 0.6  # least share of these that must be there
 MIN_SURE_FRAME_SHARE = 0.8  # where there are fewer, least share of the opening's frame that has the model's color
 
 
@@ -117,13 +113,13 @@ class ShutDoorExplainer(RobotKnowledgeSource):
         robot, frames = find_robot_in(view, locale), find_frames(view, door.between)
         before, covariance = belief.value.world_from_robot(robot.world), belief.value.covariance_world(robot.world)
         as_shut = robot.in_building(with_door_shut(view, door.name, frames))
-        held = [explain_picture(r, before, covariance, segments.value.segments_px, frame.value.jpeg, self._settings)
-                for r in (as_shut, robot)]
-        shut, opened = held
-        if shut is None or not self._is_explained(shut, opened, belief.value):
+        looked = before, covariance, segments.value.segments_px, frame.value.jpeg
+        shut, opened = (explain_picture(r, *looked, self._settings) for r in (as_shut, robot))
+        is_sure = belief.value.sigma_m <= MAX_SIGMA_M and belief.value.sigma_rad <= MAX_SIGMA_RAD
+        if shut is None or not is_explained(shut, opened, is_sure=is_sure):
             return None
         pose = shut.pose
-        if not _is_near(before, pose, belief.value, MAX_DOUBTED_SIGMAS):
+        if not is_near(before, pose, belief.value):
             return None
         opening = predict_opening(robot, pose, shut.covariance, door, locale, robot.world)
         evidence = None if opening is None else measure_opening(robot, opening, read_picture(frame.value.jpeg).half)
@@ -147,28 +143,8 @@ class ShutDoorExplainer(RobotKnowledgeSource):
         because = (frame, milestone, belief, segments)
         return Post(now, because) if known is None else Revise(known, now, (*because, known))
 
-    def _is_explained(self, shut: Explanation, opened: Explanation | None, belief: Hypothesis) -> bool:
-        """Whether a picture tells the place with the door shut, and does not with it open.
-
-        Where too few lines are in view to tell the place by, the belief must be sure, and these lines be there; of
-        none, or next to none, the frame of the opening must do.
-        """
-        if not shut.is_solved:
-            is_sure = belief.sigma_m <= MAX_SIGMA_M and belief.sigma_rad <= MAX_SIGMA_RAD
-            are_there = shut.matched >= MIN_FEW_SHARE * shut.expected
-            return is_sure and (are_there or shut.expected < MIN_FEW_LINES)
-        if not POSE_CONFIDENCE.accepts(shut.p_false):
-            return False
-        return opened is None or not opened.is_solved or opened.p_false > MIN_EXPLAINED_BETTER * shut.p_false
-
 
 def _find_segments(view: View, milestone: Entry[Milestone]) -> Entry[Segments] | None:
     """The lines of the picture by which a milestone was judged, as long as that picture is there."""
     found = view.latest(Segments, lambda segments: segments.milestone == milestone.id)
     return found if found is not None and view.get(found.value.frame) is not None else None
-
-
-def _is_near(before: Pose2, after: Pose2, belief: Hypothesis, sigmas: float) -> bool:
-    """Whether a pose is where the robot believes to be."""
-    off_rad = abs(wrap_angle(after.heading_rad - before.heading_rad))
-    return before.distance_to(after) <= sigmas * belief.sigma_m + 0.05 and off_rad <= sigmas * belief.sigma_rad + 0.02

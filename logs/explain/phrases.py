@@ -22,7 +22,7 @@ from logs.timeline import Timeline
 from world_models import words
 from world_models.building.locale_frame import FrameRequest
 from world_models.entries.body import Course, MotionReport, MotorCommand
-from world_models.entries.location import Hypothesis, Place
+from world_models.entries.location import Hypothesis, Place, PlaceSearch
 from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
 from world_models.entries.task import Certificate, Goal, Leg, Milestone, PlanSketch
 from world_models.words import count, degrees, landmark, listed, metres, point, quantity, size, turn
@@ -285,13 +285,13 @@ def doubt(d: Discrepancy) -> str:
 
 def motive(find: Find) -> Iterator[str]:
     """Why a motion was commanded, by what it rests on."""
-    leg, milestone, segments = find(Leg), find(Milestone), find(Segments)
+    leg, milestone, search = find(Leg), find(Milestone), find(PlaceSearch)
     if leg is not None and leg.aim_rad is not None:
         yield f"because the line to follow lay {turn(leg.aim_rad)} of where it believed that it faced"
     elif milestone is not None:
         yield f"because it had to face {milestone_name(milestone)} to look for it"
-    elif leg is None and segments is not None:
-        yield f"because it did not know where it was, and did not find it out from {describe_segments(segments)}"
+    elif leg is None and search is not None:
+        yield f"because it did not know where it was: {search.said}"
 
 
 def in_one_sentence(history: Timeline, command: EntryRecord[Any]) -> str:

@@ -34,7 +34,7 @@ from world_models.entries.body import (
 )
 from world_models.entries.door_state import DoorState
 from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor
-from world_models.entries.location import Hypothesis, Travel
+from world_models.entries.location import Hypothesis, PlaceSearch, Travel
 from world_models.entries.obstacle import Contact, Obstacle, Obstruction, Ranges
 from world_models.entries.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
 from world_models.entries.robot_state import CameraState, Drift, Footprint, Wheels
@@ -213,7 +213,7 @@ class _Teller:
             text = "" if record.kind in FOLDED else say(self.history, record) if say else plainly(record)
         yield from self._one(key, label, text, record, frame)
         if perhaps:
-            for below in self._below(record, Panorama):
+            for below in self._below(record, PlaceSearch):
                 yield from self._tell(below, record)
         else:
             yield from self.reasons(record)
@@ -246,7 +246,7 @@ class _Teller:
             return
         begun, certificate = phrases.pose(anchor.value), self.history.reason(anchor, Certificate)
         if anchor.value.basis == "relocalization":
-            segments, frame = self.history.chain(anchor, Segments, CameraPicture)
+            _, _, segments, frame = self.history.chain(anchor, PlaceSearch, Panorama, Segments, CameraPicture)
             lost = self.history.reason(anchor, Discrepancy)
             found = f"; {anchor.value.evidence}" if anchor.value.evidence else ""
             picture = frame.id if frame is not None else "a picture"
@@ -297,7 +297,7 @@ LABELS: Mapping[type[Any], str] = {
     Leg: "driving", Hypothesis: "believed", Milestone: "looked for", Discrepancy: "doubted", PlanSketch: "plan",
     Goal: "goal", Command: "command", Tracks: "seen", CameraPicture: "picture", MotionReport: "wheels",
     MotorCommand: "motion", Course: "motion",
-    PictureRequest: "look", Segments: "seen", Panorama: "thought", BodyFault: "fault", Recovery: "recovery",
+    PictureRequest: "look", Segments: "seen", PlaceSearch: "thought", BodyFault: "fault", Recovery: "recovery",
     Ride: "ride", RideReport: "ride", Obstruction: "hidden", Quiescence: "stillness", Outcome: "the end",
     Resumed: "resumed", Drift: "wheels", Travel: "wheels", LocaleFrame: "known", FrameRequest: "asked",
     CameraState: "camera",
@@ -313,7 +313,8 @@ FOLDED = frozenset({PoseFix, LineMatch, Segments, Certificate})
 SEVERAL = frozenset({Discrepancy, Goal, PlanSketch, BodyFault})
 """Of these a story may tell more than one."""
 FOLLOW: Mapping[type[Any], tuple[type[Any], ...]] = {
-    MotorCommand: (Leg, Milestone, Segments, Panorama, Discrepancy, Hypothesis),
+    MotorCommand: (Leg, Milestone, PlaceSearch, Discrepancy, Hypothesis),
+    PlaceSearch: (Panorama, Hypothesis),
     Panorama: (Obstruction, Panorama),
     Course: (Leg, Discrepancy, Hypothesis),
     Leg: (Hypothesis,),

@@ -40,11 +40,13 @@ FROM_VIEW = Building | RobotModel | Camera | CameraMount | ActuatorModel | View
 OF_TRUTH = Truth | SimulatedBody | Stage | TrueBuilding | Lasting | TrueCamera | Difference
 """What belongs to the simulator."""
 NAMES = [source.__module__.rpartition(".")[2] for source in KNOWLEDGE_SOURCES]
-NOT_NEEDED = {"correlator_tracker", "plan_adjuster", "discrepancy_raiser", "relocalizer", "fault_handler",
-              "recovery_retrier", "fault_closer", "landmark_chooser", "floor_changer", "travel_breaker",
-              "path_follower", "elevator_rider", "obstruction_finder", "model_reviser", "goal_changer",
-              "dependency_withdrawer", "obstacle_finder", "door_watcher", "shut_door_explainer", "range_watcher",
-              "floor_watcher", "camera_calibrator", "yaw_calibrator", "alias_monitor"}
+NOT_NEEDED = {
+    "correlator_tracker", "plan_adjuster", "discrepancy_raiser", "fault_handler", "path_follower", "elevator_rider",
+    "obstruction_finder", "model_reviser", "goal_changer", "dependency_withdrawer", "obstacle_finder", "door_watcher",
+    "shut_door_explainer", "range_watcher", "floor_watcher", "camera_calibrator", "yaw_calibrator", "alias_monitor",
+    "detour_finder", "lookout_planner", "belief_checker", "view_updater", "probe_photographer", "panorama_builder",
+    "localizer", "prober", "pose_adopter", "goal_renewer", "recovery_retrier", "fault_closer", "landmark_chooser",
+    "floor_changer", "travel_breaker"}
 """Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
 the move, ride in elevators, find what is before the camera or in the way, take up what somebody tells, or learn of the
 camera."""

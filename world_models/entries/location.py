@@ -171,6 +171,27 @@ class PlaceOdds:
                 f" picture): {self.locale}, {self.probability:.1%}")
 
 
+@inference(keep=2)
+@dataclass(frozen=True, slots=True)
+class PlaceSearch:
+    """What a lost robot's looks round tell of its place.
+
+    Attributes:
+        status: found; probe, where another look may tell more; or ambiguous, where none does.
+        said: in words.
+        probe: the turn [rad] and then the move [m] before the next look; None where no further one is worth it.
+        is_camera_as_told: whether the pictures fit the camera as it was told, and not as it was learnt.
+    """
+
+    status: Literal["found", "probe", "ambiguous"]
+    said: str
+    probe: tuple[float, float] | None = None
+    is_camera_as_told: bool = False
+
+    def sentence(self) -> str:
+        return f"search of the floor: {self.said}"
+
+
 @dataclass(frozen=True, slots=True)
 class Twin:
     """A place that looks like where the robot believes that it is.

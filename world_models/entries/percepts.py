@@ -237,15 +237,9 @@ class Glimpse:
 @inference(keep=2)
 @dataclass(frozen=True, slots=True)
 class Panorama:
-    """All looks since the robot is lost, composed by the motions between them.
-
-    Attributes:
-        glimpses: the newest last.
-        found: what was made of them, in words.
-    """
+    """All looks since the robot is lost, composed by the motions between them; the newest last."""
 
     glimpses: tuple[Glimpse, ...]
-    found: str = ""
 
     def sentence(self) -> str:
-        return f"after {words.count(len(self.glimpses), 'look')} round: {self.found or 'nothing is concluded yet'}"
+        return f"{words.count(len(self.glimpses), 'look')} round"

@@ -12,7 +12,7 @@ from world_models.building.model_errors import LineErrors, unpack_errors
 from world_models.entries.location import Covariance, Place
 
 GoalStatus = Literal["active", "reached", "abandoned"]
-SketchStatus = Literal["active", "done", "superseded"]
+SketchStatus = Literal["active", "done", "halted", "superseded"]
 LegStatus = Literal["moving", "arrived", "halted"]
 MilestoneVerdict = Literal["verified", "refuted", "not testable"]
 MilestoneStatus = Literal["turning", "expected", "verified", "refuted", "not testable", "withdrawn"]
@@ -112,9 +112,8 @@ class PlanSketch:
         subgoals: n of them; milestone k stands before subgoal k, milestone n at the end.
         at: the subgoal that is next or under way; n at the end.
         verified: whether milestone ``at`` holds.
-        status: active, done or superseded.
-        lookout_count: so often the robot went somewhere to look again at what left no way.
-        is_look: whether it leads there, and not to the goal.
+        status: active, done, halted before floor that is not seen, or superseded.
+        is_look: whether it leads to where something that left no way can be looked at again, and not to the goal.
         halts: so often in a row a leg was halted and the sketch drawn anew for it.
         adjustments: how often plan-level servoing changed it.
     """
@@ -128,7 +127,6 @@ class PlanSketch:
     status: SketchStatus = "active"
     halts: int = 0
     adjustments: int = 0
-    lookout_count: int = 0
     is_look: bool = False
 
     @property
@@ -143,6 +141,20 @@ class PlanSketch:
     def current(self) -> Subgoal | None:
         """The subgoal that is next or under way; None at the end."""
         return None if self.at_end else self.subgoals[self.at]
+
+    @property
+    def is_refinable(self) -> bool:
+        """Whether what is next is to be drawn in more detail before it is driven."""
+        return self.current is not None and not self.current.primitive and not self.current.is_ride
+
+    @property
+    def leaves_goal_open(self) -> bool:
+        """Whether it has ended, and its goal needs another one."""
+        return self.status in ("superseded", "halted") or (self.is_look and self.status == "done")
+
+    def carries_out(self, _id: str, sketch: PlanSketch) -> bool:
+        """Whether it refines the current subgoal of another sketch."""
+        return self.goal == sketch.goal and self.path == (*sketch.path, sketch.at)
 
     def advanced(self) -> PlanSketch:
         """The current subgoal is done; its milestone is yet to be verified."""
@@ -198,6 +210,10 @@ class Leg:
     aim_rad: float | None = None
     looking_rad: float | None = None
     looked_at: tuple[tuple[float, float, float], ...] = ()
+
+    def carries_out(self, id: str, sketch: PlanSketch) -> bool:
+        """Whether it is the way of the current subgoal of a sketch, which is called so on the board."""
+        return self.sketch == id and self.index == sketch.at
 
     def sentence(self) -> str:
         length_m = math.hypot(self.x1_m - self.x0_m, self.y1_m - self.y0_m)
@@ -316,6 +332,29 @@ class Certificate:
         return (f"{self.verdict}: {self.reason}; {self.milestone}; {agree}; {words.metres(self.deviation_m)} and"
                 f" {words.degrees(self.deviation_rad)} from the belief, {shift}; probability of a wrong pose"
                 f" {self.p_false:.2g}")
+
+
+@inference()
+@dataclass(frozen=True, slots=True)
+class Impasse:
+    """A knowledge source sees no way on: the mission ends by it, unless another one does.
+
+    Attributes:
+        kind: how the mission would end: blocked, lost, failed or stopped.
+        reason: in words.
+        goal: id of the goal to which no way leads; "" where it is no matter of a way.
+        behind: ids of the obstacles that leave none.
+        is_open: whether nobody has seen a way on.
+    """
+
+    kind: str
+    reason: str
+    goal: str = ""
+    behind: tuple[str, ...] = ()
+    is_open: bool = True
+
+    def sentence(self) -> str:
+        return f"no way on: {self.reason}" if self.is_open else f"another look is taken, as {self.reason}"
 
 
 @inference()

@@ -20,6 +20,7 @@ from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDEN
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries.door_state import DoorCondition, DoorPicture, DoorState
+from world_models.entries.location import Hypothesis
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
@@ -31,6 +32,10 @@ MAX_LOG_ODDS = 7.0  # largest log odds that are kept, that a door may open again
 MIN_PICTURES = 2  # fewest pictures by which a door is shut
 MIN_STEP_M = 0.3  # pictures of a door that count both are taken so far from each other
 MIN_TURN_RAD = 0.17  # or turned by so much
+MAX_DOUBTED_SIGMAS = 3.0  # standard deviations of the belief within which the explained pose must be
+MIN_EXPLAINED_BETTER = 10.0  # least ratio by which the pose is likelier to be wrong with the door open
+MIN_FEW_LINES = 3  # fewest lines by which a frame is told, where they are too few to tell the place by
+MIN_FEW_SHARE = 0.6  # least share of these that must be there
 
 
 def update_door(
@@ -132,3 +137,24 @@ def explain_picture(
     weight = compute_evidence(robot, lines.lines_world, segments_px, pose, fix.covariance, belief, covariance, agreed,
                               faces)
     return Explanation(pose, fix.covariance, POSE_CONFIDENCE.p_false(weight), agreed.agreement.matched, len(lines))
+
+
+def is_explained(shut: Explanation, opened: Explanation | None, *, is_sure: bool) -> bool:
+    """Whether a picture tells the place with the door shut, and does not with it open.
+
+    Where too few lines are in view to tell the place by, the belief must be sure (``is_sure``), and these lines be
+    there; of none, or next to none, the frame of the opening must do.
+    """
+    if not shut.is_solved:
+        are_there = shut.matched >= MIN_FEW_SHARE * shut.expected
+        return is_sure and (are_there or shut.expected < MIN_FEW_LINES)
+    if not POSE_CONFIDENCE.accepts(shut.p_false):
+        return False
+    return opened is None or not opened.is_solved or opened.p_false > MIN_EXPLAINED_BETTER * shut.p_false
+
+
+def is_near(before: Pose2, after: Pose2, belief: Hypothesis) -> bool:
+    """Whether a pose is where the robot believes to be."""
+    off_rad = abs(wrap_angle(after.heading_rad - before.heading_rad))
+    is_there = before.distance_to(after) <= MAX_DOUBTED_SIGMAS * belief.sigma_m + 0.05
+    return is_there and off_rad <= MAX_DOUBTED_SIGMAS * belief.sigma_rad + 0.02

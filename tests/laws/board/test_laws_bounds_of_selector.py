@@ -1,4 +1,4 @@
-"""The milestone selector at its bounds: in which direction it looks first before a leg that begins with a turn."""
+"""The view chooser at its bounds: in which direction it looks first before a leg that begins with a turn."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from knowledge_sources.plan.milestone_selector import MilestoneSelector
+from knowledge_sources.plan.view_chooser import ViewChooser
 from knowledge_sources.settings import DEFAULT
 from world_models.entries.location import Place
 from world_models.entries.task import PlanSketch, Subgoal
@@ -27,7 +27,7 @@ def first_direction(turn_rad: float, length_m: float = LENGTH_M, *, primitive: b
     here = HERE.in_world(world)
     pose = Pose2(here.x_m, here.y_m, facing)
     sketch = PlanSketch("Goal-1", (), HALL if primitive else "", (leg,))
-    return next(MilestoneSelector()._candidate_headings(world, sketch, pose)) - facing
+    return next(ViewChooser().list_headings(world, sketch, pose)) - facing
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

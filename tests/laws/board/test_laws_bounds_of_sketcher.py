@@ -1,4 +1,4 @@
-"""The sketcher at its bounds: when a subgoal is repeated, and what follows when that was in vain."""
+"""The milestone passer at its bounds: when a subgoal is repeated, and what follows when that was in vain."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.plan.sketcher import Sketcher
+from knowledge_sources.plan.milestone_passer import MilestonePasser
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.entries.location import Hypothesis, Place, diagonal
-from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch, Subgoal
+from world_models.entries.task import Goal, Impasse, Milestone, PlanSketch, Subgoal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
@@ -29,7 +29,7 @@ SMALL = 1e-3
 
 
 def decide(off_m: float, adjustments: int, earlier_goals: int = 0) -> Effect:
-    """What the sketcher does when the milestone at the end of a subgoal is verified, so far from where it should be."""
+    """What it does when the milestone at the end of a subgoal is verified, so far from where it should be."""
     world, board = load_world(WORLDS / "two_ways.toml"), Blackboard()
     store, robot = FrameStore(world), build_robot_model(load_scenario("shut-door"), world)
     cycle = 0
@@ -49,7 +49,7 @@ def decide(off_m: float, adjustments: int, earlier_goals: int = 0) -> Effect:
     (sketch,) = apply(Post(PlanSketch(goal.entry.id, (), "", (way,), at=1, adjustments=adjustments)))
     (expected,) = apply(Post(Milestone(sketch.entry.id, 1, "the end", 0.0)))
     (verified,) = apply(Revise(expected.entry, replace(expected.entry.value, status="verified")))
-    effects = answer(Sketcher(DEFAULT), board.view, verified)
+    effects = answer(MilestonePasser(DEFAULT), board.view, verified)
     assert effects is not None
     return effects[0]
 
@@ -66,4 +66,4 @@ def test_in_vain_is_doubt_for_the_first_goal_and_blocked_for_a_later_one() -> No
     assert isinstance(last, Revise) and isinstance(last.value, PlanSketch) and last.value.adjustments == MOST
     doubt, blocked = decide(0.5, MOST), decide(0.5, MOST, earlier_goals=1)
     assert isinstance(doubt, Post) and isinstance(doubt.value, Discrepancy) and doubt.value.level is Level.GOAL
-    assert isinstance(blocked, Post) and isinstance(blocked.value, Outcome) and blocked.value.kind == "blocked"
+    assert isinstance(blocked, Post) and isinstance(blocked.value, Impasse) and blocked.value.kind == "blocked"

@@ -1,6 +1,6 @@
 """The ladder of Figure 2 with the knowledge sources themselves, without images: only what is measured is given.
 
-Tracker, judge and relocalizer are replaced by knowledge sources that post what a picture says in figures; all others,
+Tracker, judge and localizer are replaced by knowledge sources that post what a picture says in figures; all others,
 and the board, are the real ones. The body does what it is asked. Every picture's figure is drawn by hypothesis.
 """
 
@@ -49,7 +49,8 @@ from world_models.robot import RobotModel
 
 ACTION_PX, PLAN_PX = 6.0, DEFAULT.plan.max_deviation_px
 PERCEIVERS = {"correlator_tracker", "landmark_chooser", "line_finder", "matcher", "med_r_and_t", "milestone_judge",
-              "relocalizer", "floor_watcher", "door_watcher", "shut_door_explainer"}
+              "probe_photographer", "panorama_builder", "localizer", "prober", "pose_adopter", "goal_renewer",
+              "floor_watcher", "door_watcher", "shut_door_explainer"}
 SURE = diagonal(0.002, 0.001)
 
 
@@ -233,7 +234,7 @@ class Ladder:
             elif isinstance(value, Goal) and value.status == "abandoned":
                 assert Level.GOAL in above  # a goal is given up only when lost
             elif isinstance(value, PlanSketch) and value.status == "superseded":
-                assert entry.author == "sketcher"
+                assert entry.author in ("goal_sketcher", "refiner", "lookout_planner")
             elif isinstance(value, PlanSketch) and isinstance(change, Revised) and value.adjustments:
                 assert any(reason.id.startswith(("Milestone", "Leg", "PlanSketch")) for reason in entry.because)
             elif isinstance(value, MotorCommand) and value.move_m > 0.0:

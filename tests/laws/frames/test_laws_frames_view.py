@@ -20,8 +20,8 @@ from world_models.frame_building import FrameBuilding
 
 
 @pytest.mark.parametrize(("name", "acting"), [
-    ("told_run", {"model_reviser", "dependency_withdrawer", "sketcher", "motor", "correlator_tracker", "matcher"}),
-    ("lost_run", {"relocalizer", "discrepancy_raiser", "milestone_judge", "med_r_and_t", "plan_adjuster"}),
+    ("told_run", {"model_reviser", "dependency_withdrawer", "goal_sketcher", "motor", "correlator_tracker", "matcher"}),
+    ("lost_run", {"localizer", "discrepancy_raiser", "milestone_judge", "med_r_and_t", "plan_adjuster"}),
 ])
 def test_acts_are_the_same_on_a_board_that_is_rebuilt_from_the_journal(
     name: str, acting: set[str], request: pytest.FixtureRequest

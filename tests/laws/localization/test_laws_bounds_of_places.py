@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from experiments.generated.floors import generated_floor
-from knowledge_sources.goal.relocalizer import Relocalizer, _find_prior, _prefer_reachable
+from knowledge_sources.goal.localizer import _find_prior
 from knowledge_sources.methods.localization.global_localization import (
     LocalizationResult,
     LocalizationStatus,
@@ -30,8 +30,10 @@ from knowledge_sources.methods.localization.place_odds import (
     is_within_reach,
     weigh_told,
 )
+from knowledge_sources.methods.localization.place_search import prefer_reachable
 from knowledge_sources.methods.localization.refinement import PoseLikelihood
 from knowledge_sources.settings import DEFAULT
+from knowledge_sources.while_lost import is_dark as is_picture_dark
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries.percepts import Segments
@@ -175,7 +177,7 @@ def test_the_only_place_within_reach_is_believed_if_it_stands_by_itself(
     reach: tuple[str, ...], places: tuple[PlaceCandidate, ...], status: LocalizationStatus, room: str
 ) -> None:
     building: Any = Reach(*reach)
-    found = _prefer_reachable(building, LocalizationResult(AMBIGUOUS, places), "here")
+    found = prefer_reachable(building, LocalizationResult(AMBIGUOUS, places), "here")
     assert found.status is status
     assert status is not FOUND or [c.room for c in found.candidates] == [room]
 
@@ -185,7 +187,7 @@ def test_a_dark_frame_is_dark_by_contrast_and_brightness_together() -> None:
 
     def is_dark(contrast: float, brightness: float) -> bool:
         empty = np.zeros((0, 2, 2))
-        return Relocalizer()._is_dark(Segments("CameraPicture-1", "", empty, np.zeros(0), contrast, brightness))
+        return is_picture_dark(Segments("CameraPicture-1", "", empty, np.zeros(0), contrast, brightness), g)
 
     assert is_dark(g.min_contrast - SMALL, g.min_brightness - SMALL)
     assert not is_dark(g.min_contrast + SMALL, g.min_brightness - SMALL)

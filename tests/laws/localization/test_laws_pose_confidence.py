@@ -29,7 +29,7 @@ from knowledge_sources.methods.verification.pose_confidence import (
     compute_terms,
 )
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from knowledge_sources.plan.milestone_selector import predict_milestone
+from knowledge_sources.methods.verification.view_quality import predict_milestone
 from sim.render.renderer import Renderer
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel

@@ -32,7 +32,7 @@ DRAWS = 24
 
 
 def views_after(steps: Steps, segments: list[Floats]) -> list[CameraView]:
-    """One view before every step, and one after the last, as the relocalizer keeps them."""
+    """One view before every step, and one after the last, as the panorama builder keeps them."""
     views = [CameraView(segments[0], Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))]
     for k, (turn, move) in enumerate(steps):
         step, spread = ACTUATOR.predict_motion(turn, move), ACTUATOR.motion_covariance(turn, move)

@@ -148,7 +148,7 @@ def test_why_not_is_answered_on_the_command_line(
         assert main(["why", str(runs[0]), *more]) == 0
         return capsys.readouterr().out
 
-    assert "watches for" in said("--not", "relocalizer", "--at", "3")
+    assert "watches for" in said("--not", "probe_photographer", "--at", "3")
     lost = next(d for d in history.decisions() if d.runner_up and d.chosen and d.runner_up.source != d.chosen.source)
     assert lost.runner_up is not None and lost.chosen is not None
     out = said("--not", lost.runner_up.source, "--at", str(lost.cycle))
@@ -166,14 +166,14 @@ def test_why_not_is_answered_on_the_command_line(
 def test_a_watch_whose_condition_did_not_hold_is_told_as_that(
     runs: tuple[Path, Path], history: Timeline, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The relocalizer watches for beliefs moved by odometry; one that rests on landmarks does not wake it."""
+    """The probe photographer watches for beliefs moved by odometry; one that rests on landmarks does not wake it."""
     beliefs = ((d.cycle, history.entry(ref)) for d in history.decisions() for ref in d.seen
                if ref.startswith("Hypothesis-1."))
     cycle, ref = next((cycle, r.ref) for cycle, r in beliefs
                       if r is not None and r.change == "Revised" and r.fields["basis"] == "tracks")
-    assert main(["why", str(runs[0]), "--not", "relocalizer", "--at", str(cycle)]) == 0
+    assert main(["why", str(runs[0]), "--not", "probe_photographer", "--at", str(cycle)]) == 0
     told = capsys.readouterr().out
-    assert f"came what the relocalizer watches for, {ref} revised, but its watch has a condition" in told
+    assert f"came what the probe photographer watches for, {ref} revised, but its watch has a condition" in told
     assert "Nothing that" not in told
 
 

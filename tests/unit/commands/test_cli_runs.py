@@ -29,12 +29,12 @@ from logs.records import entry_of, read_records
 from world_models import words
 from world_models.frames import Pose2
 
-SHORT = ["--set", "limits.max_cycles=33"]
+SHORT = ["--set", "limits.max_cycles=36"]
 
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A mission that was given 33 cycles, in 5 of which an act only asks for locale frames, and its trace."""
+    """A mission that was given 36 cycles, in 6 of which an act only asks for locale frames, and its trace."""
     out, printed = tmp_path_factory.mktemp("runs") / "short", io.StringIO()
     with redirect_stdout(printed):
         assert main(["run", "lab-to-allens-office", *SHORT, "--out", str(out), "--trace"]) == 1
@@ -61,7 +61,7 @@ def test_a_run_leaves_its_files(run: Path) -> None:
     assert json.loads((run / "result.json").read_text())["outcome"] == "failed"
     head = json.loads((run / "run.json").read_text())
     assert (head["kind"], head["name"], head["seed"]) == ("simulator", "lab-to-allens-office", 0)
-    assert head["scenario"]["limits"] == {"max_cycles": 33}
+    assert head["scenario"]["limits"] == {"max_cycles": 36}
 
 
 def test_why_goes_down_to_the_command(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -278,7 +278,7 @@ def test_diff_names_the_first_decision_that_differs(
     assert "agree in all" in capsys.readouterr().out
     assert main(["diff", str(run), str(both[0] / "1")]) == 1
     out = capsys.readouterr().out
-    assert "agree for 8 decisions." in out
+    assert "agree for 9 decisions." in out
     assert "The first observation that differs is CameraPicture-1.0" in out
     assert "seed: 0 against 1" in out
     assert main(["diff", str(run), str(both[0] / "1"), "--fields"]) == 1
@@ -287,9 +287,9 @@ def test_diff_names_the_first_decision_that_differs(
 
 def test_trace_prints_every_cycle(told: tuple[Path, str]) -> None:
     printed = told[1]
-    assert [f"cycle {n}, focus" in printed for n in range(1, 29)] == [True] * 28
+    assert [f"cycle {n}, focus" in printed for n in range(1, 31)] == [True] * 30
     assert "posted    Goal-1.0 by interpreter: goal: from robot-laboratory" in printed
-    assert "next      sketcher" in printed
+    assert "next      milestone_passer" in printed
 
 
 def test_the_check_foresees_the_milestones_that_come(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

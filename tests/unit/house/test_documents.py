@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 
 
 def test_the_table_of_knowledge_sources_is_the_one_that_the_classes_give() -> None:
-    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "knowledge-sources.md").read_text(encoding="utf-8")
     table = text.split("<!-- knowledge sources -->\n")[1].split("\n<!-- /knowledge sources -->")[0]
     assert table.splitlines() == rows(KNOWLEDGE_SOURCES)
 

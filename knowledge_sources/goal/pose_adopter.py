@@ -1,0 +1,50 @@
+"""Pose adopter (§2): a lost robot's place is found, and becomes its belief."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Retract, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from knowledge_sources.priority import Priority
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.while_lost import WHILE_LOST, Lost, find_lost
+from world_models.entries.location import Hypothesis, PlaceSearch
+from world_models.entries.robot_state import CameraState
+
+
+class Case(NamedTuple):
+    """A search that found the place, the only candidate that is left, what was believed, and the camera as learnt."""
+
+    search: Entry[PlaceSearch]
+    place: Entry[Hypothesis]
+    lost: Lost
+    camera: Entry[CameraState]
+
+
+class PoseAdopter(RobotKnowledgeSource):
+    """Takes the place that was found for the belief, and the camera with which it was found."""
+
+    level = closes = Level.GOAL
+    priority = Priority.CORRECT
+    on = (Watch(PlaceSearch, (Posted,), lambda search: search.status == "found"),)
+    needs = WHILE_LOST
+    writes = (Hypothesis, CameraState)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        place, camera = view.latest(Hypothesis, lambda h: h.status == "candidate"), view.latest(CameraState)
+        return None if place is None or camera is None else Case(trigger.entry, place, find_lost(view), camera)
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        search, place, (doubt, belief), camera = case
+        held = replace(place.value, status="held", weight=1.0, motion=belief.value.motion)
+        yield Revise(belief, held, (search, place, doubt, belief))
+        yield Retract(place, (search,))
+        found_with = camera.value.as_told() if search.value.is_camera_as_told else camera.value
+        if found_with != camera.value:
+            yield Revise(camera, found_with, (search, camera))

@@ -1,0 +1,44 @@
+"""Prober (§2, §4): the motion after which a lost robot's next picture tells most."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Watch
+from blackboard.effect import Effect, Post
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.conditions import LOST
+from knowledge_sources.priority import Priority
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.while_lost import WHILE_LOST
+from world_models.entries.body import MotorCommand
+from world_models.entries.location import PlaceSearch
+
+
+class Case(NamedTuple):
+    """A search that did not tell the place, and the doubt that it is to end."""
+
+    search: Entry[PlaceSearch]
+    doubt: Entry[Discrepancy]
+
+
+class Prober(RobotKnowledgeSource):
+    """Carries out the turn or short safe move by which the candidates' views are expected to differ most."""
+
+    level = closes = Level.GOAL
+    priority = Priority.RECOVER
+    on = (Watch(PlaceSearch, (Posted,), lambda search: search.status == "probe" and search.probe is not None),)
+    needs = WHILE_LOST
+    writes = (MotorCommand,)
+
+    def bind(self, view: View, trigger: Change) -> Case:
+        return Case(trigger.entry, LOST.of(view))
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        s, (turn_rad, move_m) = self._settings.action, case.search.value.probe or (0.0, 0.0)
+        slowly = s.creep_speed_m_per_s if s.keeps_to_seen_floor and move_m > 0.0 else None  # no floor is known free
+        yield Post(MotorCommand(turn_rad, move_m, slowly), (case.search, case.doubt))

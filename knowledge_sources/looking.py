@@ -1,0 +1,67 @@
+"""What the knowledge sources that look for milestones have in common: when a look may be chosen, and what was tried."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from blackboard.board import View
+from blackboard.entry import Entry
+from knowledge_sources.methods.verification.view_quality import INDEPENDENT_LOOK_RAD
+from knowledge_sources.questions import find_building, find_robot_in
+from knowledge_sources.settings import Settings
+from world_models.entries.location import Hypothesis
+from world_models.entries.task import Certificate, Milestone, PlanSketch
+from world_models.frames import Pose2, wrap_angle
+from world_models.robot import RobotModel
+
+MAX_LOOK_ERROR_RAD = math.radians(3.5)  # the robot faces a milestone when its heading is off by no more than this
+
+
+def find_robot_and_pose(view: View, belief: Hypothesis) -> tuple[RobotModel, Pose2]:
+    """The robot on its floor, and the believed pose in the world."""
+    robot = find_robot_in(view, belief.locale)
+    return robot, belief.world_from_robot(robot.world)
+
+
+def find_heading(view: View, belief: Hypothesis) -> float:
+    """The believed heading [rad, world]."""
+    return belief.world_from_robot(find_building(view)).heading_rad
+
+
+def find_tried(view: View, is_same: Callable[[Entry[Milestone]], bool]) -> tuple[float, ...]:
+    """The headings in which the last milestone, if it is the same one, was not testable."""
+    last = view.latest(Milestone)
+    if last is None or last.value.status != "not testable" or not is_same(last):
+        return ()
+    return (*last.value.tried, last.value.look_heading_rad)
+
+
+def find_car(sketch: PlanSketch, index: int) -> str:
+    """The elevator's car in which a ride before a milestone ends, or "": it looks the same on every floor."""
+    before = sketch.subgoals[index - 1] if index > 0 else None
+    return before.destination.locale if before is not None and before.is_ride else ""
+
+
+def find_car_of(view: View, milestone: Milestone) -> str:
+    """The same for a milestone of any sketch, or of none."""
+    sketch = view.get(milestone.sketch)
+    return "" if sketch is None else find_car(sketch.value, milestone.index)
+
+
+def sum_told(view: View, milestone: Milestone, settings: Settings) -> float:
+    """The log odds of a wrong place by the looks for a milestone in other directions, of an inexact model.
+
+    A look counts less the nearer its direction is to another's: what both show is no evidence twice.
+    """
+    last, s = view.latest(Milestone), settings.plan
+    certificate = view.latest(Certificate)
+    if not milestone.tried or last is None or certificate is None or certificate.value.milestone != last.id:
+        return 0.0
+    c = certificate.value
+    if not last.value.displacement_modes or c.matched < settings.verification.min_matched_lines:
+        return last.value.log_odds_so_far
+    p = min(max(c.p_false, 1e-9), 1.0 - 1e-9)
+    apart = min(abs(wrap_angle(milestone.look_heading_rad - heading)) for heading in milestone.tried)
+    said = min(max(math.log(p / (1.0 - p)), -s.max_told), s.max_told)
+    return last.value.log_odds_so_far + min(1.0, apart / INDEPENDENT_LOOK_RAD) * said

@@ -1,0 +1,129 @@
+"""Which place of a floor a lost robot is at: a search with each camera and building that may be, and what follows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from knowledge_sources.methods.localization.global_localization import LocalizationResult, LocalizationStatus, localize
+from knowledge_sources.methods.localization.next_view import SensingAction, choose_far_action, make_view_predictor
+from knowledge_sources.methods.localization.place_odds import StatedPlace
+from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.settings import GoalSettings, Settings
+from world_models.building.building import Building
+from world_models.entries.location import PlaceOdds
+from world_models.frame_building import FrameBuilding
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+
+
+class Search(NamedTuple):
+    """What is looked for.
+
+    Attributes:
+        looks: since the robot is lost, without what stands before its camera.
+        rooms: that are searched, the nearest to the last belief first.
+        here: room and pose (world) of the last belief.
+        followed: rooms and poses of the candidates of the last search, as the robot has moved since.
+    """
+
+    looks: Sequence[CameraView]
+    rooms: Sequence[str]
+    here: tuple[str, Pose2]
+    followed: Sequence[tuple[str, Pose2]]
+
+
+def search(robots: Iterable[RobotModel], what: Search, settings: Settings) -> tuple[LocalizationResult, int]:
+    """The result of the robot, camera and building, in which the best place fits best, and which it is."""
+    tried = [localize(robot, what.looks, what.rooms, settings, what.here, what.followed) for robot in robots]
+    best = max(range(len(tried)), key=lambda k: _measure_fit(tried[k]))  # of equals the first
+    return tried[best], best
+
+
+def _measure_fit(result: LocalizationResult) -> float:
+    """The log likelihood of the best place."""
+    return max((c.likelihood.log_likelihood for c in result.candidates), default=-math.inf)
+
+
+def prefer_reachable(building: Building, result: LocalizationResult, locale: str) -> LocalizationResult:
+    """Of places that nothing more can tell apart the only one to which wheels lead from where the robot was.
+
+    Carried to another place of where it can drive to, it may look the same there: that stays ambiguous. But being
+    carried through a wall or up the stairs, to a place that looks just like one within reach, is not believed.
+    """
+    near = [c for c in result.candidates if building.route(locale, c.room) is not None]
+    if result.status is LocalizationStatus.FOUND or len(near) != 1 or not near[0].is_accepted:
+        return result
+    return LocalizationResult(LocalizationStatus.FOUND, (replace(near[0], weight=1.0),))
+
+
+def find_odds_used(
+    by_pictures: LocalizationResult, result: LocalizationResult, told: StatedPlace, *, was_tracked: bool
+) -> PlaceOdds | None:
+    """The odds by which a place was found that the pictures alone had not found; None where they had."""
+    if result.status is not LocalizationStatus.FOUND or by_pictures.status is LocalizationStatus.FOUND:
+        return None
+    found, count = result.candidates[0], len(by_pictures.candidates)
+    return PlaceOdds(found.room, count, "tracked" if was_tracked else "told", told.p_told, found.weight)
+
+
+def find_far_action(
+    robot: RobotModel, result: LocalizationResult, looked: Sequence[Pose2], rooms: Sequence[str], settings: Settings
+) -> SensingAction | None:
+    """The first leg of the way to a view that tells places apart that look alike from wherever the robot has looked.
+
+    ``looked``: the poses of the looks, as seen from the present one.
+    """
+    s, looks = settings, len(looked)
+    is_stuck = result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None
+    accepted = sum(bool(c.is_accepted) for c in result.candidates)
+    if result.status is LocalizationStatus.FOUND or accepted < 2 or looks >= s.goal.max_far_probes:
+        return None
+    if looks < s.localization.min_views or not (is_stuck or looks >= s.localization.max_searched_views):
+        return None
+    hypotheses = [c.hypothesis for c in result.candidates]
+    return choose_far_action(robot, hypotheses, looked, rooms, make_view_predictor(robot, s))
+
+
+def list_rooms(building: FrameBuilding, locale: str, here: Pose2, settings: GoalSettings) -> list[str]:
+    """The rooms of a locale's floor, the nearest to a pose (world) first; other floors are not searched."""
+    level_m = building.floor_m(locale)
+    container = building.locale(locale).parent or locale
+    rooms = _list_rooms_of_floor(building, container, level_m, settings.max_floor_difference_m)
+    while len(rooms) < 2 and (above := building.locale(container).parent) is not None:  # as from an elevator's car
+        container = above
+        rooms = _list_rooms_of_floor(building, container, level_m, settings.max_floor_difference_m)
+    away = [(_distance(building.outline(name), here), name) for name in rooms]
+    return [name for _, name in sorted(away)[:settings.max_rooms]]
+
+
+def _list_rooms_of_floor(building: FrameBuilding, container: str, level_m: float, same_m: float) -> list[str]:
+    rooms = building.list_rooms_in(container, level_m, same_m)
+    building.require(rooms)
+    return [name for name in rooms if abs(building.floor_m(name) - level_m) < same_m]
+
+
+def _distance(outline: object, here: Pose2) -> float:
+    """From a robot to the nearest corner of a room [m]: good enough for an order."""
+    corners = np.asarray(outline, float)
+    return float(np.min(np.hypot(corners[:, 0] - here.x_m, corners[:, 1] - here.y_m)))
+
+
+def describe(result: LocalizationResult, *, is_far: bool) -> str:
+    """What a search came to, in words; ``is_far``: the next action is on the way to a view that tells."""
+    places = " or ".join(f"{c.room} ({c.weight:.0%})" for c in result.candidates)
+    if result.status is LocalizationStatus.FOUND:
+        return f"it is {places}, which stands alone"
+    if result.status is LocalizationStatus.AMBIGUOUS:
+        return f"ambiguous: {places}, which look alike from wherever could be looked"
+    if result.next_action is None:
+        return f"perhaps {places}; nothing new could be seen from here"
+    move = f" and a move of {result.next_action.move_m:.1f} m" if result.next_action.move_m else ""
+    probe = f"a turn by {math.degrees(result.next_action.turn_rad):.0f} degrees{move}"
+    if is_far:
+        return f"perhaps {places}, which look alike from here; on the way to a view that tells: {probe}"
+    return f"perhaps {places}; {probe} tells most" if places else f"no place bears it out; {probe} shows something new"

@@ -1,0 +1,76 @@
+"""Milestone passer (§3.3, §6): a milestone of a plan sketch is verified: on from it, or the same subgoal again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+from blackboard.board import View
+from blackboard.change import Change, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.priority import Priority
+from knowledge_sources.questions import find_belief, find_building
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.sketching import has_missed
+from world_models.entries.location import Hypothesis, Place
+from world_models.entries.task import Goal, Impasse, Milestone, PlanSketch
+
+
+class Case(NamedTuple):
+    """A verified milestone, the sketch that has come to it, the goal, and the belief."""
+
+    milestone: Entry[Milestone]
+    sketch: Entry[PlanSketch]
+    goal: Entry[Goal]
+    belief: Entry[Hypothesis]
+
+
+class MilestonePasser(RobotKnowledgeSource):
+    """Lets the next subgoal begin once the milestone before it is verified; after the last one the sketch is done.
+
+    A subgoal whose end was missed is repeated from where the robot turned out to be: plan-level servoing (§6). Where
+    that is in vain for the first goal, the robot may be elsewhere, and the goal level looks; a later goal, which began
+    at a place that was just found, is given up.
+    """
+
+    level, priority = Level.PLAN, Priority.ADVANCE
+    on = (Watch(Milestone, (Revised,), lambda m: m.status == "verified"),)
+    writes = (PlanSketch, Discrepancy, Impasse)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        milestone, belief = trigger.entry, find_belief(view)
+        sketch = view.get(milestone.value.sketch)
+        goal = None if sketch is None else view.get(sketch.value.goal)
+        if sketch is None or goal is None or belief is None or not sketch.value.is_active:
+            return None
+        return Case(milestone, sketch, goal, belief) if sketch.value.at == milestone.value.index else None
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        milestone, sketch, goal, belief = case
+        s = sketch.value
+        if not has_missed(view, belief.value, s, is_inexact=bool(milestone.value.displacement_modes)):
+            passed = replace(s, status="done") if s.at_end else replace(s, adjustments=0)
+            yield Revise(sketch, replace(passed, verified=True), (milestone, belief))
+            return
+        if s.adjustments < self._settings.plan.max_adjustments:
+            yield Revise(sketch, _repeat(view, s, belief.value), (milestone, belief))
+            return
+        in_vain, is_first = f"{sketch.id} was adjusted {s.adjustments} times in vain", len(view.all(Goal)) == 1
+        if is_first:
+            yield Post(Discrepancy(Level.GOAL, in_vain, None, (0.0, 0.0), "px"), (milestone, goal))
+        else:
+            yield Post(Impasse("blocked", in_vain, goal.id), (milestone, sketch))
+
+
+def _repeat(view: View, sketch: PlanSketch, belief: Hypothesis) -> PlanSketch:
+    """The sketch with its last subgoal once more, from here."""
+    k, building = sketch.at - 1, find_building(view)
+    pose = belief.world_from_robot(building)
+    origin = Place.of_world(building, sketch.subgoals[k].destination.locale, pose.x_m, pose.y_m)
+    again = replace(sketch.subgoals[k], origin=origin, primitive=True)
+    subgoals = (*sketch.subgoals[:k], again, *sketch.subgoals[k + 1:])
+    return replace(sketch, subgoals=subgoals, at=k, verified=True, adjustments=sketch.adjustments + 1)

@@ -1,0 +1,93 @@
+"""What the knowledge sources of plan sketches have in common: planners round obstacles, and the sketches of a goal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import replace
+
+from blackboard.board import View
+from blackboard.effect import Effect, Revise
+from blackboard.entry import Entry
+from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
+from knowledge_sources.questions import find_building, find_robot
+from knowledge_sources.settings import PlanSettings
+from world_models.entries.location import Hypothesis, Place
+from world_models.entries.obstacle import Obstacle
+from world_models.entries.task import Goal, PlanSketch, SketchStatus, Subgoal
+from world_models.frames import wrap_angle
+
+GOAL_TOLERANCE_M = 0.010  # tolerance at the goal
+GOAL_HEADING_TOLERANCE_RAD = 0.02  # tolerance of a heading that the goal states
+INEXACT_TOLERANCE_SIGMAS = 2.0
+"""Deviations of the belief that are added to the tolerance of a goal where the model is inexact."""
+
+Way = tuple[Subgoal, ...]
+
+
+def list_planners(view: View, settings: PlanSettings) -> list[SubgoalPlanner]:
+    """Planners in the order in which they are asked: round all that obstacles may take, then what is seen of them.
+
+    Where the feet of an obstacle were not seen, the floor round it may be free: the robot drives as if it were, and
+    only into what it then sees to be free.
+    """
+    robot, obstacles = find_robot(view), [entry.value for entry in find_obstacles(view)]
+    ways = [False, *([True] if any(obstacle.core for obstacle in obstacles) else [])]
+    return [SubgoalPlanner(robot, settings, obstacles, by_cores=by_cores) for by_cores in ways]
+
+
+def find_way(planners: Iterable[SubgoalPlanner], ask: Callable[[SubgoalPlanner], Way | None]) -> Way | None:
+    """The first way that a planner finds."""
+    return next((way for way in map(ask, planners) if way is not None), None)
+
+
+def find_way_to_goal(planners: Iterable[SubgoalPlanner], belief: Hypothesis, goal: Goal) -> Way | None:
+    """From locale to locale, from where the robot believes to be."""
+    here = place_of(belief)
+    return find_way(planners, lambda p: p.plan_between_locales(here, goal.destination, GOAL_TOLERANCE_M))
+
+
+def find_obstacles(view: View, locales: Collection[str] | None = None) -> tuple[Entry[Obstacle], ...]:
+    """What stands in the way in some locales, or in any, and is not in the file."""
+    return view.where(Obstacle, lambda o: o.is_there and (locales is None or o.locale in locales))
+
+
+def name_obstacles(obstacles: Sequence[Entry[Obstacle]]) -> str:
+    return f"; blocked by {' and '.join(entry.value.words() for entry in obstacles)}" if obstacles else ""
+
+
+def list_locales(subgoals: Iterable[Subgoal]) -> set[str]:
+    """The locales through which subgoals lead."""
+    return {place.locale for subgoal in subgoals for place in (subgoal.origin, subgoal.destination)}
+
+
+def place_of(belief: Hypothesis) -> Place:
+    """The believed place, without a heading."""
+    return Place(belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m)
+
+
+def supersede(view: View, because: Entry[object], status: SketchStatus = "superseded") -> Iterable[Effect]:
+    """All active sketches end, before another one is drawn."""
+    for old in view.where(PlanSketch, lambda s: s.is_active):
+        yield Revise(old, replace(old.value, status=status), (because,))
+
+
+def find_first_level(view: View) -> Entry[PlanSketch] | None:
+    """The active sketch that leads from locale to locale."""
+    return view.latest(PlanSketch, lambda s: s.is_active and not s.path)
+
+
+def has_missed(view: View, belief: Hypothesis, sketch: PlanSketch, *, is_inexact: bool) -> bool:
+    """Whether the end of the subgoal before a milestone is further than its tolerance.
+
+    A model that is inexact makes it wider.
+    """
+    if sketch.at == 0:
+        return False
+    subgoal, building = sketch.subgoals[sketch.at - 1], find_building(view)
+    here, there = belief.world_from_robot(building), subgoal.destination.in_world(building)
+    heading = subgoal.destination.heading_rad
+    error = 0.0 if heading is None else wrap_angle(here.heading_rad - there.heading_rad)
+    wider_m = INEXACT_TOLERANCE_SIGMAS * belief.sigma_m if is_inexact else 0.0
+    is_off = here.distance_to(there) > math.hypot(subgoal.tolerance_m, wider_m)
+    return is_off or abs(error) > GOAL_HEADING_TOLERANCE_RAD

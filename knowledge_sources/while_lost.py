@@ -1,0 +1,59 @@
+"""What the knowledge sources of a lost robot have in common: when they may act, and the looks since it was lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from blackboard.board import View
+from blackboard.condition import Condition
+from blackboard.entry import Entry
+from blackboard.servoing import Discrepancy
+from knowledge_sources.conditions import GOING_ON, HELD, LOST, STANDING
+from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.settings import GoalSettings
+from world_models.entries.location import Hypothesis
+from world_models.entries.percepts import Glimpse, Panorama, Segments
+from world_models.entries.task import PlanSketch
+
+
+class Lost(NamedTuple):
+    """The doubt at the goal level, and what was believed last."""
+
+    doubt: Entry[Discrepancy]
+    belief: Entry[Hypothesis]
+
+
+def find_lost(view: View) -> Lost:
+    """What a lost robot rests on."""
+    return Lost(LOST.of(view), HELD.of(view).entry)
+
+
+def find_panorama(view: View, doubt: Entry[Discrepancy]) -> Entry[Panorama] | None:
+    """The looks since the robot is lost."""
+    found = view.latest(Panorama)
+    return found if found is not None and found.cycle >= doubt.cycle else None
+
+
+def list_views(view: View, glimpses: Iterable[Glimpse]) -> list[CameraView]:
+    """The looks with their segments."""
+    return [CameraView(view[g.segments].value.segments_px, g.now_from_then, np.array(g.covariance)) for g in glimpses]
+
+
+def is_dark(segments: Segments, settings: GoalSettings) -> bool:
+    """Whether a picture is dark; a bright one without contrast shows a bare wall."""
+    return segments.contrast < settings.min_contrast and segments.brightness < settings.min_brightness
+
+
+def _has_just_ridden(view: View) -> bool:
+    """Whether no milestone has borne out an elevator ride yet: then it may be on any floor."""
+    return view.latest(PlanSketch, lambda s: s.is_active and s.at > 0 and not s.verified
+                       and s.subgoals[s.at - 1].is_ride) is not None
+
+
+FLOOR_KNOWN = Condition("a known floor", lambda view: not _has_just_ridden(view),
+                        "no milestone had borne out the elevator ride yet")
+WHILE_LOST: tuple[Condition[Any], ...] = (GOING_ON, HELD, LOST, STANDING, FLOOR_KNOWN)
+"""What a lost robot needs to look round: it stands, and knows on which floor."""
