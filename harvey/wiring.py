@@ -24,13 +24,16 @@ from knowledge_sources.action.fault_handler import FaultHandler
 from knowledge_sources.action.floor_changer import FloorChanger
 from knowledge_sources.action.floor_watcher import FloorWatcher
 from knowledge_sources.action.goal_changer import GoalChanger
+from knowledge_sources.action.halt_explainer import HaltExplainer
 from knowledge_sources.action.landmark_chooser import LandmarkChooser
 from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.action.motor import Motor
-from knowledge_sources.action.obstacle_finder import ObstacleFinder
 from knowledge_sources.action.path_follower import PathFollower
 from knowledge_sources.action.range_watcher import RangeWatcher
 from knowledge_sources.action.recovery_retrier import RecoveryRetrier
+from knowledge_sources.action.thing_mapper import ThingMapper
+from knowledge_sources.action.thing_withdrawer import ThingWithdrawer
+from knowledge_sources.action.touch_finder import TouchFinder
 from knowledge_sources.action.travel_breaker import TravelBreaker
 from knowledge_sources.action.yaw_calibrator import YawCalibrator
 from knowledge_sources.goal.goal_closer import GoalCloser
@@ -111,7 +114,10 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     GoalChanger,
     FloorWatcher,
     RangeWatcher,
-    ObstacleFinder,
+    ThingMapper,
+    TouchFinder,
+    HaltExplainer,
+    ThingWithdrawer,
     DoorWatcher,
     ShutDoorExplainer,
     DependencyWithdrawer,

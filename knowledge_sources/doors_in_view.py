@@ -1,12 +1,11 @@
-"""The doors that a picture may show, and what revises the frames of their rooms; for several knowledge sources."""
+"""The doors that a picture may show; for several knowledge sources."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from blackboard.board import View
-from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from knowledge_sources.methods.doors.leaf import is_in_view
 from knowledge_sources.questions import find_frames, find_robot_in
@@ -52,15 +51,3 @@ def with_door_open(view: View, door: str, frames: Frames) -> FrameBuilding:
 def with_door_shut(view: View, door: str, frames: Frames) -> FrameBuilding:
     """The building as it would be known if a door were shut that is believed to be open."""
     return FrameBuilding(view, [entry.value.changed(FrameChange("shut", door, "")) for entry in frames])
-
-
-def shut_in_frames(door: str, by: str, frames: Frames, because: Effect) -> Iterable[Revise]:
-    """What says in the frames of both its rooms that a door is shut."""
-    for entry in frames:
-        yield Revise(entry, entry.value.changed(FrameChange("shut", door, by)), (because, entry))
-
-
-def open_in_frames(door: str, frames: Frames, because: Effect) -> Iterable[Revise]:
-    """What takes that back."""
-    for entry in frames:
-        yield Revise(entry, entry.value.restored("shut", door), (because, entry))

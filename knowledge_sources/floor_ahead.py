@@ -12,6 +12,7 @@ import shapely
 
 from blackboard.board import View
 from blackboard.entry import Entry
+from knowledge_sources.conditions import Belief
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.seen_floor import (
     Costs,
@@ -178,6 +179,13 @@ def _list_what_may_stand(view: View) -> list[tuple[Entry[Obstacle], shapely.Poly
     """
     found = [(entry, entry.value) for entry in view.where(Obstacle, lambda o: o.status != "gone")]
     return [(entry, build_polygon(o.core if o.is_there and o.core else o.footprint)) for entry, o in found]
+
+
+def find_swept_next(belief: Belief, leg: Leg, settings: ActionSettings) -> shapely.Geometry:
+    """What the robot will sweep next on its leg [m, world]."""
+    here = shapely.Point(belief.pose.position)
+    way = shapely.LineString([here, (leg.x1_m, leg.y1_m)])
+    return shapely.intersection(way, here.buffer(settings.act_within_m)).buffer(belief.robot.radius_m + SEEN_MARGIN_M)
 
 
 def find_known_free(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> shapely.Geometry:

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any, ClassVar
+from typing import Any
 
-from blackboard.board import View
-from blackboard.change import Change
-from blackboard.effect import Effect
 from blackboard.knowledge_source import KnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.locale_frame import FrameRequest
@@ -27,25 +23,3 @@ class RobotKnowledgeSource(KnowledgeSource):
 
     def __init__(self, settings: Settings = DEFAULT) -> None:
         self._settings = settings
-
-
-class OlderSource(RobotKnowledgeSource):
-    """One that judges and answers a trigger without binding what it found between the two."""
-
-    writes: ClassVar[tuple[type[Any], ...]] = ()
-
-    def bind(self, view: View, trigger: Change) -> tuple[Change, float] | None:
-        rating = self.judge(view, trigger)
-        return None if rating is None else (trigger, rating)
-
-    def rate(self, case: tuple[Change, float]) -> float:
-        return case[1]
-
-    def act(self, view: View, case: tuple[Change, float]) -> Iterable[Effect]:
-        return self.answer(view, case[0])
-
-    def judge(self, view: View, trigger: Change) -> float | None:
-        return self.priority
-
-    def answer(self, view: View, trigger: Change) -> Iterable[Effect]:
-        raise NotImplementedError

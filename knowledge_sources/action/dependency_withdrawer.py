@@ -113,18 +113,12 @@ def _find_misled(view: View, frame: Entry[LocaleFrame], settings: Settings) -> t
     if active_goal(view) is None:
         return ()
     active = view.where(PlanSketch, lambda sketch: sketch.is_active)
-    changed = _list_changed(view, frame)
-    if changed:
-        misled = any(_meets(view, sketch, obstacle, settings) for sketch in active for obstacle in changed)
-    else:
-        misled = any(_leads_there(sketch.value, frame.value) for sketch in active)
-    return active if misled else ()
-
-
-def _list_changed(view: View, frame: Entry[LocaleFrame]) -> list[Obstacle]:
-    """The obstacles for which a frame was revised: what was found, or is gone."""
-    found = (view.get(ref.id) for ref in frame.because)
-    return [entry.value for entry in found if entry is not None and isinstance(entry.value, Obstacle)]
+    found = [view.get(ref.id) for ref in frame.because if ref.id != frame.id]
+    changed = [entry.value for entry in found if entry is not None and isinstance(entry.value, Obstacle)]
+    is_misled = any(_meets(view, sketch, obstacle, settings) for sketch in active for obstacle in changed)
+    if len(changed) < len(found) or not changed:  # something else is otherwise too: a door, or what the file has
+        is_misled = is_misled or any(_leads_there(sketch.value, frame.value) for sketch in active)
+    return active if is_misled else ()
 
 
 def _meets(view: View, sketch: Entry[PlanSketch], obstacle: Obstacle, settings: Settings) -> bool:

@@ -17,8 +17,6 @@ from knowledge_sources.doors_in_view import (
     Watched,
     find_door_state,
     list_doors_in_view,
-    open_in_frames,
-    shut_in_frames,
     with_door_open,
 )
 from knowledge_sources.methods.arrays import Image
@@ -28,7 +26,6 @@ from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.body import CameraPicture
 from world_models.entries.door_state import DoorPicture, DoorState
 from world_models.entries.task import Milestone
@@ -43,7 +40,7 @@ class Case(NamedTuple):
 
 
 class DoorWatcher(RobotKnowledgeSource):
-    """Looks whether the doors in view are open or shut, and puts what it finds into the frames of both their rooms.
+    """Looks whether the doors in view are open or shut.
 
     It looks at pictures as long as the belief is trusted: at those that track landmarks, and at those by which a
     milestone was verified. An opening shows what the model has beyond, or a leaf. That adds to the log odds of the
@@ -57,7 +54,7 @@ class DoorWatcher(RobotKnowledgeSource):
         Watch(Milestone, (Revised,), lambda m: m.status == "verified"),
     )
     needs = (GOING_ON, HELD, PICTURE, UP_TO_DATE, SURE)
-    writes = (DoorState, LocaleFrame)
+    writes = (DoorState,)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         """Doors that the newest picture may show, and a belief that is sharp enough to look at them."""
@@ -94,10 +91,5 @@ class DoorWatcher(RobotKnowledgeSource):
         if now is None or (known is not None and now.state == known.value.state == "open"):
             return
         because = (frame, belief) if known is None else (frame, belief, known)
-        found = Post(now, because) if known is None else Revise(known, now, because)
-        yield found
-        if now.state == "shut" and not watched.is_shut:
-            yield from shut_in_frames(door.name, self.name, frames, found)
-        elif now.state == "open" and watched.is_shut:
-            yield from open_in_frames(door.name, frames, found)
+        yield Post(now, because) if known is None else Revise(known, now, because)
 

@@ -1,4 +1,4 @@
-"""Door doubter (§4: models are incomplete): before the robot believes that it is lost, is a door ahead shut?"""
+"""Shut door explainer (§4: models are incomplete): before the robot believes that it is lost, is a door ahead shut?"""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from knowledge_sources.doors_in_view import (
     Watched,
     find_door_state,
     list_doors_in_view,
-    shut_in_frames,
     with_door_shut,
 )
 from knowledge_sources.methods.doors.belief import (
@@ -43,7 +42,6 @@ from knowledge_sources.questions import (
     open_discrepancy,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.body import CameraPicture
 from world_models.entries.door_state import DoorPicture, DoorState
 from world_models.entries.location import Hypothesis
@@ -81,7 +79,7 @@ class ShutDoorExplainer(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.ENTER
     on = (Watch(Milestone, (Revised,), lambda m: m.status in ("refuted", "not testable")),)
-    writes = (DoorState, LocaleFrame, Discrepancy)
+    writes = (DoorState, Discrepancy)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         belief, doubt = find_belief(view), open_discrepancy(view, Level.PLAN)
@@ -100,8 +98,6 @@ class ShutDoorExplainer(RobotKnowledgeSource):
             found = self._hold_against(view, watched, case)
             if found is not None:
                 yield found
-                frames = find_frames(view, watched.doorway.between)
-                yield from shut_in_frames(watched.doorway.name, self.name, frames, found)
                 yield Revise(case.doubt, case.doubt.value.corrected(), (found,))
                 return
 

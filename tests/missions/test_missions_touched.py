@@ -19,7 +19,7 @@ from blackboard.journal import Decision
 from blackboard.knowledge_source import KnowledgeSource
 from harvey.simulation.simulated_run import build_robot_model, run_mission
 from harvey.wiring import knowledge_sources
-from knowledge_sources.action.obstacle_finder import ObstacleFinder
+from knowledge_sources.action.touch_finder import TouchFinder
 from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario, parse_scenario
 from sim.stage import build_stage
@@ -88,7 +88,7 @@ def world() -> World:
 
 
 def touch(world: World, pose: Pose2, contact: Contact, *, sigma_m: float = 0.01) -> list[Obstacle]:
-    """What the obstacle finder concludes from a contact at a pose of the north hall, once a milestone was verified."""
+    """What the touch finder concludes from a contact at a pose of the north hall, once a milestone was verified."""
     board, store = Blackboard(), FrameStore(world)
     robot = build_robot_model(load_scenario("shut-door"), world)
     frames = [Post(store.frame(name)) for name in ("", "north-hall")]
@@ -99,7 +99,7 @@ def touch(world: World, pose: Pose2, contact: Contact, *, sigma_m: float = 0.01)
     seen = Hypothesis("north-hall", pose, diagonal(sigma_m, 0.005), "milestone")
     (revised,) = board.apply([Revise(made[-1].entry, seen)], author="test", cycle=2)
     assert isinstance(revised, Revised)
-    effects = answer(ObstacleFinder(), board.view, revised) or ()
+    effects = answer(TouchFinder(), board.view, revised) or ()
     return [e.value for e in effects if isinstance(e, Post) and isinstance(e.value, Obstacle)]
 
 

@@ -11,22 +11,27 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
-from blackboard.board import Blackboard
-from blackboard.change import Change, Posted
+from blackboard.change import Change
 from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
+from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.action.obstacle_finder import FREE_FLOOR_ODDS, ObstacleFinder
+from knowledge_sources.action.halt_explainer import HaltExplainer
+from knowledge_sources.action.model_reviser import ModelReviser
+from knowledge_sources.action.thing_mapper import ThingMapper
+from knowledge_sources.action.thing_withdrawer import ThingWithdrawer
+from knowledge_sources.action.touch_finder import TouchFinder
 from knowledge_sources.floor_ahead import PUT_DOWN_FREE_M, list_free_discs
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor.weigh_sight import FREE_FLOOR_ODDS
 from knowledge_sources.questions import find_building_as_filed
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.building.locale_frame import FRAME_OF, LocaleFrame
 from world_models.building.world import World
 from world_models.entries.body import MotorCommand
+from world_models.entries.entry_kinds import KINDS
 from world_models.entries.floor import FloorThing, FreeFloor
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.obstacle import Contact, Obstacle
@@ -51,17 +56,18 @@ def world() -> World:
 
 
 class Hall:
-    """A board with a robot in the north hall, and the obstacle finder beside it."""
+    """A board with a robot in the north hall, and round it those who find things on the floor."""
 
     def __init__(self, world: World) -> None:
-        self.board, store = Blackboard(), FrameStore(world)
+        sources = (ThingMapper(), TouchFinder(), HaltExplainer(), ThingWithdrawer(), ModelReviser())
+        self._scheduler, store = Scheduler(sources, kinds=KINDS), FrameStore(world)
+        self.board = self._scheduler.board
         self.robot = build_robot_model(load_scenario("shut-door"), world)
         self._belief = Hypothesis(HALL, Pose2(2.0, 1.2, 0.0), diagonal(0.01, 0.005), "tracks")
         frames = [Post(store.frame(name)) for name in ("", HALL, "reception", "archive")]
-        self.board.apply([*map(Post, self.robot.entries()), *frames, Post(self._belief)], author="test", cycle=1)
-        self.source, self.cycle = ObstacleFinder(), 1
+        self.apply(*map(Post, self.robot.entries()), *frames, Post(self._belief))
 
-    def see(self, *things: FloorThing, seen_s: float, far_m: float = 4.0, ahead_m: float = 0.0) -> tuple[Change, ...]:
+    def see(self, *things: FloorThing, seen_s: float, far_m: float = 4.0, ahead_m: float = 0.0) -> None:
         """One sight of the floor: free up to ``far_m``, with some things on it."""
         bearings = np.linspace(-0.5, 0.5, 41)
         far = np.full(41, far_m)
@@ -72,42 +78,37 @@ class Hall:
             far[hit] = np.minimum(far[hit], np.linalg.norm(corners, axis=1).min())
         scan = FreeFloor("camera", HALL, HERE.x_m + ahead_m, HERE.y_m, tuple(bearings.tolist()), (1.5,) * 41,
                          tuple(far.tolist()), ("sight",) * 41, (0.02,) * 41, things, seen_s)
-        self.cycle += 1
-        (posted,) = self.board.apply([Post(scan)], author="floor_watcher", cycle=self.cycle)
-        assert isinstance(posted, Posted)
-        effects = answer(self.source, self.board.view, posted)
-        if effects is None:
-            return ()
-        return self.board.apply(effects, author=self.source.name, cycle=self.cycle)
+        self.apply(Post(scan))
 
     def touch(self, direction_rad: float, *, turns: tuple[float, ...], basis: str) -> None:
         """Something is touched ahead in the hall; then the robot turns, and its place is found to be as believed."""
-        (asked,) = self._apply(Post(MotorCommand(0.0, 0.5)))
-        self._apply(Post(Contact("bumper", direction_rad, 0.15, 3.0), (asked.entry,)))
+        (asked,) = self.apply(Post(MotorCommand(0.0, 0.5)))
+        self.apply(Post(Contact("bumper", direction_rad, 0.15, 3.0), (asked.entry,)))
         for turn_rad in turns:
-            self._apply(Post(MotorCommand(turn_rad, 0.0)))
+            self.apply(Post(MotorCommand(turn_rad, 0.0)))
         belief = self.board.view.latest(Hypothesis)
         assert belief is not None
         pose = Pose2(2.0, 1.2, sum(turns))
         known = Hypothesis(HALL, pose, diagonal(0.01, 0.005), basis)
-        (found,) = self._apply(Revise(belief, known, (belief,)))
-        self._apply(*(answer(self.source, self.board.view, found) or ()))
+        self.apply(Revise(belief, known, (belief,)))
 
     def verify(self, verdict: MilestoneVerdict = "verified") -> None:
         """A milestone is judged."""
-        self._apply(Post(Certificate("Milestone-1", "", verdict, "so it was", 9, 9, 9, 1.0, 0.2, 0.0, 0.0, 0.0, 4.0,
+        self.apply(Post(Certificate("Milestone-1", "", verdict, "so it was", 9, 9, 9, 1.0, 0.2, 0.0, 0.0, 0.0, 4.0,
                                      1e-3)))
 
     def find(self, basis: str) -> None:
         """The belief is corrected by a milestone, or by being found after it was lost."""
         belief = self.board.view.latest(Hypothesis)
         assert belief is not None
-        (found,) = self._apply(Revise(belief, replace(belief.value, basis=basis), (belief,)))
-        self._apply(*(answer(self.source, self.board.view, found) or ()))
+        self.apply(Revise(belief, replace(belief.value, basis=basis), (belief,)))
 
-    def _apply(self, *effects: Effect) -> tuple[Change, ...]:
-        self.cycle += 1
-        return self.board.apply(effects, author="test", cycle=self.cycle)
+    def apply(self, *effects: Effect) -> tuple[Change, ...]:
+        """Something happens, and is answered until nothing is left to do."""
+        changes = self._scheduler.post(effects, "test")
+        while (decision := self._scheduler.step()) is not None:
+            assert not decision.refused, decision.refused
+        return changes
 
     @property
     def obstacles(self) -> list[Obstacle]:
@@ -146,12 +147,12 @@ def test_what_was_touched_is_where_it_was_touched_however_the_robot_has_turned_s
 
 
 def test_a_move_after_the_touch_leaves_it_open_what_was_touched(hall: Hall) -> None:
-    (asked,) = hall._apply(Post(MotorCommand(0.0, 0.5)))
-    hall._apply(Post(Contact("bumper", 0.0, 0.15, 3.0), (asked.entry,)), Post(MotorCommand(0.0, 0.2)))
+    (asked,) = hall.apply(Post(MotorCommand(0.0, 0.5)))
+    hall.apply(Post(Contact("bumper", 0.0, 0.15, 3.0), (asked.entry,)), Post(MotorCommand(0.0, 0.2)))
     belief = hall.board.view.latest(Hypothesis)
     assert belief is not None
-    (found,) = hall._apply(Revise(belief, replace(belief.value, basis="milestone"), (belief,)))
-    assert answer(hall.source, hall.board.view, found) is None
+    hall.apply(Revise(belief, replace(belief.value, basis="milestone"), (belief,)))
+    assert hall.obstacles == []
 
 
 @pytest.mark.parametrize(("aside_rad", "obstacles"), [(0.0, 1), (0.8, 2)])
@@ -218,7 +219,7 @@ def test_floor_that_is_not_seen_does_not_make_an_obstacle_gone(hall: Hall) -> No
 
 def test_what_was_touched_is_forgotten_when_its_floor_is_clearly_free(hall: Hall) -> None:
     touched = Obstacle(f"{HALL}/obstacle-1", HALL, CARTON, 0.05, 4.0, 1.2, 0.45, certainty=0.99, touched_s=0.5)
-    hall.board.apply([Post(touched)], author="test", cycle=hall.cycle)
+    hall.apply(Post(touched))
     hall.see(seen_s=3.0)
     hall.see(seen_s=4.0)
     assert [o.status for o in hall.obstacles] == ["gone"]
@@ -234,7 +235,7 @@ def test_what_the_model_has_there_is_no_obstacle(hall: Hall) -> None:
 
 
 def test_a_pose_in_doubt_never_makes_an_obstacle(hall: Hall) -> None:
-    hall.board.apply([Post(Discrepancy(Level.PLAN, "lost", None, (4.0, 30.0), "px"))], author="test", cycle=hall.cycle)
+    hall.apply(Post(Discrepancy(Level.PLAN, "lost", None, (4.0, 30.0), "px")))
     hall.see(carton(), seen_s=1.0)
     assert hall.obstacles == []
 
@@ -340,7 +341,7 @@ def test_the_floor_that_is_free_as_it_was_put_down_is_round_the_robot_and_not_ro
     scan = FreeFloor("camera", HALL, eye.x_m, eye.y_m, bearings, (1.5,) * 41, (3.0,) * 41, ("sight",) * 41,
                      (0.02,) * 41, (), 0.5)
     at = Place.of_world(hall.robot.world, HALL, HERE.x_m + 0.03, HERE.y_m)
-    hall._apply(Post(scan), Post(Goal(at, at)))
+    hall.apply(Post(scan), Post(Goal(at, at)))
     discs = list_free_discs(hall.board.view, hall.robot, HERE, hall.board.view.all(FreeFloor))
     x_m, y_m, radius_m = discs[-1].circle
     assert radius_m == PUT_DOWN_FREE_M

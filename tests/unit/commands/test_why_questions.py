@@ -25,7 +25,7 @@ BOX = Obstacle("hallway/obstacle-1", "hallway", SQUARE, 0.05, 0.25, 0.25, 0.5, c
 THERE = replace(BOX, status="there", certainty=0.99)
 PICTURE = DoorPicture("CameraPicture-3", (10.0, 20.0, 30.0, 40.0), 0.0, 0.0, 0.0, 3.0, "a leaf")
 DOOR = DoorState("library-door", ("hallway", "library"), "shut", 0.99, 4.0, 2, PICTURE, 5.0)
-EXTRA = FrameChange("extra", "hallway/obstacle-1", "obstacle_finder", SQUARE)
+EXTRA = FrameChange("extra", "hallway/obstacle-1", "thing_mapper", SQUARE)
 
 
 def entry(ref: str, value: Any, because: tuple[str, ...] = (), cycle: int = 1) -> EntryRecord:

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 9_950,
-    "knowledge_sources": 20_760,
+    "knowledge_sources": 21_030,
     "sim": 5_830,
     "logs": 7_450,
     "harvey": 10_520,

@@ -1,0 +1,151 @@
+"""Things on the floor that the model lacks: how certain they are, where they stand, and which are the same."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.motion.footprints import (
+    build_polygon,
+    join_footprints,
+    list_corners,
+    measure_common_directions,
+    measure_hull_part,
+    measure_width_m,
+    take_free,
+)
+from knowledge_sources.settings import ActionSettings
+from world_models.building.building import Building
+from world_models.building.locales import EXTRA_KIND, Doorway
+from world_models.entries.location import Place
+from world_models.entries.obstacle import Obstacle, ObstacleStatus
+
+VAGUE_SIGMA_M = 0.05  # sights of an obstacle whose standard deviations differ by this and twofold are not joined
+MIN_COMMON_DIRECTIONS = 0.6
+"""A sight without feet tells nothing new where this part of its directions is that of what is known."""
+MAX_BEHIND_DOOR_M = 4.0  # a thing that is seen through a doorway stands at most so far behind it
+
+
+def may_be_there(obstacle: Obstacle) -> bool:
+    """Whether it is there or suspected."""
+    return obstacle.status != "gone"
+
+
+def tell_status(certainty: float, settings: ActionSettings) -> ObstacleStatus:
+    """Whether something so certain is acted on."""
+    return "there" if certainty >= settings.min_obstacle_certainty else "suspected"
+
+
+def combine_odds(certainty: float, odds: float) -> float:
+    """The probability after further evidence."""
+    product = certainty / max(1e-9, 1.0 - certainty) * odds
+    return product / (1.0 + product)
+
+
+def find_same(
+    known: Mapping[str, Obstacle], shape: shapely.Polygon, sigma_m: float, most_hull: float
+) -> str | None:
+    """Which obstacle a thing is another sight of: that of which it covers most, within the standard deviations.
+
+    What lies beside an obstacle, so that a hull round both would take much floor that neither takes, is another thing.
+    """
+    best: tuple[float, str] | None = None
+    for name, obstacle in known.items():
+        polygon = build_polygon(obstacle.footprint)
+        reach_m = 2.0 * math.hypot(sigma_m, obstacle.sigma_m)
+        shared = shapely.intersection(polygon.buffer(reach_m), shape).area
+        if shared > 0.0 and (best is None or shared > best[0]) and measure_hull_part(polygon, shape) <= most_hull:
+            best = shared, name
+    return None if best is None else best[1]
+
+
+def find_before(
+    known: Mapping[str, Obstacle], seen: shapely.Geometry, eye: tuple[float, float], overhang_m: float
+) -> str | None:
+    """Which obstacle a sight without feet is one of: known well, nearer than the picture's border, and in most of its
+    directions, where its top may be wider than its feet.
+    """
+    at = np.array(eye)
+    reach_m = float(np.linalg.norm(shapely.get_coordinates(seen) - at, axis=1).max())
+    best: tuple[float, str] | None = None
+    for name, obstacle in known.items():
+        wide = build_polygon(obstacle.footprint).buffer(overhang_m)
+        if not obstacle.is_there or obstacle.sigma_m > VAGUE_SIGMA_M:
+            continue
+        if wide.distance(shapely.Point(at)) > reach_m:
+            continue
+        part = measure_common_directions(wide, seen, at)
+        if part >= MIN_COMMON_DIRECTIONS and (best is None or part > best[0]):
+            best = part, name
+    return None if best is None else best[1]
+
+
+def weigh_footprints(
+    known: shapely.Geometry, seen: shapely.Geometry, free: shapely.Geometry, known_sigma_m: float, sigma_m: float,
+    eye: Floats,
+) -> shapely.Geometry:
+    """The footprint by two sights: the sharper one decides.
+
+    A sight of which the feet are not seen tells in which directions the thing is, and that it is nearer than the
+    picture's lower border: it adds to what is known only in directions in which nothing was known.
+    """
+    if known_sigma_m >= 2.0 * sigma_m + VAGUE_SIGMA_M:
+        return seen
+    vague_m = VAGUE_SIGMA_M
+    is_vague = sigma_m >= 2.0 * known_sigma_m + vague_m or min(sigma_m, known_sigma_m) >= 2.0 * vague_m
+    if is_vague and measure_common_directions(known, seen, eye) >= MIN_COMMON_DIRECTIONS:
+        return take_free(known, free)
+    return join_footprints(known, seen, free)
+
+
+def with_core(obstacle: Obstacle, seen: shapely.Geometry) -> Obstacle:
+    """An obstacle with what was seen of its footprint last, where that is clearly less than the footprint."""
+    footprint = build_polygon(obstacle.footprint)
+    core = shapely.intersection(footprint, seen)
+    is_less = 0.0 < core.area < 0.9 * footprint.area
+    return replace(obstacle, core=list_corners(core) if is_less else ())
+
+
+def keep_touched(known: Obstacle, seen: shapely.Geometry) -> shapely.Geometry:
+    """What was seen of a known obstacle, with what it took when it was touched: no picture takes that back."""
+    if known.touched_s is None:
+        return seen
+    return shapely.union(seen, build_polygon(known.core or known.footprint))
+
+
+def place(world: Building, obstacle: Obstacle, shape: shapely.Geometry) -> Obstacle:
+    """An obstacle with the place and the width that follow from its footprint."""
+    middle = shape.centroid
+    at = Place.of_world(world, obstacle.locale, float(middle.x), float(middle.y))
+    return replace(obstacle, x_m=round(at.x_m, 3), y_m=round(at.y_m, 3),
+                   width_m=round(measure_width_m(obstacle.footprint), 3))
+
+
+def find_room(world: Building, shape: shapely.Polygon, near: str) -> str:
+    """The room in which most of a thing stands, of that where the robot is and those next to it."""
+    if shapely.Polygon(world.outline(near)).contains(shape.centroid):
+        return near
+    doors = {doorway.other(near): doorway for doorway in world.doorways_of(near)}
+    rooms = [near, *(room for room, door in doors.items() if _measure_behind_m(door, shape) <= MAX_BEHIND_DOOR_M)]
+    areas = [shapely.intersection(shapely.Polygon(world.outline(room)), shape).area for room in rooms]
+    return rooms[int(np.argmax(areas))]
+
+
+def _measure_behind_m(door: Doorway, shape: shapely.Polygon) -> float:
+    """How far a thing is from a doorway."""
+    return float(shapely.MultiPoint(np.concatenate(door.thresholds_world)).distance(shape))
+
+
+def find_open_floor(world: Building, locale: str, margin_m: float) -> shapely.Geometry:
+    """The floor of a room, with its open doorways, so far from its walls and from what the file has there."""
+    openings = [shapely.MultiPoint(np.concatenate(doorway.thresholds_world)).convex_hull.buffer(0.01)
+                for doorway in world.doorways_of(locale)]
+    floor = shapely.union_all([shapely.Polygon(world.outline(locale)), *openings])
+    things = [shapely.Polygon(thing.footprint_world) for thing in world.things_of(locale)
+              if thing.is_obstacle and thing.kind != EXTRA_KIND]
+    return shapely.difference(shapely.buffer(floor, -margin_m), shapely.buffer(shapely.union_all(things), margin_m))

@@ -1,0 +1,58 @@
+"""What is known of a locale after something was found there, a door was looked at, or somebody said how it is."""
+
+from __future__ import annotations
+
+from knowledge_sources.methods.motion.footprints import measure_change_m
+from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
+from world_models.entries.door_state import DoorState
+from world_models.entries.obstacle import Obstacle
+from world_models.entries.user_reports import DOOR_STATES, UserReport
+
+MIN_HEIGHT_CHANGE_M = 0.15  # a thing in a frame is revised where its top is so much higher or lower
+
+
+def revise_by_thing(frame: LocaleFrame, thing: Obstacle, by: str, least_m: float) -> LocaleFrame:
+    """A frame with a thing as it is known now; the same frame where no plan could change by it.
+
+    Args:
+        least_m: a change of the footprint by less is none.
+    """
+    known = next((c for c in frame.changes if (c.what, c.name) == ("extra", thing.name)), None)
+    if not thing.is_there:
+        return frame if known is None else frame.restored("extra", thing.name)
+    height_m = thing.height_m + thing.sigma_height_m if thing.is_height_known else 0.0
+    change = FrameChange("extra", thing.name, by, thing.footprint, round(height_m, 2))
+    if known is None:
+        return frame.changed(change)
+    moved_m = measure_change_m(known.footprint, change.footprint)
+    is_touched = thing.touched_s == thing.seen_s
+    same_height = abs(known.height_m - change.height_m) < MIN_HEIGHT_CHANGE_M
+    if not is_touched and moved_m < least_m and same_height:
+        return frame
+    return frame.restored("extra", thing.name).changed(change)
+
+
+def revise_by_door(frame: LocaleFrame, door: DoorState, by: str) -> LocaleFrame:
+    """A frame in which a door is as it was seen; the same frame as long as that is not certain."""
+    is_shut = any((change.what, change.name) == ("shut", door.door) for change in frame.changes)
+    if door.state == "shut" and not is_shut:
+        return frame.changed(FrameChange("shut", door.door, by))
+    return frame.restored("shut", door.door) if door.state == "open" and is_shut else frame
+
+
+def revise_by_report(frame: LocaleFrame, report: UserReport, by: str) -> LocaleFrame:
+    """A frame in which a door or a thing is as somebody said. Raises ValueError where it has nothing of that name."""
+    what, state = report.what, report.state
+    if state == "gone" and any((change.what, change.name) == ("extra", what) for change in frame.changes):
+        return frame.restored("extra", what)
+    known = {(change.what, change.name) for change in frame.changes}
+    filed = frame.filed or frame
+    names = [door.name for door in filed.doorways] if state in DOOR_STATES else [thing.name for thing in filed.things]
+    if what not in names:
+        kind = "an open door" if state in DOOR_STATES else "a thing"
+        raise ValueError(f"expected {kind} of {frame.name} ({', '.join(names) or 'it has none'}), got {what!r}")
+    if state in UNDONE:
+        return frame.restored(UNDONE[state], what)
+    if (state, what) in known:
+        return frame
+    return frame.changed(FrameChange("shut" if state == "shut" else "gone", what, by))
