@@ -1,0 +1,216 @@
+"""Boards for the laws of knowledge sources: a plain house, a robot in it, and what a law puts there, entry by entry.
+
+The hall is the same left to right, so that a board can be mirrored: :func:`mirrored` is about its middle line.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from typing import Any, TypeVar
+
+import numpy as np
+from hypothesis import strategies as st
+
+from acting import answer
+from blackboard.board import Blackboard, View
+from blackboard.change import Change, Posted, Revised
+from blackboard.effect import Effect, Post, Retract, Revise
+from blackboard.entry import Entry, Ref
+from blackboard.knowledge_source import KnowledgeSource
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from world_models.actuator import ActuatorModel
+from world_models.building.world import World
+from world_models.camera import Camera, CameraMount
+from world_models.entries.body import MotionReport, MotorCommand
+from world_models.entries.location import Covariance, Hypothesis, Place, covariance_tuple, diagonal
+from world_models.entries.task import Goal, Leg, Milestone, PlanSketch, Subgoal
+from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
+from world_models.frame_store import FrameStore
+from world_models.frames import Pose2, flattened
+from world_models.robot import RobotModel
+
+T = TypeVar("T")
+
+HOUSE = """
+name = "plain"
+units = "metres"
+include = ["standard"]
+
+[locales.house]
+kind = "building"
+at = [3, -2]
+turn = 30
+
+[locales.hall]
+kind = "hallway"
+in = "house"
+at = [0, 0]
+size = [8, 4]
+
+[locales.study]
+kind = "office"
+in = "house"
+at = [8.2, 0]
+size = [6, 4]
+
+[doors]
+study-door = { between = ["hall", "study"], wall = "east", along = 2.0, width = 1.0, open = true }
+"""
+HALL, STUDY = "hall", "study"
+LENGTH_M, WIDTH_M = 8.0, 4.0
+"""Of the hall; its frame begins in its south-west corner, and is turned in the world."""
+SURE = diagonal(0.01, 0.005)
+
+
+@cache
+def house() -> World:
+    """The building, read once."""
+    return read_world(Source.parse(HOUSE, "house.toml"))
+
+
+def plain_robot(world: World | None = None, *, continuous: bool = False,
+                actuator: ActuatorModel | None = None) -> RobotModel:
+    """A robot in the house, or in another world."""
+    camera, mount = Camera.from_field_of_view(math.radians(65.0), 256, 256), CameraMount(height_m=1.0, forward_m=0.12, tilt_rad=0.1)
+    return RobotModel(world or house(), camera, mount, actuator or ActuatorModel(), continuous=continuous)
+
+
+class Bench:
+    """A board on which a law puts what it needs, one cycle after the other.
+
+    Args:
+        robot: whose camera, wheels and footprint are put there, with all frames of its world; None for an empty board.
+    """
+
+    def __init__(self, robot: RobotModel | None = None) -> None:
+        self.board = Blackboard()
+        self.cycle = 0
+        self.robot = robot
+        if robot is not None:
+            assert isinstance(robot.world, World)
+            store = FrameStore(robot.world)
+            for value in (*robot.entries(), *(store.frame(name) for name in ("", *robot.world.locales))):
+                self.put(value)
+
+    @property
+    def view(self) -> View:
+        return self.board.view
+
+    def put(self, value: Any, *because: Entry[Any]) -> Entry[Any]:
+        """A new entry."""
+        return self.apply(Post(value, because))[0].entry
+
+    def revise(self, entry: Entry[T], **fields: Any) -> Entry[T]:
+        """The current revision of an entry, with other values in some fields."""
+        now = self.view[entry.id]
+        return self.apply(Revise(now, replace(now.value, **fields), (now,)))[0].entry
+
+    def retract(self, entry: Entry[Any]) -> None:
+        self.apply(Retract(self.view[entry.id]))
+
+    def apply(self, *effects: Effect) -> tuple[Change, ...]:
+        """The changes that effects make, in a cycle of their own."""
+        self.cycle += 1
+        return self.board.apply(effects, author="test", cycle=self.cycle)
+
+    def ask(self, source: KnowledgeSource, trigger: Entry[Any]) -> tuple[Effect, ...] | None:
+        """What a source makes of an entry that was just posted or revised; None where it does not act."""
+        return answer(source, self.view, Revised(trigger) if trigger.revision else Posted(trigger))
+
+    def believe(self, pose: Pose2 | None = None, covariance: Covariance = SURE, *, locale: str = HALL,
+                basis: str = "milestone", motion: str = "") -> Entry[Hypothesis]:
+        """A belief that is held; ``pose`` in the locale's frame."""
+        return self.put(Hypothesis(locale, pose or Pose2(2.0, 2.0, 0.0), covariance, basis, motion=motion))
+
+    def pursue(self, destination: Place | None = None) -> Entry[Goal]:
+        """A goal that is pursued."""
+        return self.put(Goal(Place(HALL, 1.0, 2.0), destination or Place(HALL, 6.0, 2.0)))
+
+    def sketch(self, *places: Place, goal: Entry[Goal] | None = None, path: tuple[int, ...] = (), at: int = 0,
+               verified: bool = True, primitive: bool = True) -> Entry[PlanSketch]:
+        """A sketch that leads from place to place, for a goal of its own unless one is given."""
+        way = places or (Place(HALL, 1.0, 2.0), Place(HALL, 6.0, 2.0))
+        steps = tuple(Subgoal(a, b, primitive) for a, b in pairwise(way))
+        served = goal or self.pursue(way[-1])
+        return self.put(PlanSketch(served.id, path, HALL, steps, at, verified), served)
+
+    def leg(self, sketch: Entry[PlanSketch], **fields: Any) -> Entry[Leg]:
+        """The leg of a sketch's current subgoal, under way."""
+        step = sketch.value.current
+        assert step is not None
+        start, end = (place.in_world(house()) for place in (step.origin, step.destination))
+        return self.put(replace(Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m,
+                                    step.tolerance_m), **fields), sketch)
+
+    def await_milestone(self, sketch: str = "", index: int = 0, **fields: Any) -> Entry[Milestone]:
+        """A milestone that the robot has yet to turn to, unless ``fields`` say otherwise."""
+        return self.put(Milestone(sketch, index, "M of a law", **{"look_heading_rad": 0.0, **fields}))
+
+    def doubt(self, level: Level = Level.GOAL, magnitude: float | None = None) -> Entry[Discrepancy]:
+        """A discrepancy that is open at a level; by default the robot is lost."""
+        return self.put(Discrepancy(level, "what a law says", magnitude, (5.0, 30.0), "px"))
+
+    def move(self, turn_rad: float = 0.0, move_m: float = 0.5) -> tuple[Entry[MotorCommand], Entry[MotionReport]]:
+        """A motor command, and the report that it was carried out; no belief has it yet."""
+        command = self.put(MotorCommand(turn_rad, move_m))
+        return command, self.put(MotionReport(turn_rad, move_m, 1.0, 1.0), command)
+
+
+def to_world(pose: Pose2, locale: str = HALL) -> Pose2:
+    """A pose in a locale's frame as one of the world."""
+    return flattened(house().world_from_locale(locale)) @ pose
+
+
+def mirrored(pose: Pose2) -> Pose2:
+    """A pose in the hall's frame, mirrored left to right about its middle line."""
+    return Pose2(pose.x_m, WIDTH_M - pose.y_m, -pose.heading_rad)
+
+
+def mirrored_place(place: Place) -> Place:
+    """The same of a place in the hall."""
+    heading = place.heading_rad
+    return Place(place.locale, place.x_m, WIDTH_M - place.y_m, None if heading is None else -heading)
+
+
+def mirrored_covariance(covariance: Covariance) -> Covariance:
+    """The same of a covariance in the hall's frame."""
+    signs = np.diag([1.0, -1.0, -1.0])
+    return covariance_tuple(signs @ np.array(covariance) @ signs)
+
+
+def made(effects: Iterable[Effect] | None, kind: type[T]) -> list[T]:
+    """The values of a kind that effects post or revise."""
+    return [e.value for e in effects or () if not isinstance(e, Retract) and isinstance(e.value, kind)]
+
+
+def effect_on(effects: Iterable[Effect] | None, kind: type[Any]) -> Any:
+    """The only effect that makes a value of a kind."""
+    (found,) = [e for e in effects or () if not isinstance(e, Retract) and isinstance(e.value, kind)]
+    return found
+
+
+def reasons(effect: Effect) -> set[str]:
+    """What an effect names, directly: ids of entries, and of its act's other effects the kinds of their values."""
+    return {r.id if isinstance(r, Entry | Ref) else type(r.value).__name__ for r in effect.because}
+
+
+def all_reasons(effects: Sequence[Effect]) -> set[str]:
+    """The ids of all entries that the effects of one act name."""
+    return {r.id for e in effects for r in e.because if isinstance(r, Entry | Ref)}
+
+
+poses = st.builds(Pose2, st.floats(0.8, LENGTH_M - 0.8), st.floats(0.8, WIDTH_M - 0.8), st.floats(-3.1, 3.1))
+"""Of a robot in the hall's frame, off its walls."""
+places = st.builds(Place, st.just(HALL), st.floats(0.8, LENGTH_M - 0.8), st.floats(0.8, WIDTH_M - 0.8))
+covariances = st.builds(diagonal, st.floats(0.002, 0.2), st.floats(0.001, 0.2))
+
+
+def wakes(source: KnowledgeSource, change: Change) -> bool:
+    """Whether a source watches for a change."""
+    return any(watch.sees(change) for watch in source.on)

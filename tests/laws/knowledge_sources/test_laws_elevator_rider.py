@@ -1,0 +1,81 @@
+"""Laws of the elevator rider: it asks for the ride that is next, once, and only while nothing above it is in doubt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blackboard.change import Posted
+from blackboard.level import Level
+from generated_boards import Bench, all_reasons, effect_on, wakes
+from knowledge_sources.action.elevator_rider import ElevatorRider
+from world_models.entries.body import Ride
+from world_models.entries.location import Place
+from world_models.entries.task import PlanSketch, Subgoal
+
+BELOW, ABOVE, FAR = Place("car-1", 1.0, 1.0), Place("car-2", 1.0, 1.0), Place("car-3", 0.0, 0.0)
+UP, ON = Subgoal(BELOW, ABOVE, primitive=False, passage="lift"), Subgoal(ABOVE, FAR, primitive=False, passage="lift")
+WALK = Subgoal(Place("hall", 0.0, 0.0), BELOW, primitive=True)
+THROUGH = replace(WALK, passage="door")
+ACROSS = Subgoal(Place("hall", 0.0, 0.0), BELOW, primitive=False)
+
+
+
+
+@settings(max_examples=60)
+@given(st.sampled_from((UP, WALK, THROUGH, ACROSS)), st.booleans(),
+       st.sampled_from((None, ("PlanSketch-1", 1), ("PlanSketch-1", 0), ("PlanSketch-9", 1))))
+def test_it_asks_for_the_next_subgoal_where_that_is_a_ride_and_was_not_asked_for(
+    step: Subgoal, verified: bool, asked: tuple[str, int] | None
+) -> None:
+    bench = Bench()
+    belief, goal = bench.believe(), bench.pursue(FAR)
+    sketch = bench.put(PlanSketch(goal.id, (), "", (WALK, step, ON), 1, verified), goal)
+    if asked is not None:
+        bench.put(Ride(*asked, "lift", "car-1", "car-2"))
+    effects = bench.ask(ElevatorRider(), sketch)
+    assert (effects is not None) == (step is UP and verified and asked != ("PlanSketch-1", 1))
+    if effects is not None:
+        (effect,) = effects
+        assert effect.value == Ride(sketch.id, 1, "lift", "car-1", "car-2")
+        assert all_reasons(effects) == {sketch.id, belief.id}
+
+
+def test_at_the_end_of_a_sketch_there_is_no_ride() -> None:
+    bench = Bench()
+    bench.believe()
+    goal = bench.pursue(FAR)
+    sketch = bench.put(PlanSketch(goal.id, (), "", (UP,), 1, True), goal)
+    assert bench.ask(ElevatorRider(), sketch) is None
+
+
+def test_the_second_ride_is_from_where_the_first_one_ended() -> None:
+    bench = Bench()
+    bench.believe()
+    goal = bench.pursue(FAR)
+    sketch = bench.put(PlanSketch(goal.id, (), "", (UP, ON), 1, True), goal)
+    bench.put(Ride(sketch.id, 0, "lift", "car-1", "car-2"))
+    ride = effect_on(bench.ask(ElevatorRider(), sketch), Ride).value
+    assert (ride.index, ride.origin, ride.destination) == (1, "car-2", "car-3")
+
+
+@pytest.mark.parametrize("level", list(Level))
+def test_in_doubt_above_the_action_level_it_waits(level: Level) -> None:
+    bench = Bench()
+    bench.believe()
+    goal = bench.pursue(FAR)
+    sketch = bench.put(PlanSketch(goal.id, (), "", (UP,), 0, True), goal)
+    doubt = bench.doubt(level, 1.0)
+    assert (bench.ask(ElevatorRider(), sketch) is None) == (level > Level.ACTION)
+    bench.revise(doubt, status="corrected")
+    assert bench.ask(ElevatorRider(), sketch) is not None
+
+
+@pytest.mark.parametrize(("status", "verified"), [("active", True), ("active", False), ("superseded", True)])
+def test_it_wakes_for_a_verified_sketch_that_is_carried_out(status: str, verified: bool) -> None:
+    bench = Bench()
+    sketch = bench.put(PlanSketch("Goal-1", (), "", (UP,), 0, verified, status))  # type: ignore[arg-type]
+    assert wakes(ElevatorRider(), Posted(sketch)) == (status == "active" and verified)

@@ -1,0 +1,46 @@
+"""Laws of the travel breaker: a push, a stop or being lost breaks a way, once, and changes nothing else of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blackboard.change import Posted, Revised
+from blackboard.level import Level
+from generated_boards import Bench, all_reasons, wakes
+from knowledge_sources.action.travel_breaker import TravelBreaker
+from world_models.entries.location import begin_travel, diagonal
+from world_models.frames import Pose2
+
+lengths = st.floats(0.0, 9.0)
+
+
+@given(st.sampled_from(Level), st.sampled_from((None, 0.0, 1e9, math.inf)))
+def test_it_wakes_when_lost_or_when_a_difference_cannot_be_measured(level: Level, magnitude: float | None) -> None:
+    bench = Bench()
+    doubt = bench.doubt(level, magnitude)
+    assert wakes(TravelBreaker(), Posted(doubt)) == (level is Level.GOAL or magnitude == math.inf)
+    assert not wakes(TravelBreaker(), Revised(doubt))  # it broke the way when it was posted
+
+
+@given(st.booleans(), lengths, lengths, lengths)
+def test_it_marks_the_newest_way_and_no_more(is_broken: bool, x_m: float, y_m: float, gone_m: float) -> None:
+    bench = Bench()
+    old = bench.put(begin_travel(Pose2(0.0, 0.0, 0.0), diagonal(0.1, 0.1), 0.0, 0.1))
+    way = replace(old.value, x_m=x_m, y_m=y_m, gone_m=gone_m, is_broken=is_broken)
+    travel = bench.put(way)
+    doubt = bench.doubt()
+    effects = bench.ask(TravelBreaker(), doubt)
+    assert (effects is None) == is_broken
+    if effects is not None:
+        (effect,) = effects
+        assert effect.entry is travel and effect.value == replace(way, is_broken=True)
+        assert all_reasons(effects) == {travel.id, doubt.id}
+
+
+def test_without_a_way_there_is_nothing_to_break() -> None:
+    bench = Bench()
+    assert bench.ask(TravelBreaker(), bench.doubt()) is None
