@@ -77,7 +77,8 @@ def house() -> World:
 def plain_robot(world: World | None = None, *, continuous: bool = False,
                 actuator: ActuatorModel | None = None) -> RobotModel:
     """A robot in the house, or in another world."""
-    camera, mount = Camera.from_field_of_view(math.radians(65.0), 256, 256), CameraMount(height_m=1.0, forward_m=0.12, tilt_rad=0.1)
+    camera = Camera.from_field_of_view(math.radians(65.0), 256, 256)
+    mount = CameraMount(height_m=1.0, forward_m=0.12, tilt_rad=0.1)
     return RobotModel(world or house(), camera, mount, actuator or ActuatorModel(), continuous=continuous)
 
 

@@ -30,7 +30,7 @@ SMALL = 1e-6
 
 
 class Way(NamedTuple):
-    """A board on which the robot has come a way, and what was made of it; ``course_rad``: in which direction it came."""
+    """A board on which the robot has come a way, and what was made of it."""
 
     bench: Bench
     belief: Entry[Hypothesis]
@@ -69,7 +69,7 @@ def come(
 
 
 def compute_noise(length_m: float, slip_m2: float) -> float:
-    """Variance of the direction of a straight way: both ends aside, the slip, the heading at its begin, and its mean."""
+    """Variance of the direction of a straight way: both ends aside, slip, heading at its begin, and on it."""
     return ((2 * 0.002**2 + slip_m2) / length_m**2 + 0.001**2 + S.heading_sigma_rad**2 / length_m)
 
 
