@@ -11,119 +11,32 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Change
-from blackboard.effect import Effect, Post, Revise
+from blackboard.effect import Post, Revise
 from blackboard.level import Level
-from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
-from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.action.halt_explainer import HaltExplainer
-from knowledge_sources.action.model_reviser import ModelReviser
-from knowledge_sources.action.thing_mapper import ThingMapper
-from knowledge_sources.action.thing_withdrawer import ThingWithdrawer
-from knowledge_sources.action.touch_finder import TouchFinder
 from knowledge_sources.floor_ahead import PUT_DOWN_FREE_M, list_free_discs
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.weigh_sight import FREE_FLOOR_ODDS
 from knowledge_sources.questions import find_building_as_filed
 from knowledge_sources.settings import DEFAULT
-from sim.scenario import load_scenario
-from world_models.building.locale_frame import FRAME_OF, LocaleFrame
+from things_in_hall import CARTON, HALL, HERE, X_M, Y_M, Hall, carton
 from world_models.building.world import World
 from world_models.entries.body import MotorCommand
-from world_models.entries.entry_kinds import KINDS
 from world_models.entries.floor import FloorThing, FreeFloor
-from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Contact, Obstacle
-from world_models.entries.task import Certificate, Goal, MilestoneVerdict
+from world_models.entries.task import Goal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_building import FrameBuilding
-from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
 from world_models.visibility.lines_and_points import visible_lines
 
-HALL = "north-hall"
-X_M, Y_M = 6.2484, 3.6576
-"""The hall's corner in the world."""
-HERE = Pose2(X_M + 2.0, Y_M + 1.2, 0.0)
-CARTON = tuple((X_M + x, Y_M + y) for x, y in ((4.0, 1.0), (4.5, 1.0), (4.5, 1.4), (4.0, 1.4)))
 SCREEN = tuple((X_M + x, Y_M + y) for x, y in ((3.9, 0.6), (4.3, 0.6), (4.3, 1.8), (3.9, 1.8)))
 
 
 @pytest.fixture(scope="module")
 def world() -> World:
     return load_world(WORLDS / "two_ways.toml")
-
-
-class Hall:
-    """A board with a robot in the north hall, and round it those who find things on the floor."""
-
-    def __init__(self, world: World) -> None:
-        sources = (ThingMapper(), TouchFinder(), HaltExplainer(), ThingWithdrawer(), ModelReviser())
-        self._scheduler, store = Scheduler(sources, kinds=KINDS), FrameStore(world)
-        self.board = self._scheduler.board
-        self.robot = build_robot_model(load_scenario("shut-door"), world)
-        self._belief = Hypothesis(HALL, Pose2(2.0, 1.2, 0.0), diagonal(0.01, 0.005), "tracks")
-        frames = [Post(store.frame(name)) for name in ("", HALL, "reception", "archive")]
-        self.apply(*map(Post, self.robot.entries()), *frames, Post(self._belief))
-
-    def see(self, *things: FloorThing, seen_s: float, far_m: float = 4.0, ahead_m: float = 0.0) -> None:
-        """One sight of the floor: free up to ``far_m``, with some things on it."""
-        bearings = np.linspace(-0.5, 0.5, 41)
-        far = np.full(41, far_m)
-        for thing in things:
-            corners = np.array(thing.footprint) - HERE.position
-            angles = np.arctan2(corners[:, 1], corners[:, 0])
-            hit = (bearings >= angles.min() - 0.02) & (bearings <= angles.max() + 0.02)
-            far[hit] = np.minimum(far[hit], np.linalg.norm(corners, axis=1).min())
-        scan = FreeFloor("camera", HALL, HERE.x_m + ahead_m, HERE.y_m, tuple(bearings.tolist()), (1.5,) * 41,
-                         tuple(far.tolist()), ("sight",) * 41, (0.02,) * 41, things, seen_s)
-        self.apply(Post(scan))
-
-    def touch(self, direction_rad: float, *, turns: tuple[float, ...], basis: str) -> None:
-        """Something is touched ahead in the hall; then the robot turns, and its place is found to be as believed."""
-        (asked,) = self.apply(Post(MotorCommand(0.0, 0.5)))
-        self.apply(Post(Contact("bumper", direction_rad, 0.15, 3.0), (asked.entry,)))
-        for turn_rad in turns:
-            self.apply(Post(MotorCommand(turn_rad, 0.0)))
-        belief = self.board.view.latest(Hypothesis)
-        assert belief is not None
-        pose = Pose2(2.0, 1.2, sum(turns))
-        known = Hypothesis(HALL, pose, diagonal(0.01, 0.005), basis)
-        self.apply(Revise(belief, known, (belief,)))
-
-    def verify(self, verdict: MilestoneVerdict = "verified") -> None:
-        """A milestone is judged."""
-        self.apply(Post(Certificate("Milestone-1", "", verdict, "so it was", 9, 9, 9, 1.0, 0.2, 0.0, 0.0, 0.0, 4.0,
-                                     1e-3)))
-
-    def find(self, basis: str) -> None:
-        """The belief is corrected by a milestone, or by being found after it was lost."""
-        belief = self.board.view.latest(Hypothesis)
-        assert belief is not None
-        self.apply(Revise(belief, replace(belief.value, basis=basis), (belief,)))
-
-    def apply(self, *effects: Effect) -> tuple[Change, ...]:
-        """Something happens, and is answered until nothing is left to do."""
-        changes = self._scheduler.post(effects, "test")
-        while (decision := self._scheduler.step()) is not None:
-            assert not decision.refused, decision.refused
-        return changes
-
-    @property
-    def obstacles(self) -> list[Obstacle]:
-        return [entry.value for entry in self.board.view.all(Obstacle)]
-
-    @property
-    def frame(self) -> LocaleFrame:
-        entry = self.board.view.newest(FRAME_OF, HALL)
-        assert entry is not None
-        return entry.value
-
-
-def carton(p_thing: float = 0.97, *, by_m: float = 0.0, height_m: float = 0.4) -> FloorThing:
-    corners = tuple((x, y + by_m) for x, y in CARTON)
-    return FloorThing(corners, 0.03, height_m, 0.05, p_thing, (200.0, 300.0, 260.0, 350.0), "unlike the floor")
 
 
 @pytest.fixture

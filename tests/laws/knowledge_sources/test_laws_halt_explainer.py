@@ -1,0 +1,75 @@
+"""Law of a halted leg: exactly what is suspected within the robot's next sweep is held to be there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import get_args
+
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from acting import answer
+from blackboard.change import Posted, Revised
+from blackboard.effect import Revise
+from knowledge_sources.action.halt_explainer import HaltExplainer
+from knowledge_sources.floor_ahead import SEEN_MARGIN_M
+from knowledge_sources.settings import DEFAULT
+from things_in_hall import CARTON, HALL, HERE, Hall
+from world_models.building.world import World
+from world_models.entries.obstacle import Obstacle, ObstacleStatus
+from world_models.entries.task import Leg, LegStatus
+from world_models.files.world_files import WORLDS, load_world
+
+SOURCE = HaltExplainer()
+things = st.lists(st.tuples(st.floats(-4.0, 4.0), st.floats(-1.5, 1.5), st.sampled_from(get_args(ObstacleStatus))),
+                  min_size=1, max_size=4)
+"""How far each is from the carton's place, and how it is known."""
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return load_world(WORLDS / "two_ways.toml")
+
+
+def leg_to(dx_m: float, dy_m: float, status: LegStatus = "halted") -> Leg:
+    return Leg("PlanSketch-1", 0, HERE.x_m, HERE.y_m, HERE.x_m + dx_m, HERE.y_m + dy_m, 0.05, status=status)
+
+
+@pytest.mark.parametrize("status", get_args(LegStatus))
+def test_it_wakes_when_a_leg_is_halted(world: World, status: LegStatus) -> None:
+    entry = Hall(world, ()).put(leg_to(3.0, 0.0, status))
+    (watch,) = SOURCE.on
+    assert watch.sees(Revised(entry)) == (status == "halted")
+    assert not watch.sees(Posted(entry))
+
+
+@given(things, st.floats(-4.0, 4.0), st.floats(-0.8, 0.8))
+@settings(max_examples=60, deadline=None)
+def test_what_is_suspected_in_the_next_sweep_is_there_and_nothing_else(
+    world: World, drawn: list[tuple[float, float, ObstacleStatus]], dx_m: float, dy_m: float
+) -> None:
+    hall = Hall(world, ())
+    entries = []
+    for number, (by_x_m, by_y_m, status) in enumerate(drawn, 1):
+        corners = tuple((x + by_x_m, y + by_y_m) for x, y in CARTON)
+        entries.append(hall.put(Obstacle(f"{HALL}/obstacle-{number}", HALL, corners, 0.05, 0.0, 0.0, 0.5,
+                                         certainty=0.7, status=status)))
+    leg = hall.put(leg_to(dx_m, dy_m))
+    length_m = (dx_m**2 + dy_m**2) ** 0.5
+    assume(length_m > 0.01)
+    part = min(1.0, DEFAULT.action.act_within_m / length_m)
+    way = shapely.LineString([HERE.position, (HERE.x_m + part * dx_m, HERE.y_m + part * dy_m)])
+    gaps = [way.distance(shapely.Polygon(entry.value.footprint)) for entry in entries]
+    rim_m = hall.robot.radius_m + SEEN_MARGIN_M
+    assume(all(abs(gap - rim_m) > 0.02 for gap in gaps))
+    met = [entry for entry, gap in zip(entries, gaps, strict=True) if gap < rim_m and entry.value.status == "suspected"]
+    effects = answer(SOURCE, hall.board.view, Revised(leg))
+    assert (effects is not None) == bool(met)
+    for entry, effect in zip(met, effects or (), strict=True):
+        assert isinstance(effect, Revise) and effect.entry is entry
+        assert effect.value == replace(entry.value, status="there")
+        assert set(effect.because) == {entry, leg, hall.belief()}
+    hall.apply(*(effects or ()))
+    assert answer(SOURCE, hall.board.view, Revised(leg)) is None

@@ -1,0 +1,138 @@
+"""Law of the model reviser: after any run of findings and tellings the frames say what the newest of each says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acting import answer
+from blackboard.change import Posted, Retracted, Revised
+from blackboard.effect import Post, Revise
+from knowledge_sources.action.model_reviser import ModelReviser
+from knowledge_sources.settings import DEFAULT
+from things_in_hall import CARTON, HALL, Hall
+from world_models.building.locale_frame import FRAME_OF, FrameChange, LocaleFrame
+from world_models.building.world import World
+from world_models.entries.door_state import DoorPicture, DoorState
+from world_models.entries.obstacle import Obstacle
+from world_models.entries.user_reports import UserReport
+from world_models.files.world_files import WORLDS, load_world
+
+SOURCE = ModelReviser()
+DOOR, ROOMS = "archive-north-door", ("archive", HALL)
+THING = f"{HALL}/obstacle-1"
+LEAST_M = DEFAULT.action.min_footprint_change_m
+found = st.tuples(st.just("found"), st.sampled_from(("suspected", "there", "gone")), st.sampled_from((0.0, 0.3, 3.0)))
+seen = st.tuples(st.just("seen"), st.sampled_from(("open", "shut", "ajar", "unknown")), st.just(0.0))
+told = st.tuples(st.just("told"), st.sampled_from(("open", "shut", "gone")), st.just(0.0))
+"""What is found of a thing and by how many times the least change it stands elsewhere; seen of a door; or told."""
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return load_world(WORLDS / "two_ways.toml")
+
+
+def corners(by_m: float) -> tuple[tuple[float, float], ...]:
+    return tuple((round(x + by_m, 3), y) for x, y in CARTON)
+
+
+def make(what: str, state: Any, times: float) -> Obstacle | DoorState | UserReport:
+    if what == "found":
+        return Obstacle(THING, HALL, corners(times * LEAST_M), 0.03, 0.0, 0.0, 0.5, 0.4, 0.1, by="camera", seen_s=9.0,
+                        status=state)
+    if what == "seen":
+        picture = DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), 0.0, 0.0, 0.0, 3.0, "a leaf")
+        return DoorState(DOOR, ROOMS, state, 0.99, 4.0, 2, picture, 5.0)
+    return UserReport(DOOR if state != "gone" else THING, state)
+
+
+def changes(hall: Hall, room: str) -> tuple[FrameChange, ...]:
+    entry = hall.board.view.newest(FRAME_OF, room)
+    assert entry is not None
+    return entry.value.changes
+
+
+def tell(hall: Hall, value: Any) -> Any:
+    """Something is found, seen or told: revised, where it is known already."""
+    known = None if isinstance(value, UserReport) else hall.board.view.latest(type(value))
+    (change,) = hall.apply(Post(value) if known is None else Revise(known, value, (known,)))
+    return change
+
+
+def test_it_wakes_by_what_is_found_seen_or_told(world: World) -> None:
+    hall = Hall(world, ())
+    for what, state, wakes in (("found", "there", 2), ("seen", "shut", 2), ("told", "shut", 1)):
+        entry = hall.put(make(what, state, 0.0))
+        kinds = [kind for kind in (Posted, Revised, Retracted) if any(w.sees(kind(entry)) for w in SOURCE.on)]
+        assert kinds == [Posted, Revised][:wakes]
+
+
+@given(st.lists(found | seen | told, max_size=6))
+@settings(max_examples=40, deadline=None)
+def test_the_frames_say_what_the_newest_says(world: World, drawn: Sequence[tuple[str, Any, float]]) -> None:
+    hall, shut, thing = Hall(world, (SOURCE,)), False, None
+    for what, state, times in drawn:
+        change = tell(hall, make(what, state, times))
+        answered = hall.board.view[change.entry.id].value
+        before = shut, thing
+        if what == "found":
+            at_m = times * LEAST_M
+            is_elsewhere = thing is None or abs(at_m - thing) >= LEAST_M
+            thing = None if state != "there" else at_m if is_elsewhere else thing
+        elif state in ("open", "shut"):
+            shut = state == "shut"
+        elif what == "told":
+            assert isinstance(answered, UserReport)
+            if thing is None:  # the file has no such thing, and it is not believed to be there
+                assert answered.answer.startswith("which cannot be")
+            thing = None
+        if what == "told" and not answered.answer.startswith("which cannot be"):
+            assert answered.answer == ("and took it over" if (shut, thing) != before else "as it was known")
+        expected = {("shut", DOOR)} if shut else set()
+        assert {(c.what, c.name) for c in changes(hall, "archive")} == expected
+        ours = {(c.what, c.name): c for c in changes(hall, HALL)}
+        assert set(ours) == expected | ({("extra", THING)} if thing is not None else set())
+        if thing is not None:
+            extra = ours["extra", THING]
+            assert extra.footprint == corners(thing) and extra.height_m == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("what", "state", "rooms"), [
+    ("found", "there", (HALL,)), ("seen", "shut", ROOMS), ("told", "shut", ROOMS)])
+def test_each_frame_that_it_concerns_names_what_says_so_and_who(
+    world: World, what: str, state: str, rooms: tuple[str, ...]
+) -> None:
+    hall = Hall(world, (SOURCE,))
+    before = {entry.value.name: entry for entry in hall.board.view.all(LocaleFrame)}
+    said = hall.put(make(what, state, 0.0))
+    after = {entry.value.name: entry for entry in hall.board.view.all(LocaleFrame)}
+    assert {room for room, entry in after.items() if entry.revision} == set(rooms)
+    for room in rooms:
+        assert after[room].because == (said.ref, before[room].ref)
+        assert [change.by for change in after[room].value.changes] == ["test"]
+
+
+def test_all_that_is_new_of_a_room_comes_into_its_frame_at_once(world: World) -> None:
+    hall = Hall(world, ())
+    first = hall.put(make("found", "there", 0.0))
+    moved = tuple((x + 1.5, y) for x, y in CARTON)
+    second = hall.put(Obstacle(f"{HALL}/obstacle-2", HALL, moved, 0.03, 0.0, 0.0, 0.5, by="camera", seen_s=9.0))
+    effects = answer(SOURCE, hall.board.view, Posted(first)) or ()
+    (effect,) = effects
+    assert {change.name for change in effect.value.changes} == {first.value.name, second.value.name}
+    assert {entry.id for entry in effect.because} >= {first.id, second.id}
+    hall.apply(*effects)
+    assert answer(SOURCE, hall.board.view, Posted(second)) is None  # it is said already
+
+
+def test_what_the_model_has_not_is_answered_and_revises_nothing(world: World) -> None:
+    hall = Hall(world, (SOURCE,))
+    for what in ("no-such-door", f"{HALL}/obstacle-9"):
+        change = tell(hall, UserReport(what, "shut"))
+        assert hall.board.view[change.entry.id].value.answer.startswith("which cannot be")
+    assert changes(hall, HALL) == ()

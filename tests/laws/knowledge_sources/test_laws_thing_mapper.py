@@ -1,0 +1,150 @@
+"""Law of what sights of the floor tell: certainty by plain odds, and what is seen free is forgotten."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acting import answer
+from blackboard.change import Posted, Revised
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.action.thing_mapper import ThingMapper
+from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M
+from knowledge_sources.methods.floor.weigh_sight import FREE_FLOOR_ODDS, MAX_OBSTACLE_SIGMA_M, MIN_EVIDENCE_INTERVAL_S
+from knowledge_sources.settings import DEFAULT
+from things_in_hall import CARTON, HALL, HERE, Hall, carton
+from world_models.building.world import World
+from world_models.entries.floor import FreeFloor
+from world_models.entries.location import Place
+from world_models.entries.obstacle import Obstacle, ObstacleStatus
+from world_models.entries.task import Goal, Leg, PlanSketch, Subgoal
+from world_models.files.world_files import WORLDS, load_world
+
+SOURCE, S = ThingMapper(), DEFAULT.action
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return load_world(WORLDS / "two_ways.toml")
+
+
+def known(status: ObstacleStatus = "there", certainty: float = 0.9) -> Obstacle:
+    return Obstacle(f"{HALL}/obstacle-1", HALL, CARTON, 0.03, 4.25, 1.2, 0.5, 0.4, 0.05, certainty, by="camera",
+                    status=status)
+
+
+def ask(hall: Hall, scan: FreeFloor) -> tuple[Entry[FreeFloor], tuple[Effect, ...] | None]:
+    """What it makes of a sight, which is not carried out."""
+    (change,) = hall.apply(Post(scan))
+    return change.entry, answer(SOURCE, hall.board.view, Posted(change.entry))
+
+
+def probability(*odds: float) -> float:
+    return math.prod(odds) / (1.0 + math.prod(odds))
+
+
+def odds_of(p: float) -> float:
+    return p / (1.0 - p)
+
+
+def test_it_wakes_by_each_new_sight() -> None:
+    entry = Hall(load_world(WORLDS / "two_ways.toml"), ()).put(FreeFloor("camera", HALL, *[0.0] * 2, *[()] * 6, 1.0))
+    (watch,) = SOURCE.on
+    assert watch.sees(Posted(entry)) and not watch.sees(Revised(entry))
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.01, 0.5), st.sampled_from((None, "suspected", "there", "gone")),
+       st.sampled_from((None, Level.ACTION, Level.PLAN, Level.GOAL)))
+@settings(max_examples=40, deadline=None)
+def test_it_acts_where_a_sight_may_tell_of_a_thing_and_the_place_is_not_in_doubt(
+    world: World, p_thing: float, sigma_m: float, status: ObstacleStatus | None, doubt: Level | None
+) -> None:
+    hall = Hall(world, ())
+    if status is not None:
+        hall.put(known(status))
+    if doubt is not None:
+        hall.put(Discrepancy(doubt, "landmarks are elsewhere", 99.0, (4.0, 30.0), "px"))
+    thing = replace(carton(p_thing), sigma_m=sigma_m)
+    _, effects = ask(hall, hall.look(thing, seen_s=1.0))
+    is_telling = p_thing >= S.min_thing_certainty and sigma_m <= MAX_OBSTACLE_SIGMA_M
+    assert (effects is not None) == (doubt is None and (is_telling or status in ("suspected", "there")))
+    if effects and status is None:
+        assert is_telling
+
+
+@given(st.floats(S.min_thing_certainty, 0.99))
+@settings(max_examples=20, deadline=None)
+def test_what_was_not_known_is_as_certain_as_its_sight(world: World, p_thing: float) -> None:
+    hall = Hall(world, ())
+    scan, effects = ask(hall, hall.look(carton(p_thing), seen_s=7.0))
+    (effect,) = effects or ()
+    assert isinstance(effect, Post) and tuple(effect.because) == (scan,)
+    found: Obstacle = effect.value
+    assert found.certainty == min(p_thing, S.max_obstacle_certainty)
+    assert found.status == ("there" if p_thing >= S.min_obstacle_certainty else "suspected")
+    assert (found.name, found.seen_s, found.looked_s, found.touched_s) == (f"{HALL}/obstacle-1", 7.0, 7.0, None)
+    assert shapely.hausdorff_distance(shapely.Polygon(found.footprint), shapely.Polygon(CARTON)) < 2e-3
+
+
+@given(st.floats(0.5, 0.95), st.floats(S.min_thing_certainty, 0.95), st.floats(0.0, 2.0 * FLOOR_VIEW_DISTANCE_M))
+@settings(max_examples=25, deadline=None)
+def test_odds_multiply_only_where_it_is_seen_from_elsewhere(
+    world: World, before: float, p_thing: float, ahead_m: float
+) -> None:
+    hall = Hall(world, ())
+    first = hall.put(hall.look(seen_s=1.0))
+    old = hall.put(known("there" if before >= S.min_obstacle_certainty else "suspected", before), first)
+    scan, effects = ask(hall, hall.look(carton(p_thing), seen_s=9.0, ahead_m=ahead_m))
+    (effect,) = effects or ()
+    is_elsewhere = ahead_m >= FLOOR_VIEW_DISTANCE_M / 2.0
+    expected = probability(odds_of(before), odds_of(p_thing)) if is_elsewhere else max(before, p_thing)
+    assert isinstance(effect, Revise) and effect.entry is old and set(effect.because) == {scan, old}
+    assert effect.value.certainty == pytest.approx(min(expected, S.max_obstacle_certainty))
+    assert effect.value.status == (
+        "there" if old.value.is_there or effect.value.certainty >= S.min_obstacle_certainty else "suspected")
+
+
+@given(st.floats(0.3, 0.999), st.sampled_from((0.0, 0.5 * MIN_EVIDENCE_INTERVAL_S, 2.0 * MIN_EVIDENCE_INTERVAL_S)))
+@settings(max_examples=20, deadline=None)
+def test_floor_that_is_seen_free_lowers_the_odds_by_a_stated_factor(
+    world: World, before: float, later_s: float
+) -> None:
+    hall = Hall(world, ())
+    old = hall.put(replace(known("suspected", before), looked_s=5.0, seen_s=5.0))
+    scan, effects = ask(hall, hall.look(seen_s=5.0 + later_s))
+    assert effects is not None
+    if later_s < MIN_EVIDENCE_INTERVAL_S:
+        assert effects == ()
+        return
+    (effect,) = effects
+    assert isinstance(effect, Revise) and set(effect.because) == {scan, old}
+    certainty = probability(odds_of(before), FREE_FLOOR_ODDS)
+    assert effect.value.certainty == pytest.approx(certainty, rel=1e-6)
+    assert effect.value.status == ("gone" if certainty < S.min_gone_certainty else "suspected")
+    assert effect.value.looked_s == 5.0 + later_s and effect.value.seen_s == 5.0
+
+
+@pytest.mark.parametrize(("turn_rad", "is_next"), [(0.0, True), (0.3, True), (-0.3, True), (0.9, False), (2.0, False)])
+def test_what_is_suspected_next_on_the_way_counts_as_there_and_the_leg_is_a_reason(
+    world: World, turn_rad: float, is_next: bool
+) -> None:
+    hall = Hall(world, ())
+    here, there = (Place(HALL, x_m, 1.2) for x_m in (2.0, 6.0))
+    goal = hall.put(Goal(here, there))
+    steps = (Subgoal(here, there, primitive=True),)
+    sketch = hall.put(PlanSketch(goal.id, (), "", steps, verified=True))
+    end = HERE.x_m + 3.0 * math.cos(turn_rad), HERE.y_m + 3.0 * math.sin(turn_rad)
+    leg = hall.put(Leg(sketch.id, 0, HERE.x_m, HERE.y_m, *end, 0.05))
+    near = tuple((x - 2.0 + S.act_within_m, y) for x, y in CARTON)  # its front where the next way ends
+    scan, effects = ask(hall, hall.look(replace(carton(0.8), footprint=near), seen_s=7.0))
+    (effect,) = effects or ()
+    assert effect.value.status == ("there" if is_next else "suspected")
+    assert set(effect.because) == ({scan, leg} if is_next else {scan})
