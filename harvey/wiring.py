@@ -30,7 +30,6 @@ from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.action.motor import Motor
 from knowledge_sources.action.path_follower import PathFollower
 from knowledge_sources.action.range_watcher import RangeWatcher
-from knowledge_sources.action.recovery_retrier import RecoveryRetrier
 from knowledge_sources.action.thing_mapper import ThingMapper
 from knowledge_sources.action.thing_withdrawer import ThingWithdrawer
 from knowledge_sources.action.touch_finder import TouchFinder
@@ -108,7 +107,6 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     GoalRenewer,
     AliasMonitor,
     FaultHandler,
-    RecoveryRetrier,
     FaultCloser,
     ModelReviser,
     GoalChanger,

@@ -24,10 +24,12 @@ from knowledge_sources.questions import (
     find_building,
     find_robot,
     find_robot_in,
+    is_given_up,
     is_in_doubt,
     is_over,
     is_standing,
     is_up_to_date,
+    open_discrepancies,
     open_discrepancy,
     open_fault,
     open_milestone,
@@ -110,8 +112,7 @@ def _find_lost(view: View) -> Entry[Discrepancy] | None:
 
 
 def _list_doubts_above(view: View) -> list[Entry[Discrepancy]]:
-    found = (open_discrepancy(view, level) for level in (Level.PLAN, Level.GOAL))
-    return [entry for entry in found if entry is not None]
+    return [entry for entry in open_discrepancies(view) if entry.value.level is not Level.ACTION]
 
 
 def _tell_motion(view: View) -> str:
@@ -122,10 +123,11 @@ def _tell_motion(view: View) -> str:
 
 
 def _tell_doubt(view: View) -> str:
-    found = (open_discrepancy(view, level) for level in reversed(Level))
-    return ", ".join(f"{entry.ref} was open at the {entry.value.level} level" for entry in found if entry is not None)
+    found = reversed(open_discrepancies(view))
+    return ", ".join(f"{entry.ref} was open at the {entry.value.level} level" for entry in found)
 
 
+NOT_GIVEN_UP = Condition("not given up", lambda view: not is_given_up(view), "it had ended")
 GOING_ON = Condition("not over", lambda view: not is_over(view), "it had ended")
 HELD = Condition("a belief", find_held, "none was held")
 PICTURE: Condition[Entry[CameraPicture]] = Condition(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -26,10 +27,11 @@ from knowledge_sources.methods.floor.seen_floor import (
     sample_sweep,
 )
 from knowledge_sources.methods.motion.footprints import build_free_floor, build_polygon
+from knowledge_sources.methods.motion.increments import MAX_LOOK_ERROR_RAD, plan_turn
 from knowledge_sources.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.locales import EXTRA_KIND, Thing
-from world_models.entries.body import CameraPicture, MotionReport, RideReport
+from world_models.entries.body import CameraPicture, MotionReport, MotorCommand, RideReport
 from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Obstacle
@@ -99,6 +101,28 @@ class FloorAhead:
         if not caution.creeps:
             return caution
         return caution._replace(move_m=min(caution.move_m, self._measure_to_things_m(move_m)))
+
+    def keep_to_seen(self, command: MotorCommand) -> tuple[Leg, MotorCommand | None]:
+        """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
+
+        Returns the leg and the command. That is None where something may stand in floor that is not seen, right before
+        the robot.
+        """
+        leg, here, actuator = self._leg, self._here, self._robot.actuator
+        look = self.choose_look()
+        if look is not None:
+            looking = replace(leg, looking_rad=look.heading_rad, looked_at=(
+                *leg.looked_at, (here.x_m, here.y_m, look.heading_rad)))
+            turned = plan_turn(look.heading_rad, here, actuator, MAX_LOOK_ERROR_RAD)
+            if turned is not None:
+                return looking, turned
+        wanted_m = actuator.reach * command.move_m
+        caution = self.limit_move(wanted_m)
+        if caution.creeps and caution.move_m < min(MIN_CREEP_M, wanted_m):
+            return leg, None
+        move_m = min(command.move_m, actuator.compute_command_m(caution.move_m))
+        slowly = self._settings.creep_speed_m_per_s if caution.creeps else None
+        return leg, MotorCommand(command.turn_rad, move_m, slowly)
 
     def _measure_to_things_m(self, most_m: float) -> float:
         """How far the robot can go towards the leg's end before it comes nearer to what may stand there; 0..most."""

@@ -107,6 +107,12 @@ def open_discrepancy(view: View, level: Level) -> Entry[Discrepancy] | None:
     return view.newest(OPEN, level)
 
 
+def open_discrepancies(view: View) -> tuple[Entry[Discrepancy], ...]:
+    """The newest open discrepancy of each level that has one, the lowest level first."""
+    found = (open_discrepancy(view, level) for level in Level)
+    return tuple(entry for entry in found if entry is not None)
+
+
 def unmeasured_doubt(view: View) -> Entry[Discrepancy] | None:
     """What the action level has passed up and the plan level has not measured yet."""
     doubt = open_discrepancy(view, Level.PLAN)
@@ -181,6 +187,11 @@ def open_fault(view: View) -> Entry[BodyFault] | None:
 def is_over(view: View) -> bool:
     """Whether the mission has ended, or does unless somebody sees a way on."""
     return view.latest(Outcome) is not None or open_impasse(view) is not None
+
+
+def is_given_up(view: View) -> bool:
+    """Whether the mission has ended, or does by what no other look can change."""
+    return view.latest(Outcome) is not None or view.latest(Impasse, lambda i: i.is_open and not i.behind) is not None
 
 
 def open_impasse(view: View) -> Entry[Impasse] | None:

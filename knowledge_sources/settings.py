@@ -368,7 +368,7 @@ class ActionSettings:
     min_followed_landmarks: int = setting(
         4, "count", "With so many landmarks in the last tracked frame, the robot is taken to be still in its room.")
 
-    # Obstacle finder
+    # Things on the floor
     obstacle_width_m: float = setting(0.45, "m", "Width and depth that something touched is taken to have.")
     min_thing_certainty: float = setting(
         0.5, "1", "What is seen on the floor with less certainty than this tells of no obstacle.")

@@ -6,14 +6,12 @@ from collections.abc import Collection, Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
-import shapely
-
 from blackboard.board import View
 from blackboard.change import Change, Revised, Watch
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.methods.motion.footprints import build_polygon, measure_approach_m
+from knowledge_sources.methods.motion.ways_left import leads_through, meets
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import active_goal, find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -22,8 +20,6 @@ from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.percepts import Track, Tracks
 from world_models.entries.task import Milestone, PlanSketch
-
-LEG_SLACK_M = 0.03  # an obstacle that is nearer to a leg than the least clearance by so much blocks it
 
 
 class Case(NamedTuple):
@@ -112,50 +108,15 @@ def _find_misled(view: View, frame: Entry[LocaleFrame], settings: Settings) -> t
     """The active sketches, all of them, where one leads through what has changed."""
     if active_goal(view) is None:
         return ()
-    active = view.where(PlanSketch, lambda sketch: sketch.is_active)
+    active, belief = view.where(PlanSketch, lambda sketch: sketch.is_active), find_belief(view)
     found = [view.get(ref.id) for ref in frame.because if ref.id != frame.id]
     changed = [entry.value for entry in found if entry is not None and isinstance(entry.value, Obstacle)]
-    is_misled = any(_meets(view, sketch, obstacle, settings) for sketch in active for obstacle in changed)
+    is_misled = False
+    if belief is not None and changed:
+        robot = find_robot(view)
+        here = belief.value.world_from_robot(robot.world)
+        is_misled = any(meets(sketch.value, obstacle, here, robot, settings.plan)
+                        for sketch in active for obstacle in changed)
     if len(changed) < len(found) or not changed:  # something else is otherwise too: a door, or what the file has
-        is_misled = is_misled or any(_leads_there(sketch.value, frame.value) for sketch in active)
+        is_misled = is_misled or any(leads_through(sketch.value, frame.value) for sketch in active)
     return active if is_misled else ()
-
-
-def _meets(view: View, sketch: Entry[PlanSketch], obstacle: Obstacle, settings: Settings) -> bool:
-    """Whether what is left of a sketch leads against an obstacle that is there, or round one that is gone."""
-    belief = find_belief(view)
-    if belief is None:
-        return False
-    robot, s = find_robot(view), sketch.value
-    world = robot.world
-    footprint = build_polygon(obstacle.footprint)
-    here = shapely.Point(belief.value.world_from_robot(world).position)
-    clearance_m = settings.plan.clearances_m[-1] if obstacle.is_there else settings.plan.clearances_m[0]
-    slack_m = LEG_SLACK_M
-    reach_m = robot.radius_m + clearance_m + (-slack_m if obstacle.is_there else slack_m)
-    for index, subgoal in enumerate(s.subgoals[s.at:]):
-        if obstacle.locale not in (subgoal.origin.locale, subgoal.destination.locale):
-            continue
-        start, end = (shapely.Point(p.in_world(world).position) for p in (subgoal.origin, subgoal.destination))
-        if obstacle.is_there and obstacle.touched_s == obstacle.seen_s:
-            return True  # the robot stands at it
-        if not obstacle.is_there:
-            near_m = min(start.distance(footprint), end.distance(footprint))
-        elif subgoal.primitive:
-            near_m = measure_approach_m(shapely.LineString([here if index == 0 else start, end]), footprint, reach_m)
-        else:
-            near_m = end.distance(footprint)
-        if near_m < reach_m:
-            return True
-    return False
-
-
-def _leads_there(sketch: PlanSketch, frame: LocaleFrame) -> bool:
-    """Whether what is left of a sketch leads through a door that is shut, or across a room that has changed."""
-    left = sketch.subgoals[sketch.at:]
-    shut = {doorway.name for doorway in frame.shut_doorways}
-    if any(subgoal.passage in shut for subgoal in left):
-        return True
-    crosses = any(frame.name in (subgoal.origin.locale, subgoal.destination.locale) for subgoal in left)
-    is_rearranged = not frame.changes or any(change.what in ("gone", "extra") for change in frame.changes)
-    return crosses and is_rearranged

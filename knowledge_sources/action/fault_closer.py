@@ -12,11 +12,11 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.conditions import GOING_ON
+from knowledge_sources.conditions import NOT_GIVEN_UP
 from knowledge_sources.priority import Priority
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import BodyFault, Course, MotorCommand, Recovery
-from world_models.entries.task import Outcome
+from world_models.entries.task import Impasse
 
 
 class Case(NamedTuple):
@@ -31,13 +31,13 @@ class FaultCloser(RobotKnowledgeSource):
     """Closes a fault of the body that is over.
 
     A motion that was broken off puts the belief in doubt: a milestone must be verified before the robot moves on. After
-    ``max_broken_motions`` motions in a row that were broken off the mission ends.
+    ``max_broken_motions`` motions in a row that were broken off there is no way on.
     """
 
     level, priority = Level.ACTION, Priority.ENTER
     on = (Watch(Recovery, (Revised,), lambda r: r.status == "over"),)
-    needs = (GOING_ON,)
-    writes = (BodyFault, Discrepancy, Outcome)
+    needs = (NOT_GIVEN_UP,)
+    writes = (BodyFault, Discrepancy, Impasse)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         """The fault that a recovery was for, and what it broke off."""
@@ -54,7 +54,7 @@ class FaultCloser(RobotKnowledgeSource):
         times = self._settings.action.max_broken_motions
         if _were_all_broken_off(view, times):
             reason = f"{times} motions in a row were broken off, the last one by: {fault.value.what}"
-            yield Post(Outcome("failed", reason), (closed,))
+            yield Post(Impasse("failed", reason), (closed,))
             return
         bound_px = self._settings.plan.max_deviation_px
         what = f"{motion.id} was broken off: {fault.value.what}"

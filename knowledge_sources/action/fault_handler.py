@@ -1,35 +1,60 @@
-"""Fault handler (§2, §4): what a fault of the body asks for."""
+"""Fault handler (§2, §4): a fault of the body is waited for, ever longer, but not for ever."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
 
 from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, Post
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.conditions import GOING_ON
+from knowledge_sources.conditions import NOT_GIVEN_UP
 from knowledge_sources.priority import Priority
+from knowledge_sources.questions import OPEN_FAULT
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import STOP_KEY, BodyFault, Recovery
-from world_models.entries.task import Outcome
+from world_models.entries.task import Impasse
+
+
+class Case(NamedTuple):
+    """A fault that is open, and the recovery that was in vain so far; None where none was asked for yet."""
+
+    fault: Entry[BodyFault]
+    recovery: Entry[Recovery] | None
 
 
 class FaultHandler(RobotKnowledgeSource):
-    """Asks for recovery from a fault of the body; at the stop key it ends the mission."""
+    """Asks for recovery from a fault of the body that is open, each time after twice the pause.
+
+    After the stop key, and after ``max_fault_s``, there is no way on.
+    """
 
     level, priority = Level.ACTION, Priority.ENTER
-    on = (Watch(BodyFault, (Posted,)),)
-    needs = (GOING_ON,)
-    writes = (Recovery, Outcome)
+    on = (Watch(BodyFault, (Posted,)), Watch(Recovery, (Revised,), lambda r: r.status not in ("asked", "over")))
+    needs = (NOT_GIVEN_UP,)
+    writes = (Recovery, Impasse)
 
-    def bind(self, view: View, trigger: Change) -> Entry[BodyFault]:
-        return trigger.entry
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """An open fault for which nobody waits, the oldest of them."""
+        asked = {entry.value.fault: entry for entry in view.all(Recovery)}
+        waiting = {id for id, entry in asked.items() if entry.value.status in ("asked", "over")}
+        fault = next((entry for entry in view.having(OPEN_FAULT, True) if entry.id not in waiting), None)
+        return None if fault is None else Case(fault, asked.get(fault.id))
 
-    def act(self, view: View, case: Entry[BodyFault]) -> Iterable[Effect]:
-        f = case.value
-        if f.what == STOP_KEY:
-            yield Post(Outcome("stopped", f.detail), (case,))
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        (fault, recovery), s = case, self._settings.action
+        f, asked = fault.value, None if recovery is None else recovery.value
+        because = (fault,) if recovery is None else (fault, recovery)
+        if STOP_KEY in (f.what, "" if asked is None else asked.what):
+            yield Post(Impasse("stopped", f.detail if asked is None else asked.detail), because)
+        elif recovery is None or asked is None:
+            yield Post(Recovery(fault.id, f.request, f.when_s, s.min_retry_wait_s), because)
+        elif asked.waited_s >= s.max_fault_s:
+            reason = f"{f.what}, and it was not over after {asked.waited_s:.0f} s; nothing more is commanded"
+            yield Post(Impasse("failed", reason), because)
         else:
-            yield Post(Recovery(case.id, f.request, f.when_s, self._settings.action.min_retry_wait_s), (case,))
+            again = replace(asked, status="asked", wait_s=min(2.0 * asked.wait_s, s.max_retry_wait_s))
+            yield Revise(recovery, again, because)

@@ -13,7 +13,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import GOING_ON, HELD, SOUND, STANDING, Belief
-from knowledge_sources.floor_ahead import MIN_CREEP_M, FloorAhead
+from knowledge_sources.floor_ahead import FloorAhead
 from knowledge_sources.methods.motion.increments import (
     MAX_HEADING_ERROR_RAD,
     MAX_LOOK_ERROR_RAD,
@@ -21,7 +21,7 @@ from knowledge_sources.methods.motion.increments import (
     plan_increment,
     plan_turn,
 )
-from knowledge_sources.methods.motion.pure_pursuit import update_leg
+from knowledge_sources.methods.motion.pure_pursuit import lay_leg, update_leg
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import (
     current_leg,
@@ -36,9 +36,6 @@ from world_models.entries.body import BodyFault, MotorCommand
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot_state import Drift
 from world_models.entries.task import Leg, Milestone, PlanSketch
-
-MAX_START_OFFSET_M = 0.15
-"""From nearer than this the robot returns to the planned line; from further off it draws a new one."""
 
 
 class Turn(NamedTuple):
@@ -106,7 +103,8 @@ class Motor(RobotKnowledgeSource):
             case Turn():
                 yield Post(case.command, (case.milestone, case.belief.entry))
             case Begin():
-                yield Post(_lay_leg(case.sketch, case.belief), (case.sketch, case.belief.entry))
+                leg = lay_leg(case.sketch.id, case.sketch.value, case.belief.pose, case.belief.world)
+                yield Post(leg, (case.sketch, case.belief.entry))
             case Drive():
                 yield from self._command_increment(view, case.leg, case.belief)
 
@@ -121,7 +119,8 @@ class Motor(RobotKnowledgeSource):
             seen = replace(seen, looking_rad=None)
             command = plan_increment(robot.actuator, seen, here, curvature_per_m, lookahead_m)
             if command is not None and command.move_m > 0.0 and self._settings.action.keeps_to_seen_floor:
-                seen, command, told = self._keep_to_seen_floor(view, seen, held, command)
+                floor = FloorAhead(view, seen, belief, self._settings)
+                (seen, command), told = floor.keep_to_seen(command), floor.because
                 if command is None:
                     yield Revise(leg, replace(seen, status="halted"), (leg, belief, *told))
                     return
@@ -134,40 +133,6 @@ class Motor(RobotKnowledgeSource):
         step = Revise(leg, replace(seen, increments=seen.increments + 1), (leg, belief, *corrected))
         yield step
         yield Post(command, (step, belief, *(() if drift is None else (drift,)), *told))
-
-    def _keep_to_seen_floor(
-        self, view: View, leg: Leg, belief: Belief, command: MotorCommand
-    ) -> tuple[Leg, MotorCommand | None, tuple[Entry[Any], ...]]:
-        """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
-
-        Returns the leg, the command, and what of the floor both rest on. The command is None where something may
-        stand in floor that is not seen, right before the robot.
-        """
-        s, actuator, here = self._settings.action, belief.robot.actuator, belief.pose
-        floor = FloorAhead(view, leg, belief.entry, self._settings)
-        look = floor.choose_look()
-        if look is not None:
-            looking = replace(leg, looking_rad=look.heading_rad, looked_at=(
-                *leg.looked_at, (here.x_m, here.y_m, look.heading_rad)))
-            turned = plan_turn(look.heading_rad, here, actuator, MAX_LOOK_ERROR_RAD)
-            if turned is not None:
-                return looking, turned, floor.because
-        wanted_m = actuator.reach * command.move_m
-        caution = floor.limit_move(wanted_m)
-        if caution.creeps and caution.move_m < min(MIN_CREEP_M, wanted_m):
-            return leg, None, floor.because
-        move_m = min(command.move_m, actuator.compute_command_m(caution.move_m))
-        slowly = s.creep_speed_m_per_s if caution.creeps else None
-        return leg, MotorCommand(command.turn_rad, move_m, slowly), floor.because
-
-
-def _lay_leg(sketch: Entry[PlanSketch], belief: Belief) -> Leg:
-    """The leg of a sketch's current subgoal, from the planned line or from where the robot is."""
-    subgoal, here = sketch.value.subgoals[sketch.value.at], belief.pose
-    end, planned = subgoal.destination.in_world(belief.world), subgoal.origin.in_world(belief.world)
-    start = planned if planned.distance_to(here) <= MAX_START_OFFSET_M else here
-    heading = None if subgoal.destination.heading_rad is None else end.heading_rad
-    return Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m, subgoal.tolerance_m, heading)
 
 
 def _ends_doubt(view: View, milestone: Entry[Milestone]) -> bool:

@@ -16,10 +16,12 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import HELD, SOUND, Belief
 from knowledge_sources.floor_ahead import FloorAhead
 from knowledge_sources.methods.motion.pure_pursuit import (
+    ROLLING_STOP_MARGIN_M,
+    choose_speed,
     compute_bearing,
-    compute_curvature_to,
     find_aim_point,
     measure_progress,
+    steer_to,
     update_leg,
 )
 from knowledge_sources.priority import Priority
@@ -29,12 +31,12 @@ from knowledge_sources.questions import (
     is_over,
     is_standing,
     is_up_to_date,
+    open_discrepancies,
     open_discrepancy,
     open_milestone,
     rolling_course,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.actuator import ActuatorModel
 from world_models.entries.body import Course
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot_state import Drift
@@ -42,10 +44,8 @@ from world_models.entries.task import Leg, Milestone, PlanSketch
 
 ROLLING_LOOKAHEAD_M = 0.75  # distance ahead on the line at which the path follower steers (pure pursuit)
 MIN_ROLLING_LEG_M = 0.3  # shortest rest of a leg, beyond the stopping distance, that is driven without stopping
-ROLLING_STOP_MARGIN_M = 0.1  # the path follower stops so far before floor that was not seen to be free
 MAX_ROLLING_START_ERROR_RAD = math.radians(3.0)  # the path follower starts when it faces its aim to within this
 MAX_ROLLING_ERROR_RAD = math.radians(12.0)  # the path follower stops when its aim is further to the side than this
-MAX_CURVATURE_PER_M = 1.0  # largest curvature that is steered on the move
 
 
 class Case(NamedTuple):
@@ -103,7 +103,7 @@ class PathFollower(RobotKnowledgeSource):
         if course is not None and must_stop:
             reasons = () if leg is None else self._look_ahead(view, leg.value, held)[1]
             yield Revise(course, replace(course.value, speed_m_per_s=0.0),
-                         (course, held.entry, *_reasons(view), *reasons))
+                         (course, held.entry, *open_discrepancies(view), *reasons))
         elif leg is not None:
             yield from self._steer(view, course, leg, held)
 
@@ -120,18 +120,11 @@ class PathFollower(RobotKnowledgeSource):
         seen = update_leg(leg.value, here, point)
         step = Revise(leg, replace(seen, increments=seen.increments + (course is None)), (leg, belief, *corrected))
         yield step
-        wanted = compute_curvature_to(point, here) - (0.0 if drift is None else drift.value.curvature_per_m)
-        curvature = min(max(wanted, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
+        curvature = steer_to(point, here, 0.0 if drift is None else drift.value.curvature_per_m)
         free_m, reasons = self._look_ahead(view, leg.value, held)
-        new = Course(leg.id, self._choose_speed(free_m, robot.actuator), curvature)
+        new = Course(leg.id, choose_speed(free_m, robot.actuator, self._settings.action.creep_speed_m_per_s), curvature)
         because = (step, belief, *(() if drift is None else (drift,)), *reasons)
         yield Post(new, because) if course is None else Revise(course, new, (course, *because))
-
-    def _choose_speed(self, free_m: float, actuator: ActuatorModel) -> float:
-        """The full speed, or what can be stopped from before the floor ends that is seen to be free."""
-        room_m = max(0.0, free_m - ROLLING_STOP_MARGIN_M)
-        fastest = math.sqrt(2.0 * actuator.brake_m_per_s2 * room_m)
-        return min(actuator.speed_m_per_s, max(fastest, self._settings.action.creep_speed_m_per_s))
 
     def _look_ahead(self, view: View, leg: Leg, belief: Belief) -> tuple[float, tuple[Entry[Any], ...]]:
         """How far ahead the floor is seen to be free, as far as that matters at full speed; and what tells that."""
@@ -153,9 +146,3 @@ class PathFollower(RobotKnowledgeSource):
 def _is_hindered(view: View) -> bool:
     """Whether the mission has ended, something is in doubt, or a milestone is awaited."""
     return is_over(view) or is_in_doubt(view) or open_milestone(view) is not None
-
-
-def _reasons(view: View) -> tuple[Entry[Discrepancy], ...]:
-    """The open discrepancies: why it stops, where they are the reason."""
-    found = (open_discrepancy(view, level) for level in Level)
-    return tuple(entry for entry in found if entry is not None)

@@ -10,6 +10,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.level import Level
+from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_building
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.commands import read_places
@@ -26,7 +27,7 @@ class Interpreter(RobotKnowledgeSource):
     first place is also the first belief. A command that cannot be understood ends the mission with the reason.
     """
 
-    level = Level.GOAL
+    level, priority = Level.GOAL, Priority.ENTER
     on = (Watch(Command, (Posted,)),)
     writes = (Goal, Hypothesis, Impasse)
 

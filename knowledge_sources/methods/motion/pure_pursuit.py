@@ -27,8 +27,24 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from world_models.entries.task import Leg
+from world_models.actuator import ActuatorModel
+from world_models.building.building import Building
+from world_models.entries.task import Leg, PlanSketch
 from world_models.frames import Pose2, wrap_angle
+
+MAX_START_OFFSET_M = 0.15
+"""From nearer than this the robot returns to the planned line; from further off it draws a new one."""
+ROLLING_STOP_MARGIN_M = 0.1  # the robot stops so far before floor that was not seen to be free
+MAX_CURVATURE_PER_M = 1.0  # largest curvature that is steered on the move
+
+
+def lay_leg(id: str, sketch: PlanSketch, here: Pose2, world: Building) -> Leg:
+    """The leg of a sketch's current subgoal, from the planned line or from where the robot is [world]."""
+    subgoal = sketch.subgoals[sketch.at]
+    end, planned = subgoal.destination.in_world(world), subgoal.origin.in_world(world)
+    start = planned if planned.distance_to(here) <= MAX_START_OFFSET_M else here
+    heading = None if subgoal.destination.heading_rad is None else end.heading_rad
+    return Leg(id, sketch.at, start.x_m, start.y_m, end.x_m, end.y_m, subgoal.tolerance_m, heading)
 
 
 def measure_progress(leg: Leg, here: Pose2) -> tuple[float, float]:
@@ -66,3 +82,16 @@ def compute_curvature_to(point: tuple[float, float], here: Pose2) -> float:
     """Curvature of the arc tangent to the robot's heading that leads through a point ahead [1/m]."""
     away = math.hypot(point[0] - here.x_m, point[1] - here.y_m)
     return 2.0 * math.sin(compute_bearing(point, here)) / max(away, 1e-6)
+
+
+def steer_to(point: tuple[float, float], here: Pose2, drift_per_m: float) -> float:
+    """The curvature to steer to come to a point [1/m], where the wheels add theirs."""
+    wanted = compute_curvature_to(point, here) - drift_per_m
+    return min(max(wanted, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
+
+
+def choose_speed(free_m: float, actuator: ActuatorModel, creep_speed_m_per_s: float) -> float:
+    """The full speed, or what can be stopped from before the floor ends that is seen to be free [m/s]."""
+    room_m = max(0.0, free_m - ROLLING_STOP_MARGIN_M)
+    fastest = math.sqrt(2.0 * actuator.brake_m_per_s2 * room_m)
+    return min(actuator.speed_m_per_s, max(fastest, creep_speed_m_per_s))

@@ -18,7 +18,7 @@ from blackboard.servoing import Discrepancy
 from harvey.runner.ports import BodyPort
 from knowledge_sources.action.fault_closer import FaultCloser
 from knowledge_sources.action.fault_handler import FaultHandler
-from knowledge_sources.action.recovery_retrier import RecoveryRetrier
+from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.settings import DEFAULT
 from strategies import Note, Scripted
 from world_models.entries.body import (
@@ -85,7 +85,7 @@ def drive(requests: list[str], body: ScriptedBody) -> tuple[Scheduler, list[Any]
         told.extend(change.entry for change in (*decision.observed, *decision.made))
 
     scheduler = Scheduler(
-        [FaultHandler(), RecoveryRetrier(), FaultCloser(),
+        [FaultHandler(), FaultCloser(), MissionMonitor(),
          Scripted("asker", Note, asking, writes=(MotorCommand, PictureRequest))],
         ports=(BodyPort(body),), sinks=(listen,),
     )

@@ -32,9 +32,10 @@ from generated_boards import (
     wakes,
 )
 from ideal_floor_watcher import scan_floor
-from knowledge_sources.action.motor import MAX_START_OFFSET_M, Motor
+from knowledge_sources.action.motor import Motor
 from knowledge_sources.methods.floor.seen_floor import find_floor
 from knowledge_sources.methods.motion.increments import MAX_HEADING_ERROR_RAD
+from knowledge_sources.methods.motion.pure_pursuit import MAX_START_OFFSET_M
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import MotorCommand

@@ -31,16 +31,15 @@ from generated_boards import (
 )
 from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.path_follower import (
-    MAX_CURVATURE_PER_M,
     MAX_ROLLING_ERROR_RAD,
     MAX_ROLLING_START_ERROR_RAD,
     MIN_ROLLING_LEG_M,
     ROLLING_LOOKAHEAD_M,
-    ROLLING_STOP_MARGIN_M,
     PathFollower,
 )
 from knowledge_sources.floor_ahead import FloorAhead
 from knowledge_sources.methods.floor.seen_floor import find_floor
+from knowledge_sources.methods.motion.pure_pursuit import MAX_CURVATURE_PER_M, ROLLING_STOP_MARGIN_M, choose_speed
 from knowledge_sources.priority import Priority
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
@@ -255,7 +254,8 @@ def test_it_stops_where_too_little_floor_is_free_and_names_what_tells_that(gap_m
 
 def test_it_never_rolls_slower_than_it_creeps() -> None:
     for free_m in (0.0, 0.1, 0.101):
-        assert BLIND._choose_speed(free_m, ACTUATOR) == DEFAULT.action.creep_speed_m_per_s
+        creep = DEFAULT.action.creep_speed_m_per_s
+        assert choose_speed(free_m, ACTUATOR, creep) == creep
 
 
 def test_what_it_watches() -> None:

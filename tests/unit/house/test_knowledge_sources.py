@@ -22,8 +22,11 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources, load_kinds
+from knowledge_sources.priority import Priority
 from sim.scenario import load_scenario
 from sim.stage import build_stage
+from world_models.building.locale_frame import FrameRequest, LocaleFrame
+from world_models.entries.task import Outcome
 
 FOLDER = Path(__file__).parents[3] / "knowledge_sources"
 FILES = {path.stem: path for level in Level for path in sorted((FOLDER / str(level)).glob("[!_]*.py"))}
@@ -98,6 +101,55 @@ def test_it_keeps_no_memory_but_the_board(stem: str) -> None:
 def test_it_knows_no_other_knowledge_source(stem: str) -> None:
     modules = {n.module for n in ast.walk(TREES[stem]) if isinstance(n, ast.ImportFrom)}
     assert not modules & {f"knowledge_sources.{other}" for other in KNOWLEDGE_SOURCES}
+
+
+MOST_LINES = 150
+SHARED: dict[str, tuple[int, str]] = {
+    "CameraState": (3, "learnt from lines, from the way, and told anew to who was lost"),
+    "Discrepancy": (12, "who measures a difference posts it; who corrects it says so"),
+    "DoorState": (2, "by a leaf in sight, and by what a shut door explains"),
+    "Drift": (4, "the belief's other half: who turns the heading restarts it"),
+    "FreeFloor": (2, "two senses"),
+    "Goal": (4, "set, reached, replaced because lost, replaced because asked"),
+    "Hypothesis": (9, "each correction of the belief is one rule"),
+    "Impasse": (9, "who sees no way on says so; the mission monitor decides"),
+    "Leg": (2, "two ways to drive: in increments, and on the move"),
+    "Milestone": (7, "a chain: chosen, predicted, updated, judged, withdrawn"),
+    "MotorCommand": (2, "on the way, and to look round when lost"),
+    "Obstacle": (4, "by sight, by touch, by a halt, and taken back"),
+    "Obstruction": (2, "in looks at milestones, and in looks of who is lost"),
+    "PictureRequest": (3, "who needs a picture asks for it"),
+    "PlanSketch": (8, "a chain: drawn, refined, advanced, led round, withdrawn"),
+    "Tracks": (4, "followed, taken anew, and dropped on another floor or with what is gone"),
+    "Travel": (4, "gone on, begun anew by either calibration, broken off"),
+}
+"""The kinds that several knowledge sources write: how many at most, and why. It may only shrink."""
+
+
+def test_each_kind_is_written_by_one_knowledge_source_but_for_a_short_list() -> None:
+    writers: dict[str, int] = {}
+    for source in KNOWLEDGE_SOURCES.values():
+        for kind in source.writes:
+            writers[kind.__name__] = writers.get(kind.__name__, 0) + 1
+    writers.pop(FrameRequest.__name__)  # whoever lacks a frame asks for it
+    assert {kind: count for kind, count in writers.items() if count > 1} == {
+        kind: count for kind, (count, _) in SHARED.items()}
+    assert writers[LocaleFrame.__name__] == writers[Outcome.__name__] == 1
+
+
+@pytest.mark.parametrize("stem", KNOWLEDGE_SOURCES)
+def test_it_is_one_rule_in_a_short_file(stem: str) -> None:
+    """It does not ask of what type its trigger is: what it watches are several reasons to do one thing."""
+    assert FILES[stem].read_text(encoding="utf-8").count("\n") <= MOST_LINES
+    asked = [n.args[0] for n in ast.walk(TREES[stem])
+             if isinstance(n, ast.Call) and ast.unparse(n.func) in ("isinstance", "type", "issubclass")]
+    asked += [n.subject for n in ast.walk(TREES[stem]) if isinstance(n, ast.Match)]
+    assert not [ast.unparse(n) for n in asked if "trigger" in ast.unparse(n)]
+
+
+@each_source
+def test_its_priority_is_one_of_the_named_scale_or_rated_by_the_case(source: type[KnowledgeSource]) -> None:
+    assert isinstance(source.priority, Priority) or source.rate is not KnowledgeSource.rate
 
 
 def effect_record(effect: Effect) -> list[Any]:

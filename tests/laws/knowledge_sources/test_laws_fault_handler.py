@@ -1,0 +1,80 @@
+"""Law of faults: each open fault is waited for, ever longer, until the patience is at its end or somebody stops it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, get_args
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acting import answer
+from blackboard.board import Blackboard
+from blackboard.change import Posted, Revised
+from blackboard.effect import Post, Revise
+from knowledge_sources.action.fault_handler import FaultHandler
+from knowledge_sources.settings import DEFAULT
+from world_models.entries.body import STOP_KEY, BodyFault, Recovery, RecoveryStatus
+from world_models.entries.task import Impasse, Outcome
+
+SOURCE, S = FaultHandler(), DEFAULT.action
+PATIENCE_S = S.max_fault_s
+waits_s = st.sampled_from((0.05, 0.3, 1.0, S.max_retry_wait_s))
+whats = st.sampled_from(("link lost", STOP_KEY))
+recoveries = st.none() | st.builds(
+    Recovery, st.just(""), st.just("MotorCommand-1"), st.just(1.0), waits_s, st.just(2),
+    st.sampled_from((0.0, 0.5 * PATIENCE_S, PATIENCE_S, 2.0 * PATIENCE_S)),
+    st.sampled_from(get_args(RecoveryStatus)), whats, st.just("so it was found"))
+faults = st.lists(st.tuples(whats, st.booleans(), recoveries), min_size=1, max_size=3)
+"""What is wrong, whether it is over, and what was tried."""
+ends = st.sampled_from((None, Outcome("failed", ""), Impasse("failed", ""), Impasse("blocked", "", behind=("x",)),
+                        Impasse("blocked", "", behind=("x",), is_open=False)))
+
+
+def test_it_wakes_by_a_new_fault_and_by_a_try_in_vain() -> None:
+    board = Blackboard()
+    for status in get_args(RecoveryStatus):
+        value = Recovery("BodyFault-1", "MotorCommand-1", 1.0, 0.1, status=status)
+        (change,) = board.apply([Post(value)], author="test", cycle=1)
+        assert any(w.sees(Revised(change.entry)) for w in SOURCE.on) == (status not in ("asked", "over"))
+        assert not any(w.sees(Posted(change.entry)) for w in SOURCE.on)
+    (change,) = board.apply([Post(BodyFault("base", "link lost", "", "", 1.0))], author="test", cycle=1)
+    assert any(w.sees(Posted(change.entry)) for w in SOURCE.on)
+    assert not any(w.sees(Revised(change.entry)) for w in SOURCE.on)
+
+
+@given(faults, ends)
+@settings(max_examples=300)
+def test_the_oldest_open_fault_for_which_nobody_waits_is_answered(drawn: list[Any], end: Any) -> None:
+    board = Blackboard()
+    unanswered: list[tuple[Any, Any]] = []
+    for what, is_over, recovery in drawn:
+        status: Any = "over" if is_over else "open"
+        fault = BodyFault("base", what, "as it was noticed", "MotorCommand-1", 1.0, status=status)
+        (change,) = board.apply([Post(fault)], author="test", cycle=1)
+        tried = None
+        if recovery is not None:
+            (tried_change,) = board.apply([Post(replace(recovery, fault=change.entry.id))], author="test", cycle=1)
+            tried = tried_change.entry
+        if not is_over and (tried is None or tried.value.status not in ("asked", "over")):
+            unanswered.append((change.entry, tried))
+    if end is not None:
+        board.apply([Post(end)], author="test", cycle=1)
+    is_given_up = isinstance(end, Outcome) or (isinstance(end, Impasse) and end.kind == "failed")
+    effects = answer(SOURCE, board.view, Posted(change.entry))
+    assert (effects is not None) == (bool(unanswered) and not is_given_up)
+    if effects is None:
+        return
+    (effect,), (fault, tried) = effects, unanswered[0]
+    assert list(effect.because) == [entry for entry in (fault, tried) if entry is not None]
+    if fault.value.what == STOP_KEY or (tried is not None and tried.value.what == STOP_KEY):
+        detail = fault.value.detail if tried is None else tried.value.detail
+        assert effect.value == Impasse("stopped", detail)
+    elif tried is None:
+        assert effect == Post(Recovery(fault.id, "MotorCommand-1", 1.0, S.min_retry_wait_s), effect.because)
+    elif tried.value.waited_s >= PATIENCE_S:
+        assert effect.value.kind == "failed" and fault.value.what in effect.value.reason
+    else:
+        assert isinstance(effect, Revise) and effect.entry is tried
+        wait_s = min(2.0 * tried.value.wait_s, S.max_retry_wait_s)
+        assert effect.value == replace(tried.value, status="asked", wait_s=wait_s)
