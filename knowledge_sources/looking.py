@@ -7,12 +7,12 @@ from collections.abc import Callable
 
 from blackboard.board import View
 from blackboard.entry import Entry
-from knowledge_sources.methods.verification.view_quality import INDEPENDENT_LOOK_RAD
+from knowledge_sources.methods.belief.odds import to_log_odds
 from knowledge_sources.questions import find_building, find_robot_in
 from knowledge_sources.settings import Settings
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Certificate, Milestone, PlanSketch
-from world_models.frames import Pose2, wrap_angle
+from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
 MAX_LOOK_ERROR_RAD = math.radians(3.5)  # the robot faces a milestone when its heading is off by no more than this
@@ -49,19 +49,11 @@ def find_car_of(view: View, milestone: Milestone) -> str:
     return "" if sketch is None else find_car(sketch.value, milestone.index)
 
 
-def sum_told(view: View, milestone: Milestone, settings: Settings) -> float:
-    """The log odds of a wrong place by the looks for a milestone in other directions, of an inexact model.
-
-    A look counts less the nearer its direction is to another's: what both show is no evidence twice.
-    """
-    last, s = view.latest(Milestone), settings.plan
-    certificate = view.latest(Certificate)
+def list_told(view: View, milestone: Milestone, settings: Settings) -> tuple[float, ...]:
+    """The log odds of a wrong place by each of the looks that were tried for a milestone; 0 where one told nothing."""
+    last, certificate = view.latest(Milestone), view.latest(Certificate)
     if not milestone.tried or last is None or certificate is None or certificate.value.milestone != last.id:
-        return 0.0
-    c = certificate.value
-    if not last.value.displacement_modes or c.matched < settings.verification.min_matched_lines:
-        return last.value.log_odds_so_far
-    p = min(max(c.p_false, 1e-9), 1.0 - 1e-9)
-    apart = min(abs(wrap_angle(milestone.look_heading_rad - heading)) for heading in milestone.tried)
-    said = min(max(math.log(p / (1.0 - p)), -s.max_told), s.max_told)
-    return last.value.log_odds_so_far + min(1.0, apart / INDEPENDENT_LOOK_RAD) * said
+        return (0.0,) * len(milestone.tried)
+    c, most = certificate.value, settings.plan.max_told
+    tells = c.matched >= settings.verification.min_matched_lines
+    return (*last.value.told, min(max(to_log_odds(c.p_false), -most), most) if tells else 0.0)

@@ -223,6 +223,9 @@ class LocalizationSettings:
     p_told: float = setting(0.98, "1", "Probability that the robot is where it was told to be at the start.")
     lost_again_odds: float = setting(
         0.2, "1", "Factor on the odds of that for every time that it was believed by them, and the robot got lost.")
+    p_displaced_to_alias: float = setting(
+        0.001, "1", "Probability that a robot that was displaced stands just where everything looks as it should.",
+        "a window of 0.6 m and 20 degrees round one place of a room of 20 m2")
     told_sigma_m: float = setting(
         0.1, "m", "Standard deviation that a tracked position has beyond its covariance: it may have slipped.")
     told_sigma_rad: float = setting(
@@ -437,6 +440,9 @@ class PlanSettings:
         "half of max_deviation_px")
     p_wrong_unfollowed: float = setting(0.12, "1", "The same where no landmarks were followed.")
     p_wrong_in_doubt: float = setting(0.5, "1", "The same where the belief is in doubt.")
+    max_p_rival: float = setting(
+        0.03, "1", "Largest probability of a place that looks alike, by belief and picture, where one is verified.",
+        "as localization.min_p_believed has it")
     min_contrast: float = setting(
         6.0, "grey levels", "A frame of less contrast (standard deviation of its grey values, 0 to 255) is dark.")
     max_looks: int = setting(

@@ -66,6 +66,14 @@ def place_of(belief: Hypothesis) -> Place:
     return Place(belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m)
 
 
+def is_just_found(belief: Hypothesis) -> bool:
+    """Whether the robot stands where a search has just found it: there the milestone that a sketch begins with holds.
+
+    The looks of the search are its evidence; the same question put again at the same place would count them twice.
+    """
+    return belief.basis == "relocalization"
+
+
 def supersede(view: View, because: Entry[object], status: SketchStatus = "superseded") -> Iterable[Effect]:
     """All active sketches end, before another one is drawn."""
     for old in view.where(PlanSketch, lambda s: s.is_active):

@@ -13,7 +13,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.camera_knowledge import find_camera
 from knowledge_sources.methods.localization.global_localization import LocalizationStatus, make_alias_test
-from knowledge_sources.methods.localization.place_odds import StatedPlace, compute_prior, weigh_told
+from knowledge_sources.methods.localization.place_odds import StatedPlace, weigh_told
 from knowledge_sources.methods.localization.place_search import (
     Search,
     describe,
@@ -23,13 +23,13 @@ from knowledge_sources.methods.localization.place_search import (
     prefer_reachable,
     search,
 )
+from knowledge_sources.place_believed import count_refuted, find_p_there
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_building, find_building_as_filed, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.settings import LocalizationSettings
 from knowledge_sources.while_lost import WHILE_LOST, Lost, find_lost, list_views
 from world_models.entries.body import MotionReport
-from world_models.entries.location import Hypothesis, PlaceOdds, PlaceSearch, TwinOdds
+from world_models.entries.location import Hypothesis, PlaceOdds, PlaceSearch
 from world_models.entries.obstacle import Obstruction
 from world_models.entries.percepts import Panorama
 from world_models.entries.robot_state import CameraState
@@ -74,7 +74,8 @@ class Localizer(RobotKnowledgeSource):
         panorama, (doubt, belief), candidates, hidden = case
         building, locale, tuning = find_building(view), belief.value.locale, self._settings.localization
         here = belief.value.world_from_robot(building)
-        told = StatedPlace(here, belief.value.covariance_world(building), _find_prior(view, tuning))
+        refuted = count_refuted(view, doubt)
+        told = StatedPlace(here, belief.value.covariance_world(building), find_p_there(view, refuted, tuning))
         looked = [glimpse.now_from_then for glimpse in panorama.value.glimpses]
         looks, obstruction = list_views(view, panorama.value.glimpses), None if hidden is None else hidden.value
         if obstruction is not None:
@@ -90,7 +91,7 @@ class Localizer(RobotKnowledgeSource):
         look_alike = make_alias_test(robots[which], looked, self._settings)
         result = weigh_told(seen, told, look_alike, len(looks), tuning)
         verified = view.latest(Certificate, lambda c: c.verdict == "verified")
-        odds = find_odds_used(seen, result, told, was_tracked=verified is not None)
+        odds = find_odds_used(seen, result, told, was_tracked=verified is not None, refuted=refuted)
         if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
             result = prefer_reachable(building, result, locale)
         far = find_far_action(robots[which], result, looked, rooms, self._settings)
@@ -136,9 +137,3 @@ def _follow(view: View, candidates: Candidates, building: FrameBuilding) -> list
             pose = pose @ actuator.predict_motion(report.value.turn_rad, report.value.move_m)
         out.append((entry.value.locale, pose))
     return out
-
-
-def _find_prior(view: View, settings: LocalizationSettings) -> float:
-    """Probability of the believed place: as told, with all that was seen since it was told or found."""
-    known, p_told = view.latest(TwinOdds), compute_prior(len(view.where(PlaceOdds, lambda _: True)), settings)
-    return p_told if known is None else max(settings.min_p_twin, min(known.value.probability, p_told))

@@ -22,10 +22,11 @@ from knowledge_sources.methods.localization.place_odds import compute_prior, com
 from knowledge_sources.methods.localization.pose_candidates import are_distinct
 from knowledge_sources.methods.localization.refinement import compute_pose_likelihood
 from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.place_believed import count_refuted
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_building, find_robot_in, is_over, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.location import Hypothesis, PlaceOdds, Twin, TwinOdds
+from world_models.entries.location import Hypothesis, Twin, TwinOdds
 from world_models.entries.percepts import PoseFix, Segments
 from world_models.entries.task import Certificate
 from world_models.frames import Pose2, wrap_angle
@@ -69,7 +70,7 @@ class AliasMonitor(RobotKnowledgeSource):
         robot, here = find_robot_in(view, belief.value.locale), fix.value.world_from_robot
         s = self._settings.localization
         if known is None:
-            p_prior = compute_prior(len(view.where(PlaceOdds, lambda _: True)), s)
+            p_prior = compute_prior(count_refuted(view), s)
             twins = self._find_twins(view, robot, belief.value, here)
         else:
             p_prior, twins = known.value.p_prior, known.value.twins

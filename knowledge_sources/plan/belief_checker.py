@@ -13,7 +13,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import GOING_ON, HELD, NO_MILESTONE, NOT_LOST, STANDING
-from knowledge_sources.looking import find_robot_and_pose, find_tried, sum_told
+from knowledge_sources.looking import find_robot_and_pose, find_tried, list_told
 from knowledge_sources.methods.verification.view_quality import (
     CHECK_TOLERANCE_M,
     choose_heading,
@@ -64,4 +64,4 @@ class BeliefChecker(RobotKnowledgeSource):
             headings = find_untried(turn_headings(pose, self._settings), tried) or [heading]
             heading = choose_heading(robot, pose, headings, CHECK_TOLERANCE_M, settings=self._settings)
         check = Milestone("", -1, f"check of the belief, because {doubt.value.what}", heading, tried=tried)
-        yield Post(replace(check, log_odds_so_far=sum_told(view, check, self._settings)), (doubt, belief))
+        yield Post(replace(check, told=list_told(view, check, self._settings)), (doubt, belief))

@@ -16,6 +16,7 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.sketching import (
     find_obstacles,
     find_way_to_goal,
+    is_just_found,
     list_locales,
     list_planners,
     name_obstacles,
@@ -73,7 +74,7 @@ class GoalSketcher(RobotKnowledgeSource):
             yield Post(Impasse("blocked", why, case.goal.id, behind), (*_all(case), *obstacles))
             return
         halted = [sketch.value.halts + 1 for sketch in case.ended if sketch.value.status == "halted"]
-        drawn = PlanSketch(case.goal.id, (), "", way, halts=max(halted, default=0))
+        drawn = PlanSketch(case.goal.id, (), "", way, verified=is_just_found(here), halts=max(halted, default=0))
         yield Post(drawn, (*_all(case), *find_frames(view, list_locales(way))))
 
     def _explain_no_way(self, view: View, here: str, there: str) -> str:

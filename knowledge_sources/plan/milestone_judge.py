@@ -16,7 +16,8 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.camera_knowledge import add_yaw, compute_camera_covariance, find_camera, is_camera_known
-from knowledge_sources.methods.localization.aliasing import find_strongest_alias
+from knowledge_sources.methods.belief.places import BelievedPlace, compute_p_rivals
+from knowledge_sources.methods.localization.aliasing import list_aliases
 from knowledge_sources.methods.verification.weigh import (
     Before,
     PictureEvidence,
@@ -24,9 +25,11 @@ from knowledge_sources.methods.verification.weigh import (
     Weighed,
     certify,
     compute_coverage_elsewhere,
+    is_last_look,
     judge_place,
     weigh_picture,
 )
+from knowledge_sources.place_believed import find_p_not_alias
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_robot_in, has_followed, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -36,13 +39,9 @@ from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Certificate, Milestone
 
 MIN_ALIAS_PART = 0.8  # another place at which this part of the agreement is seen is not ruled out
-P_FALSE_ALIAS = 0.3
-"""Probability of a wrong place where another one is not ruled out (harvey experiment milestones: 993 of 10,289
-cases)."""
 MAX_P_FALSE_UNMISTAKABLE = 2e-4  # up to this probability of a wrong place, it is not compared with others
 MAX_P_FALSE_CLEAR = 2e-3
 """Up to this one, only with places at which the room repeats itself; beyond, with the whole room."""
-MIN_ALIAS_MARGIN = 1.0  # fewest lines that must speak for the place and not for the other one
 
 
 class Case(NamedTuple):
@@ -54,6 +53,13 @@ class Case(NamedTuple):
     frame: Entry[CameraPicture]
     milestone: Entry[Milestone]
     belief: Entry[Hypothesis]
+
+
+class Rival(NamedTuple):
+    """Where else a picture may have been taken, in words, and how likely that is."""
+
+    said: str
+    p: float
 
 
 class MilestoneJudge(RobotKnowledgeSource):
@@ -89,7 +95,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         certificate = Post(certify(names, weighed, verdict, case.fix.value, case.match.value), (case.fix, milestone))
         yield certificate
         yield Revise(milestone, replace(milestone.value, status=verdict.kind), (certificate,))
-        if self.may_look_again(verdict, milestone.value):
+        if verdict.kind == "not testable" and not is_last_look(milestone.value, self._settings.plan):
             return
         most_px = max(self._settings.plan.max_deviation_px, weighed.tolerance_px)
         is_measured = verdict.kind == "verified" or weighed.shift_px > most_px
@@ -115,27 +121,25 @@ class MilestoneJudge(RobotKnowledgeSource):
 
     def _hold_against_others(self, view: View, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:
         """What would be verified is not testable where the picture may have been taken elsewhere."""
-        elsewhere = self._find_elsewhere(view, case, weighed) if verdict.kind == "verified" else ""
-        if not elsewhere:
+        rival = self._find_rival(view, case, weighed) if verdict.kind == "verified" else None
+        if rival is None or rival.p <= self._settings.plan.max_p_rival:
             return verdict
-        return Verdict("not testable", f"{verdict.reason}; but {elsewhere}", max(weighed.p_false, P_FALSE_ALIAS))
+        return Verdict("not testable", f"{verdict.reason}; but {rival.said} ({rival.p:.0%})",
+                       max(weighed.p_false, rival.p))
 
-    def _find_elsewhere(self, view: View, case: Case, weighed: Weighed) -> str:
-        """Where else the picture may have been taken, in words; "" where nowhere."""
-        least, room = MIN_ALIAS_PART * weighed.lines.coverage, case.belief.value.locale
+    def _find_rival(self, view: View, case: Case, weighed: Weighed) -> Rival | None:
+        """Where else the picture is most likely taken, by the belief and by the picture; None where nowhere."""
+        least, room, s = MIN_ALIAS_PART * weighed.lines.coverage, case.belief.value.locale, self._settings
         for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
             there = other.value.world_from_robot(weighed.robot.world)
-            if compute_coverage_elsewhere(weighed, there, self._settings) >= least:
-                return f"as much agrees at {other.id}"
+            if compute_coverage_elsewhere(weighed, there, s) >= least:
+                return Rival(f"as much agrees at {other.id}", 0.5)
         if weighed.p_false <= MAX_P_FALSE_UNMISTAKABLE or not weighed.is_weak:
-            return ""
-        alias = find_strongest_alias(weighed.robot, weighed.segments.segments_px, room, weighed.pose,
-                                     search=weighed.p_false > MAX_P_FALSE_CLEAR, settings=self._settings)
-        is_alike = alias is not None and alias.margin < MIN_ALIAS_MARGIN
-        return f"it may be another door of {room}, or its other side" if is_alike else ""
-
-    def may_look_again(self, verdict: Verdict, milestone: Milestone) -> bool:
-        """Whether another view may tell what this one could not."""
-        s = self._settings.plan
-        most = s.max_inexact_looks if milestone.displacement_modes or milestone.log_odds_so_far else s.max_looks
-        return verdict.kind == "not testable" and len(milestone.tried) + 1 < most
+            return None
+        rivals = list_aliases(weighed.robot, weighed.segments.segments_px, room, weighed.pose,
+                              search=weighed.p_false > MAX_P_FALSE_CLEAR, settings=s)
+        p_there, most = find_p_not_alias(view, s.localization), s.localization.max_alike_log_ratio
+        believed = BelievedPlace(weighed.before, weighed.covariance + case.fix.value.covariance, p_there)
+        p = compute_p_rivals(believed, weighed.pose, [
+            (alias.world_from_robot, min(max(-alias.margin, -most), most)) for alias in rivals])
+        return Rival(f"it may be another door of {room}, or its other side", p)

@@ -20,6 +20,7 @@ from knowledge_sources.sketching import (
     find_obstacles,
     find_way,
     find_way_to_goal,
+    is_just_found,
     list_locales,
     list_planners,
     name_obstacles,
@@ -65,7 +66,8 @@ class Refiner(RobotKnowledgeSource):
         way = find_way(planners, lambda planner: _plan(planner, subgoal, belief.value))
         if way is not None:
             frames = find_frames(view, list_locales(way))
-            yield Post(PlanSketch(s.goal, (*s.path, s.at), locale, way), (sketch, belief, *frames))
+            found = is_just_found(belief.value)
+            yield Post(PlanSketch(s.goal, (*s.path, s.at), locale, way, verified=found), (sketch, belief, *frames))
             return
         obstacles = find_obstacles(view, (locale,)) or find_obstacles(view)
         if obstacles and _leads_otherwise(view, find_way_to_goal(planners, belief.value, goal.value)):

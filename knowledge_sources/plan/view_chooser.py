@@ -19,7 +19,7 @@ from knowledge_sources.looking import (
     find_car,
     find_robot_and_pose,
     find_tried,
-    sum_told,
+    list_told,
 )
 from knowledge_sources.methods.verification.view_quality import (
     CHECK_TOLERANCE_M,
@@ -77,7 +77,7 @@ class ViewChooser(RobotKnowledgeSource):
         is_ahead = abs(wrap_angle(pose.heading_rad - heading)) <= MAX_LOOK_ERROR_RAD
         chosen = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}",
                            pose.heading_rad if is_ahead else heading, tried=tried)
-        yield Post(replace(chosen, log_odds_so_far=sum_told(view, chosen, self._settings)), (sketch, belief))
+        yield Post(replace(chosen, told=list_told(view, chosen, self._settings)), (sketch, belief))
 
     def list_headings(self, building: Building, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
         """The headings that come into question [rad, world], the first good one is taken."""

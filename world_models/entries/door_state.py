@@ -44,6 +44,8 @@ class DoorState:
         pictures: number of them that were counted.
         last: the last of them.
         seen_s: when that was taken, by the body's clock.
+        prior: log odds before any picture.
+        views: the pictures that are counted, the last one last; empty where the last one alone is.
     """
 
     door: str
@@ -54,6 +56,8 @@ class DoorState:
     pictures: int
     last: DoorPicture
     seen_s: float
+    prior: float = 0.0
+    views: tuple[DoorPicture, ...] = ()
 
     @property
     def is_passable(self) -> bool:

@@ -157,6 +157,7 @@ class PlaceOdds:
         source: ``told`` at the start, or ``tracked`` by milestones since.
         p_prior: probability that it is there, before any picture since it was lost.
         probability: with the pictures.
+        refuted: how often a place that was believed by such odds was refuted before.
     """
 
     locale: str
@@ -164,6 +165,7 @@ class PlaceOdds:
     source: Literal["told", "tracked"]
     p_prior: float
     probability: float
+    refuted: int = 0
 
     def sentence(self) -> str:
         how = "this one was told at the start" if self.source == "told" else "to this one it was tracked"

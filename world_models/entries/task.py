@@ -246,7 +246,7 @@ class Milestone:
         tried: headings from which it was looked for before, and could not be told [rad, world].
         displacement_modes: what of the model may be displaced as one: walls, doors, things; none where it is exact.
         displacements: by how much a standard deviation of a mode displaces a line: (mode, line, x, y, z [m, world]).
-        log_odds_so_far: log odds of a wrong place by the looks in other directions, where the model is inexact.
+        told: of each of these looks, the log odds of a wrong place; 0 where it told nothing.
         status: turning (not yet looking there), expected, verified, refuted, not testable, or withdrawn (what is
             known of the building has changed, and it rested on that).
     """
@@ -263,7 +263,7 @@ class Milestone:
     tried: tuple[float, ...] = ()
     displacement_modes: tuple[str, ...] = ()
     displacements: tuple[tuple[float, ...], ...] = ()
-    log_odds_so_far: float = 0.0
+    told: tuple[float, ...] = ()
     status: MilestoneStatus = "turning"
 
     @property

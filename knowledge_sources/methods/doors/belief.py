@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.belief.odds import Alike, Look, add_looks, measure_common, to_probability
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.matching import match_on_floor
 from knowledge_sources.methods.pose import planar_from_lines
@@ -30,8 +31,10 @@ SHUT_LOG_ODDS = 4.6  # log odds from which a door is shut: 99 %
 OPEN_LOG_ODDS = -3.0  # log odds up to which a door is open: 95 %
 MAX_LOG_ODDS = 7.0  # largest log odds that are kept, that a door may open again
 MIN_PICTURES = 2  # fewest pictures by which a door is shut
-MIN_STEP_M = 0.3  # pictures of a door that count both are taken so far from each other
-MIN_TURN_RAD = 0.17  # or turned by so much
+SAME_PLACE = Alike(step_m=0.6, turn_rad=math.inf)
+"""Pictures of a door from places so far apart are independent; what is seen through it does not change by a turn."""
+MAX_COMMON = 0.5  # of two pictures that have more in common, one is kept
+MAX_VIEWS = 4  # so many are kept, the last ones
 MAX_DOUBTED_SIGMAS = 3.0  # standard deviations of the belief within which the explained pose must be
 MIN_EXPLAINED_BETTER = 10.0  # least ratio by which the pose is likelier to be wrong with the door open
 MIN_FEW_LINES = 3  # fewest lines by which a frame is told, where they are too few to tell the place by
@@ -44,39 +47,44 @@ def update_door(
 ) -> DoorState | None:
     """What is believed of a door after a picture; None where that picture adds nothing.
 
-    A picture from where the last one was taken shows the same again: it counts only for what it says more.
+    Pictures count by what they do not have in common (:func:`~knowledge_sources.methods.belief.odds.add_looks`): from
+    near one place they show the same jambs and the same of what is beyond, however the robot turns. A picture that
+    contradicts what was seen from there takes its place, and only the last few count: the door may have moved.
     """
-    log_odds = known.log_odds if known is not None else (1 if is_believed_shut else -1) * PRIOR_LOG_ODDS
-    gain, count = picture.log_ratio, 0 if known is None else known.pictures
-    if known is not None and is_same_view(known.last, picture):
-        gain = _stronger(picture.log_ratio, known.last.log_ratio)
-        if gain == 0.0:
-            return None
-    else:
-        count += 1
-    if abs(gain) < MIN_LOG_RATIO:
+    if abs(picture.log_ratio) < MIN_LOG_RATIO:
         return None
-    most = MAX_LOG_ODDS
-    log_odds = min(max(log_odds + gain, -most), most)
-    state = _name_state(log_odds, count, known)
+    prior = (1 if is_believed_shut else -1) * PRIOR_LOG_ODDS
+    views: tuple[DoorPicture, ...] = ()
+    if known is not None:
+        views = known.views or (known.last,)
+        prior = known.prior if known.views else known.log_odds - known.last.log_ratio
+    kept = _keep(views, picture)
+    if kept is None:
+        return None
+    views = (*kept, picture)[-MAX_VIEWS:]
+    log_odds = prior + add_looks([Look(_pose(view), view.log_ratio) for view in views], SAME_PLACE)
+    log_odds = min(max(log_odds, -MAX_LOG_ODDS), MAX_LOG_ODDS)
+    state = _name_state(log_odds, len(views), known)
     if known is not None and (state, log_odds) == (known.state, known.log_odds):
         return None
-    p_shut = 1.0 / (1.0 + math.exp(-log_odds))
+    p_shut = to_probability(log_odds)
     certainty = 1.0 - p_shut if state == "open" else p_shut
-    return DoorState(door, between, state, certainty, log_odds, count, picture, seen_s)
+    return DoorState(door, between, state, certainty, log_odds, len(views), picture, seen_s, prior, views)
 
 
-def is_same_view(one: DoorPicture, other: DoorPicture) -> bool:
-    """Whether two pictures were taken from nearly the same pose."""
-    near = math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) < MIN_STEP_M
-    return near and abs(wrap_angle(one.heading_rad - other.heading_rad)) < MIN_TURN_RAD
+def _keep(views: tuple[DoorPicture, ...], new: DoorPicture) -> tuple[DoorPicture, ...] | None:
+    """The pictures that count beside a new one; None where one of them says the same, and no less."""
+    agreeing = [view for view in views if view.log_ratio * new.log_ratio > 0.0
+                and measure_common(_pose(view), _pose(new), SAME_PLACE) > MAX_COMMON]
+    if any(abs(view.log_ratio) >= abs(new.log_ratio) for view in agreeing):
+        return None
+    against = [view for view in views if view.log_ratio * new.log_ratio < 0.0
+               and measure_common(_pose(view), _pose(new), SAME_PLACE) > 0.0]
+    return tuple(view for view in views if view not in against and view not in agreeing)
 
 
-def _stronger(now: float, before: float) -> float:
-    """By how much a picture says more than another of the same view."""
-    if now * before <= 0.0:
-        return now
-    return math.copysign(max(abs(now) - abs(before), 0.0), now)
+def _pose(picture: DoorPicture) -> Pose2:
+    return Pose2(picture.x_m, picture.y_m, picture.heading_rad)
 
 
 def _name_state(log_odds: float, count: int, known: DoorState | None) -> DoorCondition:

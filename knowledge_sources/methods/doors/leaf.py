@@ -51,6 +51,7 @@ class SeenOpening:
         across: (n,) place of each in the opening, 0 at the left jamb to 1; height_m: (n,) above the floor.
         colors: (n, 3) what the model has there, 0..1; NaN where it does not know.
         is_whole: (n,) whether the model has the same surface all round the sample.
+        sine: of the angle at which it is seen, 1 from the front.
         frame_pixels: (k, 2) samples of what is round the opening: casing and wall; frame_colors: (k, 3) of the model.
     """
 
@@ -63,6 +64,7 @@ class SeenOpening:
     is_whole: Mask
     frame_pixels: Floats
     frame_colors: Floats
+    sine: float = 1.0
 
 
 def is_in_view(
@@ -97,7 +99,9 @@ def predict_opening(
         return None
     camera_from_world, floor_m = robot.camera_from_world(pose), robot.world.floor_m(locale)
     center = camera_from_world.inverse().translation
-    distance_m = float(np.linalg.norm(doorway.threshold_of(locale).mean(axis=0) - center[:2]))
+    middle = doorway.threshold_of(locale).mean(axis=0)
+    distance_m = float(np.linalg.norm(middle - center[:2]))
+    sine = float((middle - center[:2]) @ doorway.outward_from(locale)) / distance_m
     box = _find_box(robot, camera_from_world, doorway, locale, floor_m, 0.0)
     if box is None:
         return None
@@ -124,7 +128,7 @@ def predict_opening(
     is_whole = np.all(np.abs(look - look[:, :1]) < 1e-4, axis=(1, 2))
     frame = beside[mine] & clear & is_whole & (depth[mine] < first_m[mine] + OWN_SURFACE_M)
     return SeenOpening(box, distance_m, pixels[free, 0], across[mine][free], height_m[mine][free], known[mine][free],
-                       is_whole[free], pixels[frame, 0], known[mine][frame])
+                       is_whole[free], pixels[frame, 0], known[mine][frame], sine)
 
 
 def _find_box(
@@ -209,6 +213,8 @@ MIN_FOOT_SAMPLES = 8  # fewest samples at the foot, and above it, by which both 
 MIN_FRAME_SAMPLES = 12  # fewest samples round an opening by which it is told whether something stands before it
 MIN_FRAME_SHARE = 0.6  # least share of them that has the model's color, up to one gain, where nothing stands before it
 MAX_FRAME_LEAF_SHARE = 0.4  # largest share of them that has the color of the opening, where that is a leaf
+MIN_LEAF_SINE = 0.6  # least sine of the angle at which a leaf is told from an open doorway: 37 degrees
+MAX_BARE = 0.85  # beyond a doorway is one bare surface where the model has more of it in one color
 MAX_LOG_RATIO = 4.5  # most that one picture may add to the log odds of a door: 90 to 1
 
 MAX_COMPARED = 60
@@ -228,6 +234,7 @@ class LeafEvidence:
         expected_foot: the same of what the model has beyond.
         frame: share of the samples round the opening that have the model's color, 0..1; NaN where there are too few.
         frame_leaf: share of them that has the opening's own color.
+        sine: of the angle at which the opening is seen, 1 from the front.
     """
 
     samples: int
@@ -239,6 +246,7 @@ class LeafEvidence:
     expected_foot: float
     frame: float
     frame_leaf: float
+    sine: float = 1.0
 
     @property
     def features(self) -> tuple[float, ...]:
@@ -291,7 +299,7 @@ def measure_opening(
         find_largest_share(colors[compared] - expected, MAX_GAIN_BRIGHTNESS, MAX_GAIN_TINT),
         _compare_foot(colors, opening.height_m),
         _compare_foot(expected, opening.height_m[compared]),
-        frame, frame_leaf,
+        frame, frame_leaf, opening.sine,
     )
 
 
@@ -330,12 +338,19 @@ def weigh_leaf(evidence: LeafEvidence) -> float:
     """The log likelihood ratio of a leaf against an open doorway, as much as one picture may say.
 
     A leaf stands in its frame: where what is round the opening is not as the model has it, or has the color of the
-    opening, something may stand before it.
+    opening, something may stand before it. And nothing speaks for a leaf where an open doorway would show the same: a
+    bare wall beyond it, or seen aslant little but its jamb.
     """
     ratio = float(np.dot(evidence.features, WEIGHTS))
-    if ratio > 0.0 and not is_framed(evidence):
+    if ratio > 0.0 and not (is_framed(evidence) and is_telling(evidence)):
         return 0.0
     return min(max(ratio, -MAX_LOG_RATIO), MAX_LOG_RATIO)
+
+
+def is_telling(evidence: LeafEvidence) -> bool:
+    """Whether a leaf would look otherwise than what the model has beyond: from the front, and not one bare surface."""
+    has_floor = not math.isnan(evidence.expected_foot) and evidence.expected_foot >= ALIKE_FOOT
+    return evidence.sine >= MIN_LEAF_SINE and (has_floor or evidence.expected_uniform <= MAX_BARE)
 
 
 def is_framed(evidence: LeafEvidence) -> bool:

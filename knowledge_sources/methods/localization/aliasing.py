@@ -83,7 +83,16 @@ def find_strongest_alias(
     robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, *, search: bool = False,
     settings: Settings = DEFAULT,
 ) -> Alias | None:
-    """Find the other pose of a room that segments (k, 2, 2) speak least against; None if there is no other.
+    """Find the other pose of a room that segments (k, 2, 2) speak least against; None if there is no other."""
+    found = list_aliases(robot, segments_px, room, pose, search=search, settings=settings)
+    return min(found, key=lambda alias: alias.margin, default=None)
+
+
+def list_aliases(
+    robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, *, search: bool = False,
+    settings: Settings = DEFAULT,
+) -> list[Alias]:
+    """List the other poses of a room at which segments (k, 2, 2) may have been seen, each with its margin.
 
     Tried are the poses at which the room repeats itself and, with ``search``, wherever else in it the segments fit:
     notices and painted doors that no plan shows may repeat themselves. A search takes half a second.
@@ -91,12 +100,10 @@ def find_strongest_alias(
     others = [*find_repeated_poses(robot, room, pose),
               *(find_fitting_poses(robot, segments_px, room, pose, settings) if search else ())]
     if not others:
-        return None
+        return []
     views = predict_views_on_grid(robot, (pose, *others), settings, segments_px)
     own, *there = (score_view(lines_px, segments_px, settings) for lines_px in views)
-    margins = [compute_margin(own, other) for other in there]
-    smallest = int(np.argmin(margins))
-    return Alias(others[smallest], margins[smallest])
+    return [Alias(other, compute_margin(own, view)) for other, view in zip(others, there, strict=True)]
 
 
 def find_repeated_poses(robot: RobotModel, room: str, pose: Pose2) -> list[Pose2]:

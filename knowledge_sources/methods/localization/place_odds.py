@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.belief.odds import update
 from knowledge_sources.methods.localization.global_localization import (
     LocalizationResult,
     LocalizationStatus,
@@ -115,10 +116,9 @@ def compute_twin_odds(log_ratios: Sequence[float], p_prior: float) -> tuple[floa
                               p_prior)
 
 
-def compute_prior(times_lost: int, settings: LocalizationSettings = DEFAULT.localization) -> float:
-    """Compute the prior probability of the told place after it was believed so often by it, and the robot got lost."""
-    odds = settings.p_told / (1.0 - settings.p_told) * settings.lost_again_odds**times_lost
-    return odds / (1.0 + odds)
+def compute_prior(times_refuted: int, settings: LocalizationSettings = DEFAULT.localization) -> float:
+    """Compute the prior probability of the told place after it was believed by it so often, and then refuted."""
+    return update(settings.p_told, times_refuted * math.log(settings.lost_again_odds))
 
 
 def is_within_reach(

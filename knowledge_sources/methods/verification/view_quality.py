@@ -30,8 +30,6 @@ MAX_SIGMA_RAD = math.radians(0.25)  # a view is good if it tells the heading to 
 MIN_LINES = 10  # fewest lines of a good view
 CHECK_TOLERANCE_M = 0.1  # tolerance that a view is chosen by where no subgoal states one
 MIN_LOOK_DIFFERENCE_RAD = math.radians(20.0)  # looks whose directions differ by less show much the same
-INDEPENDENT_LOOK_RAD = math.radians(65.0)
-"""Looks that differ by so much show nothing twice; nearer ones count less (the field of view)."""
 
 
 def turn_headings(pose: Pose2, settings: Settings) -> list[float]:

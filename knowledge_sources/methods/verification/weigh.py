@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.belief.odds import Alike, Look, add_looks, to_log_odds, update
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors
 from knowledge_sources.methods.verification.line_check import LineCheck, check_lines, find_errors, predict_lines
@@ -17,11 +18,14 @@ from knowledge_sources.methods.verification.pose_confidence import (
     compute_evidence,
     compute_motion_tolerance_px,
 )
-from knowledge_sources.settings import Settings
+from knowledge_sources.settings import PlanSettings, Settings
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Certificate, Milestone, MilestoneVerdict
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
+
+OTHER_DIRECTIONS = Alike(step_m=math.inf, turn_rad=math.radians(65.0))
+"""Looks from one place are independent where they show nothing in common: about the width of a picture."""
 
 
 class Before(NamedTuple):
@@ -58,11 +62,12 @@ class Weighed:
     Attributes:
         robot: the model on the floor of the belief, behind what stands before its camera.
         segments: of the picture.
-        pose: as solved for; before: as believed before the look.
+        pose: as solved for; before, covariance: as believed before the look, (3, 3).
         expected: number of lines that should be seen.
         lines: how they agree with the segments; faces: how the faces' colours agree.
         p_false: probability that the pose is wrong, by lines and colours.
-        is_enough: whether that is little enough to accept the pose.
+        p_wrong: the same with what was believed before, and with the looks in other directions.
+        is_enough: whether that is little enough to accept the pose; where no other look is left, to believe it.
         shift_px: median distance of the lines from where they were expected.
         tolerance_px: the largest that may be.
         is_inexact: whether the model's lines may be displaced.
@@ -76,10 +81,12 @@ class Weighed:
     segments: Segments
     pose: Pose2
     before: Pose2
+    covariance: Floats
     expected: int
     lines: LineCheck
     faces: ColorCheck
     p_false: float
+    p_wrong: float
     is_enough: bool
     shift_px: float
     tolerance_px: float
@@ -117,17 +124,21 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     if fix.camera_step:  # how far the robot is from where it was believed, not the camera
         expected_px = robot.camera.project_segments(lines, robot.camera_from_world(before.pose))[0]
     p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed
-    p_wrong = update(s.plan.p_wrong_in_doubt if before.in_doubt else p_wrong, milestone.log_odds_so_far)
+    p_wrong = update(s.plan.p_wrong_in_doubt if before.in_doubt else p_wrong, _sum_told(milestone))
+    p_after = update(p_wrong, to_log_odds(p_false))
+    is_believed = is_last_look(milestone, s.plan) and p_after <= 1.0 - s.localization.min_p_believed
     return Weighed(
         robot=robot,
         segments=seen.segments,
         pose=pose,
         before=before.pose,
+        covariance=before.covariance,
         expected=len(lines),
         lines=agreed,
         faces=faces,
         p_false=p_false,
-        is_enough=POSE_CONFIDENCE.accepts(p_false, p_wrong),
+        p_wrong=p_after,
+        is_enough=is_believed or POSE_CONFIDENCE.accepts(p_false, p_wrong),
         shift_px=_median_shift(expected_px, plain_px),
         tolerance_px=_find_tolerance_px(before, motion_px, POSE_CONFIDENCE.accepts(p_false), s),
         is_weak=before.in_doubt or not followed,
@@ -135,6 +146,12 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         camera_chi2=fix.camera_chi2,
         is_camera_known=before.is_camera_known,
     )
+
+
+def _sum_told(milestone: Milestone) -> float:
+    """The log odds of a wrong place by the looks in other directions: what they show beside this one."""
+    looks = [Look(Pose2(0.0, 0.0, along), told) for along, told in zip(milestone.tried, milestone.told, strict=True)]
+    return add_looks(looks, OTHER_DIRECTIONS, (Pose2(0.0, 0.0, milestone.look_heading_rad),))
 
 
 def _find_tolerance_px(before: Before, motion_px: float, is_sure: bool, settings: Settings) -> float:
@@ -168,7 +185,14 @@ def judge_place(w: Weighed, settings: Settings) -> Verdict:
     if w.shift_px > w.tolerance_px:
         most = f"more than the {w.tolerance_px:.0f} px that the plan may be adjusted by"
         return Verdict("refuted", f"{where}: {most}", w.p_false)
-    return Verdict("verified", where, w.p_false)
+    together = f"; with the looks in other directions wrong with {w.p_wrong:.1%}" * (w.p_wrong > POSE_CONFIDENCE.accept)
+    return Verdict("verified", where + together, w.p_false)
+
+
+def is_last_look(milestone: Milestone, plan: PlanSettings) -> bool:
+    """Whether so many views were tried that no other one may be."""
+    most = plan.max_inexact_looks if milestone.displacement_modes else plan.max_looks
+    return len(milestone.tried) + 1 >= most
 
 
 def compute_coverage_elsewhere(w: Weighed, there: Pose2, settings: Settings) -> float:
@@ -200,14 +224,6 @@ def certify(names: tuple[str, str], w: Weighed, verdict: Verdict, fix: PoseFix, 
         faces=w.faces.count,
         faces_alike=w.faces.agreeing,
     )
-
-
-def update(p_wrong: float, log_odds: float) -> float:
-    """The probability of a wrong place after evidence, by Bayes' rule."""
-    if not log_odds:
-        return p_wrong
-    odds = p_wrong / (1.0 - p_wrong) * math.exp(log_odds)
-    return odds / (1.0 + odds)
 
 
 def _median_shift(before_px: Floats, after_px: Floats) -> float:

@@ -25,8 +25,9 @@ from blackboard.servoing import OPEN, Discrepancy
 from experiments.generated.missions import OFFICE
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
+from knowledge_sources.methods.belief.odds import to_log_odds, update
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
-from knowledge_sources.methods.verification.weigh import Verdict, Weighed, judge_place, update
+from knowledge_sources.methods.verification.weigh import Weighed, is_last_look, judge_place
 from knowledge_sources.plan.milestone_judge import Case, MilestoneJudge
 from knowledge_sources.questions import HELD, find_belief
 from knowledge_sources.settings import DEFAULT, Settings
@@ -49,7 +50,8 @@ def weigh(**changed: Any) -> Any:
     plain = {
         "segments": Segments("CameraPicture-1", "Milestone-1", NO_LINES, np.zeros(0), contrast), "expected": 20,
         "lines": SimpleNamespace(agreement=agreement, coverage=0.9), "faces": changed.pop("faces", NO_FACES),
-        "p_false": 0.5 * POSE_CONFIDENCE.accept, "is_enough": True, "shift_px": 3.0, "tolerance_px": 10.0,
+        "p_false": 0.5 * POSE_CONFIDENCE.accept, "p_wrong": 0.1 * POSE_CONFIDENCE.accept,
+        "is_enough": True, "shift_px": 3.0, "tolerance_px": 10.0,
         "is_weak": False, "is_inexact": False, "camera_chi2": 0.0, "is_camera_known": True,
     }
     return SimpleNamespace(**(plain | changed))
@@ -83,14 +85,11 @@ def test_the_verdict_just_below_and_just_above_each_bound(changed: dict[str, Any
     assert judge_place(weigh(**changed), DEFAULT).kind == verdict
 
 
-@pytest.mark.parametrize(("modes", "told", "most"), [
-    ((), 0.0, PLAN.max_looks), (("wall",), 0.0, PLAN.max_inexact_looks), ((), 1.0, PLAN.max_inexact_looks)])
-def test_it_looks_again_as_often_as_it_may(modes: tuple[str, ...], told: float, most: int) -> None:
-    judge = MilestoneJudge()
+@pytest.mark.parametrize(("modes", "most"), [((), PLAN.max_looks), (("wall",), PLAN.max_inexact_looks)])
+def test_it_looks_again_as_often_as_it_may(modes: tuple[str, ...], most: int) -> None:
     for tried in range(most + 2):
-        milestone: Any = SimpleNamespace(displacement_modes=modes, log_odds_so_far=told, tried=(0.0,) * tried)
-        assert judge.may_look_again(Verdict("not testable", "", 0.1), milestone) is (tried + 1 < most)
-        assert not judge.may_look_again(Verdict("refuted", "", 0.1), milestone)
+        milestone: Any = SimpleNamespace(displacement_modes=modes, tried=(0.0,) * tried)
+        assert is_last_look(milestone, PLAN) is (tried + 1 >= most)
 
 
 @pytest.mark.parametrize("p", [0.001, 0.1, 0.5, 0.9])
@@ -201,6 +200,30 @@ def test_each_state_of_the_robot_asks_for_its_own_evidence() -> None:
 
     run_with(check)
     assert set(checked) == set(states) and len(checked) >= 6
+
+
+def test_where_no_other_view_is_left_all_looks_together_need_only_be_believed() -> None:
+    """By the standard of the search that would find the same place again; before the last look by the stricter one."""
+    most, believed, checked = PLAN.max_looks, 1.0 - DEFAULT.localization.min_p_believed, set()
+
+    def check(board: Blackboard, trigger: Change) -> None:
+        view = StateView(board, True, 0)
+        case = case_on(view, trigger)
+        plain = case.milestone.value
+        alone = to_log_odds(MilestoneJudge().weigh(view, case).p_false) + to_log_odds(PLAN.p_wrong_in_doubt)
+        for tried in (most - 2, most - 1):
+            for wanted in (0.9 * POSE_CONFIDENCE.accept, 0.9 * believed, 1.1 * believed):
+                told = (to_log_odds(wanted) - alone, *(0.0,) * (tried - 1))
+                behind = tuple(plain.look_heading_rad + math.pi + k for k in range(tried))
+                looked: Any = SimpleNamespace(value=replace(plain, tried=behind, told=told, displacement_modes=()))
+                weighed = MilestoneJudge().weigh(view, case._replace(milestone=looked))
+                assert weighed.p_wrong == pytest.approx(wanted, rel=1e-6)
+                may_be = believed if tried + 1 == most else POSE_CONFIDENCE.accept
+                assert weighed.is_enough is (wanted <= may_be)
+                checked.add((tried, weighed.is_enough))
+
+    run_with(check)
+    assert len(checked) == 4
 
 
 def test_landmarks_that_were_followed_speak_for_no_place_where_the_belief_leaves_much_open() -> None:

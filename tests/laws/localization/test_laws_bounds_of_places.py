@@ -5,6 +5,7 @@ A table of boards or results, and the decision that follows. Both sides of each 
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -13,8 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
 from experiments.generated.floors import generated_floor
-from knowledge_sources.goal.localizer import _find_prior
 from knowledge_sources.methods.localization.global_localization import (
     LocalizationResult,
     LocalizationStatus,
@@ -32,10 +34,12 @@ from knowledge_sources.methods.localization.place_odds import (
 )
 from knowledge_sources.methods.localization.place_search import prefer_reachable
 from knowledge_sources.methods.localization.refinement import PoseLikelihood
+from knowledge_sources.place_believed import count_refuted, find_p_not_alias, find_p_there
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.while_lost import is_dark as is_picture_dark
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
+from world_models.entries.location import PlaceOdds, TwinOdds
 from world_models.entries.percepts import Segments
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -194,14 +198,49 @@ def test_a_dark_frame_is_dark_by_contrast_and_brightness_together() -> None:
     assert not is_dark(g.min_contrast - SMALL, g.min_brightness + SMALL)
 
 
+def believing(p_twins: float | None = None, refuted: int | None = None, doubt: Any = None) -> Any:
+    """A view of a board with these odds."""
+    known = {
+        TwinOdds: None if p_twins is None else SimpleNamespace(value=SimpleNamespace(probability=p_twins)),
+        PlaceOdds: None if refuted is None else SimpleNamespace(value=SimpleNamespace(refuted=refuted), cycle=5),
+    }
+    return SimpleNamespace(latest=lambda kind: known[kind], newest=lambda index, level: doubt)
+
+
 def test_the_prior_is_the_smaller_of_what_was_told_and_what_twins_leave() -> None:
     def find(p_twins: float | None, times: int) -> float:
-        known = None if p_twins is None else SimpleNamespace(value=SimpleNamespace(probability=p_twins))
-        view: Any = SimpleNamespace(latest=lambda kind: known, where=lambda kind, which: (None,) * times)
-        return _find_prior(view, S)
+        return find_p_there(believing(p_twins), times, S)
 
     assert find(None, 0) == pytest.approx(S.p_told)
     assert find(S.p_told - 0.1, 0) == pytest.approx(S.p_told - 0.1)
     assert find(min(1.0, S.p_told + 0.01), 0) == pytest.approx(S.p_told)
     assert find(0.0, 0) == S.min_p_twin
     assert find(None, 1) < find(None, 0)
+
+
+def test_against_aliases_all_pictures_count_up_to_what_is_sure() -> None:
+    assert find_p_not_alias(believing(), S) == pytest.approx(S.p_told)
+    assert find_p_not_alias(believing(refuted=1), S) == pytest.approx(compute_prior(1, S))
+    assert find_p_not_alias(believing(0.9), S) == pytest.approx(0.9)
+    assert find_p_not_alias(believing(1.0), S) == pytest.approx(S.min_p_sure)
+    in_doubt = find_p_not_alias(believing(0.9, doubt=object()), S)
+    assert in_doubt == pytest.approx(0.9 * (1.0 - S.p_displaced_to_alias))
+
+
+@pytest.mark.parametrize(("magnitude", "cycle", "counts"), [
+    (41.0, 6, True), (41.0, 4, False), (math.inf, 6, False), (None, 6, False)])
+def test_only_what_was_measured_speaks_against_a_place(magnitude: float | None, cycle: int, counts: bool) -> None:
+    """Lost because nothing could be told is no evidence; nor is what was before the place was believed by odds."""
+    cause = SimpleNamespace(value=Discrepancy(Level.PLAN, "it", magnitude, (0.0, 30.0), "px"))
+    doubt: Any = SimpleNamespace(cycle=cycle, because=(SimpleNamespace(id="Discrepancy-1"),))
+    view = believing(refuted=2)
+    view.get = lambda name: cause
+    assert count_refuted(view, doubt) == 2 + counts
+    assert count_refuted(view) == 2 and count_refuted(believing(), doubt) == 0
+
+
+def test_another_place_that_is_likelier_speaks_against_it() -> None:
+    doubt: Any = SimpleNamespace(cycle=9, because=(SimpleNamespace(id="TwinOdds-1"),))
+    view = believing(refuted=0)
+    view.get = lambda name: SimpleNamespace(value=object())
+    assert count_refuted(view, doubt) == 1

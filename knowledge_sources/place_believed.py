@@ -1,0 +1,57 @@
+"""How likely the robot is where it believes, and not at a place that looks the same: what the board says of that.
+
+One number for all that ask: the judge of milestones, the search of a lost robot, and the monitor of aliases.
+"""
+
+from __future__ import annotations
+
+import math
+
+from blackboard.board import View
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.methods.localization.place_odds import compute_prior
+from knowledge_sources.questions import open_discrepancy
+from knowledge_sources.settings import LocalizationSettings
+from world_models.entries.location import PlaceOdds, TwinOdds
+
+
+def find_p_there(view: View, refuted: int, settings: LocalizationSettings) -> float:
+    """The probability of the believed place: as told, with all pictures since it was told or found.
+
+    ``refuted``: how often a place that was believed by such odds was refuted.
+    """
+    known, p_told = view.latest(TwinOdds), compute_prior(refuted, settings)
+    return p_told if known is None else max(settings.min_p_twin, min(known.value.probability, p_told))
+
+
+def find_p_not_alias(view: View, settings: LocalizationSettings) -> float:
+    """The probability that the robot is where it believes rather than where everything looks the same.
+
+    By the pictures since it was told or found. A robot in doubt may have been displaced, but hardly to such a place.
+    """
+    known = view.latest(TwinOdds)
+    p = compute_prior(count_refuted(view), settings) if known is None else known.value.probability
+    p = min(p, settings.min_p_sure)
+    return p * (1.0 - settings.p_displaced_to_alias) if open_discrepancy(view, Level.PLAN) is not None else p
+
+
+def count_refuted(view: View, doubt: Entry[Discrepancy] | None = None) -> int:
+    """How often a place that was believed by odds was refuted; ``doubt``: of a robot that is lost now.
+
+    Lost because nothing could be told from where it looked, is no evidence against the place.
+    """
+    last = view.latest(PlaceOdds)
+    if last is None:
+        return 0
+    return last.value.refuted + (doubt is not None and doubt.cycle > last.cycle and _refutes(view, doubt))
+
+
+def _refutes(view: View, doubt: Entry[Discrepancy]) -> bool:
+    """Whether a doubt at the goal level comes of a place that was measured, or that another one is likelier than."""
+    for ref in doubt.because:
+        cause = view.get(ref.id)
+        if cause is not None and isinstance(cause.value, Discrepancy):
+            return cause.value.magnitude is not None and math.isfinite(cause.value.magnitude)
+    return True

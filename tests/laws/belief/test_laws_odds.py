@@ -1,0 +1,123 @@
+"""Evidence is added by one rule: in any order, the same look once, and what was known before never speaks against."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from knowledge_sources.methods.belief.odds import (
+    Alike,
+    Look,
+    add_looks,
+    measure_common,
+    to_log_odds,
+    to_probability,
+    update,
+)
+from knowledge_sources.methods.belief.places import BelievedPlace, compute_p_rivals
+from world_models.frames import Pose2
+
+ALIKE = Alike(step_m=0.6, turn_rad=1.0)
+poses = st.builds(Pose2, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+ratios = st.floats(-5.0, 5.0)
+looks = st.builds(Look, poses, ratios)
+probabilities = st.floats(1e-6, 1.0 - 1e-6)
+
+
+@given(probabilities)
+def test_log_odds_and_probability_are_inverse(p: float) -> None:
+    assert to_probability(to_log_odds(p)) == pytest.approx(p, abs=1e-9)
+    assert to_log_odds(p) == pytest.approx(math.log(p) - math.log1p(-p), rel=1e-6, abs=1e-9)
+
+
+@given(probabilities, ratios, ratios)
+def test_evidence_is_added_one_after_the_other_or_at_once(p: float, one: float, other: float) -> None:
+    assert update(update(p, one), other) == pytest.approx(update(p, one + other), rel=1e-6)
+    odds = p / (1.0 - p) * math.exp(one)
+    assert update(p, one) == pytest.approx(odds / (1.0 + odds), rel=1e-6)
+
+
+@given(st.lists(looks, max_size=6), st.randoms(use_true_random=False))
+def test_the_order_of_looks_does_not_matter(some: list[Look], chance: object) -> None:
+    shuffled = list(some)
+    chance.shuffle(shuffled)  # type: ignore[attr-defined]
+    assert add_looks(shuffled, ALIKE) == add_looks(some, ALIKE)
+
+
+@given(st.lists(looks, max_size=5), st.integers(0, 4))
+def test_a_look_taken_twice_from_one_place_is_worth_one(some: list[Look], which: int) -> None:
+    if some:
+        again = [*some, some[which % len(some)]]
+        assert add_looks(again, ALIKE) == pytest.approx(add_looks(some, ALIKE), abs=1e-9)
+
+
+@given(st.lists(looks, max_size=6))
+def test_looks_never_add_more_than_all_that_they_say(some: list[Look]) -> None:
+    assert abs(add_looks(some, ALIKE)) <= sum(abs(look.log_ratio) for look in some) + 1e-9
+
+
+@given(ratios, ratios)
+def test_looks_from_far_apart_add_whole(one: float, other: float) -> None:
+    far = [Look(Pose2(0.0, 0.0, 0.0), one), Look(Pose2(ALIKE.step_m, 0.0, 0.0), other)]
+    turned = [Look(Pose2(0.0, 0.0, 0.0), one), Look(Pose2(0.0, 0.0, ALIKE.turn_rad), other)]
+    assert add_looks(far, ALIKE) == pytest.approx(one + other)
+    assert add_looks(turned, ALIKE) == pytest.approx(one + other)
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.1, 5.0), st.floats(0.0, 1.0))
+def test_of_two_looks_the_weaker_adds_what_is_not_common(part: float, strong: float, share: float) -> None:
+    at = Pose2(part * ALIKE.step_m, 0.0, 0.0)
+    seen = [Look(Pose2(0.0, 0.0, 0.0), strong), Look(at, share * strong)]
+    assert measure_common(seen[0].pose, at, ALIKE) == pytest.approx(1.0 - part)
+    assert add_looks(seen, ALIKE) == pytest.approx(strong + part * share * strong)
+
+
+@given(poses, poses, poses)
+def test_what_is_common_does_not_depend_on_where_the_building_stands(one: Pose2, other: Pose2, by: Pose2) -> None:
+    assert measure_common(by @ one, by @ other, ALIKE) == pytest.approx(measure_common(one, other, ALIKE), abs=1e-9)
+    mirrored = [Pose2(p.x_m, -p.y_m, -p.heading_rad) for p in (one, other)]
+    assert measure_common(*mirrored, ALIKE) == pytest.approx(measure_common(one, other, ALIKE), abs=1e-9)
+
+
+HERE, SIGMAS = Pose2(0.0, 0.0, 0.0), np.diag([0.01, 0.01, 0.01]) ** 2
+FAR, FARTHER, NEAR = Pose2(3.66, 0.0, 0.0), Pose2(7.32, 0.0, 0.0), Pose2(0.005, 0.0, 0.0)
+
+
+@given(probabilities, probabilities, ratios)
+def test_more_prior_knowledge_never_makes_a_right_belief_less_likely(one: float, other: float, ratio: float) -> None:
+    less, more = (compute_p_rivals(BelievedPlace(HERE, SIGMAS, p), NEAR, [(FAR, ratio)]) for p in sorted((one, other)))
+    assert more <= less + 1e-12
+
+
+@given(st.floats(0.005, 5.0), st.floats(1.0, 10.0), st.floats(0.5, 0.9999))
+def test_a_sharper_belief_excludes_more(sigma: float, wider: float, p_there: float) -> None:
+    sharp, wide = (BelievedPlace(HERE, np.diag([s, s, 0.01]) ** 2, p_there) for s in (sigma, wider * sigma))
+    assert compute_p_rivals(sharp, HERE, [(FAR, 0.0)]) <= compute_p_rivals(wide, HERE, [(FAR, 0.0)]) + 1e-12
+
+
+@given(st.floats(0.5, 0.9999), ratios)
+def test_a_door_far_outside_the_belief_is_as_likely_as_the_belief_is_wrong(p_there: float, ratio: float) -> None:
+    p = compute_p_rivals(BelievedPlace(HERE, SIGMAS, p_there), HERE, [(FAR, ratio)])
+    share = 0.5 * (1.0 - p_there)  # wrong, the belief leaves this place open too
+    there, here = share * math.exp(ratio), p_there + share
+    assert p == pytest.approx(there / (there + here), rel=1e-6)
+
+
+@given(ratios)
+def test_within_the_belief_the_picture_alone_tells(ratio: float) -> None:
+    wide = BelievedPlace(HERE, np.diag([1e6, 1e6, 1e6]), 0.98)
+    assert compute_p_rivals(wide, HERE, [(FAR, ratio)]) == pytest.approx(to_probability(ratio), abs=1e-3)
+
+
+@given(st.floats(0.5, 0.9999), ratios, ratios)
+def test_rivals_share_what_the_belief_leaves(p_there: float, one: float, other: float) -> None:
+    """However many places are tried, together they are no likelier than the likeliest picture of them makes them."""
+    believed = BelievedPlace(HERE, SIGMAS, p_there)
+    both = compute_p_rivals(believed, HERE, [(FAR, one), (FARTHER, other)])
+    assert both == compute_p_rivals(believed, HERE, [(FARTHER, other), (FAR, one)])
+    assert both <= (1.0 - p_there) * math.exp(max(one, other, 0.0)) / p_there + 1e-9
+    assert compute_p_rivals(believed, HERE, []) == 0.0
