@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -12,11 +13,16 @@ from blackboard.condition import Condition
 from blackboard.entry import Entry
 from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import GOING_ON, HELD, LOST, STANDING
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.questions import find_robot
 from knowledge_sources.settings import GoalSettings
+from world_models.entries.body import MotionReport
 from world_models.entries.location import Hypothesis
+from world_models.entries.obstacle import AROUND_SIGMA_RAD, Contact
 from world_models.entries.percepts import Glimpse, Panorama, Segments
 from world_models.entries.task import PlanSketch
+from world_models.frames import Pose2
 
 
 class Lost(NamedTuple):
@@ -40,6 +46,23 @@ def find_panorama(view: View, doubt: Entry[Discrepancy]) -> Entry[Panorama] | No
 def list_views(view: View, glimpses: Iterable[Glimpse]) -> list[CameraView]:
     """The looks with their segments."""
     return [CameraView(view[g.segments].value.segments_px, g.now_from_then, np.array(g.covariance)) for g in glimpses]
+
+
+def list_contacts(view: View, doubt: Entry[Discrepancy]) -> list[Entry[Contact]]:
+    """What was touched since the robot is lost, and the last before that, where the direction is known."""
+    last = view.latest(Contact)
+    return [entry for entry in view.where(Contact, lambda touch: touch.sigma_rad < AROUND_SIGMA_RAD)
+            if entry.cycle >= doubt.cycle or (last is not None and entry.id == last.id)]
+
+
+def locate_contact(view: View, contact: Entry[Contact]) -> Floats:
+    """Where something was touched, (2,) [m] in the robot's frame now: at its rim then, and as it has moved since."""
+    robot, direction, now_from_then = find_robot(view), contact.value.direction_rad, Pose2(0.0, 0.0, 0.0)
+    for report in view.since(MotionReport, contact.cycle):
+        if report.because[0].id != contact.because[0].id:
+            moved = robot.actuator.predict_motion(report.value.turn_rad, report.value.move_m)
+            now_from_then = moved.inverse() @ now_from_then
+    return now_from_then.apply(robot.radius_m * np.array([math.cos(direction), math.sin(direction)]))
 
 
 def is_dark(segments: Segments, settings: GoalSettings) -> bool:

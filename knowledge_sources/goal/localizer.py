@@ -27,7 +27,7 @@ from knowledge_sources.place_believed import count_refuted, find_p_there
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_building, find_building_as_filed, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.while_lost import WHILE_LOST, Lost, find_lost, list_views
+from knowledge_sources.while_lost import WHILE_LOST, Lost, find_lost, list_contacts, list_views, locate_contact
 from world_models.entries.body import MotionReport
 from world_models.entries.location import Hypothesis, PlaceOdds, PlaceSearch
 from world_models.entries.obstacle import Obstruction
@@ -82,10 +82,12 @@ class Localizer(RobotKnowledgeSource):
             looks = [replace(g, segments_px=obstruction.without_its_own(g.segments_px)) for g in looks]
         rooms = list_rooms(building, locale, here, self._settings.goal)
         followed = _follow(view, candidates, building)
+        contacts = list_contacts(view, doubt)
+        touched = [locate_contact(view, contact) for contact in contacts]
         cameras, buildings = self._list_cameras(view), self._list_buildings(view)
         robots = [find_robot(view, camera).in_building(among).with_obstruction(obstruction).on_floor_of(locale)
                   for camera in cameras for among in buildings]
-        seen, which = search(robots, Search(looks, rooms, (locale, here), followed), self._settings)
+        seen, which = search(robots, Search(looks, rooms, (locale, here), followed, touched), self._settings)
         is_last = len(looks) >= (self._settings.goal.max_far_probes if seen.candidates else MAX_PROBES)
         seen = replace(seen, next_action=None) if is_last else seen
         look_alike = make_alias_test(robots[which], looked, self._settings)
@@ -94,13 +96,13 @@ class Localizer(RobotKnowledgeSource):
         odds = find_odds_used(seen, result, told, was_tracked=verified is not None, refuted=refuted)
         if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
             result = prefer_reachable(building, result, locale)
-        far = find_far_action(robots[which], result, looked, rooms, self._settings)
+        far = find_far_action(robots[which], result, looked, rooms, self._settings, touched)
         if far is not None:
             result = replace(result, status=LocalizationStatus.PROBE, next_action=far)
         said = describe(result, is_far=far is not None) if odds is None else odds.sentence()
         step = result.next_action if result.status is LocalizationStatus.PROBE else None
         probe = None if step is None else (step.turn_rad, step.move_m)
-        because = (panorama, doubt, belief, *candidates, *(() if hidden is None else (hidden,)))
+        because = (panorama, doubt, belief, *candidates, *contacts, *(() if hidden is None else (hidden,)))
         found = Post(PlaceSearch(result.status.value, said, probe, which >= len(buildings)), because)
         yield found
         yield from (Retract(old, (found,)) for old in candidates)

@@ -108,16 +108,18 @@ class RefinedPose(NamedTuple):
 def localize(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT,
     guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (),
+    touched: Sequence[Floats] = (),
 ) -> LocalizationResult:
     """Find the robot in these rooms by its views, the last of which was taken from where it is now.
 
     Args:
         guess: a room and a pose that are always tried: of many places that look alike only some are.
         followed: the candidates of the last localization, moved as the robot moved since: they are tried too.
+        touched: where something was touched, (2,) [m] in the robot's frame now: no move leads there.
     """
     aligned = align_headings(views, robot.camera, robot.mount.camera_from_robot, settings)
     candidates = find_candidates(robot, aligned, rooms, settings, guess, followed)
-    return decide(robot, candidates, [view.now_from_then for view in aligned], settings)
+    return decide(robot, candidates, [view.now_from_then for view in aligned], settings, touched)
 
 
 def find_candidates(
@@ -247,7 +249,8 @@ def rank_candidates(
 
 
 def decide(
-    robot: RobotModel, candidates: Sequence[PlaceCandidate], looked: Sequence[Pose2], settings: Settings = DEFAULT
+    robot: RobotModel, candidates: Sequence[PlaceCandidate], looked: Sequence[Pose2], settings: Settings = DEFAULT,
+    touched: Sequence[Floats] = (),
 ) -> LocalizationResult:
     """Decide whether the robot is found, cannot be found, or needs another look, and which."""
     kept, enough = tuple(candidates), len(looked) >= settings.localization.min_views
@@ -255,7 +258,7 @@ def decide(
         return LocalizationResult(LocalizationStatus.FOUND, kept)
     if not kept:
         return LocalizationResult(LocalizationStatus.PROBE, (), SensingAction(find_widest_gap(looked), 0.0, 0.0))
-    predict, is_safe = make_view_predictor(robot, settings), make_safety_check(robot)
+    predict, is_safe = make_view_predictor(robot, settings), make_safety_check(robot, touched)
     hypotheses = [c.hypothesis for c in kept]
     tied = len(kept) > 1 and all(c.is_accepted for c in kept[:2]) and enough
     if tied and not can_distinguish(hypotheses[0], hypotheses[1], looked, predict, is_safe):

@@ -45,6 +45,7 @@ FAR_STEP_M = 1.0  # grid of the positions of such views
 FAR_LEG_M = 1.2  # longest move on the way there; then another look is taken
 FAR_ARRIVED_M = 0.15  # distance from such a position from which the robot only turns
 FAR_COARSE_M = 0.03  # to this the free floor's outline is simplified
+TOUCHED_PART = 0.95  # of the robot's radius that it keeps from what it touched: it stands at one radius from it
 FAR_HYPOTHESES = 3  # most places, the likeliest, that a far view is to tell apart
 
 PredictView = Callable[[Pose2], Floats]
@@ -181,15 +182,26 @@ def can_distinguish(
     return any(are_distinguishable([predict(a @ step)], [predict(b @ step)]) for step in (*looked, *reach))
 
 
-def make_safety_check(robot: RobotModel) -> IsSafe:
-    """Return a check whether an action's move keeps free of the walls and things of the hypothesis's room."""
+def make_safety_check(robot: RobotModel, touched: Sequence[Floats] = ()) -> IsSafe:
+    """Return a check whether an action's move keeps free of the walls and things of the hypothesis's room.
+
+    And of what was ``touched``, whatever it is: points (2,) [m] in the robot's frame now.
+    """
     clearance_m = robot.radius_m + MOVE_CLEARANCE_M
 
     def is_safe(hypothesis: PoseHypothesis, action: SensingAction) -> bool:
+        if any(_leads_to(action, point, clearance_m) for point in touched):
+            return False
         free, pose = find_free_space(robot.world, hypothesis.room, clearance_m), hypothesis.world_from_robot
         return is_clear(free, pose.position, action.apply_to(pose).position)
 
     return is_safe
+
+
+def _leads_to(action: SensingAction, point: Floats, clearance_m: float) -> bool:
+    """Whether a move comes nearer than a clearance to a point (2,) that lies ahead of it [m, the robot's frame]."""
+    ahead_m, aside_m = Pose2(0.0, 0.0, -action.turn_rad).apply(point)
+    return action.move_m > 0.0 and 0.0 < ahead_m < action.move_m + clearance_m and abs(aside_m) < clearance_m
 
 
 def find_widest_gap(looked: Sequence[Pose2]) -> float:
@@ -225,7 +237,7 @@ class _Way(NamedTuple):
 
 def choose_far_action(
     robot: RobotModel, hypotheses: Sequence[PoseHypothesis], looked: Sequence[Pose2], rooms: Sequence[str],
-    predict: PredictView,
+    predict: PredictView, touched: Sequence[Floats] = (),
 ) -> SensingAction | None:
     """Choose the first leg of the shortest way to a view that tells two hypotheses apart; None where there is none.
 
@@ -234,8 +246,11 @@ def choose_far_action(
         looked: poses of the views so far: what they did not tell they will not tell.
         rooms: of the floor.
         predict: the lines that should be visible from a pose, world.
+        touched: where something was touched, (2,) [m] in the robot's frame now; the way keeps off it.
     """
     free = find_common_floor(robot, hypotheses, rooms)
+    if touched and not free.is_empty:
+        free = _keep_off(free, touched, robot.radius_m)
     compared = hypotheses[:FAR_HYPOTHESES]
     weights = [h.weight for h in compared]
     for way in _list_ways(free, FAR_STEP_M):
@@ -272,6 +287,13 @@ def find_common_floor(
         common = shapely.intersection(common, affinity.affine_transform(near, [c, -s, s, c, here.x_m, here.y_m]))
     at = shapely.Point(0.0, 0.0)
     return next((part for part in shapely.get_parts(common) if part.distance(at) <= SLACK_M), shapely.Polygon())
+
+
+def _keep_off(free: shapely.Geometry, touched: Sequence[Floats], radius_m: float) -> shapely.Geometry:
+    """Free floor without where the robot's rim would reach a touched point; the part where it stands."""
+    off = shapely.unary_union([shapely.Point(point).buffer(TOUCHED_PART * radius_m) for point in touched])
+    left, at = shapely.difference(free, off), shapely.Point(0.0, 0.0)
+    return next((part for part in shapely.get_parts(left) if part.distance(at) <= SLACK_M), shapely.Polygon())
 
 
 def _shrink(building: Building, rooms: Sequence[str], clearance_m: float, coarse_m: float) -> shapely.Geometry:

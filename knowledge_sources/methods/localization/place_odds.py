@@ -51,8 +51,10 @@ def weigh_told(
     """Weigh the candidates by what was told and by the pictures, the likeliest first.
 
     Found is the told place if it is accepted and so likely that it is believed: ``min_p_sure``, or ``min_p_believed``
-    where no look within reach tells more, after ``min_views`` of ``looks``. Where the pictures alone have found a
-    place, or none of the candidates is the told place, nothing is changed.
+    where no look within reach tells more, after ``min_views`` of ``looks``. After ``max_searched_views`` of them it
+    need not be accepted by the shares of lines that are found, if that many are not found by chance: where it was
+    told to be, no strange place has to be ruled out. Where the pictures alone have found a place, or none of the
+    candidates is the told place, nothing is changed.
     """
     is_told = [told.includes(c, settings) for c in result.candidates]
     if result.status is LocalizationStatus.FOUND or not any(is_told):
@@ -66,10 +68,17 @@ def weigh_told(
     likeliest = weighed[0]
     is_tied = result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None
     enough = settings.min_p_believed if is_tied else settings.min_p_sure
-    is_settled = looks >= settings.min_views and likeliest.is_accepted and likeliest.weight >= enough
+    is_borne_out = likeliest.is_accepted and looks >= settings.min_views
+    is_borne_out |= looks >= settings.max_searched_views and _is_far_from_chance(likeliest, settings)
+    is_settled = is_borne_out and likeliest.weight >= enough
     if is_settled and told.includes(likeliest, settings):
         return LocalizationResult(LocalizationStatus.FOUND, (likeliest,))
     return replace(result, candidates=weighed)
+
+
+def _is_far_from_chance(candidate: PlaceCandidate, settings: LocalizationSettings) -> bool:
+    """Whether so much agrees that only the same place shows it, though a model that is inexact lacks many lines."""
+    return candidate.likelihood.log_likelihood >= settings.sure_log_likelihood
 
 
 def compute_place_odds(

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.localization.global_localization import LocalizationResult, LocalizationStatus, localize
 from knowledge_sources.methods.localization.next_view import SensingAction, choose_far_action, make_view_predictor
 from knowledge_sources.methods.localization.place_odds import StatedPlace
@@ -29,17 +30,20 @@ class Search(NamedTuple):
         rooms: that are searched, the nearest to the last belief first.
         here: room and pose (world) of the last belief.
         followed: rooms and poses of the candidates of the last search, as the robot has moved since.
+        touched: where something was touched, (2,) [m] in the robot's frame now.
     """
 
     looks: Sequence[CameraView]
     rooms: Sequence[str]
     here: tuple[str, Pose2]
     followed: Sequence[tuple[str, Pose2]]
+    touched: Sequence[Floats] = ()
 
 
 def search(robots: Iterable[RobotModel], what: Search, settings: Settings) -> tuple[LocalizationResult, int]:
     """The result of the robot, camera and building, in which the best place fits best, and which it is."""
-    tried = [localize(robot, what.looks, what.rooms, settings, what.here, what.followed) for robot in robots]
+    tried = [localize(robot, what.looks, what.rooms, settings, what.here, what.followed, what.touched)
+             for robot in robots]
     best = max(range(len(tried)), key=lambda k: _measure_fit(tried[k]))  # of equals the first
     return tried[best], best
 
@@ -74,7 +78,8 @@ def find_odds_used(
 
 
 def find_far_action(
-    robot: RobotModel, result: LocalizationResult, looked: Sequence[Pose2], rooms: Sequence[str], settings: Settings
+    robot: RobotModel, result: LocalizationResult, looked: Sequence[Pose2], rooms: Sequence[str], settings: Settings,
+    touched: Sequence[Floats] = (),
 ) -> SensingAction | None:
     """The first leg of the way to a view that tells places apart that look alike from wherever the robot has looked.
 
@@ -88,7 +93,7 @@ def find_far_action(
     if looks < s.localization.min_views or not (is_stuck or looks >= s.localization.max_searched_views):
         return None
     hypotheses = [c.hypothesis for c in result.candidates]
-    return choose_far_action(robot, hypotheses, looked, rooms, make_view_predictor(robot, s))
+    return choose_far_action(robot, hypotheses, looked, rooms, make_view_predictor(robot, s), touched)
 
 
 def list_rooms(building: FrameBuilding, locale: str, here: Pose2, settings: GoalSettings) -> list[str]:

@@ -144,6 +144,17 @@ def test_the_told_place_is_believed_at_the_stated_odds(tied: bool, bound: float)
     assert S.min_p_believed < S.min_p_sure
 
 
+@pytest.mark.parametrize(("log", "looks", "x_m", "expected"), [
+    (S.sure_log_likelihood, S.max_searched_views, 2.0, FOUND), (S.sure_log_likelihood - SMALL, 9, 2.0, PROBE),
+    (S.sure_log_likelihood, S.max_searched_views - 1, 2.0, PROBE), (S.sure_log_likelihood, 9, 9.0, PROBE)])
+def test_where_it_was_told_to_be_it_need_only_be_far_from_chance(
+    log: float, looks: int, x_m: float, expected: LocalizationStatus
+) -> None:
+    """A model that is inexact lacks so many lines that no share of them is enough; elsewhere that rules a place out."""
+    seen = LocalizationResult(PROBE, (place(x_m, log, accepted=False),), SensingAction(1.0, 0.0, 1.0))
+    assert weigh_told(seen, replace(HERE, p_told=0.9), lambda one, other: False, looks).status is expected
+
+
 def test_a_place_is_the_told_one_up_to_the_stated_distance() -> None:
     covariance = np.diag([0.02, 0.03, 0.01])
     beyond = np.diag(np.square([S.told_sigma_m, S.told_sigma_m, S.told_sigma_rad]))

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 9_950,
-    "knowledge_sources": 21_030,
+    "knowledge_sources": 21_360,
     "sim": 5_830,
     "logs": 7_450,
     "harvey": 10_520,
