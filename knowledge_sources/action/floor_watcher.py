@@ -65,7 +65,7 @@ class FloorWatcher(RobotKnowledgeSource):
         return Case(frame, belief)
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        frame, belief, robot, pose = case.frame, case.belief.entry, case.belief.robot, case.belief.pose
+        frame, belief, robot, pose = case.frame, case.belief.entry, case.belief.seeing, case.belief.pose
         locale = case.belief.locale
         floor_m = robot.world.floor_m(locale)
         known = {entry.value.locale: entry for entry in view.all(FloorAppearance)}

@@ -37,6 +37,7 @@ from knowledge_sources.methods.floor.standing_regions import (
     compute_parallax_odds,
     find_footprint,
     find_regions,
+    is_on_the_lens,
     measure_foot_part,
     measure_height,
 )
@@ -114,6 +115,8 @@ def see_free_floor(
     picture = read_picture(jpeg).rectified_half(robot.lens, robot.camera)
     known = appearances.get(locale)
     unlike, tells, light = find_unlike(picture[grid.top:], model, known, last_light)
+    if robot.camera.obstruction is not None:
+        tells &= ~robot.camera.obstruction.covers(grid.pixels, MODEL_MARGIN_PX)
     regions = find_regions(unlike, tells, grid) if s.use_appearance else ()
     built = [(region, _build_thing(region, grid, robot, pose, covariance, picture, earlier, s)) for region in regions]
     things = [(region, *thing) for region, thing in built if thing is not None]
@@ -256,7 +259,7 @@ def _build_thing(
     picture: NDArray[np.uint8], earlier: Sequence[Seen], settings: FloorSettings,
 ) -> tuple[FloorThing, float] | None:
     """What stands where a region is, and the part of its seeming distance; None where it is lower than what is rolled
-    over.
+    over, or is no thing but on the lens.
     """
     part = 1.0
     height_m, sigma_height_m = measure_height(region, grid)
@@ -270,6 +273,8 @@ def _build_thing(
         before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera).astype(np.float32) @ GREY
         grey = picture.astype(np.float32) @ GREY
         both = TwoPictures(grid, grey, before, earlier_from_now, robot.camera, robot.mount)
+        if is_on_the_lens(region, both):
+            return None
         told = compute_parallax_odds(region, both)
         odds *= told
         if not region.is_cut and told >= 1.0:

@@ -171,6 +171,7 @@ FOOT_PART_STEP = 0.05  # distances at which a lower border may hang over the flo
 MIN_FOOT_PART = 0.4  # least part of its seeming distance at which a lower border is looked for
 MIN_FOOT_MARGIN = 0.07
 """Smallest difference of the mean correlations of a lower border over the floor and on it that tells anything."""
+MIN_FIXED = 4  # fewest patches of a border that stay in the picture, by which it is on the lens
 MIN_FOOT_COLUMNS = 6  # with fewer patches of a lower border its height is not told
 
 HALF = 4
@@ -259,6 +260,31 @@ def compute_parallax_odds(region: StandingRegion, both: TwoPictures) -> float:
     if votes == 0:
         return 1.0
     return float(PARALLAX_ODDS ** np.clip(votes / 2.0, -1.0, 1.0))
+
+
+def is_on_the_lens(region: StandingRegion, both: TwoPictures) -> bool:
+    """Whether a region stayed where it is in the picture while the robot moved: it is on the lens or before it.
+
+    So it must be told from what lies on the floor there and from what stands there, by most of its border that tells.
+    """
+    grid = both.grid
+    rows, columns = _find_upper_border(region)
+    lower = region.feet[region.feet[:, 0] < grid.shape[0] - 2][::max(1, len(region.feet) // COLUMNS)]
+    rows, columns = np.concatenate([rows, lower[:, 0]]), np.concatenate([columns, lower[:, 1]])
+    if not len(rows):
+        return False
+    points, same = grid.points_robot[rows, columns], np.column_stack([columns, grid.top + rows]).astype(float)
+    elsewhere = [both.move_along(points, part) for part in np.arange(1.0, MIN_FOOT_PART, -0.1)]
+    fixed = other = 0
+    for i in range(len(rows)):
+        patch = both.cut(int(rows[i]), int(columns[i]))
+        as_fixed = _correlate(both.earlier, patch, same[i])
+        as_other = _correlate_best(both.earlier, patch, same[i], [there[i] for there in elsewhere])
+        if as_other is None or max(as_fixed, as_other) < MIN_PARALLAX_CORRELATION:
+            continue
+        fixed += as_fixed - as_other >= MIN_PARALLAX_MARGIN
+        other += as_other > as_fixed
+    return fixed >= MIN_FIXED and fixed > 2 * other
 
 
 def measure_foot_part(region: StandingRegion, both: TwoPictures) -> float:

@@ -1,4 +1,7 @@
-"""Laws of a lower border's height: a board that is drawn ray by ray, on the floor or over it, and seen twice."""
+"""Laws of two pictures: a board that is drawn ray by ray, on the floor or over it, flat marks, and dirt on the lens.
+
+Dirt is no thing on the floor: it stays in the picture while the robot moves, which nothing else does.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ from knowledge_sources.methods.floor.standing_regions import (
     TwoPictures,
     find_footprint,
     find_regions,
+    is_on_the_lens,
     measure_foot_part,
 )
 from world_models.camera import Camera, CameraMount
@@ -92,4 +96,69 @@ def test_without_motion_nothing_is_told(seed: int, at_m: float) -> None:
     noise = np.random.default_rng(seed).uniform(0.0, 255.0, (40, 40))
     picture, board = draw(cv2.resize(noise, (200, 200)), at_m, 0.2, 0.0)
     (region,) = find_regions(board[GRID.top:], np.ones(GRID.shape, bool), GRID)
-    assert measure_foot_part(region, TwoPictures(GRID, picture, picture, Pose2(0.0, 0.0, 0.0), CAMERA, MOUNT)) == 1.0
+    both = TwoPictures(GRID, picture, picture, Pose2(0.0, 0.0, 0.0), CAMERA, MOUNT)
+    assert measure_foot_part(region, both) == 1.0
+    assert not is_on_the_lens(region, both)
+
+
+SIZE = CAMERA.width // STEP_PX
+TOLD_OF_FORTY = 32
+FLOOR = cv2.GaussianBlur(np.random.default_rng(7).uniform(90.0, 150.0, (400, 400)), (0, 0), 1.5).astype(np.float32)
+
+
+def texture(seed: int) -> NDArray[np.float64]:
+    noise = np.random.default_rng(seed).uniform(0.0, 255.0, (40, 40))
+    return np.asarray(cv2.resize(noise, (200, 200), interpolation=cv2.INTER_LINEAR))
+
+
+def draw_floor(moved_m: float) -> NDArray[np.float32]:
+    """A textured floor as the camera sees it after the robot has moved ahead."""
+    picture = np.full((CAMERA.height // STEP_PX, SIZE), 120.0, np.float32)
+    at = GRID.points_robot + np.array([moved_m, 0.0])
+    rows, columns = ((50.0 * (at[..., k] + 4.0)).astype(np.float32) for k in (0, 1))
+    picture[GRID.top:] = cv2.remap(FLOOR, columns, rows, cv2.INTER_LINEAR)
+    return picture
+
+
+def tell(now: NDArray[np.float32], earlier: NDArray[np.float32], mask: NDArray[np.bool_], moved_m: float) -> bool:
+    regions = find_regions(mask[GRID.top:], np.ones(GRID.shape, bool), GRID)
+    both = TwoPictures(GRID, now, earlier, Pose2(moved_m, 0.0, 0.0), CAMERA, MOUNT)
+    return bool(regions) and is_on_the_lens(regions[0], both)
+
+
+def test_most_of_what_stays_in_the_picture_is_told_to_be_on_the_lens() -> None:
+    told = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        left, size = rng.integers([20, 24], [SIZE - 70, 48])
+        grey, moved_m = rng.uniform(0.0, 60.0), rng.uniform(0.25, 0.6)
+        bottom = CAMERA.height // STEP_PX - int(rng.integers(8, 60))
+        mask = np.zeros((CAMERA.height // STEP_PX, SIZE), bool)
+        mask[max(GRID.top + 4, bottom - size):bottom, left:left + size] = True
+        earlier, now = draw_floor(0.0), draw_floor(moved_m)
+        earlier[mask] = now[mask] = grey
+        told += tell(now, earlier, mask, moved_m)
+    assert told >= TOLD_OF_FORTY
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(1.8, 3.0), st.sampled_from([0.0, 0.15]), st.floats(0.25, 0.6))
+def test_what_stands_on_the_floor_or_over_it_is_not(seed: int, at_m: float, low_m: float, moved_m: float) -> None:
+    (earlier, was), (now, board) = draw(texture(seed), at_m, low_m, 0.0), draw(texture(seed), at_m, low_m, moved_m)
+    floors = draw_floor(0.0), draw_floor(moved_m)
+    shown = np.where(board, now, floors[1]), np.where(was, earlier, floors[0])
+    assert not tell(*shown, board, moved_m)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(1.6, 2.6), st.floats(-0.5, 0.5), st.floats(0.15, 0.4), st.floats(0.25, 0.6))
+def test_nor_is_what_lies_flat_on_it(x_m: float, y_m: float, half_m: float, moved_m: float) -> None:
+    shown, masks = [], []
+    for gone_m in (moved_m, 0.0):
+        picture, mask = draw_floor(gone_m), np.zeros((CAMERA.height // STEP_PX, SIZE), bool)
+        off = np.abs(GRID.points_robot + np.array([gone_m - x_m, -y_m]))
+        mask[GRID.top:] = np.all(off < half_m, axis=-1)
+        picture[mask] = 20.0
+        shown.append(picture)
+        masks.append(mask)
+    assert not tell(shown[0], shown[1], masks[0], moved_m)
