@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import islice
 from typing import NamedTuple
 
 from blackboard.board import View
@@ -17,7 +18,7 @@ from knowledge_sources.priority import Priority
 from knowledge_sources.questions import rolling_course
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import CameraPicture
-from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor
+from world_models.entries.floor import LAST_VIEWS, FloorAppearance, FloorView, FreeFloor
 from world_models.entries.location import Hypothesis
 from world_models.frames import Pose2
 
@@ -69,7 +70,7 @@ class FloorWatcher(RobotKnowledgeSource):
         locale = case.belief.locale
         floor_m = robot.world.floor_m(locale)
         known = {entry.value.locale: entry for entry in view.all(FloorAppearance)}
-        kept = [entry for entry in view.newest_first(FloorView)
+        kept = [entry for entry in islice(view.newest_first(FloorView), LAST_VIEWS)
                 if entry.value.belief == belief.id and entry.value.floor_m == floor_m]
         apart_m = FLOOR_VIEW_DISTANCE_M
         earlier = [entry for entry in kept if _measure_way_m(entry.value, pose) >= apart_m]
