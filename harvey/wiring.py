@@ -31,7 +31,7 @@ from knowledge_sources.action.motor import Motor
 from knowledge_sources.action.path_follower import PathFollower
 from knowledge_sources.action.range_watcher import RangeWatcher
 from knowledge_sources.action.thing_mapper import ThingMapper
-from knowledge_sources.action.thing_withdrawer import ThingWithdrawer
+from knowledge_sources.action.thing_mover import ThingMover
 from knowledge_sources.action.touch_finder import TouchFinder
 from knowledge_sources.action.travel_breaker import TravelBreaker
 from knowledge_sources.action.yaw_calibrator import YawCalibrator
@@ -115,7 +115,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     ThingMapper,
     TouchFinder,
     HaltExplainer,
-    ThingWithdrawer,
+    ThingMover,
     DoorWatcher,
     ShutDoorExplainer,
     DependencyWithdrawer,

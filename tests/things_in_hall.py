@@ -17,7 +17,7 @@ from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.action.halt_explainer import HaltExplainer
 from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.action.thing_mapper import ThingMapper
-from knowledge_sources.action.thing_withdrawer import ThingWithdrawer
+from knowledge_sources.action.thing_mover import ThingMover
 from knowledge_sources.action.touch_finder import TouchFinder
 from sim.scenario import load_scenario
 from world_models.building.locale_frame import FRAME_OF, LocaleFrame
@@ -36,7 +36,7 @@ X_M, Y_M = 6.2484, 3.6576
 """The hall's corner in the world."""
 HERE = Pose2(X_M + 2.0, Y_M + 1.2, 0.0)
 CARTON = tuple((X_M + x, Y_M + y) for x, y in ((4.0, 1.0), (4.5, 1.0), (4.5, 1.4), (4.0, 1.4)))
-FINDERS = (ThingMapper(), TouchFinder(), HaltExplainer(), ThingWithdrawer(), ModelReviser())
+FINDERS = (ThingMapper(), TouchFinder(), HaltExplainer(), ThingMover(), ModelReviser())
 
 
 class Hall:
@@ -94,10 +94,12 @@ class Hall:
         self.apply(Post(Certificate("Milestone-1", "", verdict, "so it was", 9, 9, 9, 1.0, 0.2, 0.0, 0.0, 0.0, 4.0,
                                      1e-3)))
 
-    def find(self, basis: str) -> None:
-        """The belief is corrected by a milestone, or by being found after it was lost."""
+    def find(self, basis: str, correction: Pose2 | None = None) -> None:
+        """The belief is corrected by a milestone, or by being found after it was lost, so far from where it was."""
         belief = self.belief()
-        self.apply(Revise(belief, replace(belief.value, basis=basis), (belief,)))
+        pose = belief.value.locale_from_robot @ (correction or Pose2(0.0, 0.0, 0.0))
+        found = replace(belief.value, basis=basis, locale_from_robot=pose, correction=correction)
+        self.apply(Revise(belief, found, (belief,)))
 
     def apply(self, *effects: Effect) -> tuple[Change, ...]:
         """Something happens, and is answered until nothing is left to do."""

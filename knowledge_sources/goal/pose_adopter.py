@@ -12,6 +12,7 @@ from blackboard.effect import Effect, Retract, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.priority import Priority
+from knowledge_sources.questions import find_building
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.while_lost import WHILE_LOST, Lost, find_lost
 from world_models.entries.location import Hypothesis, PlaceSearch
@@ -42,7 +43,10 @@ class PoseAdopter(RobotKnowledgeSource):
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         search, place, (doubt, belief), camera = case
-        held = replace(place.value, status="held", weight=1.0, motion=belief.value.motion)
+        building = find_building(view)
+        before, now = (h.value.world_from_robot(building) for h in (belief, place))
+        held = replace(place.value, status="held", weight=1.0, motion=belief.value.motion,
+                       correction=before.inverse() @ now)
         yield Revise(belief, held, (search, place, doubt, belief))
         yield Retract(place, (search,))
         found_with = camera.value.as_told() if search.value.is_camera_as_told else camera.value

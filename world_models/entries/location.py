@@ -83,6 +83,7 @@ class Hypothesis:
         weight: relative belief among candidates.
         motion: id of the last motion report that is taken into account, or "".
         evidence: what speaks for it, in words, where no other entry says it.
+        correction: where it is, as seen from where it was believed to be, of one that a search has found.
     """
 
     locale: str
@@ -93,6 +94,7 @@ class Hypothesis:
     weight: float = 1.0
     motion: str = ""
     evidence: str = ""
+    correction: Pose2 | None = None
 
     @property
     def is_held(self) -> bool:

@@ -11,6 +11,7 @@ import shapely
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.motion.footprints import (
+    Corners,
     build_polygon,
     join_footprints,
     list_corners,
@@ -24,6 +25,7 @@ from world_models.building.building import Building
 from world_models.building.locales import EXTRA_KIND, Doorway
 from world_models.entries.location import Place
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
+from world_models.frames import Pose2
 
 VAGUE_SIGMA_M = 0.05  # sights of an obstacle whose standard deviations differ by this and twofold are not joined
 MIN_COMMON_DIRECTIONS = 0.6
@@ -124,6 +126,25 @@ def place(world: Building, obstacle: Obstacle, shape: shapely.Geometry) -> Obsta
     at = Place.of_world(world, obstacle.locale, float(middle.x), float(middle.y))
     return replace(obstacle, x_m=round(at.x_m, 3), y_m=round(at.y_m, 3),
                    width_m=round(measure_width_m(obstacle.footprint), 3))
+
+
+def move_thing(world: Building, thing: Obstacle, by: Pose2, off_m: float, told: str) -> Obstacle:
+    """A thing that is moved on the floor: ``by``, in the world; it was seen by a belief that was ``off_m`` wrong.
+
+    How much of that the belief was wrong already when it was seen, is not known: half of it is added to its deviation.
+    """
+    def move(corners: Corners) -> Corners:
+        return tuple((round(float(x), 3), round(float(y), 3)) for x, y in by.apply(corners)) if corners else ()
+
+    moved = replace(thing, footprint=move(thing.footprint), core=move(thing.core), evidence=told,
+                    sigma_m=round(math.hypot(thing.sigma_m, 0.5 * off_m), 4))
+    return place(world, moved, build_polygon(moved.footprint))
+
+
+def doubt_thing(thing: Obstacle, told: str, settings: ActionSettings) -> Obstacle:
+    """A thing that was seen there, or elsewhere, one as likely as the other."""
+    certainty = 0.5 * thing.certainty
+    return replace(thing, certainty=certainty, evidence=told, status=tell_status(certainty, settings))
 
 
 def find_room(world: Building, shape: shapely.Polygon, near: str) -> str:

@@ -116,7 +116,7 @@ SHARED: dict[str, tuple[int, str]] = {
     "Leg": (2, "two ways to drive: in increments, and on the move"),
     "Milestone": (7, "a chain: chosen, predicted, updated, judged, withdrawn"),
     "MotorCommand": (2, "on the way, and to look round when lost"),
-    "Obstacle": (4, "by sight, by touch, by a halt, and taken back"),
+    "Obstacle": (4, "by sight, by touch, by a halt, and moved with the belief"),
     "Obstruction": (2, "in looks at milestones, and in looks of who is lost"),
     "PictureRequest": (3, "who needs a picture asks for it"),
     "PlanSketch": (8, "a chain: drawn, refined, advanced, led round, withdrawn"),

@@ -1,0 +1,123 @@
+"""Law of what is moved when a lost robot is found: what was seen, and not touched, since it was last sure."""
+
+from __future__ import annotations
+
+import cmath
+from dataclasses import replace
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acting import answer
+from blackboard.board import Blackboard
+from blackboard.change import Posted, Revised
+from blackboard.effect import Post, Revise
+from knowledge_sources.action.thing_mover import MAX_DRIFT_M, MAX_DRIFT_RAD, ThingMover
+from knowledge_sources.methods.floor.found_things import move_thing
+from knowledge_sources.settings import DEFAULT
+from things_in_hall import CARTON, HALL
+from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.obstacle import Obstacle, ObstacleStatus
+from world_models.entries.task import Certificate, MilestoneVerdict
+from world_models.files.world_files import WORLDS, load_world
+from world_models.frame_store import FrameStore
+from world_models.frames import Pose2
+
+SOURCE, S = ThingMover(), DEFAULT.action
+WORLD = load_world(WORLDS / "two_ways.toml")
+BELIEF = Hypothesis(HALL, Pose2(2.0, 1.2, 0.4), diagonal(0.01, 0.005), "relocalization")
+PLAIN = Pose2(0.05, -0.02, 0.01)
+things = st.tuples(st.sampled_from(get_args(ObstacleStatus)), st.booleans())
+"""How it is known, and whether it was touched."""
+verdicts = st.sampled_from(get_args(MilestoneVerdict))
+corrections = st.builds(Pose2, st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.3, 0.3))
+
+
+def thing(status: ObstacleStatus = "there", *, is_touched: bool = False, number: int = 1) -> Obstacle:
+    return Obstacle(f"{HALL}/obstacle-{number}", HALL, CARTON, 0.05, 0.0, 0.0, 0.5, certainty=0.9,
+                    touched_s=1.0 if is_touched else None, status=status)
+
+
+def open_hall() -> Blackboard:
+    """A board with the frames of the hall and of what is next to it."""
+    board, store = Blackboard(), FrameStore(WORLD)
+    frames = [Post(store.frame(name)) for name in ("", HALL, "reception", "archive")]
+    board.apply(frames, author="test", cycle=0)
+    return board
+
+
+@pytest.mark.parametrize("corrected", [True, False])
+@pytest.mark.parametrize("status", ["held", "candidate"])
+def test_it_wakes_when_a_lost_robot_is_found(corrected: bool, status: Any) -> None:
+    found = replace(BELIEF, status=status, correction=PLAIN if corrected else None)
+    (change,) = Blackboard().apply([Post(found)], author="test", cycle=1)
+    (watch,) = SOURCE.on
+    assert watch.sees(Revised(change.entry)) == (corrected and status == "held")
+    assert not watch.sees(Posted(change.entry))
+
+
+@given(st.lists(things | verdicts, max_size=8))
+@settings(max_examples=60, deadline=None)
+def test_it_moves_what_was_seen_since_it_was_sure_and_was_not_touched(drawn: list[Any]) -> None:
+    board, expected, sure = open_hall(), list[Any](), list[Any]()
+    for cycle, one in enumerate(drawn, 1):
+        is_thing = isinstance(one, tuple)
+        value: Any = thing(one[0], is_touched=one[1], number=cycle) if is_thing else Certificate(
+            "Milestone-1", "", one, "so it was", 9, 9, 9, 1.0, 0.2, 0.0, 0.0, 0.0, 4.0, 1e-3)
+        (change,) = board.apply([Post(value)], author="test", cycle=cycle)
+        if is_thing and one[0] != "gone" and not one[1]:
+            expected.append(change.entry)
+        elif one == "verified":
+            expected, sure = [], [change.entry]
+    (found,) = board.apply([Post(replace(BELIEF, correction=PLAIN))], author="test", cycle=99)
+    effects = answer(SOURCE, board.view, Revised(found.entry))
+    assert (effects is not None) == bool(expected)
+    assert [effect.entry for effect in effects or () if isinstance(effect, Revise)] == expected
+    assert all(list(effect.because) == [found.entry, effect.entry, *sure] for effect in effects or ())
+
+
+def find(by: Pose2) -> Obstacle:
+    """A thing that is there, after the belief was corrected."""
+    board = open_hall()
+    board.apply([Post(thing())], author="test", cycle=1)
+    (found,) = board.apply([Post(replace(BELIEF, correction=by))], author="test", cycle=2)
+    (effect,) = answer(SOURCE, board.view, Revised(found.entry)) or ()
+    assert isinstance(effect, Revise)
+    return effect.value
+
+
+@given(corrections)
+@settings(max_examples=40, deadline=None)
+def test_as_seen_from_the_robot_it_stays_where_it_was(by: Pose2) -> None:
+    """Recomputed with complex numbers; and its place is less sure by half of what the belief was off."""
+    moved, here = find(by), BELIEF.world_from_robot(WORLD)
+    now, turned = complex(here.x_m, here.y_m), cmath.exp(1j * here.heading_rad)
+    before_turned = turned * cmath.exp(-1j * by.heading_rad)
+    before = now - before_turned * complex(by.x_m, by.y_m)
+    for (x0, y0), (x1, y1) in zip(CARTON, moved.footprint, strict=True):
+        as_seen = (complex(x0, y0) - before) / before_turned
+        assert abs((complex(x1, y1) - now) / turned - as_seen) < 2e-3
+    assert moved.certainty == 0.9 and moved.status == "there"
+    assert moved.sigma_m == pytest.approx(float(np.hypot(0.05, 0.5 * np.hypot(by.x_m, by.y_m))), abs=1e-4)
+
+
+@given(corrections, corrections)
+@settings(max_examples=40, deadline=None)
+def test_a_correction_and_its_inverse_leave_it_where_it_was(here: Pose2, by: Pose2) -> None:
+    there = here @ by @ here.inverse()
+    moved = move_thing(WORLD, thing(), there, 0.0, "")
+    back = move_thing(WORLD, moved, there.inverse(), 0.0, "")
+    assert np.array(back.footprint) == pytest.approx(np.array(CARTON), abs=4e-3)
+
+
+@pytest.mark.parametrize(("by", "is_carried"), [
+    (Pose2(MAX_DRIFT_M - 1e-6, 0.0, 0.0), False), (Pose2(0.0, MAX_DRIFT_M + 1e-6, 0.0), True),
+    (Pose2(0.0, 0.0, MAX_DRIFT_RAD - 1e-6), False), (Pose2(0.0, 0.0, -MAX_DRIFT_RAD - 1e-6), True)])
+def test_what_was_seen_by_who_was_carried_off_stays_and_is_believed_half(by: Pose2, is_carried: bool) -> None:
+    now = find(by)
+    assert (now.footprint == CARTON) is is_carried
+    assert now.certainty == (0.45 if is_carried else 0.9)
+    assert now.status == ("there" if now.certainty >= S.min_obstacle_certainty else "suspected")
