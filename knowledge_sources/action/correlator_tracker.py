@@ -35,10 +35,10 @@ from knowledge_sources.methods.tracking.template_tracking import (
     cut_template,
     follow_landmarks,
 )
+from knowledge_sources.methods.tracking.tolerance import action_px
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_robot, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.tolerances import action_px
 from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Anchor, Track, Tracks

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from consistency import assert_consistent, compute_error, compute_nees
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.tracking.template_tracking import correct_pose
+from knowledge_sources.methods.tracking.tolerance import action_px
 from knowledge_sources.questions import NOWHERE
 from knowledge_sources.settings import DEFAULT
-from knowledge_sources.tolerances import action_px
 from sim.scenario import load_scenario
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount

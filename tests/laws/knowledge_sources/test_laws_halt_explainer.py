@@ -45,6 +45,18 @@ def test_it_wakes_when_a_leg_is_halted(world: World, status: LegStatus) -> None:
     assert not watch.sees(Posted(entry))
 
 
+@pytest.mark.parametrize(("beyond_rim_m", "is_met"), [(-0.01, True), (0.01, False)])
+def test_the_sweep_is_the_robot_with_the_margin_within_which_floor_must_be_seen(
+    world: World, beyond_rim_m: float, is_met: bool
+) -> None:
+    hall = Hall(world, ())
+    aside_m = hall.robot.radius_m + SEEN_MARGIN_M + beyond_rim_m
+    corners = tuple((HERE.x_m + x, HERE.y_m + aside_m + y) for x, y in ((0.2, 0.0), (0.5, 0.0), (0.5, 0.3), (0.2, 0.3)))
+    hall.put(Obstacle(f"{HALL}/obstacle-1", HALL, corners, 0.05, 0.0, 0.0, 0.5, certainty=0.7, status="suspected"))
+    leg = hall.put(leg_to(3.0, 0.0))
+    assert (answer(SOURCE, hall.board.view, Revised(leg)) is not None) == is_met
+
+
 @given(things, st.floats(-4.0, 4.0), st.floats(-0.8, 0.8))
 @settings(max_examples=60, deadline=None)
 def test_what_is_suspected_in_the_next_sweep_is_there_and_nothing_else(

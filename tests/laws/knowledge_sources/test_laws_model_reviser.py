@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -100,6 +101,22 @@ def test_the_frames_say_what_the_newest_says(world: World, drawn: Sequence[tuple
         if thing is not None:
             extra = ours["extra", THING]
             assert extra.footprint == corners(thing) and extra.height_m == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("by_m", "height_m", "is_touched", "is_revised"), [
+    (0.0, 0.4, False, False), (0.5 * LEAST_M, 0.4, False, False), (1.5 * LEAST_M, 0.4, False, True),
+    (0.0, 0.5, False, False), (0.0, 0.6, False, True), (0.5 * LEAST_M, 0.4, True, True)])
+def test_a_frame_is_revised_where_a_plan_may_change_by_it(
+    world: World, by_m: float, height_m: float, is_touched: bool, is_revised: bool
+) -> None:
+    hall = Hall(world, (SOURCE,))
+    first = make("found", "there", 0.0)
+    assert isinstance(first, Obstacle)
+    tell(hall, first)
+    before = hall.frame
+    touched_s = first.seen_s if is_touched else None
+    tell(hall, replace(first, footprint=corners(by_m), height_m=height_m, touched_s=touched_s))
+    assert (hall.frame is not before) == is_revised and len(hall.frame.changes) == 1
 
 
 @pytest.mark.parametrize(("what", "state", "rooms"), [

@@ -118,7 +118,7 @@ def test_floor_that_is_seen_free_lowers_the_odds_by_a_stated_factor(
     world: World, before: float, later_s: float
 ) -> None:
     hall = Hall(world, ())
-    old = hall.put(replace(known("suspected", before), looked_s=5.0, seen_s=5.0))
+    old = hall.put(replace(known("suspected", before), looked_s=5.0, seen_s=2.0))
     scan, effects = ask(hall, hall.look(seen_s=5.0 + later_s))
     assert effects is not None
     if later_s < MIN_EVIDENCE_INTERVAL_S:
@@ -129,7 +129,53 @@ def test_floor_that_is_seen_free_lowers_the_odds_by_a_stated_factor(
     certainty = probability(odds_of(before), FREE_FLOOR_ODDS)
     assert effect.value.certainty == pytest.approx(certainty, rel=1e-6)
     assert effect.value.status == ("gone" if certainty < S.min_gone_certainty else "suspected")
-    assert effect.value.looked_s == 5.0 + later_s and effect.value.seen_s == 5.0
+    assert effect.value.looked_s == 5.0 + later_s and effect.value.seen_s == 2.0
+
+
+@given(st.floats(2.3, 2.6))
+@settings(max_examples=15, deadline=None)
+def test_where_a_part_is_seen_free_so_much_of_the_factor_counts(world: World, far_m: float) -> None:
+    hall = Hall(world, ())
+    old = hall.put(replace(known("suspected", 0.7), looked_s=5.0))
+    scan = hall.look(seen_s=9.0, far_m=far_m)
+    _, effects = ask(hall, scan)
+    seen = shapely.Point(scan.x_m, scan.y_m).buffer(far_m - scan.sigma_m[0], quad_segs=200)
+    part = shapely.intersection(shapely.Polygon(CARTON), seen).area / shapely.Polygon(CARTON).area
+    (effect,) = effects or ()
+    odds = effect.value.certainty / (1.0 - effect.value.certainty)
+    told = math.log(odds / odds_of(0.7)) / math.log(FREE_FLOOR_ODDS)
+    assert isinstance(effect, Revise) and effect.entry is old and told == pytest.approx(part, abs=0.02)
+
+
+@given(st.floats(0.3, 0.999), st.floats(S.min_thing_certainty, 0.95))
+@settings(max_examples=10, deadline=None)
+def test_what_was_gone_is_as_certain_as_it_is_seen_now(world: World, before: float, p_thing: float) -> None:
+    hall = Hall(world, ())
+    old = hall.put(known("gone", before))
+    _, effects = ask(hall, hall.look(carton(p_thing), seen_s=9.0))
+    (effect,) = effects or ()
+    assert isinstance(effect, Revise) and effect.entry is old
+    assert effect.value.certainty == min(p_thing, S.max_obstacle_certainty)
+    assert effect.value.status == ("there" if p_thing >= S.min_obstacle_certainty else "suspected")
+
+
+@pytest.mark.parametrize(("by_x_m", "by_y_m", "is_same"), [(0.0, 0.45, True), (0.55, 0.45, False), (0.0, 0.6, False)])
+def test_what_lies_aslant_beside_a_thing_is_another(world: World, by_x_m: float, by_y_m: float, is_same: bool) -> None:
+    hall = Hall(world, ())
+    hall.put(known())
+    beside = tuple((x + by_x_m, y + by_y_m) for x, y in CARTON)
+    _, effects = ask(hall, hall.look(replace(carton(), footprint=beside), seen_s=9.0))
+    assert isinstance((effects or ())[0], Revise) == is_same
+
+
+@pytest.mark.parametrize(("part", "count"), [(0.7, 1), (0.3, 2)])
+def test_another_part_of_a_thing_in_the_same_sight_is_not_another_thing(
+    world: World, part: float, count: int
+) -> None:
+    hall = Hall(world, ())
+    aside_m = 0.4 * (1.0 - part)
+    _, effects = ask(hall, hall.look(carton(), carton(by_m=aside_m), seen_s=9.0))
+    assert len(effects or ()) == count
 
 
 @pytest.mark.parametrize(("turn_rad", "is_next"), [(0.0, True), (0.3, True), (-0.3, True), (0.9, False), (2.0, False)])
