@@ -36,6 +36,14 @@ def find_belief(view: View) -> Entry[Hypothesis] | None:
     return view.newest(HELD, True)
 
 
+def find_camera(view: View) -> CameraState:
+    """The camera as the board knows it. Raises LookupError where nobody has told of it."""
+    camera = view.latest(CameraState)
+    if camera is None:
+        raise LookupError("expected the robot's camera on the board, got none")
+    return camera.value
+
+
 def find_robot(view: View, camera: CameraState | None = None) -> RobotModel:
     """The robot as the board knows it, in the building as the board knows it; with another ``camera`` if one is given.
 

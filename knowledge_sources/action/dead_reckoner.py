@@ -15,10 +15,10 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.camera_knowledge import compute_camera_covariance, find_camera
 from knowledge_sources.conditions import HELD, Belief
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_contact
+from knowledge_sources.questions import find_camera, find_contact
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.camera import YAW

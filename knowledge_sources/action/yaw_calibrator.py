@@ -14,8 +14,8 @@ from blackboard.change import Change, Revised, Watch
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.camera_knowledge import compute_camera_covariance, to_tuples
 from knowledge_sources.conditions import HELD, STANDING, Belief
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance, to_tuples
 from knowledge_sources.priority import Priority
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.camera import CAMERA_UNKNOWNS, YAW

@@ -11,7 +11,6 @@ from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Retract
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.camera_knowledge import find_camera
 from knowledge_sources.methods.localization.global_localization import LocalizationStatus, make_alias_test
 from knowledge_sources.methods.localization.place_odds import StatedPlace, weigh_told
 from knowledge_sources.methods.localization.place_search import (
@@ -25,7 +24,7 @@ from knowledge_sources.methods.localization.place_search import (
 )
 from knowledge_sources.place_believed import count_refuted, find_p_there
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_building, find_building_as_filed, find_robot
+from knowledge_sources.questions import find_building, find_building_as_filed, find_camera, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.while_lost import WHILE_LOST, Lost, find_lost, list_contacts, list_views, locate_contact
 from world_models.entries.body import MotionReport

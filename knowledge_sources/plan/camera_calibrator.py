@@ -12,7 +12,7 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.camera_knowledge import compute_camera_covariance, learn
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance, learn
 from knowledge_sources.priority import Priority
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.camera import YAW

@@ -14,19 +14,18 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.camera_knowledge import (
+from knowledge_sources.methods.calibration.camera_state import (
     RIGID_DISTANCE_M,
     add_yaw,
     compute_camera_covariance,
     compute_knocked_covariance,
-    find_camera,
     is_camera_known,
     loosen,
 )
 from knowledge_sources.methods.localization.camera_matching import match_with_camera, rate_match
 from knowledge_sources.methods.matching import Match, PoseMatch, match_lines, match_on_floor
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_belief, find_robot
+from knowledge_sources.questions import find_belief, find_camera, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, Segments

@@ -12,21 +12,20 @@ from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.camera_knowledge import (
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.calibration.camera_state import (
     add_yaw,
     compute_camera_covariance,
     compute_knocked_covariance,
-    find_camera,
     has_counted,
     loosen,
     to_tuples,
 )
-from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.methods.pose.estimate import PlanarEstimate
 from knowledge_sources.methods.pose.with_camera import CameraEstimate, estimate_camera_and_pose
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_belief, find_robot
+from knowledge_sources.questions import find_belief, find_camera, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, PoseFix

@@ -15,8 +15,8 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.camera_knowledge import add_yaw, compute_camera_covariance, find_camera, is_camera_known
 from knowledge_sources.methods.belief.places import BelievedPlace, compute_p_rivals
+from knowledge_sources.methods.calibration.camera_state import add_yaw, compute_camera_covariance, is_camera_known
 from knowledge_sources.methods.localization.aliasing import list_aliases
 from knowledge_sources.methods.verification.weigh import (
     Before,
@@ -31,7 +31,7 @@ from knowledge_sources.methods.verification.weigh import (
 )
 from knowledge_sources.place_believed import find_p_not_alias
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_belief, find_robot_in, has_followed, open_discrepancy
+from knowledge_sources.questions import find_belief, find_camera, find_robot_in, has_followed, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis

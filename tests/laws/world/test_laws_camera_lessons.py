@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harvey.runner.run import build_camera_text
-from knowledge_sources.camera_knowledge import compute_camera_covariance, has_counted, learn
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance, has_counted, learn
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount
 from world_models.entries.robot_state import CameraState, find_camera_lessons

@@ -1,4 +1,4 @@
-"""How well the camera is known: its covariance on the board, and what a picture that counts makes of it."""
+"""How well the camera is known: its covariance, and what a picture that counts makes of it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from blackboard.board import View
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.settings import CameraStateSettings, Settings
 from world_models.camera import YAW, Camera
@@ -19,14 +18,6 @@ RIGID_DISTANCE_M = 2.5  # distance at which that uncertainty is taken
 PRIOR_COVARIANCE_FACTOR = 4.0  # factor by which the belief's covariance is loosened as a prior of the pose
 PRIOR_SIGMA_M = 0.05  # standard deviation of the place that is added to that prior
 PRIOR_SIGMA_RAD = math.radians(1.5)  # standard deviation of the heading that is added to that prior
-
-
-def find_camera(view: View) -> CameraState:
-    """The camera as the board knows it. Raises LookupError where nobody has told of it."""
-    camera = view.latest(CameraState)
-    if camera is None:
-        raise LookupError("expected the robot's camera on the board, got none")
-    return camera.value
 
 
 def compute_camera_covariance(camera: CameraState, settings: CameraStateSettings) -> Floats:
