@@ -5,7 +5,7 @@ The grid is by the camera's known mounting (inverse perspective).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import cv2
@@ -97,6 +97,10 @@ class ModelFloor:
     kinds: Ints
     colours: Floats
     is_plain: NDArray[np.bool_]
+
+    def behind(self, hidden: NDArray[np.bool_]) -> ModelFloor:
+        """The same where something before the camera hides some pixels (rows, columns): these show no floor."""
+        return replace(self, is_plain=self.is_plain & ~hidden)
 
 
 def predict_model_floor(

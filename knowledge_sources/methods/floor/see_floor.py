@@ -114,9 +114,9 @@ def see_free_floor(
         robot, pose, grid, floor_m, MAX_ROLLED_OVER_M, margin_px, 2.0 * sigma_m * robot.camera.fx)
     picture = read_picture(jpeg).rectified_half(robot.lens, robot.camera)
     known = appearances.get(locale)
+    if robot.camera.obstruction is not None:  # its looks are those of no floor
+        model = model.behind(robot.camera.obstruction.covers(grid.pixels, MODEL_MARGIN_PX))
     unlike, tells, light = find_unlike(picture[grid.top:], model, known, last_light)
-    if robot.camera.obstruction is not None:
-        tells &= ~robot.camera.obstruction.covers(grid.pixels, MODEL_MARGIN_PX)
     regions = find_regions(unlike, tells, grid) if s.use_appearance else ()
     built = [(region, _build_thing(region, grid, robot, pose, covariance, picture, earlier, s)) for region in regions]
     things = [(region, *thing) for region, thing in built if thing is not None]

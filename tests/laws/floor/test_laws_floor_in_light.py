@@ -74,3 +74,17 @@ def test_white_balance_that_changes_little_by_little_is_followed(red: float, blu
         gains = (red**part, 1.0, blue**part)
         unlike, tells, light = find_unlike((shaded(np.ones(SHAPE)) * gains).astype(np.uint8), model, None, light)
         assert tells.all() and unlike.mean() < 0.02
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(10, 60), st.integers(0, 30), st.floats(0.75, 1.25))
+def test_what_hides_most_of_the_picture_is_not_taken_for_the_floor(left: int, above: int, gain: float) -> None:
+    """A grey patch on the lens, larger than the floor that is left: the floor beside it is floor still."""
+    picture = shaded(np.ones(SHAPE))
+    hidden = np.zeros(SHAPE, bool)
+    hidden[above:, left:] = True
+    picture[hidden] = 104.0 * gain
+    model = ModelFloor(np.zeros(SHAPE, np.int64), FLOOR[None] / 255.0, np.ones(SHAPE, bool)).behind(hidden)
+    unlike, tells, _ = find_unlike(picture.astype(np.uint8), model, None)
+    assert not tells[hidden].any() and tells[~hidden].all()
+    assert unlike[:, : left - 2].mean() < 0.02
