@@ -1,4 +1,4 @@
-"""The milestone judge at its bounds: verified, refuted or not testable just below and just above each number.
+"""Laws of the milestone judge: verified, refuted or not testable just below and just above each number.
 
 The verdicts of a table of weighed pictures; and, on the boards of a mission, how much evidence is asked for by whether
 the robot is in doubt, has followed landmarks, or has not: each state has its own number, and that alone decides.

@@ -1,0 +1,122 @@
+"""Laws of the belief checker: a doubt is measured where the robot stands, ahead first; no look is counted twice."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from generated_boards import Bench, effect_on, plain_robot, poses, reasons, to_world
+from knowledge_sources.looking import sum_told
+from knowledge_sources.methods.verification.view_quality import INDEPENDENT_LOOK_RAD
+from knowledge_sources.plan.belief_checker import BeliefChecker
+from knowledge_sources.settings import DEFAULT
+from world_models.entries.task import Certificate, Milestone, MilestoneStatus, Outcome
+from world_models.frames import Pose2, wrap_angle
+
+SOURCE = BeliefChecker()
+FEW = DEFAULT.verification.min_matched_lines
+
+
+def doubtful(pose: Pose2 | None = None) -> tuple[Bench, Entry[Discrepancy]]:
+    bench = Bench(plain_robot())
+    bench.believe(pose)
+    return bench, bench.doubt(Level.PLAN)
+
+
+def certify(bench: Bench, milestone: str, p_false: float, matched: int) -> None:
+    """What a look for a milestone said."""
+    said = Certificate(milestone, "", "not testable", "", 9, matched, matched, 0.5, 1.0, 0.0, 0.0, 0.0, 10.0, p_false)
+    bench.put(said)
+
+
+@settings(max_examples=25)
+@given(poses)
+def test_the_first_check_is_the_present_view_and_of_no_sketch(pose: Pose2) -> None:
+    bench, doubt = doubtful(pose)
+    effect = effect_on(bench.ask(SOURCE, doubt), Milestone)
+    check = effect.value
+    assert check.look_heading_rad == pytest.approx(to_world(pose).heading_rad)
+    assert (check.sketch, check.index, check.tried, check.log_odds_so_far, check.status) == ("", -1, (), 0.0, "turning")
+    assert doubt.value.what in check.what and reasons(effect) == {doubt.id, "Hypothesis-1"}
+
+
+def test_the_second_is_another_view_and_never_one_that_was_tried() -> None:
+    bench, doubt = doubtful()
+    tried: list[float] = []
+    for _ in range(4):
+        check = effect_on(bench.ask(SOURCE, doubt), Milestone).value
+        assert list(check.tried) == tried
+        assert all(abs(wrap_angle(check.look_heading_rad - heading)) > 0.05 for heading in tried)
+        tried.append(check.look_heading_rad)
+        bench.revise(bench.put(check), status="not testable")
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+@pytest.mark.parametrize("status", ["not testable", "verified", "withdrawn"])
+def test_only_looks_since_the_doubt_that_told_nothing_were_in_vain(when: str, status: MilestoneStatus) -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    if when == "before":
+        bench.revise(bench.await_milestone(), status=status)
+    doubt = bench.doubt(Level.PLAN)
+    if when == "after":
+        bench.revise(bench.await_milestone(), status=status)
+    check = effect_on(bench.ask(SOURCE, doubt), Milestone).value
+    assert check.tried == ((0.0,) if (when, status) == ("after", "not testable") else ())
+
+
+@pytest.mark.parametrize("lacks", ["nothing", "doubt", "belief", "rest", "course of things", "place", "look"])
+def test_it_checks_only_what_is_in_doubt_and_not_while_a_look_is_under_way(lacks: str) -> None:
+    bench = Bench(plain_robot())
+    if lacks != "belief":
+        bench.believe()
+    doubt = bench.doubt(Level.PLAN, 3.0 if lacks == "doubt" else None)
+    if lacks == "rest":
+        bench.move()
+    elif lacks == "course of things":
+        bench.put(Outcome("failed", ""))
+    elif lacks == "place":
+        bench.doubt(Level.GOAL)
+    elif lacks == "look":
+        bench.await_milestone()
+    assert (bench.ask(SOURCE, doubt) is not None) == (lacks == "nothing")
+
+
+@settings(max_examples=150)
+@given(st.floats(-3.0, 3.0), st.lists(st.floats(-3.1, 3.1), min_size=1, max_size=3), st.floats(-3.1, 3.1),
+       st.floats(0.0, 1.0), st.sampled_from((FEW - 1, FEW, FEW + 5)), st.booleans())
+def test_a_look_counts_by_how_far_its_direction_is_from_the_others_and_never_more_than_once(
+    before: float, tried: list[float], heading: float, p_false: float, matched: int, is_inexact: bool
+) -> None:
+    """From the same direction it says nothing new, from an independent one all that it says."""
+    bench = Bench()
+    last = bench.await_milestone(look_heading_rad=tried[-1], tried=tuple(tried[:-1]), log_odds_so_far=before,
+                                 displacement_modes=("wall",) if is_inexact else (), status="not testable")
+    certify(bench, last.id, p_false, matched)
+    told = sum_told(bench.view, Milestone("", -1, "", heading, tried=tuple(tried)), DEFAULT)
+    p = min(max(p_false, 1e-9), 1.0 - 1e-9)
+    said = min(max(math.log(p / (1.0 - p)), -DEFAULT.plan.max_told), DEFAULT.plan.max_told)
+    apart = min(abs(math.remainder(heading - other, math.tau)) for other in tried)
+    share = 1.0 if apart >= INDEPENDENT_LOOK_RAD else apart / INDEPENDENT_LOOK_RAD
+    counts = is_inexact and matched >= FEW
+    assert told == pytest.approx(before + (share * said if counts else 0.0))
+    mirrored = Milestone("", -1, "", -heading, tried=tuple(-h for h in tried))
+    assert sum_told(bench.view, mirrored, DEFAULT) == pytest.approx(told)
+
+
+def test_nothing_was_told_without_a_look_or_by_the_verdict_on_another() -> None:
+    bench = Bench()
+    fresh, again = (Milestone("", -1, "", 1.0, tried=tried) for tried in ((), (0.0,)))
+    assert sum_told(bench.view, again, DEFAULT) == 0.0
+    last = bench.await_milestone(log_odds_so_far=1.0, displacement_modes=("wall",), status="not testable")
+    assert sum_told(bench.view, again, DEFAULT) == 0.0
+    certify(bench, last.id, 0.1, 20)
+    assert sum_told(bench.view, fresh, DEFAULT) == 0.0 and sum_told(bench.view, again, DEFAULT) < 1.0
+    certify(bench, "Milestone-9", 0.1, 20)
+    assert sum_told(bench.view, again, DEFAULT) == 0.0

@@ -1,0 +1,51 @@
+"""Laws of the goal closer: a goal is reached by the sketch that leads to it, and by no other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import get_args
+
+import pytest
+
+from blackboard.change import Posted, Revised
+from generated_boards import Bench, all_reasons, effect_on, wakes
+from knowledge_sources.goal.goal_closer import GoalCloser
+from world_models.entries.task import Goal, GoalStatus, SketchStatus
+
+SOURCE = GoalCloser()
+
+
+@pytest.mark.parametrize("status", get_args(SketchStatus))
+@pytest.mark.parametrize("path", [(), (1,)])
+@pytest.mark.parametrize("is_look", [False, True])
+def test_only_the_end_of_a_sketch_from_locale_to_locale_wakes_it(
+    status: SketchStatus, path: tuple[int, ...], is_look: bool
+) -> None:
+    bench = Bench()
+    sketch = bench.revise(bench.sketch(path=path), status=status, is_look=is_look)
+    assert wakes(SOURCE, Revised(sketch)) == (status == "done" and not path and not is_look)
+    assert not wakes(SOURCE, Posted(sketch))
+
+
+@pytest.mark.parametrize("status", get_args(GoalStatus))
+def test_it_closes_the_goal_of_the_sketch_once(status: GoalStatus) -> None:
+    bench = Bench()
+    goal, other = bench.pursue(), bench.pursue()
+    sketch = bench.revise(bench.sketch(goal=goal), status="done")
+    goal = bench.revise(goal, status=status)
+    effects = bench.ask(SOURCE, sketch)
+    assert (effects is not None) == (status == "active")
+    if effects is not None:
+        effect = effect_on(effects, Goal)
+        assert effect.entry is goal and effect.value == replace(goal.value, status="reached")
+        assert all_reasons(effects) == {sketch.id} and effect.entry.id != other.id
+        bench.apply(*effects)
+        assert bench.ask(SOURCE, sketch) is None
+
+
+def test_a_goal_that_is_gone_cannot_be_reached() -> None:
+    bench = Bench()
+    goal = bench.pursue()
+    sketch = bench.revise(bench.sketch(goal=goal), status="done")
+    bench.retract(goal)
+    assert bench.ask(SOURCE, sketch) is None

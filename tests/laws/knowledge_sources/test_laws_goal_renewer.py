@@ -1,0 +1,101 @@
+"""Laws of the goal renewer: the robot that knows its place again doubts nothing, and begins anew from there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blackboard.change import Posted, Revised
+from blackboard.effect import Post, Revise
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from generated_boards import (
+    HALL,
+    WIDTH_M,
+    Bench,
+    all_reasons,
+    effect_on,
+    made,
+    mirrored,
+    mirrored_place,
+    plain_robot,
+    poses,
+    reasons,
+    wakes,
+)
+from knowledge_sources.goal.goal_renewer import GoalRenewer
+from world_models.entries.location import Place
+from world_models.entries.task import Goal
+from world_models.frames import Pose2
+
+SOURCE = GoalRenewer()
+TO = Place(HALL, 6.0, 1.2, 0.4)
+
+
+@settings(max_examples=40)
+@given(poses, st.sets(st.sampled_from((Level.ACTION, Level.PLAN))))
+def test_all_doubts_end_and_a_new_goal_leads_from_here_to_the_old_end(pose: Pose2, others: set[Level]) -> None:
+    bench = Bench(plain_robot())
+    goal = bench.pursue(TO)
+    doubts = {bench.doubt(level, 9.0).id for level in others} | {bench.doubt().id}
+    found = bench.revise(bench.believe(), locale_from_robot=pose, basis="relocalization")
+    effects = bench.ask(SOURCE, found)
+    assert effects is not None
+    ended = [e for e in effects if isinstance(e, Revise) and isinstance(e.value, Discrepancy)]
+    assert {e.entry.id for e in ended} == doubts
+    assert all(e.value == replace(e.entry.value, status="corrected") for e in ended)
+    old, new = made(effects, Goal)
+    assert old == replace(goal.value, status="abandoned") and new.is_active
+    assert new.destination == TO and new.origin.locale == HALL
+    assert (new.origin.x_m, new.origin.y_m) == pytest.approx((pose.x_m, pose.y_m), abs=1e-9)
+    assert all_reasons(effects) == {found.id}
+    renewed = next(e for e in effects if isinstance(e, Post) and e.value is new)
+    assert reasons(renewed) == {found.id, "Goal"}
+
+
+@given(poses)
+@settings(max_examples=30)
+def test_mirrored_it_begins_at_the_mirrored_place(pose: Pose2) -> None:
+    origins = []
+    for here, to in ((pose, TO), (mirrored(pose), mirrored_place(TO))):
+        bench = Bench(plain_robot())
+        bench.pursue(to)
+        bench.doubt()
+        effects = bench.ask(SOURCE, bench.revise(bench.believe(), locale_from_robot=here, basis="relocalization"))
+        origins.append(made(effects, Goal)[1].origin)
+    one, other = origins
+    assert (one.x_m, one.y_m) == pytest.approx((other.x_m, WIDTH_M - other.y_m), abs=1e-9)
+
+
+def test_without_a_goal_only_the_doubt_ends_and_without_a_doubt_nothing_happens() -> None:
+    bench = Bench(plain_robot())
+    found = bench.revise(bench.believe(), basis="relocalization")
+    assert bench.ask(SOURCE, found) is None
+    below = bench.doubt(Level.PLAN, 9.0)
+    assert bench.ask(SOURCE, found) is None
+    lost = bench.doubt()
+    effects = bench.ask(SOURCE, found)
+    assert {e.entry.id for e in effects or () if isinstance(e, Revise)} == {below.id, lost.id}
+    bench.revise(lost, status="corrected")
+    assert bench.ask(SOURCE, found) is None
+
+
+def test_a_goal_that_was_given_up_is_not_renewed() -> None:
+    bench = Bench(plain_robot())
+    bench.revise(bench.pursue(TO), status="abandoned")
+    bench.doubt()
+    found = bench.revise(bench.believe(), basis="relocalization")
+    assert made(bench.ask(SOURCE, found), Goal) == []
+    assert effect_on(bench.ask(SOURCE, found), Discrepancy).value.status == "corrected"
+
+
+@pytest.mark.parametrize("basis", ["relocalization", "odometry", "milestone"])
+@pytest.mark.parametrize("status", ["held", "candidate"])
+def test_what_it_watches(basis: str, status: str) -> None:
+    bench = Bench()
+    belief = bench.revise(bench.believe(), basis=basis, status=status)
+    assert wakes(SOURCE, Revised(belief)) == (basis == "relocalization" and status == "held")
+    assert not wakes(SOURCE, Posted(belief))

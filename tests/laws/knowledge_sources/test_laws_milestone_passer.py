@@ -1,0 +1,159 @@
+"""Laws of the milestone passer: on from a verified milestone, or the same subgoal again; in vain so often, doubt."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from acting import answer
+from blackboard.board import Blackboard
+from blackboard.change import Change, Posted, Revised
+from blackboard.effect import Effect, Post, Revise
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from generated_boards import Bench, all_reasons, plain_robot, reasons, wakes
+from harvey.simulation.simulated_run import build_robot_model
+from knowledge_sources.plan.milestone_passer import MilestonePasser
+from knowledge_sources.settings import DEFAULT
+from knowledge_sources.sketching import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS
+from sim.scenario import load_scenario
+from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries.task import Goal, Impasse, Milestone, MilestoneStatus, PlanSketch, SketchStatus, Subgoal
+from world_models.files.world_files import WORLDS, load_world
+from world_models.frame_store import FrameStore
+from world_models.frames import Pose2
+
+HALL = "north-hall"
+FROM, TO = Place(HALL, 2.0, 1.2), Place(HALL, 4.0, 1.2)
+MOST, TOLERANCE_M = DEFAULT.plan.max_adjustments, 0.1
+SMALL = 1e-3
+
+
+def decide(off_m: float, adjustments: int, earlier_goals: int = 0, **other: Any) -> Effect:
+    """Its first effect; arguments as in :func:`decide_all`."""
+    return decide_all(off_m, adjustments, earlier_goals, **other)[0]
+
+
+def decide_all(
+    off_m: float, adjustments: int, earlier_goals: int = 0, *, left_m: float = 0.0, heading: float | None = None,
+    off_rad: float = 0.0, sigma_m: float = 0.01, modes: tuple[str, ...] = (), way: tuple[Subgoal, ...] = (),
+    at: int = 1,
+) -> tuple[Effect, ...]:
+    """What it does when the milestone at the end of a subgoal is verified, so far from where it should be."""
+    world, board = load_world(WORLDS / "two_ways.toml"), Blackboard()
+    store, robot = FrameStore(world), build_robot_model(load_scenario("shut-door"), world)
+    cycle = 0
+
+    def apply(*effects: Effect) -> tuple[Change, ...]:
+        nonlocal cycle
+        cycle += 1
+        return board.apply(effects, author="test", cycle=cycle)
+
+    apply(*map(Post, robot.entries()), *(Post(store.frame(name)) for name in ("", HALL, "reception", "archive")),
+          Post(Hypothesis(HALL, Pose2(TO.x_m - off_m, TO.y_m + left_m, (heading or 0.0) + off_rad),
+                          diagonal(sigma_m, 0.005), "milestone")))
+    for _ in range(earlier_goals):
+        (old,) = apply(Post(Goal(FROM, TO)))
+        apply(Revise(old.entry, replace(old.entry.value, status="abandoned")))
+    (goal,) = apply(Post(Goal(FROM, TO)))
+    steps = way or (Subgoal(FROM, replace(TO, heading_rad=heading), primitive=True, tolerance_m=TOLERANCE_M),)
+    (sketch,) = apply(Post(PlanSketch(goal.entry.id, (), "", steps, at=at, adjustments=adjustments)))
+    (expected,) = apply(Post(Milestone(sketch.entry.id, at, "the end", 0.0, displacement_modes=modes)))
+    (verified,) = apply(Revise(expected.entry, replace(expected.entry.value, status="verified")))
+    effects = answer(MilestonePasser(DEFAULT), board.view, verified)
+    assert effects is not None
+    return effects
+
+
+@pytest.mark.parametrize(("off_m", "is_repeated"), [(TOLERANCE_M - SMALL, False), (TOLERANCE_M + SMALL, True)])
+def test_a_subgoal_is_repeated_beyond_its_tolerance(off_m: float, is_repeated: bool) -> None:
+    effect = decide(off_m, 0)
+    assert isinstance(effect, Revise) and isinstance(effect.value, PlanSketch)
+    assert (effect.value.adjustments == 1, effect.value.status == "done") == (is_repeated, not is_repeated)
+
+
+def test_in_vain_is_doubt_for_the_first_goal_and_blocked_for_a_later_one() -> None:
+    last = decide(0.5, MOST - 1)
+    assert isinstance(last, Revise) and isinstance(last.value, PlanSketch) and last.value.adjustments == MOST
+    doubt, blocked = decide(0.5, MOST), decide(0.5, MOST, earlier_goals=1)
+    assert isinstance(doubt, Post) and isinstance(doubt.value, Discrepancy) and doubt.value.level is Level.GOAL
+    assert isinstance(blocked, Post) and isinstance(blocked.value, Impasse) and blocked.value.kind == "blocked"
+
+
+def is_repeated(effect: Effect) -> bool:
+    assert isinstance(effect, Revise) and isinstance(effect.value, PlanSketch)
+    return effect.value.at == 0
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("more", [-SMALL, SMALL])
+def test_off_to_either_side_and_turned_to_either_side_is_missed_alike(side: float, more: float) -> None:
+    assert is_repeated(decide(0.0, 0, left_m=side * (TOLERANCE_M + more))) == (more > 0.0)
+    for heading in (0.0, 1.0, -3.1):
+        off = side * (GOAL_HEADING_TOLERANCE_RAD + more)
+        assert is_repeated(decide(0.0, 0, heading=heading, off_rad=off)) == (more > 0.0)
+    assert not is_repeated(decide(0.0, 0, off_rad=side * 2.0))  # no heading is asked for
+
+
+@pytest.mark.parametrize("more", [-SMALL, SMALL])
+@pytest.mark.parametrize("modes", [(), ("wall",)])
+def test_an_inexact_model_makes_the_tolerance_wider_by_what_is_not_known(more: float, modes: tuple[str, ...]) -> None:
+    sigma_m = 0.06
+    wider = math.hypot(TOLERANCE_M, INEXACT_TOLERANCE_SIGMAS * sigma_m) if modes else TOLERANCE_M
+    assert is_repeated(decide(wider + more, 0, sigma_m=sigma_m, modes=modes)) == (more > 0.0)
+
+
+def test_a_missed_subgoal_is_driven_again_from_where_the_robot_is() -> None:
+    end = Place(HALL, 5.0, 1.2)
+    way = (Subgoal(FROM, TO, primitive=False, tolerance_m=TOLERANCE_M), Subgoal(TO, end, primitive=True))
+    effects = decide_all(0.3, 1, left_m=0.2, way=way)
+    (effect,) = effects
+    assert isinstance(effect, Revise)
+    again, then = effect.value.subgoals
+    assert (again.origin.locale, again.destination, again.primitive) == (HALL, TO, True) and then == way[1]
+    assert (again.origin.x_m, again.origin.y_m) == pytest.approx((TO.x_m - 0.3, TO.y_m + 0.2))
+    now = effect.value
+    assert (now.at, now.verified, now.adjustments, now.status) == (0, True, 2, "active")
+    assert all_reasons(effects) == {"Milestone-1", "Hypothesis-1"}
+
+
+@pytest.mark.parametrize(("at", "status"), [(0, "active"), (1, "active"), (2, "done")])
+def test_a_milestone_that_holds_lets_the_next_subgoal_begin(at: int, status: str) -> None:
+    middle = Place(HALL, 3.0, 1.2)
+    way = (Subgoal(FROM, TO if at == 1 else middle, primitive=True), Subgoal(middle, TO, primitive=True))
+    (effect,) = decide_all(0.0, 2, way=way, at=at)
+    assert isinstance(effect, Revise)
+    now = effect.value
+    assert (now.at, now.verified, now.status, now.subgoals) == (at, True, status, way)
+    assert now.adjustments == (0 if status == "active" else 2)
+
+
+def test_what_is_in_vain_names_what_it_rests_on() -> None:
+    doubt, blocked = decide(0.5, MOST), decide(0.5, MOST, earlier_goals=1)
+    assert reasons(doubt) == {"Milestone-1", "Goal-1"} and reasons(blocked) == {"Milestone-1", "PlanSketch-1"}
+
+
+@pytest.mark.parametrize("status", ["active", "done", "halted", "superseded"])
+@pytest.mark.parametrize("index", [0, 1])
+@pytest.mark.parametrize("has_belief", [True, False])
+def test_only_the_milestone_to_which_an_active_sketch_has_come_counts(
+    status: SketchStatus, index: int, has_belief: bool
+) -> None:
+    bench = Bench(plain_robot())
+    if has_belief:
+        bench.believe(Pose2(6.0, 2.0, 0.0))
+    sketch = bench.revise(bench.sketch(at=1, verified=False), status=status)
+    verified = bench.revise(bench.await_milestone(sketch.id, index), status="verified")
+    acts = bench.ask(MilestonePasser(DEFAULT), verified) is not None
+    assert acts == (status == "active" and index == 1 and has_belief)
+
+
+@pytest.mark.parametrize("status", ["expected", "verified", "refuted", "not testable", "withdrawn"])
+def test_what_it_watches(status: MilestoneStatus) -> None:
+    bench = Bench()
+    milestone = bench.revise(bench.await_milestone(), status=status)
+    assert wakes(MilestonePasser(), Revised(milestone)) == (status == "verified")
+    assert not wakes(MilestonePasser(), Posted(milestone))

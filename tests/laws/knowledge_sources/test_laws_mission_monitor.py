@@ -1,0 +1,102 @@
+"""Laws of the mission monitor: one outcome a mission, by what weighs most: reached, no way on, lost, nothing left."""
+
+from __future__ import annotations
+
+import pytest
+
+from blackboard.change import Posted, Quiescence, Revised
+from blackboard.entry import Entry
+from blackboard.level import Level
+from generated_boards import HALL, Bench, all_reasons, made, plain_robot, wakes
+from knowledge_sources.goal.mission_monitor import MissionMonitor
+from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.task import Impasse, Outcome
+from world_models.frames import Pose2
+
+SOURCE = MissionMonitor()
+
+
+def end(bench: Bench, trigger: Entry[object]) -> tuple[str, str, set[str]] | None:
+    """Kind, reason, and what is named."""
+    effects = bench.ask(SOURCE, trigger)
+    if effects is None:
+        return None
+    (outcome,) = made(effects, Outcome)
+    return outcome.kind, outcome.reason, all_reasons(effects)
+
+
+def be_still(bench: Bench) -> Entry[Quiescence]:
+    return bench.put(Quiescence(bench.cycle))
+
+
+@pytest.mark.parametrize("is_reached", [True, False])
+@pytest.mark.parametrize("has_impasse", [True, False])
+@pytest.mark.parametrize("is_lost", [True, False])
+def test_what_weighs_most_tells_how_it_ends(is_reached: bool, has_impasse: bool, is_lost: bool) -> None:
+    bench = Bench(plain_robot())
+    goal = bench.pursue()
+    if is_reached:
+        goal = bench.revise(goal, status="reached")
+    impasse = bench.put(Impasse("blocked", "a wall", is_open=has_impasse))
+    doubt = bench.doubt(Level.GOAL if is_lost else Level.PLAN)
+    still = be_still(bench)
+    found = end(bench, still)
+    assert found is not None
+    kind, reason, named = found
+    if is_reached:
+        assert (kind, named) == ("reached", {goal.id})
+    elif has_impasse:
+        assert (kind, reason, named) == ("blocked", "a wall", {impasse.id})
+    elif is_lost:
+        assert (kind, named) == ("lost", {still.id, doubt.id}) and "nobody could tell where" in reason
+    else:
+        assert (kind, named) == ("failed", {still.id, goal.id})
+    bench.put(Outcome(kind, reason))
+    assert end(bench, still) is None
+
+
+@pytest.mark.parametrize("kind", ["blocked", "lost", "failed", "stopped"])
+def test_an_impasse_says_how_it_ends(kind: str) -> None:
+    bench = Bench(plain_robot())
+    impasse = bench.put(Impasse(kind, f"why {kind}"))
+    assert end(bench, impasse) == (kind, f"why {kind}", {impasse.id})
+
+
+@pytest.mark.parametrize(("weights", "said"), [
+    ((), "nobody could tell where"), ((0.7,), "perhaps"), ((0.6, 0.4), "ambiguous where")])
+def test_lost_it_says_where_it_may_be(weights: tuple[float, ...], said: str) -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    doubt = bench.doubt()
+    perhaps = [bench.put(Hypothesis(HALL, Pose2(1.0 + k, 2.0, 0.0), diagonal(0.1, 0.1), "relocalization",
+                                    status="candidate", weight=w)) for k, w in enumerate(weights)]
+    still = be_still(bench)
+    found = end(bench, still)
+    assert found is not None and found[0] == "lost" and said in found[1]
+    assert found[2] == {still.id, doubt.id, *(p.id for p in perhaps)}
+    for k, weight in enumerate(weights):
+        assert f"({1.0 + k:.2f}, 2.00) m) ({weight:.0%})" in found[1]
+
+
+def test_it_names_the_milestone_for_which_nobody_answered() -> None:
+    bench = Bench(plain_robot())
+    goal, milestone = bench.pursue(), bench.await_milestone()
+    still = be_still(bench)
+    found = end(bench, still)
+    assert found is not None and found[0] == "failed" and milestone.id in found[1]
+    assert found[2] == {still.id, milestone.id, goal.id}
+    bench.revise(milestone, status="verified")
+    found = end(bench, still)
+    assert found is not None and found[2] == {still.id, goal.id}
+
+
+def test_what_it_watches() -> None:
+    bench = Bench()
+    goal = bench.pursue()
+    reached = bench.revise(goal, status="reached")
+    assert not wakes(SOURCE, Posted(goal)) and not wakes(SOURCE, Posted(reached)) and wakes(SOURCE, Revised(reached))
+    assert not wakes(SOURCE, Revised(bench.revise(goal, status="abandoned")))
+    assert wakes(SOURCE, Posted(be_still(bench)))
+    for is_open in (True, False):
+        impasse = bench.put(Impasse("lost", "", is_open=is_open))
+        assert wakes(SOURCE, Posted(impasse)) == is_open and not wakes(SOURCE, Revised(impasse))

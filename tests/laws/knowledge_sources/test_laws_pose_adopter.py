@@ -1,0 +1,76 @@
+"""Laws of the pose adopter: the place that was found is the belief, whole, and the camera with which it was found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blackboard.change import Posted
+from blackboard.effect import Retract, Revise
+from blackboard.entry import Entry
+from generated_boards import HALL, STUDY, Bench, covariances, effect_on, made, plain_robot, poses, reasons, wakes
+from knowledge_sources.goal.pose_adopter import PoseAdopter
+from world_models.entries.location import Covariance, Hypothesis, PlaceSearch, diagonal
+from world_models.entries.robot_state import CameraState
+from world_models.frames import Pose2
+
+SOURCE = PoseAdopter()
+STEP = (0.01, -0.004, 0.0, 0.02, 0.0, 0.0, 0.0)
+
+
+def find(bench: Bench, pose: Pose2, covariance: Covariance, *, as_told: bool = False, locale: str = HALL) -> tuple[
+        Entry[Hypothesis], Entry[PlaceSearch]]:
+    """A candidate, and the search that found it."""
+    place = bench.put(Hypothesis(locale, pose, covariance, "relocalization", status="candidate", weight=0.6))
+    return place, bench.put(PlaceSearch("found", "one place", None, as_told))
+
+
+@settings(max_examples=40)
+@given(poses, covariances, st.booleans(), st.sampled_from((HALL, STUDY)), st.booleans())
+def test_the_belief_is_what_was_found_with_the_motions_it_had(
+    pose: Pose2, covariance: Covariance, as_told: bool, locale: str, has_learnt: bool
+) -> None:
+    bench = Bench(plain_robot())
+    _, report = bench.move()
+    belief, doubt = bench.believe(motion=report.id), bench.doubt()
+    told = bench.view["CameraState-1"]
+    if has_learnt:
+        bench.apply(Revise(told, told.value.moved(STEP), (told,)))
+    place, search = find(bench, pose, covariance, as_told=as_told, locale=locale)
+    effects = bench.ask(SOURCE, search)
+    change = effect_on(effects, Hypothesis)
+    assert change.entry.id == belief.id
+    assert change.value == replace(place.value, status="held", weight=1.0, motion=report.id)
+    assert reasons(change) == {search.id, place.id, doubt.id, belief.id}
+    (gone,) = [e for e in effects or () if isinstance(e, Retract)]
+    assert gone.entry.id == place.id and reasons(gone) == {search.id}
+    cameras = made(effects, CameraState)
+    assert bool(cameras) == (as_told and has_learnt)
+    if cameras:
+        assert (cameras[0].lens, cameras[0].mount) == (told.value.lens, told.value.mount)
+        assert reasons(effect_on(effects, CameraState)) == {search.id, told.id}
+    bench.apply(*effects or ())
+    assert bench.ask(SOURCE, search) is None
+
+
+@pytest.mark.parametrize("lacks", ["nothing", "doubt", "belief", "place", "rest"])
+def test_it_adopts_only_when_lost_and_standing(lacks: str) -> None:
+    bench = Bench(plain_robot())
+    if lacks != "belief":
+        bench.believe()
+    if lacks != "doubt":
+        bench.doubt()
+    place, search = find(bench, Pose2(3.0, 1.0, 0.5), diagonal(0.02, 0.01))
+    if lacks == "place":
+        bench.retract(place)
+    if lacks == "rest":
+        bench.move()
+    assert (bench.ask(SOURCE, search) is not None) == (lacks == "nothing")
+
+
+@pytest.mark.parametrize("status", ["found", "probe", "ambiguous"])
+def test_only_a_search_that_found_the_place_wakes_it(status: str) -> None:
+    assert wakes(SOURCE, Posted(Bench().put(PlaceSearch(status, "")))) == (status == "found")

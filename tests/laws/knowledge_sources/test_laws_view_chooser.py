@@ -1,0 +1,151 @@
+"""Laws of the view chooser: when a milestone is due, and in which direction it is looked for."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blackboard.change import Posted, Revised
+from blackboard.effect import Effect
+from blackboard.entry import Entry
+from blackboard.level import Level
+from generated_boards import Bench, effect_on, mirrored, mirrored_place, plain_robot, poses, reasons, to_world, wakes
+from knowledge_sources.looking import MAX_LOOK_ERROR_RAD
+from knowledge_sources.methods.verification.view_quality import turn_headings
+from knowledge_sources.plan.view_chooser import ViewChooser
+from knowledge_sources.settings import DEFAULT
+from world_models.entries.location import Place
+from world_models.entries.task import Milestone, MilestoneStatus, Outcome, PlanSketch, Subgoal
+from world_models.files.world_files import WORLDS, load_world
+from world_models.frames import Pose2, wrap_angle
+
+HALL, LONG_TURN, SMALL = "north-hall", DEFAULT.plan.long_turn_rad, 1e-6
+HERE, LENGTH_M, TOLERANCE_M = Place(HALL, 2.0, 1.2), 1.0, 0.1
+
+
+def first_direction(turn_rad: float, length_m: float = LENGTH_M, *, primitive: bool = True) -> float:
+    """In which direction it looks first where the next leg leads aside by this [rad from the present heading]."""
+    world = load_world(WORLDS / "two_ways.toml")
+    facing = 0.7
+    along = facing + turn_rad
+    end = Place(HALL, HERE.x_m + length_m * math.cos(along), HERE.y_m + length_m * math.sin(along))
+    leg = Subgoal(HERE, end, primitive=primitive, tolerance_m=TOLERANCE_M)
+    here = HERE.in_world(world)
+    pose = Pose2(here.x_m, here.y_m, facing)
+    sketch = PlanSketch("Goal-1", (), HALL if primitive else "", (leg,))
+    return next(ViewChooser().list_headings(world, sketch, pose)) - facing
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_before_a_long_turn_it_looks_along_the_leg_and_else_ahead(side: float) -> None:
+    assert first_direction(side * (LONG_TURN - SMALL)) == 0.0
+    assert first_direction(side * (LONG_TURN + SMALL)) == pytest.approx(side * (LONG_TURN + SMALL))
+
+
+def test_where_there_is_nothing_to_drive_it_looks_ahead() -> None:
+    assert first_direction(2.0, TOLERANCE_M - SMALL) == 0.0
+    assert first_direction(2.0, TOLERANCE_M + SMALL) == pytest.approx(2.0)
+
+
+def test_a_part_of_the_route_that_is_not_driven_as_it_is_tells_no_direction() -> None:
+    assert first_direction(2.0, primitive=False) == 0.0
+
+
+SOURCE = ViewChooser()
+FROM, TO, AHEAD = Place("hall", 2.0, 2.0), Place("hall", 6.0, 2.0), Pose2(2.0, 2.0, 0.0)
+
+
+def due(pose: Pose2 = AHEAD, *, at: int = 0, to: Place = TO) -> tuple[Bench, Entry[PlanSketch]]:
+    """A board on which a milestone is due."""
+    bench = Bench(plain_robot())
+    bench.believe(pose)
+    return bench, bench.sketch(FROM, to, at=at, verified=False)
+
+
+def milestone_of(effects: tuple[Effect, ...] | None) -> Milestone:
+    value: Milestone = effect_on(effects, Milestone).value
+    return value
+
+
+@settings(max_examples=25)
+@given(poses, st.sampled_from((0, 1)))
+def test_it_looks_in_one_of_the_directions_that_come_into_question(pose: Pose2, at: int) -> None:
+    bench, sketch = due(pose, at=at)
+    effects = bench.ask(SOURCE, sketch)
+    chosen = milestone_of(effects)
+    here = to_world(pose)
+    headings = list(SOURCE.list_headings(plain_robot().world, sketch.value, here))
+    assert any(abs(wrap_angle(chosen.look_heading_rad - h)) <= MAX_LOOK_ERROR_RAD for h in headings)
+    if abs(wrap_angle(chosen.look_heading_rad - here.heading_rad)) <= MAX_LOOK_ERROR_RAD:
+        assert chosen.look_heading_rad == pytest.approx(here.heading_rad)
+    assert (chosen.sketch, chosen.index, chosen.status, chosen.tried, chosen.log_odds_so_far) == (
+        sketch.id, at, "turning", (), 0.0)
+    assert reasons(effect_on(effects, Milestone)) == {sketch.id, "Hypothesis-1"}
+
+
+@settings(max_examples=25)
+@given(poses, st.floats(-1.2, 1.2))
+def test_the_directions_of_the_mirrored_board_are_mirrored(pose: Pose2, wanted: float) -> None:
+    """In the same order but for those all round, which begin on one side."""
+    listed = []
+    hall = to_world(Pose2(0.0, 0.0, 0.0)).heading_rad
+    for here, to in ((pose, Place("hall", 6.0, 1.3, wanted)),
+                     (mirrored(pose), mirrored_place(Place("hall", 6.0, 1.3, wanted)))):
+        _, sketch = due(here, at=1, to=to)
+        found = list(SOURCE.list_headings(plain_robot().world, sketch.value, to_world(here)))
+        around = len(turn_headings(to_world(here), DEFAULT))
+        listed.append([wrap_angle(h - hall) for h in found[:len(found) - around]])
+    one, other = listed
+    assert one and [wrap_angle(a + b) for a, b in zip(one, other, strict=True)] == pytest.approx([0.0] * len(one))
+
+
+@pytest.mark.parametrize("status", ["not testable", "verified", "refuted", "withdrawn"])
+@pytest.mark.parametrize("same", ["same", "another sketch", "another index"])
+def test_where_the_same_milestone_was_not_testable_it_looks_elsewhere(status: MilestoneStatus, same: str) -> None:
+    bench, sketch = due()
+    before = (0.4, 1.4)
+    last = bench.await_milestone(sketch.id if same != "another sketch" else "PlanSketch-9",
+                                 0 if same != "another index" else 1, look_heading_rad=0.5, tried=before)
+    assert bench.ask(SOURCE, sketch) is None  # it is looked for already
+    bench.revise(last, status=status)
+    chosen = milestone_of(bench.ask(SOURCE, sketch))
+    tried = (*before, 0.5) if (status, same) == ("not testable", "same") else ()
+    assert chosen.tried == tried
+    for heading in tried:
+        assert abs(wrap_angle(chosen.look_heading_rad - heading)) > MAX_LOOK_ERROR_RAD
+
+
+@pytest.mark.parametrize("lacks", ["nothing", "belief", "sketch", "rest", "course of things", "place", "measure"])
+def test_it_chooses_only_when_the_robot_stands_and_knows_its_place(lacks: str) -> None:
+    bench = Bench(plain_robot())
+    if lacks != "belief":
+        bench.believe()
+    sketch = bench.sketch(FROM, TO, verified=False)
+    if lacks == "sketch":
+        bench.revise(sketch, verified=True)
+    elif lacks == "rest":
+        bench.move()
+    elif lacks == "course of things":
+        bench.put(Outcome("failed", ""))
+    elif lacks in ("place", "measure"):
+        bench.doubt(Level.GOAL if lacks == "place" else Level.PLAN)
+    assert (bench.ask(SOURCE, sketch) is not None) == (lacks == "nothing")
+
+
+def test_a_doubt_that_is_measured_within_its_bound_does_not_keep_it_from_looking() -> None:
+    bench, sketch = due()
+    bench.doubt(Level.PLAN, 3.0)
+    assert bench.ask(SOURCE, sketch) is not None
+
+
+def test_what_it_watches() -> None:
+    bench, sketch = due()
+    assert wakes(SOURCE, Posted(sketch)) and not wakes(SOURCE, Revised(bench.revise(sketch, verified=True)))
+    milestone = bench.await_milestone()
+    assert not wakes(SOURCE, Revised(bench.revise(milestone, status="expected")))
+    assert wakes(SOURCE, Revised(bench.revise(milestone, status="verified")))
+    belief = bench.view["Hypothesis-1"]
+    assert wakes(SOURCE, Revised(bench.revise(belief, basis="tracks"))) and not wakes(SOURCE, Posted(belief))
