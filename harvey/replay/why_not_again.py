@@ -120,7 +120,7 @@ def why_absent(
         return
     board = board_at(history, cycle, kinds, store)
     for change in woken:
-        yield from _ask_rating(source, board, change)
+        yield from tell_of_trigger(source, board, change)
 
 
 def _tell_why_not_triggered(source: KnowledgeSource, seen: Sequence[Change], cycle: int) -> Iterator[str]:
@@ -139,7 +139,8 @@ def _tell_why_not_triggered(source: KnowledgeSource, seen: Sequence[Change], cyc
     yield f"Nothing that the {name} watches for came in cycle {cycle}. It watches for: {watched}; what came: {came}."
 
 
-def _ask_rating(source: KnowledgeSource, board: Blackboard, change: Change) -> Iterator[str]:
+def tell_of_trigger(source: KnowledgeSource, board: Blackboard, change: Change) -> Iterator[str]:
+    """Whether a source could have acted on a change that woke it, and if not, for what reason; in sentences."""
     name, ref = words.source(source.name), change.entry.ref
     if not isinstance(change, Retracted) and not board.view.is_current(change.entry):
         now = board.view.get(change.entry.id)

@@ -11,71 +11,25 @@ and one without which it makes the same and more, as a picture of the floor that
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Hashable, Iterable, Iterator, Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import pytest
 
-from blackboard.board import Blackboard, TracedView, View
+from blackboard.board import Blackboard, View
 from blackboard.change import Change
-from blackboard.effect import Effect, Post, Retract
-from blackboard.entry import Entry, Ref
-from blackboard.entry_store import Index
-from blackboard.journal import plain
-from blackboard.kinds import kind_of
+from blackboard.effect import Effect
 from blackboard.knowledge_source import KnowledgeSource
 from experiments.generated.missions import OFFICE, fault
 from harvey.simulation.simulated_run import run_mission
-from harvey.wiring import knowledge_sources, load_kinds
+from harvey.wiring import knowledge_sources
+from hidden_reasons import HidingView, describe, find_named, list_unnamed
 from knowledge_sources.settings import Settings
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 
-T = TypeVar("T")
-TRACED = frozenset(kind for kind in load_kinds().values() if kind_of(kind).traced)
-ID = re.compile(r"'([A-Z][A-Za-z]+-[0-9]+)'")
-"""An entry's id in a value that is written out."""
 MAX_HIDDEN = 6
 """So many unnamed entries of an act are hidden, the newest of each kind first."""
-
-
-class HidingView(TracedView):
-    """A view that records the ids of all that is read, and on which some entries are not there."""
-
-    __slots__ = ("hidden", "read")
-
-    def __init__(self, board: Blackboard, hidden: Collection[str] = ()) -> None:
-        super().__init__(board, TRACED)
-        self.hidden, self.read = frozenset(hidden), dict[str, Entry[Any]]()
-
-    def get(self, id: str) -> Entry[Any] | None:
-        return None if id in self.hidden else super().get(id)
-
-    def __getitem__(self, id: str) -> Entry[Any]:
-        if id in self.hidden:
-            raise KeyError(id)
-        return super().__getitem__(id)
-
-    def all(self, kind: type[T]) -> tuple[Entry[T], ...]:
-        return tuple(self._note(e) for e in View.all(self, kind) if e.id not in self.hidden)
-
-    def newest_first(self, kind: type[T]) -> Iterator[Entry[T]]:
-        return (self._note(e) for e in View.newest_first(self, kind) if e.id not in self.hidden)
-
-    def having(self, index: Index[T], key: Hashable) -> tuple[Entry[T], ...]:
-        return tuple(self._note(e) for e in View.having(self, index, key) if e.id not in self.hidden)
-
-    def newest(self, index: Index[T], key: Hashable) -> Entry[T] | None:
-        found = [e for e in View.having(self, index, key) if e.id not in self.hidden]
-        return self._note(found[-1]) if found else None
-
-    def since(self, kind: type[T], cycle: int) -> tuple[Entry[T], ...]:
-        return tuple(self._note(e) for e in View.since(self, kind, cycle) if e.id not in self.hidden)
-
-    def _note(self, entry: Entry[T]) -> Entry[T]:
-        self.read[entry.id] = entry
-        return super()._note(entry)
 
 
 class Watched:
@@ -107,46 +61,20 @@ class Watched:
 
     def _check(self, name: str, act: Any, board: Blackboard, trigger: Change, effects: tuple[Effect, ...]) -> None:
         seen = HidingView(board)
-        made = _describe(act(seen, trigger))
-        assert made == _describe(effects), f"{name} decides otherwise on the same board"
+        made = describe(act(seen, trigger))
+        assert made == describe(effects), f"{name} decides otherwise on the same board"
         self.acts += 1
-        named = _find_named(board, trigger, effects)
-        by_kind: dict[str, list[Entry[Any]]] = {}
-        for entry in seen.read.values():
-            if entry.id not in named and type(entry.value) not in TRACED:
-                by_kind.setdefault(type(entry.value).__name__, []).append(entry)
-        newest = [max(entries, key=lambda e: (e.cycle, e.id)) for entries in by_kind.values()]
-        for entry in newest[:MAX_HIDDEN]:
+        named = find_named(board, trigger, effects)
+        for entry in list_unnamed(seen, named, MAX_HIDDEN):
             self.hidden += 1
             try:
-                again = _describe(act(HidingView(board, {entry.id}), trigger))
+                again = describe(act(HidingView(board, {entry.id}), trigger))
             except (KeyError, LookupError, AttributeError):
                 again = ["it cannot decide"]
             key = name, type(entry.value).__name__
             if again and not set(made) <= set(again):
                 self.unnamed.setdefault(key, f"{name} does not name {entry.ref}, without which it makes"
                                              f" {[a[:200] for a in again]} instead of {[m[:200] for m in made]}")
-
-
-def _describe(effects: Iterable[Effect]) -> list[str]:
-    """What an act makes, without its reasons."""
-    return [repr((type(e).__name__, None if isinstance(e, Post) else e.entry.id,
-                  None if isinstance(e, Retract) else plain(e.value))) for e in effects]
-
-
-def _find_named(board: Blackboard, trigger: Change, effects: tuple[Effect, ...]) -> set[str]:
-    """The ids of what an act names, of what that rests on, and of what the values of these refer to."""
-    reasons: list[Any] = [trigger.entry, *(reason for e in effects for reason in e.because)]
-    reasons += [e.entry for e in effects if not isinstance(e, Post)]
-    named = {reason.id for reason in reasons if isinstance(reason, Entry | Ref)}
-    named |= {ref.id for id in tuple(named) if (entry := board._current.get(id)) is not None for ref in entry.because}
-    todo = list(named)
-    while todo:
-        entry = board._current.get(todo.pop())
-        found = set() if entry is None else set(ID.findall(repr(plain(entry.value)))) - named
-        named |= found
-        todo += found
-    return named
 
 
 MISSIONS = {

@@ -1,4 +1,4 @@
-"""The correlator tracker at its bounds: by how many landmarks it corrects, when tracking has failed, what it drops.
+"""Laws of the correlator tracker: by how many landmarks it corrects, when tracking has failed, what it learns.
 
 It follows real templates through rendered pictures; where a landmark is not to be found, the picture is grey there.
 """
@@ -6,6 +6,7 @@ It follows real templates through rendered pictures; where a landmark is not to 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -17,11 +18,12 @@ import pytest
 from acting import answer
 from blackboard.board import Blackboard
 from blackboard.change import Change
-from blackboard.effect import Effect, Post, Retract
+from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from generated_boards import reasons
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.action.correlator_tracker import CorrelatorTracker
+from knowledge_sources.action.correlator_tracker import MIN_DRIFT_STRETCH_M, MIN_LANDMARKS, CorrelatorTracker
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.tracking.template_tracking import select_landmarks
 from knowledge_sources.settings import DEFAULT
@@ -32,6 +34,7 @@ from sim.stage import Stage, build_stage
 from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis, covariance_tuple, diagonal
 from world_models.entries.percepts import Anchor, Track, Tracks
+from world_models.entries.robot_state import Drift
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -89,7 +92,10 @@ def place_px(robot: RobotModel, pose: Pose2, track: Track) -> tuple[float, float
     return float(u), float(v)
 
 
-def follow(found: int, hidden: int = 0, misses: int = 0) -> list[Effect]:
+def follow(
+    found: int, hidden: int = 0, misses: int = 0, *, drift: Drift | None = None, doubt: Discrepancy | None = None,
+    taken: int | None = None,
+) -> list[Effect]:
     """What the tracker does where so many landmarks are followed and so many of them are not to be found."""
     seen = setting()
     robot, board, cycle = build_robot_model(stage().scenario), Blackboard(), 0
@@ -113,9 +119,13 @@ def follow(found: int, hidden: int = 0, misses: int = 0) -> list[Effect]:
           Post(Hypothesis.of_world(world, ROOM, believed, np.array(TURNED), "odometry")),
           Post(CameraPicture(seen.before, 0, 0.0)))
     anchor = Anchor("CameraPicture-1", seen.start.x_m, seen.start.y_m, covariance_tuple(np.array(SURE)))
-    apply(Post(Tracks("CameraPicture-1", DEFAULT.tracking.template_half_px, tuple(tracks), (anchor,), len(tracks))))
-    (taken,) = apply(Post(CameraPicture(compress_jpeg(image, 95), 1, 1.0, "track")))
-    effects = answer(CorrelatorTracker(NO_EDGES), board.view, taken)
+    apply(Post(Tracks("CameraPicture-1", DEFAULT.tracking.template_half_px, tuple(tracks), (anchor,),
+                      len(tracks) if taken is None else taken)))
+    for value in (drift, doubt):
+        if value is not None:
+            apply(Post(value))
+    (picture,) = apply(Post(CameraPicture(compress_jpeg(image, 95), 1, 1.0, "track")))
+    effects = answer(CorrelatorTracker(NO_EDGES), board.view, picture)
     assert effects is not None
     return list(effects)
 
@@ -164,3 +174,78 @@ def test_a_landmark_is_dropped_when_it_was_missed_so_often_in_a_row() -> None:
         (tracks,) = (value for value in written(effects) if isinstance(value, Tracks))
         kept = [track for track in tracks.items if track.template_frame == "CameraPicture-1"]
         assert len(kept) == 2 + (misses + 1 < ACTION.max_misses)
+
+
+def test_what_is_told_rests_on_the_picture_the_belief_and_the_landmarks() -> None:
+    effects = follow(6)
+    by_kind = {type(e.value): reasons(e) for e in effects if not isinstance(e, Retract)}
+    assert by_kind[Tracks] == {"CameraPicture-2", "Hypothesis-1", "Tracks-1"}
+    assert by_kind[Hypothesis] == {"CameraPicture-2", "Hypothesis-1", "Tracks"}
+    assert by_kind[Discrepancy] == {"Hypothesis"}
+    lost = {type(e.value): reasons(e) for e in follow(0, 6) if not isinstance(e, Retract)}
+    assert lost == {Discrepancy: {"CameraPicture-2", "Hypothesis-1", "Tracks-1"},
+                    Tracks: {"CameraPicture-2", "Hypothesis-1", "Tracks-1"}}
+
+
+def test_the_difference_is_the_median_shift_and_its_bound_that_of_the_belief() -> None:
+    seen, effects = setting(), follow(7)
+    robot = build_robot_model(stage().scenario)
+    believed = Pose2(seen.end.x_m, seen.end.y_m, seen.end.heading_rad - SLIP_RAD)
+    shifts = [math.dist(place_px(robot, believed, t), place_px(robot, seen.end, t)) for t in seen.tracks[:7]]
+    (found,) = discrepancies(effects)
+    assert found.magnitude == pytest.approx(sorted(shifts)[3], abs=0.5)
+    ahead = [float(robot.camera_from_world(believed).apply(np.array(t.point_world))[2]) for t in seen.tracks[:7]]
+    spread = math.hypot(0.02, 0.004 / sorted(ahead)[3])
+    bound = ACTION.min_tolerance_px + ACTION.tolerance_sigmas * robot.camera.fx * spread
+    assert found.bounds == (pytest.approx(min(bound, DEFAULT.plan.max_deviation_px)), DEFAULT.plan.max_deviation_px)
+    assert found.level is Level.ACTION and found.unit == "px" and found.what.startswith("7 landmarks are ")
+
+
+def test_where_tracking_has_failed_no_landmark_is_followed_and_the_belief_stays() -> None:
+    effects = follow(0, 6)
+    (tracks,) = [value for value in written(effects) if isinstance(value, Tracks)]
+    assert (tracks.items, tracks.frame, tracks.taken) == ((), "CameraPicture-2", 0) and not corrections(effects)
+    (found,) = discrepancies(effects)
+    assert re.match(r"[56] of 6 landmarks are not where they were expected \(", found.what)  # one is found elsewhere
+
+
+@pytest.mark.parametrize(("gone_m", "learns"), [(MIN_DRIFT_STRETCH_M - 1e-6, False), (MIN_DRIFT_STRETCH_M, True)])
+def test_the_drift_is_learnt_where_the_robot_has_gone_far_enough(gone_m: float, learns: bool) -> None:
+    start = setting().start.heading_rad
+    drift = Drift(0.0, 0.011, start, TURN_RAD - SLIP_RAD, 1e-6, gone_m)
+    effects = follow(7, drift=drift)
+    found = [e for e in effects if isinstance(e.value, Drift)]
+    assert len(found) == learns
+    if learns:
+        (belief,) = corrections(effects)
+        heading = belief.world_from_robot(stage().world).heading_rad
+        assert found[0].value == drift.update(build_robot_model(stage().scenario).actuator, heading,
+                                              math.sqrt(2.0) * belief.sigma_rad)
+        assert found[0].value.curvature_per_m > 0.0  # it turned further left than the wheels say
+        assert reasons(found[0]) == {"Drift-1", "Hypothesis"}
+
+
+@pytest.mark.parametrize(("magnitude", "is_kept"), [(1.0, False), (1e9, True)])
+def test_a_difference_beyond_its_bound_is_left_to_climb(magnitude: float, is_kept: bool) -> None:
+    open_one = Discrepancy(Level.ACTION, "before", magnitude, (5.0, 30.0), "px")
+    effects = follow(7, doubt=open_one)
+    found = [e for e in effects if isinstance(e.value, Discrepancy)]
+    assert len(found) == (not is_kept)
+    assert all(isinstance(e, Revise) and e.entry.id == "Discrepancy-1" for e in found)
+
+
+def test_few_landmarks_are_added_to_and_many_are_not() -> None:
+    """Below the least always; from enough on never; between them below a part of those at the last renewal."""
+    for found, taken, is_renewed in ((MIN_LANDMARKS - 1, 0, True), (MIN_LANDMARKS, 0, False),
+                                     (6, 2 * 6, False), (6, 2 * 6 + 1, True)):
+        effects = follow(found, taken=taken)
+        (tracks,) = [value for value in written(effects) if isinstance(value, Tracks)]
+        cut = [t for t in tracks.items if t.template_frame == "CameraPicture-2"]
+        assert bool(cut) == is_renewed, (found, taken)
+        assert tracks.taken == (len(tracks.items) if is_renewed else taken)
+        assert {a.frame for a in tracks.anchors} == {t.template_frame for t in tracks.items}
+
+
+def test_the_part_that_must_agree_is_enough() -> None:
+    assert ACTION.min_agreeing_part * 6 == 2.0
+    assert math.inf not in [one.magnitude for one in discrepancies(follow(2, 4))]

@@ -1,10 +1,12 @@
-"""Law of what a revised frame takes with it: on drawn boards, exactly what rested on it, against a plain listing."""
+"""Laws of the dependency withdrawer: a revised frame takes with it exactly what rested on what it no longer says."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, get_args
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -13,9 +15,16 @@ from blackboard.board import Blackboard, View
 from blackboard.change import Revised
 from blackboard.effect import Post, Revise
 from blackboard.entry import Entry
+from generated_boards import HALL, STUDY, Bench, made, plain_robot, reasons, to_world
 from knowledge_sources.action.dependency_withdrawer import DependencyWithdrawer
+from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M
+from knowledge_sources.settings import DEFAULT
 from world_models.building.locale_frame import FrameChange, LocaleFrame
-from world_models.entries.task import Milestone, MilestoneStatus, PlanSketch
+from world_models.entries.location import Place
+from world_models.entries.obstacle import Obstacle
+from world_models.entries.percepts import Track, Tracks
+from world_models.entries.task import Milestone, MilestoneStatus, PlanSketch, Subgoal
+from world_models.frames import Pose2
 
 THINGS = ("study/table-1", "study/table-10", "study/rack-1")
 LANDMARKS = (*THINGS, "study/table-1/top")
@@ -76,3 +85,133 @@ def test_what_rested_on_a_frame_is_withdrawn_and_nothing_else(
     sketches = [e.value for e in effects if isinstance(e.value, PlanSketch)]
     assert [s.verified for s in sketches] == [False] * is_unverified
     assert all(frame in effect.because for effect in effects)
+
+
+# What blocks a way, or has led round it: on boards of the plain house, the sketch along the middle of the hall.
+
+LEAST_M, MOST_M = DEFAULT.plan.clearances_m[-1], DEFAULT.plan.clearances_m[0]
+RADIUS_M = plain_robot().radius_m
+SMALL = 1e-3
+FROM, MIDDLE, TO = Place(HALL, 1.0, 2.0), Place(HALL, 4.0, 2.0), Place(HALL, 7.0, 2.0)
+
+
+def square(x_m: float, y_m: float) -> tuple[tuple[float, float], ...]:
+    """The corners, 20 cm apart, of something round a place in the hall [m, world]."""
+    return tuple(to_world(Pose2(x_m + dx, y_m + dy, 0.0)).position
+                 for dx, dy in ((-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)))
+
+
+def revise_for(
+    x_m: float, y_m: float, *, at: int = 0, status: str = "there", locale: str = HALL, here: Pose2 | None = None,
+    primitive: bool = True, touched_s: float | None = None, has_goal: bool = True,
+) -> set[str]:
+    """The ids of the sketches that are superseded for a thing in the hall, of one that leads by its middle."""
+    bench = Bench(plain_robot())
+    bench.believe(here or Pose2(1.0, 2.0, 0.0))
+    sketch = bench.sketch(FROM, MIDDLE, TO, at=at, primitive=primitive)
+    if not has_goal:
+        bench.revise(bench.view[sketch.value.goal], status="abandoned")
+    thing = bench.put(Obstacle("hall/obstacle-1", locale, square(x_m, y_m), 0.05, x_m, y_m, 0.2, seen_s=3.0,
+                               touched_s=touched_s, status=status))  # type: ignore[arg-type]
+    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == HALL)
+    (revised,) = bench.apply(Revise(frame, replace(frame.value, changes=(
+        FrameChange("extra", "hall/obstacle-1", "test", square(x_m, y_m)),)), (frame, thing)))
+    effects = answer(DependencyWithdrawer(), bench.view, revised)
+    assert all(reasons(effect) == {frame.id} for effect in effects or ())
+    assert all(s.status == "superseded" for s in made(effects, PlanSketch))
+    return {effect.entry.id for effect in effects or () if not isinstance(effect, Post)}
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("more_m", [-SMALL, SMALL])
+def test_a_thing_that_is_nearer_to_the_way_than_the_least_clearance_blocks_it(side: float, more_m: float) -> None:
+    """Less a slack: what is found where it was believed does not send the robot another way."""
+    reach_m = RADIUS_M + LEAST_M - LEG_SLACK_M + 0.1
+    assert bool(revise_for(5.5, 2.0 + side * (reach_m + more_m))) == (more_m < 0.0)
+
+
+@pytest.mark.parametrize("more_m", [-SMALL, SMALL])
+def test_a_thing_that_is_gone_had_led_the_way_where_a_subgoal_is_near_to_it(more_m: float) -> None:
+    reach_m = RADIUS_M + MOST_M + LEG_SLACK_M + 0.1
+    for x_m in (FROM.x_m, MIDDLE.x_m, TO.x_m):
+        assert bool(revise_for(x_m, 2.0 + reach_m + more_m, status="gone")) == (more_m < 0.0)
+    assert not revise_for(5.5, 2.0, status="gone")  # between subgoals nothing turned for it
+
+
+def test_only_what_is_left_of_the_way_counts() -> None:
+    assert revise_for(2.5, 2.0) and not revise_for(2.5, 2.0, at=1, here=Pose2(4.0, 2.0, 0.0))
+    assert not revise_for(2.5, 2.0, here=Pose2(3.2, 2.0, 0.0))  # of the leg under way, what is before the robot
+    assert revise_for(5.5, 2.0, at=1, here=Pose2(4.0, 2.0, 0.0))
+    assert not revise_for(5.5, 2.0, locale=STUDY)
+    assert not revise_for(5.5, 2.0, has_goal=False)
+
+
+def test_of_a_step_that_is_not_drawn_yet_only_the_end_counts() -> None:
+    assert revise_for(TO.x_m, 2.0, primitive=False) and not revise_for(5.5, 2.0, primitive=False)
+
+
+@pytest.mark.parametrize(("touched_s", "is_blocked"), [(3.0, True), (2.0, False), (None, False)])
+def test_where_the_robot_touches_it_now_the_way_is_blocked_wherever_it_leads(
+    touched_s: float | None, is_blocked: bool
+) -> None:
+    assert bool(revise_for(5.5, 3.5, touched_s=touched_s)) == is_blocked
+
+
+@pytest.mark.parametrize("passage", ["study-door", "other-door"])
+@pytest.mark.parametrize("at", [0, 1])
+def test_a_way_through_a_door_that_was_found_shut_is_drawn_anew(passage: str, at: int) -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    goal = bench.pursue(Place(STUDY, 3.0, 2.0))
+    steps = (Subgoal(FROM, Place(STUDY, 1.0, 2.0), primitive=False, passage=passage),
+             Subgoal(Place(STUDY, 1.0, 2.0), Place(STUDY, 3.0, 2.0), primitive=True))
+    sketches = [bench.put(PlanSketch(goal.id, path, "", steps, at)) for path in ((), (0,))]
+    done = bench.put(PlanSketch(goal.id, (), "", steps, 0, status="done"))
+    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == HALL)
+    effects = answer(DependencyWithdrawer(), bench.view, bench.apply(Revise(
+        frame, frame.value.changed(FrameChange("shut", "study-door", "test")), (frame,)))[0])
+    misled = passage == "study-door" and at == 0
+    ids = {effect.entry.id for effect in effects or () if not isinstance(effect, Post)}
+    assert ids == ({sketch.id for sketch in sketches} if misled else set()) and done.id not in ids
+
+
+@pytest.mark.parametrize(("what", "locale", "is_drawn_anew"), [
+    ("gone", HALL, True), ("extra", HALL, True), ("removed", HALL, False), ("", HALL, True), ("gone", STUDY, False)])
+def test_a_way_across_a_room_that_was_rearranged_is_drawn_anew(what: Any, locale: str, is_drawn_anew: bool) -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    bench.sketch(FROM, MIDDLE, TO)
+    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == locale)
+    changed = (FrameChange(what, f"{locale}/desk", "test"),) if what else ()
+    effects = answer(DependencyWithdrawer(), bench.view, bench.apply(
+        Revise(frame, replace(frame.value, changes=changed), (frame,)))[0])
+    assert bool(made(effects, PlanSketch)) == is_drawn_anew
+
+
+def test_landmarks_that_are_gone_are_not_followed_and_the_others_are() -> None:
+    bench = Bench(plain_robot())
+    names = ("hall/desk-1", "hall/desk-1/top", "hall/desk-10", "hall/rack")
+    items = tuple(Track(name, (0.0, 0.0, 0.0), "CameraPicture-1", (0.0, 0.0), 1.0, (0.0, 0.0), None, 0.0, 1.0)
+                  for name in names)
+    tracks = bench.put(Tracks("CameraPicture-1", 9, items, (), 4))
+    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == HALL)
+    for thing, kept in (("hall/desk-1", names[2:]), ("hall/rack", names[:3]), ("hall/lamp", names)):
+        changed = replace(frame.value, changes=(FrameChange("gone", thing, "test"),))
+        revised = Entry(frame.id, 1, changed, "test", 99)
+        effects = answer(DependencyWithdrawer(), bench.view, Revised(revised))
+        assert (effects is None) == (kept == names)
+        for effect in effects or ():
+            assert not isinstance(effect, Post) and effect.entry is tracks and effect.because == (revised,)
+            assert effect.value == replace(tracks.value, items=tuple(t for t in items if t.landmark in kept))
+
+
+def test_a_milestone_of_a_sketch_that_is_drawn_anew_is_not_awaited() -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    sketch = bench.sketch(FROM, TO)
+    awaited, other = bench.await_milestone(sketch.id, 0), bench.await_milestone("PlanSketch-9", 0)
+    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == HALL)
+    effects = answer(DependencyWithdrawer(), bench.view, bench.apply(Revise(frame, replace(
+        frame.value, changes=(FrameChange("gone", "hall/desk", "test"),)), (frame,)))[0])
+    ids = {effect.entry.id for effect in effects or () if not isinstance(effect, Post)}
+    assert ids == {awaited.id, sketch.id} and other.id not in ids

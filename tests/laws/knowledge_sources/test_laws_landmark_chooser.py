@@ -1,0 +1,133 @@
+"""Laws of the landmark chooser: all landmarks are taken anew from the newest picture, and the drift starts afresh."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from blackboard.change import Posted, Revised
+from blackboard.effect import Effect, Post, Revise
+from blackboard.level import Level
+from generated_boards import Bench, effect_on, made, reasons, wakes
+from harvey.simulation.simulated_run import build_robot_model
+from knowledge_sources.action.landmark_chooser import LandmarkChooser
+from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.tracking.template_tracking import select_landmarks
+from knowledge_sources.settings import DEFAULT
+from sim.render.optics import Optics
+from sim.render.sensor import compress_jpeg, expose
+from sim.scenario import load_scenario
+from sim.stage import Stage, build_stage
+from world_models.entries.body import CameraPicture
+from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.percepts import Anchor, Tracks
+from world_models.entries.robot_state import Drift
+from world_models.frames import Pose2
+
+ROOM, SURE = "robot-laboratory", diagonal(0.004, 0.002)
+NO_EDGES = replace(DEFAULT, tracking=replace(DEFAULT.tracking, min_edge_lines=10**6))
+"""So that the belief stays as it is."""
+
+
+@cache
+def stage() -> Stage:
+    return build_stage(load_scenario("lab-to-allens-office"))
+
+
+@cache
+def setting() -> tuple[Pose2, bytes]:
+    """A place in the laboratory from which landmarks are seen, and the picture from there."""
+    scenario, robot = stage().scenario, build_robot_model(stage().scenario)
+    rng = np.random.default_rng(5)
+    corners = np.array(robot.world.outline(ROOM))
+    for _ in range(40):
+        x_m, y_m = rng.uniform(corners.min(axis=0) + 1.5, corners.max(axis=0) - 1.5)
+        pose = Pose2(x_m, y_m, rng.uniform(-3.0, 3.0))
+        radiance = Optics.of(scenario.camera.camera).radiance(stage().building.renderer, robot.camera_from_world(pose))
+        exposed = expose(radiance, scenario.sensor, rng, lights_on=True)
+        jpeg = compress_jpeg(exposed, scenario.sensor.jpeg_quality)
+        if len(select_landmarks(robot, (), "CameraPicture-2", read_picture(jpeg).grey, pose, DEFAULT)) >= 8:
+            return pose, jpeg
+    raise AssertionError("expected a place with enough landmarks")
+
+
+class Chosen(NamedTuple):
+    """A board after a milestone, and what the chooser makes of it."""
+
+    bench: Bench
+    effects: tuple[Effect, ...] | None
+
+
+def choose(source: LandmarkChooser, *, off_rad: float = 0.0, has_old: bool = True, lost: Level | None = None) -> Chosen:
+    pose, jpeg = setting()
+    bench = Bench(build_robot_model(stage().scenario))
+    if has_old:
+        bench.put(CameraPicture(jpeg, 0, 0.0, "milestone"))
+        bench.put(Tracks("CameraPicture-1", 9, (), (Anchor("CameraPicture-1", 0.0, 0.0, SURE),), 5))
+        bench.put(Drift(0.003, 0.004, 9.0, 0.5, 0.6, 0.7))
+    else:
+        bench.put(CameraPicture(b"an older one", 0, 0.0, "milestone"))
+    bench.put(CameraPicture(jpeg, 1, 1.0, "milestone"))
+    believed = Pose2(pose.x_m, pose.y_m, pose.heading_rad + off_rad)
+    belief = bench.put(Hypothesis.of_world(stage().world, ROOM, believed, np.array(SURE), "odometry", motion="m"))
+    belief = bench.revise(belief, basis="milestone")
+    if lost is not None:
+        bench.doubt(lost)
+    return Chosen(bench, bench.ask(source, belief))
+
+
+@pytest.mark.parametrize("has_old", [False, True])
+def test_all_landmarks_are_of_the_newest_picture(has_old: bool) -> None:
+    effects = choose(LandmarkChooser(NO_EDGES), has_old=has_old).effects
+    effect = effect_on(effects, Tracks)
+    tracks, (pose, jpeg) = effect.value, setting()
+    robot = build_robot_model(stage().scenario)
+    expected = select_landmarks(robot, (), "CameraPicture-2", read_picture(jpeg).grey, pose, NO_EDGES)
+    assert [t.landmark for t in tracks.items] == [t.landmark for t in expected] and tracks.taken == len(expected) >= 8
+    assert np.allclose([t.template_px for t in tracks.items], [t.template_px for t in expected])
+    assert tracks.frame == "CameraPicture-2" and {t.template_frame for t in tracks.items} == {"CameraPicture-2"}
+    (anchor,) = tracks.anchors
+    assert anchor.frame == "CameraPicture-2" and np.allclose((anchor.x_m, anchor.y_m), pose.position)
+    assert np.allclose(anchor.covariance, SURE)
+    assert isinstance(effect, Revise if has_old else Post)
+    assert reasons(effect) == {"CameraPicture-2", "Hypothesis-1"}
+    assert not made(effects, Hypothesis)  # it was aligned with nothing
+
+
+@pytest.mark.parametrize("has_old", [False, True])
+def test_a_new_stretch_of_the_drift_starts_at_the_believed_heading(has_old: bool) -> None:
+    effects = choose(LandmarkChooser(NO_EDGES), has_old=has_old).effects
+    drifts = made(effects, Drift)
+    assert drifts == [Drift(0.003, 0.004, pytest.approx(setting()[0].heading_rad))] * has_old
+    if has_old:
+        assert reasons(effect_on(effects, Drift)) == {"Tracks"}
+
+
+def test_the_belief_is_aligned_with_the_edges_before_landmarks_are_cut() -> None:
+    off_rad = 0.003
+    effects = choose(LandmarkChooser(), off_rad=off_rad).effects
+    effect = effect_on(effects, Hypothesis)
+    heading = effect.value.world_from_robot(stage().world).heading_rad
+    assert abs(heading - setting()[0].heading_rad) < 0.5 * off_rad
+    assert (effect.value.basis, effect.value.motion, effect.value.locale) == ("tracks", "m", ROOM)
+    assert reasons(effect) == {"CameraPicture-2", "Hypothesis-1", "Tracks"}
+    assert made(effects, Drift)[0].heading_rad == pytest.approx(heading)
+
+
+@pytest.mark.parametrize(("level", "acts"), [
+    (None, True), (Level.ACTION, True), (Level.PLAN, False), (Level.GOAL, False)])
+def test_in_doubt_or_lost_it_chooses_nothing(level: Level | None, acts: bool) -> None:
+    assert (choose(LandmarkChooser(NO_EDGES), lost=level).effects is not None) == acts
+
+
+@pytest.mark.parametrize("basis", ["milestone", "relocalization", "tracks", "odometry"])
+def test_it_wakes_where_the_robot_knows_anew_where_it_is(basis: str) -> None:
+    bench = Bench()
+    belief = bench.believe(basis=basis)
+    source, known_anew = LandmarkChooser(), basis in ("milestone", "relocalization")
+    assert wakes(source, Revised(bench.revise(belief))) == known_anew and not wakes(source, Posted(belief))
+    assert not wakes(source, Revised(bench.revise(belief, status="candidate")))
