@@ -12,7 +12,7 @@ import pytest
 from blackboard.change import Posted, Revised
 from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
-from generated_boards import Bench, effect_on, made, reasons, wakes
+from generated_boards import Bench, effect_on, made, plain_robot, reasons, to_world, wakes
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.action.landmark_chooser import LandmarkChooser
 from knowledge_sources.methods.features.picture import read_picture
@@ -105,6 +105,17 @@ def test_a_new_stretch_of_the_drift_starts_at_the_believed_heading(has_old: bool
     assert drifts == [Drift(0.003, 0.004, pytest.approx(setting()[0].heading_rad))] * has_old
     if has_old:
         assert reasons(effect_on(effects, Drift)) == {"Tracks"}
+
+
+def test_the_stretch_starts_at_the_heading_in_the_world_whatever_the_locale() -> None:
+    """The plain house is turned in the world, and the picture is of a fog."""
+    bench, pose = Bench(plain_robot()), Pose2(3.0, 2.0, 0.4)
+    belief = bench.believe(pose)
+    bench.put(CameraPicture(compress_jpeg(np.full((256, 256), 128, np.uint8), 90), 0, 0.0, "milestone"))
+    bench.put(Drift(0.003, 0.004, 9.0))
+    effects = bench.ask(LandmarkChooser(NO_EDGES), bench.revise(belief))
+    assert made(effects, Drift) == [Drift(0.003, 0.004, pytest.approx(to_world(pose).heading_rad))]
+    assert made(effects, Tracks)[0].items == ()
 
 
 def test_the_belief_is_aligned_with_the_edges_before_landmarks_are_cut() -> None:
