@@ -18,7 +18,7 @@ from generated_boards import Bench, effect_on, house, made, plain_robot, reasons
 from knowledge_sources.action.yaw_calibrator import YawCalibrator
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import CAMERA_UNKNOWNS, YAW
-from world_models.entries.location import Hypothesis, Travel, diagonal
+from world_models.entries.location import Hypothesis, Travel, covariance_tuple, diagonal
 from world_models.entries.robot_state import CameraState, Drift
 from world_models.frames import Pose2
 
@@ -183,6 +183,30 @@ def test_a_way_that_is_too_long_is_measured_for_the_last_time(more: float) -> No
     if more > 0.0:
         assert travel.yaw_rad == pytest.approx(way.camera.mount.yaw_rad)
         assert travel.yaw_variance == pytest.approx(1 / (1 / PRIOR + 1 / compute_noise(S.max_travel_m, 0.0)), rel=1e-4)
+
+
+def test_only_what_is_open_aside_of_the_way_leaves_the_yaw_open() -> None:
+    """The same places, known less well along the way, or across it."""
+    variances = []
+    for course_rad in (0.0, math.pi / 2.0):
+        bench, ends = Bench(plain_robot()), np.diag([0.05**2, 0.002**2, 0.001**2])
+        length_m = 4.0
+        bench.put(Travel(Pose2(0.0, 0.0, course_rad), covariance_tuple(ends), 0.0, PRIOR,
+                         length_m * math.cos(course_rad), length_m * math.sin(course_rad), length_m, 0.0, course_rad))
+        there = Pose2(length_m * math.cos(course_rad), length_m * math.sin(course_rad), course_rad)
+        belief = bench.put(Hypothesis.of_world(house(), "hall", there, ends, "milestone"))
+        (camera,) = made(bench.ask(YawCalibrator(), bench.revise(belief)), CameraState)
+        variances.append(camera.covariance[YAW][YAW])
+    for variance, aside_m in zip(variances, (0.002, 0.05), strict=True):
+        noise = 2 * aside_m**2 / 16.0 + 0.001**2 + S.heading_sigma_rad**2 / 4.0
+        assert variance == pytest.approx(1 / (1 / PRIOR + 1 / noise), rel=1e-6)
+
+
+def test_a_way_that_begins_anew_begins_with_the_yaw_as_it_was_learnt() -> None:
+    way = come(0.01, S.max_travel_m + SMALL)
+    (travel,) = made(way.effects, Travel)
+    assert way.camera is not None and way.camera.mount.yaw_rad < -0.005
+    assert travel.yaw_rad == pytest.approx(way.camera.mount.yaw_rad) and travel.gone_m == 0.0
 
 
 def test_a_short_bent_way_is_not_spent_yet() -> None:
