@@ -13,7 +13,7 @@ from blackboard.change import Posted
 from blackboard.effect import Revise
 from blackboard.entry import Entry
 from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
-from knowledge_sources.camera_knowledge import compute_camera_covariance
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
 from knowledge_sources.plan.camera_calibrator import CameraCalibrator
 from knowledge_sources.settings import DEFAULT
 from world_models.entries.location import Travel, begin_travel, diagonal

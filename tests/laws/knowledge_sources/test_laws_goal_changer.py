@@ -1,4 +1,4 @@
-"""The goal changer on each kind of board: with a goal and without, lost or not, while a milestone waits or not."""
+"""Laws of the goal changer on each kind of board: with a goal or without, lost or not, a milestone awaited or not."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import pytest
 from acting import answer
 from blackboard.board import Blackboard
 from blackboard.change import Change
-from blackboard.effect import Effect, Post, Revise
+from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from generated_boards import reasons
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.action.goal_changer import GoalChanger
 from knowledge_sources.settings import DEFAULT
@@ -97,3 +98,24 @@ def test_of_several_that_were_asked_before_it_could_act_the_last_counts() -> Non
     assert [effect.value.answer.partition(" (")[0] for effect in answered if isinstance(effect, Revise)] == [
         "but was asked again since", "but was asked again since", "and goes to archive"]
     assert isinstance(new, Post) and new.value.destination.locale == "archive"
+
+
+@pytest.mark.parametrize(("is_lost", "is_waiting"), list(product((False, True), repeat=2)))
+def test_each_effect_names_what_was_asked_and_what_it_replaces(is_lost: bool, is_waiting: bool) -> None:
+    effects = decide("(north-hall (3,3,0))", ASKED, is_lost=is_lost, is_waiting=is_waiting)
+    assert effects is not None
+    named = [(type(effect).__name__, type(effect.value).__name__, reasons(effect))
+             for effect in effects if not isinstance(effect, Retract)]
+    last, goal = "Redirection-2", "Goal-1"
+    expected = [("Revise", "Redirection", {"Redirection-1", last}), ("Revise", "Redirection", {last})]
+    if is_lost:
+        expected += [("Revise", "Goal", {last, goal, "Discrepancy-1"})]
+    else:
+        expected += [("Revise", "Milestone", {last, "Milestone-1"})] * is_waiting
+        expected += [("Revise", "Goal", {last, goal}), ("Post", "Goal", {last, goal, "Hypothesis-1"})]
+    assert named == expected
+
+
+def test_what_cannot_be_rests_on_what_was_asked_alone() -> None:
+    (effect,) = decide("(archive 10)") or []
+    assert reasons(effect) == {"Redirection-1"}

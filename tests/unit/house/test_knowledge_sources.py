@@ -33,6 +33,21 @@ FILES = {path.stem: path for level in Level for path in sorted((FOLDER / str(lev
 TREES = {stem: ast.parse(path.read_text(encoding="utf-8")) for stem, path in FILES.items()}
 FROM_OUTSIDE = set(load_kinds().of_role(Role.OBSERVATION))
 """What no knowledge source writes, but the user, the body and the clock of the mission."""
+LAWS = Path(__file__).parents[2] / "laws" / "knowledge_sources"
+WITHOUT_LAWS = {
+    "detour_finder",
+    "goal_sketcher",
+    "line_finder",
+    "localizer",
+    "lookout_planner",
+    "matcher",
+    "med_r_and_t",
+    "obstruction_finder",
+    "panorama_builder",
+    "refiner",
+    "shut_door_explainer",
+}
+"""Sources that have no laws of their own yet. May only shrink."""
 
 
 def sources_in(stem: str) -> list[type[KnowledgeSource]]:
@@ -53,6 +68,14 @@ def test_there_is_one_knowledge_source_a_file_and_the_file_has_its_name() -> Non
 
 def test_it_stands_in_the_folder_of_its_level() -> None:
     assert all(FILES[stem].parent.name == str(source.level) for stem, source in KNOWLEDGE_SOURCES.items())
+
+
+def test_each_has_its_laws() -> None:
+    """In a file of its own: when it acts and when not, what it writes, and what it names as its reasons."""
+    without = {stem for stem in KNOWLEDGE_SOURCES if not (LAWS / f"test_laws_{stem}.py").exists()}
+    assert without - WITHOUT_LAWS == set()
+    assert not {stem for stem in WITHOUT_LAWS if (LAWS / f"test_laws_{stem}.py").exists()}, "take it off the list"
+    assert set(KNOWLEDGE_SOURCES) >= WITHOUT_LAWS
 
 
 def test_every_knowledge_source_is_wired() -> None:
