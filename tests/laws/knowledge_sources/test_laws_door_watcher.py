@@ -17,7 +17,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.action.door_watcher import DoorWatcher
 from knowledge_sources.doors_in_view import MAX_SIGMA_M, MAX_SIGMA_RAD
-from knowledge_sources.methods.doors.belief import MIN_PICTURES
+from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_PICTURES, PRIOR_LOG_ODDS
 from sim.body.simulated_building import SimulatedBuilding
 from sim.ground_truth.table import TrueDoor
 from sim.ground_truth.true_changes import build_leaf
@@ -116,6 +116,8 @@ def test_a_leaf_from_two_places_is_a_shut_door_and_what_is_beyond_opens_it_again
         now: DoorState = effect.value
         assert now.state == ("shut" if number >= MIN_PICTURES else "unknown") and now.pictures == number
         assert now.last.frame == frame.id and now.seen_s == 1.0 * number and now.last.log_ratio > 0.0
+        if known is None:  # a door that the file has open is open, as far as nothing else tells
+            assert now.log_odds == pytest.approx(min(now.last.log_ratio - PRIOR_LOG_ODDS, MAX_LOG_ODDS))
         hall.apply(effect)
         known = hall.board.view.latest(DoorState)
         assert ask(hall, frame) == []  # the same picture again says nothing new
