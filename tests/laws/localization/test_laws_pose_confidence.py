@@ -158,3 +158,20 @@ def test_predicted_points_are_in_view() -> None:
     pixels = robot.camera.project(robot.camera_from_world(_place()).apply(points))
     assert robot.camera.inside(pixels).all()
     assert math.isfinite(float(points.sum())) and len(points) > 10
+
+
+@given(st.tuples(*[st.floats(-0.03, 0.03)] * 3), st.floats(0.005, 0.05), st.floats(0.005, 0.05))
+@settings(max_examples=20, deadline=None)
+def test_a_pose_is_near_the_belief_by_what_both_leave_open(
+    off: tuple[float, float, float], own: float, believed: float
+) -> None:
+    """In standard deviations of the difference, of which both have their part; it is the same which has which."""
+    robot, belief, lines = _robot(), _place(), _lines()
+    pose = Pose2(belief.x_m + off[0], belief.y_m + off[1], belief.heading_rad + off[2])
+    segments = _segments(belief)
+    check = check_lines(robot, lines, segments, pose)
+    spreads = [np.diag([own, own, 0.5 * own]) ** 2, np.diag([believed, believed, 0.2 * believed]) ** 2]
+    one, other = (compute_evidence(robot, lines, segments, pose, a, belief, b, check, NOT_TESTED).proximity
+                  for a, b in (spreads, spreads[::-1]))
+    sigmas = math.sqrt(sum(o * o / (spreads[0][k, k] + spreads[1][k, k]) for k, o in enumerate(off)))
+    assert one == pytest.approx(other) == pytest.approx(1.0 - min(sigmas, 6.0) / 6.0, abs=1e-6)

@@ -1,0 +1,76 @@
+"""Laws of the detour finder: a halted leg ends its sketches while another way may lead on, so many times."""
+
+from __future__ import annotations
+
+import pytest
+
+from blackboard.change import Posted, Revised
+from blackboard.entry import Entry
+from generated_boards import HALL, Bench, effect_on, made, plain_robot, wakes
+from knowledge_sources.plan.detour_finder import DetourFinder
+from knowledge_sources.settings import DEFAULT
+from world_models.entries.location import Place
+from world_models.entries.task import Impasse, Leg, LegStatus, PlanSketch
+from world_models.frames import Pose2
+
+SOURCE = DetourFinder()
+FROM, TO = Place(HALL, 1.0, 2.0), Place(HALL, 6.0, 2.0)
+MOST = DEFAULT.plan.max_adjustments
+
+
+def halt(halts: int = 0) -> tuple[Bench, Entry[Leg]]:
+    """A board on which a leg across the hall was halted, after so many in a row."""
+    bench = Bench(plain_robot())
+    bench.believe(Pose2(1.5, 2.0, 0.0))
+    goal = bench.pursue(TO)
+    bench.revise(bench.sketch(FROM, TO, goal=goal, primitive=False), halts=halts)
+    below = bench.sketch(FROM, TO, goal=goal, path=(0,))
+    return bench, bench.revise(bench.leg(below), status="halted")
+
+
+@pytest.mark.parametrize("halts", [0, MOST - 1, MOST])
+def test_so_many_times_in_a_row_all_sketches_end_and_then_it_sees_no_way_on(halts: int) -> None:
+    bench, leg = halt(halts)
+    effects = bench.ask(SOURCE, leg)
+    assert effects is not None
+    ended = made(effects, PlanSketch)
+    if halts < MOST:
+        assert [(s.path, s.status, s.halts) for s in ended] == [((), "halted", halts), ((0,), "halted", 0)]
+        assert all({r.id for r in e.because} == {leg.id} for e in effects)  # type: ignore[union-attr]
+        bench.apply(*effects)
+        assert bench.ask(SOURCE, leg) is None
+    else:
+        effect = effect_on(effects, Impasse)
+        assert not ended and (effect.value.kind, effect.value.goal, effect.value.behind) == ("blocked", "Goal-1", ())
+        assert {r.id for r in effect.because} == {leg.id, "Hypothesis-1"}
+
+
+def test_where_no_way_leads_to_the_goal_it_says_so_the_first_time() -> None:
+    bench, leg = halt()
+    goal = bench.view["Goal-1"]
+    bench.revise(goal, destination=Place(HALL, 6.0, 0.05))  # at the wall
+    effects = bench.ask(SOURCE, leg)
+    assert not made(effects, PlanSketch) and effect_on(effects, Impasse).value.goal == goal.id
+
+
+@pytest.mark.parametrize("stale", ["index", "sketch ended", "first level ended", "goal", "belief"])
+def test_a_leg_of_a_plan_that_is_over_halts_nothing(stale: str) -> None:
+    bench, leg = halt()
+    if stale == "index":
+        bench.revise(bench.view["PlanSketch-2"], at=1)
+    elif stale == "sketch ended":
+        bench.revise(bench.view["PlanSketch-2"], status="superseded")
+    elif stale == "first level ended":
+        bench.revise(bench.view["PlanSketch-1"], status="superseded")
+    elif stale == "goal":
+        bench.revise(bench.view["Goal-1"], status="reached")
+    else:
+        bench.revise(bench.view["Hypothesis-1"], status="doubted")
+    assert bench.ask(SOURCE, leg) is None
+
+
+@pytest.mark.parametrize("status", ["moving", "arrived", "halted"])
+def test_what_it_watches(status: LegStatus) -> None:
+    bench = Bench()
+    leg = bench.revise(bench.leg(bench.sketch(FROM, TO)), status=status)
+    assert wakes(SOURCE, Revised(leg)) == (status == "halted") and not wakes(SOURCE, Posted(leg))

@@ -1,0 +1,103 @@
+"""Laws of the goal sketcher: one sketch for a goal that has none, from where the robot is; else it sees no way on."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blackboard.change import Posted, Revised
+from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, wakes
+from knowledge_sources.plan.goal_sketcher import GoalSketcher
+from knowledge_sources.sketching import GOAL_TOLERANCE_M
+from world_models.entries.location import Place
+from world_models.entries.task import Goal, Impasse, Outcome, PlanSketch, SketchStatus
+from world_models.frames import Pose2
+
+SOURCE = GoalSketcher()
+AIM = Place(STUDY, 3.0, 2.0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(poses, st.sampled_from((Place(HALL, 6.0, 1.5), AIM)))
+def test_the_sketch_leads_from_the_robot_to_the_goal_step_by_step(pose: Pose2, aim: Place) -> None:
+    bench = Bench(plain_robot())
+    belief, goal = bench.believe(pose), bench.pursue(aim)
+    effect = effect_on(bench.ask(SOURCE, goal), PlanSketch)
+    drawn = effect.value
+    assert (drawn.goal, drawn.path, drawn.locale, drawn.at, drawn.verified, drawn.status, drawn.halts) == (
+        goal.id, (), "", 0, False, "active", 0)
+    first, last = drawn.subgoals[0], drawn.subgoals[-1]
+    assert (first.origin.locale, last.destination) == (HALL, aim) and last.tolerance_m == GOAL_TOLERANCE_M
+    assert (first.origin.x_m, first.origin.y_m) == pytest.approx((pose.x_m, pose.y_m))
+    passages = [step.passage for step in drawn.subgoals if step.passage]
+    assert passages == (["study-door"] if aim.locale == STUDY else [])
+    assert {goal.id, belief.id} <= reasons(effect)
+    bench.apply(*bench.ask(SOURCE, goal) or ())
+    assert bench.ask(SOURCE, goal) is None
+
+
+@pytest.mark.parametrize(("status", "halts"), [("halted", 3), ("superseded", 0)])
+def test_halts_are_counted_in_a_row(status: SketchStatus, halts: int) -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    goal = bench.pursue(AIM)
+    old = bench.revise(bench.sketch(goal=goal), status=status, halts=2)
+    effect = effect_on(bench.ask(SOURCE, old), PlanSketch)
+    assert effect.value.halts == halts and old.id in reasons(effect)
+
+
+def test_sketches_for_earlier_goals_are_superseded() -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    before = bench.pursue()
+    old = bench.sketch(goal=before)
+    bench.revise(before, status="abandoned")
+    goal = bench.pursue(AIM)
+    ended, drawn = made(bench.ask(SOURCE, goal), PlanSketch)
+    assert (ended.goal, ended.status, drawn.goal) == (before.id, "superseded", goal.id) and old.value.is_active
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(("from_wall_m", "fits"), [(0.1, False), (1.0, True)])
+def test_where_the_robot_does_not_fit_at_the_goal_it_sees_no_way_on(
+    side: float, from_wall_m: float, fits: bool
+) -> None:
+    """At the wall on either side."""
+    bench = Bench(plain_robot())
+    belief = bench.believe(Pose2(1.0, 2.0, 0.0))
+    goal = bench.pursue(Place(HALL, 6.0, 2.0 + side * (2.0 - from_wall_m)))
+    effects = bench.ask(SOURCE, goal)
+    assert bool(made(effects, PlanSketch)) == fits
+    if not fits:
+        effect = effect_on(effects, Impasse)
+        assert (effect.value.kind, effect.value.goal, effect.value.behind) == ("blocked", goal.id, ())
+        assert effect.value.is_open and reasons(effect) == {goal.id, belief.id}
+
+
+@pytest.mark.parametrize("lacks", ["nothing", "belief", "goal", "need", "mission"])
+def test_it_draws_only_what_is_needed(lacks: str) -> None:
+    bench = Bench(plain_robot())
+    if lacks != "belief":
+        bench.believe()
+    goal = bench.pursue(AIM)
+    if lacks == "goal":
+        bench.revise(goal, status="abandoned")
+    elif lacks == "need":
+        bench.sketch(goal=goal)
+    elif lacks == "mission":
+        bench.put(Outcome("failed", ""))
+    assert (bench.ask(SOURCE, goal) is not None) == (lacks == "nothing")
+
+
+@pytest.mark.parametrize("status", ["active", "done", "halted", "superseded"])
+@pytest.mark.parametrize("path", [(), (0,)])
+@pytest.mark.parametrize("is_look", [False, True])
+def test_what_it_watches(status: SketchStatus, path: tuple[int, ...], is_look: bool) -> None:
+    bench = Bench()
+    sketch = bench.revise(bench.sketch(path=path), status=status, is_look=is_look)
+    leaves_open = status in ("halted", "superseded") or (status == "done" and is_look)
+    assert wakes(SOURCE, Revised(sketch)) == (leaves_open and not path)
+    goal = bench.pursue()
+    assert wakes(SOURCE, Posted(goal)) and isinstance(goal.value, Goal)
+    assert not wakes(SOURCE, Revised(bench.revise(goal, status="reached")))

@@ -1,0 +1,82 @@
+"""Laws of the line finder: the lines of a picture and its light, of the milestone that waits for it."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from blackboard.change import Posted, Revised
+from blackboard.entry import Entry
+from generated_boards import Bench, effect_on, plain_robot, reasons, wakes
+from knowledge_sources.plan.line_finder import MIN_SEGMENT_LENGTH_PX, LineFinder
+from world_models.entries.body import CameraPicture
+from world_models.entries.percepts import Segments
+from world_models.entries.task import MilestoneStatus
+
+SOURCE = LineFinder()
+
+
+def take(bench: Bench, image: np.ndarray, purpose: str = "milestone") -> Entry[CameraPicture]:
+    jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
+    return bench.put(CameraPicture(jpeg, 0, 1.0, purpose))
+
+
+def draw(*, edge: float = 100.0, low: int = 60, high: int = 180) -> np.ndarray:
+    """Dark on the left, bright on the right of a column."""
+    image = np.full((256, 256, 3), low, np.uint8)
+    image[:, int(edge):] = high
+    return image
+
+
+@pytest.mark.parametrize("edge", [60.0, 100.0, 180.0])
+def test_an_edge_is_one_line_where_it_is_and_the_light_is_mean_and_deviation(edge: float) -> None:
+    bench = Bench(plain_robot())
+    milestone = bench.await_milestone(status="expected")
+    frame = take(bench, draw(edge=edge))
+    effect = effect_on(bench.ask(SOURCE, frame), Segments)
+    seen = effect.value
+    assert (seen.frame, seen.milestone) == (frame.id, milestone.id) and reasons(effect) == {frame.id, milestone.id}
+    lengths = np.linalg.norm(seen.segments_px[:, 1] - seen.segments_px[:, 0], axis=1)
+    assert len(lengths) == len(seen.sigma_px) >= 1 and lengths.min() >= MIN_SEGMENT_LENGTH_PX
+    longest = seen.segments_px[lengths.argmax()]
+    assert np.allclose(longest[:, 0], edge - 0.5, atol=0.3) and lengths.max() > 220.0
+    bright = (256.0 - edge) / 256.0
+    mean = 60.0 + 120.0 * bright
+    assert seen.brightness == pytest.approx(mean, abs=1.5)
+    assert seen.contrast == pytest.approx(120.0 * np.sqrt(bright * (1.0 - bright)), abs=1.5)
+
+
+def test_the_flipped_picture_has_the_flipped_lines() -> None:
+    found = []
+    for image in (draw(), np.ascontiguousarray(draw()[:, ::-1])):
+        bench = Bench(plain_robot())
+        segments = effect_on(bench.ask(SOURCE, take(bench, image)), Segments).value.segments_px
+        found.append(segments[np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).argmax()])
+    one, other = found
+    assert one[:, 0].mean() == pytest.approx(255.0 - other[:, 0].mean(), abs=0.2)
+
+
+def test_a_blank_picture_has_no_lines_and_no_contrast() -> None:
+    bench = Bench(plain_robot())
+    seen = effect_on(bench.ask(SOURCE, take(bench, draw(low=128, high=128))), Segments).value
+    assert seen.segments_px.shape == (0, 2, 2) and seen.contrast < 1.0
+    assert seen.brightness == pytest.approx(128.0, abs=1.0)
+
+
+@pytest.mark.parametrize("purpose", ["milestone", "probe"])
+@pytest.mark.parametrize("status", ["expected", "verified"])
+def test_only_a_picture_for_milestones_is_of_the_one_that_is_awaited(purpose: str, status: MilestoneStatus) -> None:
+    bench = Bench(plain_robot())
+    milestone = bench.await_milestone(status=status)
+    frame = take(bench, draw(), purpose)
+    effect = effect_on(bench.ask(SOURCE, frame), Segments)
+    is_its = (purpose, status) == ("milestone", "expected")
+    assert effect.value.milestone == (milestone.id if is_its else "")
+    assert reasons(effect) == ({frame.id, milestone.id} if is_its else {frame.id})
+
+
+@pytest.mark.parametrize("purpose", ["milestone", "probe", "track", ""])
+def test_what_it_watches(purpose: str) -> None:
+    frame = take(Bench(), draw(), purpose)
+    assert wakes(SOURCE, Posted(frame)) == (purpose in ("milestone", "probe")) and not wakes(SOURCE, Revised(frame))

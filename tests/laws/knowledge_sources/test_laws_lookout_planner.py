@@ -1,0 +1,71 @@
+"""Laws of the lookout planner: what leaves no way is looked at again from elsewhere, so often a goal."""
+
+from __future__ import annotations
+
+import pytest
+
+from blackboard.change import Posted, Revised
+from blackboard.entry import Entry
+from generated_boards import HALL, Bench, effect_on, made, plain_robot, to_world, wakes
+from knowledge_sources.plan.lookout_planner import LookoutPlanner
+from knowledge_sources.settings import DEFAULT
+from world_models.entries.location import Place
+from world_models.entries.obstacle import Obstacle
+from world_models.entries.task import Impasse, PlanSketch
+from world_models.frames import Pose2
+
+SOURCE = LookoutPlanner()
+MOST = DEFAULT.plan.max_lookouts
+
+
+def stuck(*, looked: int = 0) -> tuple[Bench, Entry[Impasse]]:
+    """A board on which something across the hall leaves no way to the goal, after so many looks at it."""
+    bench = Bench(plain_robot())
+    bench.believe(Pose2(1.2, 2.0, 0.0))
+    goal = bench.pursue(Place(HALL, 7.0, 2.0))
+    corners = tuple(tuple(to_world(Pose2(5.0 + dx, 2.0 + dy, 0.0)).position.tolist())
+                    for dx, dy in ((-0.1, -1.9), (0.1, -1.9), (0.1, 1.9), (-0.1, 1.9)))
+    middle = to_world(Pose2(5.0, 2.0, 0.0))
+    thing = bench.put(Obstacle("hall/obstacle-1", HALL, corners, 0.02, middle.x_m, middle.y_m, 3.8))
+    for _ in range(looked):
+        bench.put(Impasse("blocked", "before", goal.id, (thing.id,), is_open=False))
+    return bench, bench.put(Impasse("blocked", "no way", goal.id, (thing.id,)))
+
+
+@pytest.mark.parametrize("looked", [0, MOST - 1, MOST])
+def test_it_leads_to_a_look_so_often_a_goal(looked: int) -> None:
+    bench, impasse = stuck(looked=looked)
+    bench.put(Impasse("blocked", "of another goal", "Goal-9", (), is_open=False))
+    old = bench.sketch(goal=bench.view["Goal-1"])
+    effects = bench.ask(SOURCE, impasse)
+    assert (effects is not None) == (looked < MOST)
+    if effects is None:
+        return
+    closed = effect_on(effects, Impasse)
+    assert closed.entry is impasse and not closed.value.is_open
+    assert {r.id for r in closed.because} == {impasse.id, "Obstacle-1", "Hypothesis-1"}
+    ended, drawn = made(effects, PlanSketch)
+    assert ended.status == "superseded" and old.value.is_active
+    assert (drawn.goal, drawn.path, drawn.is_look, drawn.status) == ("Goal-1", (), True, "active")
+    (step,) = drawn.subgoals
+    assert (step.origin.x_m, step.origin.y_m) == pytest.approx((1.2, 2.0)) and step.destination.locale == HALL
+    assert step.destination.x_m < 5.0 - 0.1 - plain_robot().radius_m  # on this side of what it looks at
+
+
+@pytest.mark.parametrize("stale", ["goal", "belief", "gone"])
+def test_there_is_nothing_to_look_at_or_nobody_to_look(stale: str) -> None:
+    bench, impasse = stuck()
+    if stale == "goal":
+        bench.retract(bench.view["Goal-1"])
+    elif stale == "belief":
+        bench.revise(bench.view["Hypothesis-1"], status="doubted")
+    else:
+        bench.revise(bench.view["Obstacle-1"], status="gone")
+    assert bench.ask(SOURCE, impasse) is None
+
+
+@pytest.mark.parametrize("is_open", [True, False])
+@pytest.mark.parametrize("behind", [(), ("Obstacle-1",)])
+def test_what_it_watches(is_open: bool, behind: tuple[str, ...]) -> None:
+    impasse = Bench().put(Impasse("blocked", "", "Goal-1", behind, is_open))
+    assert wakes(SOURCE, Posted(impasse)) == (is_open and bool(behind)) and not wakes(SOURCE, Revised(impasse))

@@ -1,0 +1,134 @@
+"""Laws of panorama builder and localizer: looks are carried along by the motions between them, and so are places."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blackboard.change import Posted
+from blackboard.entry import Entry
+from generated_boards import HALL, Bench, effect_on, plain_robot, poses, reasons, to_world, wakes
+from knowledge_sources.goal.localizer import Localizer, _follow
+from knowledge_sources.goal.panorama_builder import PanoramaBuilder
+from knowledge_sources.questions import find_building
+from world_models.actuator import ActuatorModel
+from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.percepts import Panorama, Segments
+from world_models.frames import Pose2
+
+SOURCE = PanoramaBuilder()
+motions = st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(0.0, 0.8)), min_size=1, max_size=3)
+
+
+def looked(bench: Bench, contrast: float = 40.0, brightness: float = 120.0, milestone: str = "") -> Entry[Segments]:
+    return bench.put(Segments("CameraPicture-1", milestone, np.zeros((0, 2, 2)), np.zeros(0), contrast, brightness))
+
+
+def go(x: float, y: float, heading: float, step: Pose2) -> tuple[float, float, float]:
+    """From a pose by a step of the robot's own frame; the plainest composition."""
+    return (x + math.cos(heading) * step.x_m - math.sin(heading) * step.y_m,
+            y + math.sin(heading) * step.x_m + math.cos(heading) * step.y_m, heading + step.heading_rad)
+
+
+def drive(bench: Bench, way: list[tuple[float, float]]) -> None:
+    """Motions that are reported and believed."""
+    for turn_rad, move_m in way:
+        _, report = bench.move(turn_rad, move_m)
+        bench.revise(bench.view["Hypothesis-1"], motion=report.id)
+
+
+@settings(max_examples=30, deadline=None)
+@given(motions)
+def test_a_look_is_where_the_robot_was_as_seen_from_where_it_is(way: list[tuple[float, float]]) -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    doubt = bench.doubt()
+    first = looked(bench)
+    effect = effect_on(bench.ask(SOURCE, first), Panorama)
+    (glimpse,) = effect.value.glimpses
+    assert (glimpse.now_from_then, reasons(effect)) == (Pose2(0.0, 0.0, 0.0), {"Segments-1", doubt.id})
+    bench.apply(effect)
+    drive(bench, way)
+    effect = effect_on(bench.ask(SOURCE, looked(bench)), Panorama)
+    old, new = effect.value.glimpses
+    assert new.now_from_then == Pose2(0.0, 0.0, 0.0) and not np.any(new.covariance)
+    x, y, heading = 0.0, 0.0, 0.0  # of the robot now, as it was then
+    for motion in way:
+        x, y, heading = go(x, y, heading, ActuatorModel().predict_motion(*motion))
+    c, s = math.cos(heading), math.sin(heading)
+    then = old.now_from_then
+    assert (then.x_m, then.y_m) == pytest.approx((-c * x - s * y, s * x - c * y), abs=1e-9)
+    assert math.remainder(then.heading_rad + heading, math.tau) == pytest.approx(0.0, abs=1e-9)
+    assert np.all(np.diag(old.covariance) >= 0.0) and old.covariance[2][2] > 0.0
+    reports = {f"MotionReport-{k + 1}" for k in range(len(way))}
+    assert reasons(effect) == {"Segments-2", doubt.id, "Panorama-1", *reports}
+
+
+@pytest.mark.parametrize("lacks", ["nothing", "light", "doubt", "belief", "rest"])
+def test_it_looks_round_only_when_lost_and_standing_in_the_light(lacks: str) -> None:
+    bench = Bench(plain_robot())
+    if lacks != "belief":
+        bench.believe()
+    if lacks != "doubt":
+        bench.doubt()
+    seen = looked(bench, 0.0, 0.0) if lacks == "light" else looked(bench)
+    if lacks == "rest":
+        bench.move()
+    assert (bench.ask(SOURCE, seen) is not None) == (lacks == "nothing")
+
+
+def test_lost_again_it_begins_a_new_panorama() -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    doubt = bench.doubt()
+    bench.apply(*bench.ask(SOURCE, looked(bench)) or ())
+    bench.revise(doubt, status="corrected")
+    bench.doubt()
+    effect = effect_on(bench.ask(SOURCE, looked(bench)), Panorama)
+    assert len(effect.value.glimpses) == 1 and "Panorama-1" not in reasons(effect)
+
+
+def test_only_pictures_of_no_milestone_are_of_a_panorama() -> None:
+    bench = Bench()
+    assert wakes(SOURCE, Posted(looked(bench)))
+    assert not wakes(SOURCE, Posted(looked(bench, milestone="Milestone-1")))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(poses, min_size=1, max_size=3), motions, motions)
+def test_candidates_go_with_the_robot_from_when_they_were_found(
+    found: list[Pose2], before: list[tuple[float, float]], way: list[tuple[float, float]]
+) -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    drive(bench, before)
+    candidates = tuple(bench.put(Hypothesis(HALL, pose, diagonal(0.1, 0.1), "relocalization", status="candidate"))
+                       for pose in found)
+    drive(bench, way)
+    followed = _follow(bench.view, candidates, find_building(bench.view))
+    assert len(followed) == len(found)
+    for pose, (locale, there) in zip(found, followed, strict=True):
+        wanted = to_world(pose)
+        x, y, heading = wanted.x_m, wanted.y_m, wanted.heading_rad
+        for motion in way:
+            x, y, heading = go(x, y, heading, ActuatorModel().predict_motion(*motion))
+        assert locale == HALL and (there.x_m, there.y_m) == pytest.approx((x, y), abs=1e-9)
+        assert math.remainder(there.heading_rad - heading, math.tau) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("lacks", ["nothing", "doubt", "belief", "rest"])
+def test_places_are_searched_only_when_lost_and_standing(lacks: str) -> None:
+    bench = Bench(plain_robot())
+    if lacks != "belief":
+        bench.believe()
+    if lacks != "doubt":
+        bench.doubt()
+    panorama = bench.put(Panorama(()))
+    if lacks == "rest":
+        bench.move()
+    assert (Localizer().find_case(bench.view, Posted(panorama)) is not None) == (lacks == "nothing")
+    assert wakes(Localizer(), Posted(panorama))

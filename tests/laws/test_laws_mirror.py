@@ -1,0 +1,258 @@
+"""Mirror law and frame law of methods: left and right are alike, and no place or direction of the world is special.
+
+Mirrored, y and headings have the other sign, and pictures are flipped. Turned and shifted, all poses of the world are.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from generated_boards import Bench, effect_on, mirrored, plain_robot, to_world
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.doors.belief import MIN_LOG_RATIO, PRIOR_LOG_ODDS, update_door
+from knowledge_sources.methods.features.lines import find_lines
+from knowledge_sources.methods.motion.pure_pursuit import (
+    compute_bearing,
+    compute_curvature_to,
+    find_aim_point,
+    measure_progress,
+)
+from knowledge_sources.methods.motion.routes import (
+    compute_free_space,
+    find_free_space,
+    find_shortest_route,
+    list_obstacles,
+)
+from knowledge_sources.methods.pose import planar_from_points
+from knowledge_sources.methods.tracking.edge_alignment import _Edges, _solve
+from knowledge_sources.methods.verification.color_check import predict_color_check
+from knowledge_sources.plan.view_predictor import ViewPredictor
+from knowledge_sources.settings import DEFAULT
+from world_models.actuator import ActuatorModel
+from world_models.entries.door_state import DoorPicture, DoorState
+from world_models.entries.task import Leg, Milestone
+from world_models.files.world_files import WORLDS, load_world
+from world_models.frames import Pose2, wrap_angle
+
+SIGNS = np.array([1.0, -1.0, -1.0])
+"""What a mirrored pose (x, y, heading) is multiplied with."""
+ROBOT = plain_robot()
+SMALL = 1e-9
+metres = st.floats(-6.0, 6.0)
+free_poses = st.builds(Pose2, metres, metres, st.floats(-3.0, 3.0))
+actuators = st.builds(ActuatorModel)
+
+
+def flip(pose: Pose2) -> Pose2:
+    """Mirrored about the world's x axis."""
+    return Pose2(pose.x_m, -pose.y_m, -pose.heading_rad)
+
+
+def as_numbers(pose: Pose2) -> Floats:
+    return np.array([pose.x_m, pose.y_m, pose.heading_rad])
+
+
+def is_same(one: Pose2, other: Pose2, within: float = 1e-9) -> bool:
+    turn = wrap_angle(one.heading_rad - other.heading_rad)
+    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) < within and abs(turn) < within
+
+
+def make_leg(start: Pose2, end: Pose2) -> Leg:
+    return Leg("PlanSketch-1", 0, start.x_m, start.y_m, end.x_m, end.y_m, 0.1)
+
+
+@settings(max_examples=100)
+@given(free_poses, free_poses, free_poses, free_poses)
+def test_steering(start: Pose2, end: Pose2, here: Pose2, frame: Pose2) -> None:
+    assume(math.hypot(start.x_m - end.x_m, start.y_m - end.y_m) > 0.1)
+    leg = make_leg(start, end)
+    along, left = measure_progress(leg, here)
+    point = find_aim_point(leg, along, 0.8)
+    assume(math.dist(point, here.position) > 0.01 and abs(abs(compute_bearing(point, here)) - math.pi) > 1e-6)
+    bearing, bend = compute_bearing(point, here), compute_curvature_to(point, here)
+    flipped, there = make_leg(flip(start), flip(end)), flip(here)
+    assert measure_progress(flipped, there) == pytest.approx((along, -left), abs=SMALL)
+    aim = find_aim_point(flipped, along, 0.8)
+    assert aim == pytest.approx((point[0], -point[1]), abs=1e-7)
+    assert compute_bearing(aim, there) == pytest.approx(-bearing, abs=1e-5)
+    assert compute_curvature_to(aim, there) == pytest.approx(-bend, abs=1e-4, rel=1e-5)
+    turned, moved = make_leg(frame @ start, frame @ end), frame @ here
+    assert measure_progress(turned, moved) == pytest.approx((along, left), abs=SMALL)
+    assert compute_bearing(find_aim_point(turned, along, 0.8), moved) == pytest.approx(bearing, abs=1e-5)
+    # Beside a line from west to east, left is where y is larger.
+    east = make_leg(Pose2(0.0, 0.0, 0.0), Pose2(5.0, 0.0, 0.0))
+    assert measure_progress(east, here) == pytest.approx((5.0 - here.x_m, here.y_m))
+
+
+@settings(max_examples=60)
+@given(st.floats(-3.0, 3.0), st.floats(-2.0, 2.0))
+def test_dead_reckoning(turn_rad: float, move_m: float) -> None:
+    actuator = ActuatorModel()
+    left, right = actuator.predict_motion(turn_rad, move_m), actuator.predict_motion(-turn_rad, move_m)
+    assert is_same(right, flip(left))
+    spread = np.array(actuator.motion_covariance(turn_rad, move_m))
+    other = np.array(actuator.motion_covariance(-turn_rad, move_m))
+    assert np.allclose(other, spread * np.outer(SIGNS, SIGNS), atol=1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.tuples(st.floats(1.5, 6.0), st.floats(-1.5, 1.5)), min_size=1, max_size=3), st.floats(-1.4, 1.4),
+       st.floats(-1.4, 1.4), free_poses)
+def test_routes(things: list[tuple[float, float]], from_y: float, to_y: float, frame: Pose2) -> None:
+    """The same length on the other side; turned and shifted the same way points."""
+    room = np.array([(0.0, -2.0), (8.0, -2.0), (8.0, 2.0), (0.0, 2.0)])
+    squares = [np.array([(x - 0.3, y - 0.3), (x + 0.3, y - 0.3), (x + 0.3, y + 0.3), (x - 0.3, y + 0.3)])
+               for x, y in things]
+    ends = np.array([(0.6, from_y), (7.4, to_y)])
+
+    def length(change: Pose2 | None) -> float | None:
+        """Of the shortest route; mirrored where no frame is given."""
+        def put(points: Floats) -> Floats:
+            if change is None:
+                return np.asarray(points * (1.0, -1.0))
+            c, s = math.cos(change.heading_rad), math.sin(change.heading_rad)
+            return np.asarray(points @ np.array([[c, s], [-s, c]]) + (change.x_m, change.y_m))
+
+        free = compute_free_space(put(room), [put(square) for square in squares], 0.4)
+        open_floor = compute_free_space(put(room), [put(square) for square in squares], 0.0)
+        route = find_shortest_route(free, *put(ends), lambda: open_floor)
+        return None if route is None else float(shapely.LineString(route).length)
+
+    own = length(Pose2(0.0, 0.0, 0.0))
+    for other in (length(None), length(frame)):
+        assert (own is None) == (other is None)
+        assert own is None or other == pytest.approx(own, abs=0.02)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(-3.0, 3.0), st.sampled_from((0.5, 1.0, 3.0)), free_poses)
+def test_a_pose_by_points(seed: int, heading: float, sigma_px: float, frame: Pose2) -> None:
+    """Mirrored, and in another frame; what is left over is in pixels, whatever their standard deviation."""
+    rng = np.random.default_rng(seed)
+    truth = Pose2(1.0, -2.0, heading)
+    points = truth.lifted().apply(rng.uniform((3.0, -1.2, 0.0), (9.0, 1.2, 2.2), (24, 3)))
+    camera = ROBOT.camera
+    pixels = camera.project(ROBOT.camera_from_world(truth).apply(points)) + rng.normal(0.0, sigma_px, (24, 2))
+    prior = Pose2(truth.x_m + 0.05, truth.y_m - 0.04, heading + 0.01)
+    covariance = np.diag([0.05, 0.08, 0.02]) ** 2
+
+    def solve(world: Floats, seen: Floats, start: Pose2, spread: Floats) -> tuple[Pose2, Floats, Floats]:
+        found = planar_from_points(world, seen, camera, ROBOT.mount.camera_from_robot, start, spread,
+                                   sigma_px=sigma_px)
+        return found.world_from_robot, found.covariance, found.residuals_px
+
+    pose, spread, residuals = solve(points, pixels, prior, covariance)
+    again = camera.project(ROBOT.camera_from_world(pose).apply(points))
+    assert np.allclose(np.abs(residuals), np.abs(again - pixels), atol=1e-6)
+    flipped = np.stack([2.0 * camera.cx - pixels[:, 0], pixels[:, 1]], axis=1)
+    mirrored_pose, mirrored_spread, _ = solve(points * (1.0, -1.0, 1.0), flipped, flip(prior), covariance)
+    assert is_same(mirrored_pose, flip(pose), 1e-4)
+    assert np.allclose(mirrored_spread, spread * np.outer(SIGNS, SIGNS), rtol=1e-2, atol=1e-7)
+    c, s = math.cos(frame.heading_rad), math.sin(frame.heading_rad)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    there, _, _ = solve(frame.lifted().apply(points), pixels, frame @ prior, turn @ covariance @ turn.T)
+    assert is_same(there, frame @ pose, 1e-4)
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.tuples(*[st.floats(-0.02, 0.02)] * 3))
+def test_where_edges_are_linearised_does_not_matter(seed: int, step: tuple[float, float, float]) -> None:
+    """The belief is one more measurement, in every pass the same: it draws back to where it is."""
+    rng = np.random.default_rng(seed)
+    slopes, line = rng.normal(0.0, 60.0, (80, 3)), np.repeat(np.arange(16), 5)
+    prior, covariance = Pose2(1.0, 2.0, 0.3), np.diag([0.01, 0.02, 0.005]) ** 2
+    offsets = slopes @ rng.normal(0.0, 0.005, 3) + rng.normal(0.0, 0.2, 80)
+    at = Pose2(*(as_numbers(prior) + step))
+    one = _solve(_Edges(offsets, slopes, line), prior, prior, covariance, DEFAULT.tracking)
+    other = _solve(_Edges(offsets - slopes @ np.array(step), slopes, line), at, prior, covariance, DEFAULT.tracking)
+    assert one is not None and other is not None
+    assert is_same(one.world_from_robot, other.world_from_robot, 2e-3)
+
+
+@settings(max_examples=60)
+@given(st.lists(st.floats(MIN_LOG_RATIO, 5.0), min_size=1, max_size=4))
+def test_what_a_door_looks_like_from_one_place_counts_once_and_open_as_shut(ratios: list[float]) -> None:
+    """Shut is as open with the other sign; of looks from one place all that counts is what the strongest says."""
+    for sign in (1.0, -1.0):
+        known: DoorState | None = None
+        odds, said = -sign * PRIOR_LOG_ODDS, 0.0
+        for number, ratio in enumerate(ratios):
+            picture = DoorPicture(f"CameraPicture-{number}", (0.0, 0.0, 9.0, 9.0), 1.0, 2.0, 0.3, sign * ratio, "")
+            known = update_door(known, "door", ("a", "b"), picture, 1.0, is_believed_shut=sign < 0.0) or known
+            odds, said = odds + sign * max(ratio - said, 0.0), max(ratio, said)
+            assert known is not None and known.log_odds == pytest.approx(odds)
+
+
+colours = st.tuples(*[st.floats(0.05, 1.0)] * 3)
+
+
+@settings(max_examples=60)
+@given(st.lists(colours, min_size=3, max_size=6))
+def test_chance_is_what_agrees_with_the_colours_of_other_faces(faces: list[tuple[float, float, float]]) -> None:
+    """Redone one face at a time: colours given to the wrong faces, all round, and never to the right ones."""
+    logs = [np.log(255.0 * np.array(colour) + 4.0) for colour in faces]
+    n = len(logs)
+    shares = []
+    for shift in range(1, n):
+        ratios = [logs[k] - logs[(k - shift) % n] for k in range(n)]
+        counts = []
+        for one in ratios:
+            offs = [one - other for other in ratios]
+            counts.append(sum(abs(off.mean()) <= 0.3 and np.abs(off - off.mean()).max() <= 0.1 for off in offs))
+        shares.append(max(counts) / n)
+    check = predict_color_check([(colour, ()) for colour in faces])
+    assert check.chance == pytest.approx(float(np.mean(shares)), abs=1e-9)
+    assert (check.count, check.agreeing) == (n, 1.0) and check.is_testable == (check.chance <= 0.8)
+
+
+def test_a_room_is_as_free_as_it_is_whatever_was_asked_before() -> None:
+    """Each question has its own answer: locale, clearance, shape, and where things are taken to stand."""
+    world = load_world(WORLDS / "research_center.toml")
+    locale, thing = next((name, t) for name in world.locales for t in world.things_of(name) if t.is_obstacle)
+    moved = tuple((float(x) + 0.3, float(y) + 0.2) for x, y in thing.footprint_world)
+    asked = [(clearance_m, is_round, instead) for clearance_m in (0.3, 0.4) for is_round in (False, True)
+             for instead in ({}, {thing.name: moved})]
+    for clearance_m, is_round, instead in (*asked, *reversed(asked)):
+        found = find_free_space(world, locale, clearance_m, is_round=is_round, instead=instead)
+        plain = compute_free_space(world.outline(locale), list_obstacles(world, locale, instead), clearance_m,
+                                   is_round=is_round)
+        assert found.equals(plain)
+
+
+@pytest.mark.parametrize("pose", [Pose2(2.0, 1.5, 0.3), Pose2(4.0, 1.0, -1.2), Pose2(5.0, 2.4, 2.5),
+                                  Pose2(6.0, 3.0, -3.0)])
+def test_what_is_expected_to_be_seen(pose: Pose2) -> None:
+    """Where lines end at others is found by samples along them, so a few ends lie some pixels off."""
+    pictures = []
+    for here in (pose, mirrored(pose)):
+        bench = Bench(ROBOT)
+        bench.believe(here)
+        milestone = bench.await_milestone(look_heading_rad=to_world(here).heading_rad)
+        expected = effect_on(bench.ask(ViewPredictor(), milestone), Milestone).value.expected_px
+        pictures.append(np.array(expected).reshape(-1, 2, 2))
+    one, other = pictures
+    flipped = np.stack([2.0 * ROBOT.camera.cx - other[..., 0], other[..., 1]], axis=-1)
+    apart = np.array([min(min(np.abs(line - f).max(), np.abs(line[::-1] - f).max()) for f in flipped) for line in one])
+    assert abs(len(one) - len(other)) <= 1 and np.median(apart) < 0.2 and apart.max() < 4.0
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_lines_of_a_flipped_picture(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rows, columns = np.mgrid[0:200, 0:200]
+    slant = rng.uniform(-0.3, 0.3)
+    image = np.where(columns > 90 + slant * (rows - 100), 180, 60).astype(np.uint8)
+    image[rows > 150] = 120
+    pictures = [find_lines(picture, min_length_px=20.0, settings=DEFAULT.features).segments_px
+                for picture in (image, np.ascontiguousarray(image[:, ::-1]))]
+    one, other = pictures
+    flipped = np.stack([199.0 - other[..., 0], other[..., 1]], axis=-1)
+    assert len(one) == len(other) > 0
+    for line in one:
+        assert min(min(np.abs(line - f).max(), np.abs(line[::-1] - f).max()) for f in flipped) < 2.0
