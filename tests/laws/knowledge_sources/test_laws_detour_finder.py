@@ -45,14 +45,6 @@ def test_so_many_times_in_a_row_all_sketches_end_and_then_it_sees_no_way_on(halt
         assert {r.id for r in effect.because} == {leg.id, "Hypothesis-1"}
 
 
-def test_where_no_way_leads_to_the_goal_it_says_so_the_first_time() -> None:
-    bench, leg = halt()
-    goal = bench.view["Goal-1"]
-    bench.revise(goal, destination=Place(HALL, 6.0, 0.05))  # at the wall
-    effects = bench.ask(SOURCE, leg)
-    assert not made(effects, PlanSketch) and effect_on(effects, Impasse).value.goal == goal.id
-
-
 @pytest.mark.parametrize("stale", ["index", "sketch ended", "first level ended", "goal", "belief"])
 def test_a_leg_of_a_plan_that_is_over_halts_nothing(stale: str) -> None:
     bench, leg = halt()
