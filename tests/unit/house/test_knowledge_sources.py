@@ -35,16 +35,8 @@ FROM_OUTSIDE = set(load_kinds().of_role(Role.OBSERVATION))
 """What no knowledge source writes, but the user, the body and the clock of the mission."""
 LAWS = Path(__file__).parents[2] / "laws" / "knowledge_sources"
 WITHOUT_LAWS = {
-    "detour_finder",
-    "goal_sketcher",
-    "line_finder",
     "localizer",
-    "lookout_planner",
-    "matcher",
     "med_r_and_t",
-    "obstruction_finder",
-    "panorama_builder",
-    "refiner",
     "shut_door_explainer",
 }
 """Sources that have no laws of their own yet. May only shrink."""
