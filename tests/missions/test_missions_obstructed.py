@@ -33,7 +33,7 @@ def test_it_finds_what_is_before_its_camera_and_looks_past_it() -> None:
                 behind.append(known[-1].hidden_part(value.expected_px))
 
     stage = build_stage(parse_scenario(HALLWAY + HIDDEN, "behind-something"))
-    result = run_mission(stage, 1, sinks=[watch])
+    result = run_mission(stage, 0, sinks=[watch])
     assert result.outcome == "reached" and result.final_error_m < 0.0254
     assert result.collisions == 0 and result.milestones["false_accepts"] == 0
     assert found_by[0] == "obstruction_finder" and result.relocalizations == 0
