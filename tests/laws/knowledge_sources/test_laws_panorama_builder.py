@@ -46,6 +46,7 @@ def drive(bench: Bench, way: list[tuple[float, float]]) -> None:
 def test_a_look_is_where_the_robot_was_as_seen_from_where_it_is(way: list[tuple[float, float]]) -> None:
     bench = Bench(plain_robot())
     bench.believe()
+    drive(bench, [(0.3, 0.2)])  # before it looked: no part of it
     doubt = bench.doubt()
     first = looked(bench)
     effect = effect_on(bench.ask(SOURCE, first), Panorama)
@@ -64,7 +65,7 @@ def test_a_look_is_where_the_robot_was_as_seen_from_where_it_is(way: list[tuple[
     assert (then.x_m, then.y_m) == pytest.approx((-c * x - s * y, s * x - c * y), abs=1e-9)
     assert math.remainder(then.heading_rad + heading, math.tau) == pytest.approx(0.0, abs=1e-9)
     assert np.all(np.diag(old.covariance) >= 0.0) and old.covariance[2][2] > 0.0
-    reports = {f"MotionReport-{k + 1}" for k in range(len(way))}
+    reports = {f"MotionReport-{k + 2}" for k in range(len(way))}
     assert reasons(effect) == {"Segments-2", doubt.id, "Panorama-1", *reports}
 
 
