@@ -87,7 +87,7 @@ class MedRAndT(RobotKnowledgeSource):
                 () if learnt is None or not moves else to_tuples(learnt.covariance),
                 0.0 if learnt is None or not moves else learnt.prior_chi2,
             ),
-            (match, belief),
+            (match, milestone, belief),
         )
 
     def _learn(

@@ -56,7 +56,7 @@ def test_each_line_is_matched_to_its_own_and_all_tell_the_pose(off: Pose2, is_mi
     here, there = solved.value.world_from_robot, to_world(truth)
     assert math.hypot(here.x_m - there.x_m, here.y_m - there.y_m) < 0.02
     assert abs(math.remainder(here.heading_rad - there.heading_rad, math.tau)) < 0.005
-    assert solved.value.match == entry.id and reasons(solved) == {entry.id, "Hypothesis-1"}
+    assert solved.value.match == entry.id and reasons(solved) == {entry.id, milestone.id, "Hypothesis-1"}
     assert len(solved.value.inliers) == len(solved.value.rejected) == len(match.pairs)
     assert np.all(np.linalg.eigvalsh(solved.value.covariance) > 0.0)
 
@@ -79,18 +79,6 @@ def test_only_a_milestone_whose_picture_is_taken_is_matched(status: MilestoneSta
     milestone = bench.await_milestone(status=status)
     segments = bench.put(Segments("CameraPicture-1", milestone.id, np.ones((3, 2, 2)), np.ones(3), 40.0))
     assert (bench.ask(MATCHER, segments) is not None) == (status == "expected" and has_belief)
-
-
-@pytest.mark.parametrize("lacks", ["belief", "milestone"])
-def test_without_a_belief_or_a_milestone_no_pose_is_solved_for(lacks: str) -> None:
-    bench, segments, milestone = look(BELIEF, BELIEF)
-    entry = bench.apply(effect_on(bench.ask(MATCHER, segments), LineMatch))[0].entry
-    assert SOLVER.find_case(bench.view, Posted(entry)) is not None
-    if lacks == "belief":
-        bench.revise(bench.view["Hypothesis-1"], status="doubted")
-    else:
-        bench.retract(milestone)
-    assert bench.ask(SOLVER, entry) is None
 
 
 def test_what_they_watch() -> None:

@@ -1,4 +1,4 @@
-"""Laws of panorama builder and localizer: looks are carried along by the motions between them, and so are places."""
+"""Laws of the panorama builder: looks are carried along by the motions between them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,9 @@ from hypothesis import strategies as st
 
 from blackboard.change import Posted
 from blackboard.entry import Entry
-from generated_boards import HALL, Bench, effect_on, plain_robot, poses, reasons, to_world, wakes
-from knowledge_sources.goal.localizer import Localizer, _follow
+from generated_boards import Bench, effect_on, plain_robot, reasons, wakes
 from knowledge_sources.goal.panorama_builder import PanoramaBuilder
-from knowledge_sources.questions import find_building
 from world_models.actuator import ActuatorModel
-from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.percepts import Panorama, Segments
 from world_models.frames import Pose2
 
@@ -97,39 +94,3 @@ def test_only_pictures_of_no_milestone_are_of_a_panorama() -> None:
     bench = Bench()
     assert wakes(SOURCE, Posted(looked(bench)))
     assert not wakes(SOURCE, Posted(looked(bench, milestone="Milestone-1")))
-
-
-@settings(max_examples=40, deadline=None)
-@given(st.lists(poses, min_size=1, max_size=3), motions, motions)
-def test_candidates_go_with_the_robot_from_when_they_were_found(
-    found: list[Pose2], before: list[tuple[float, float]], way: list[tuple[float, float]]
-) -> None:
-    bench = Bench(plain_robot())
-    bench.believe()
-    drive(bench, before)
-    candidates = tuple(bench.put(Hypothesis(HALL, pose, diagonal(0.1, 0.1), "relocalization", status="candidate"))
-                       for pose in found)
-    drive(bench, way)
-    followed = _follow(bench.view, candidates, find_building(bench.view))
-    assert len(followed) == len(found)
-    for pose, (locale, there) in zip(found, followed, strict=True):
-        wanted = to_world(pose)
-        x, y, heading = wanted.x_m, wanted.y_m, wanted.heading_rad
-        for motion in way:
-            x, y, heading = go(x, y, heading, ActuatorModel().predict_motion(*motion))
-        assert locale == HALL and (there.x_m, there.y_m) == pytest.approx((x, y), abs=1e-9)
-        assert math.remainder(there.heading_rad - heading, math.tau) == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize("lacks", ["nothing", "doubt", "belief", "rest"])
-def test_places_are_searched_only_when_lost_and_standing(lacks: str) -> None:
-    bench = Bench(plain_robot())
-    if lacks != "belief":
-        bench.believe()
-    if lacks != "doubt":
-        bench.doubt()
-    panorama = bench.put(Panorama(()))
-    if lacks == "rest":
-        bench.move()
-    assert (Localizer().find_case(bench.view, Posted(panorama)) is not None) == (lacks == "nothing")
-    assert wakes(Localizer(), Posted(panorama))

@@ -35,8 +35,6 @@ FROM_OUTSIDE = set(load_kinds().of_role(Role.OBSERVATION))
 """What no knowledge source writes, but the user, the body and the clock of the mission."""
 LAWS = Path(__file__).parents[2] / "laws" / "knowledge_sources"
 WITHOUT_LAWS = {
-    "localizer",
-    "med_r_and_t",
     "shut_door_explainer",
 }
 """Sources that have no laws of their own yet. May only shrink."""

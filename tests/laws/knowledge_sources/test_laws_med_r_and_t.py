@@ -1,0 +1,117 @@
+"""Laws of Med-R-and-T: lines tell from where they were seen, outliers are named, and it says how sure it is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blackboard.change import Posted
+from blackboard.entry import Entry
+from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
+from knowledge_sources.plan.med_r_and_t import MedRAndT
+from knowledge_sources.plan.view_predictor import ViewPredictor
+from world_models.entries.location import diagonal
+from world_models.entries.percepts import LineMatch, PoseFix
+from world_models.entries.task import Milestone
+from world_models.frames import Pose2
+
+SOURCE, ROBOT, BELIEF = MedRAndT(), plain_robot(), Pose2(2.0, 1.6, 0.15)
+SIGMA_M, SIGMA_RAD = 0.05, 0.02
+MAX_CHI2 = 21.1
+"""Of three unknowns: 99.99 % are below."""
+offs = st.builds(Pose2, st.floats(-0.06, 0.06), st.floats(-0.06, 0.06), st.floats(-0.02, 0.02))
+
+
+def match_lines(
+    belief: Pose2, truth: Pose2, *, noise_px: float = 0.0, wrong: int = 0, seed: int = 0
+) -> tuple[Bench, Entry[LineMatch], Entry[Milestone]]:
+    """A board on which each expected line is matched to where it is truly seen; the first few wrongly."""
+    bench, rng = Bench(ROBOT), np.random.default_rng(seed)
+    bench.believe(belief, diagonal(SIGMA_M, SIGMA_RAD))
+    milestone = bench.await_milestone(look_heading_rad=to_world(belief).heading_rad)
+    expected = bench.apply(effect_on(bench.ask(ViewPredictor(), milestone), Milestone))[0].entry
+    lines = np.array(expected.value.expected)
+    seen = ROBOT.camera.project_segments(lines, ROBOT.camera_from_world(to_world(truth)))[0]
+    seen = seen + rng.normal(0.0, noise_px, seen.shape)
+    seen[:wrong] += (25.0, -18.0)
+    pairs = np.column_stack([np.arange(len(lines))] * 2)
+    return bench, bench.put(LineMatch(expected.id, "Segments-1", pairs, lines, seen, 0.0, np.ones(len(lines))),
+                            expected), expected
+
+
+def solve(bench: Bench, match: Entry[LineMatch]) -> PoseFix:
+    found: PoseFix = effect_on(bench.ask(SOURCE, match), PoseFix).value
+    return found
+
+
+def off_by(fix: PoseFix, truth: Pose2) -> np.ndarray:
+    there = to_world(truth)
+    turn = math.remainder(fix.world_from_robot.heading_rad - there.heading_rad, math.tau)
+    return np.array([fix.world_from_robot.x_m - there.x_m, fix.world_from_robot.y_m - there.y_m, turn])
+
+
+def measure_chi2(fix: PoseFix, truth: Pose2) -> float:
+    """The squared error over the stated covariance: the belief and the camera are not known better than that."""
+    error = off_by(fix, truth)
+    return float(error @ np.linalg.solve(fix.covariance, error))
+
+
+@settings(max_examples=12, deadline=None)
+@given(offs)
+def test_lines_tell_the_pose_from_which_they_were_seen(off: Pose2) -> None:
+    bench, match, _ = match_lines(BELIEF, BELIEF @ off)
+    fix = solve(bench, match)
+    assert measure_chi2(fix, BELIEF @ off) < MAX_CHI2
+    assert np.all(np.abs(off_by(fix, BELIEF @ off)) < (0.04, 0.04, 0.004))
+    assert fix.match == match.id and np.all(fix.inliers) and not any(fix.rejected)
+
+
+@settings(max_examples=8, deadline=None)
+@given(offs)
+def test_what_is_seen_in_a_mirror_is_solved_as_in_a_mirror(off: Pose2) -> None:
+    truth = BELIEF @ off
+    plain, other = (solve(*match_lines(belief, there)[:2]) for belief, there in (
+        (BELIEF, truth), (mirrored(BELIEF), mirrored(truth))))
+    one, two = off_by(plain, truth), off_by(other, mirrored(truth))
+    assert np.hypot(*one[:2]) == pytest.approx(np.hypot(*two[:2]), abs=2e-3)
+    assert one[2] == pytest.approx(-two[2], abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_pairs_that_are_wrong_are_named_and_do_not_count(seed: int) -> None:
+    truth = BELIEF @ Pose2(0.03, -0.02, 0.01)
+    bench, match, _ = match_lines(BELIEF, truth, noise_px=0.3, wrong=5, seed=seed)
+    fix = solve(bench, match)
+    assert not np.any(fix.inliers[:5]) and all(fix.rejected[:5])
+    assert np.mean(fix.inliers[5:]) > 0.85
+    assert measure_chi2(fix, truth) < MAX_CHI2
+
+
+def test_it_is_no_surer_than_it_may_be() -> None:
+    """Squared errors over the stated covariance, of 30 noisy pictures: three unknowns, 3 in the mean and no 25."""
+    chi2 = []
+    for seed in range(30):
+        rng = np.random.default_rng(1000 + seed)
+        truth = BELIEF @ Pose2(*rng.normal(0.0, (0.02, 0.02, 0.006)))
+        bench, match, _ = match_lines(BELIEF, truth, noise_px=0.6, seed=seed)
+        fix = solve(bench, match)
+        chi2.append(measure_chi2(fix, truth))
+    assert np.mean(chi2) < 6.0 and max(chi2) < MAX_CHI2
+
+
+@pytest.mark.parametrize("lacks", ["nothing", "belief", "milestone"])
+def test_without_a_belief_or_a_milestone_no_pose_is_solved_for(lacks: str) -> None:
+    bench, match, milestone = match_lines(BELIEF, BELIEF)
+    if lacks == "belief":
+        bench.revise(bench.view["Hypothesis-1"], status="doubted")
+    elif lacks == "milestone":
+        bench.retract(milestone)
+    effects = bench.ask(SOURCE, match)
+    assert (effects is not None) == (lacks == "nothing")
+    if effects is not None:
+        assert reasons(effects[0]) == {match.id, milestone.id, "Hypothesis-1"}
+    assert wakes(SOURCE, Posted(match))
