@@ -15,7 +15,9 @@ from blackboard.effect import Post, Retract
 from blackboard.entry import Entry
 from generated_boards import HALL, Bench, made, plain_robot, poses, reasons, to_world, wakes
 from knowledge_sources.goal.localizer import Localizer, _follow
-from knowledge_sources.methods.localization.next_view import MOVE_CLEARANCE_M
+from knowledge_sources.methods.localization.global_localization import LocalizationResult, LocalizationStatus
+from knowledge_sources.methods.localization.next_view import SensingAction
+from knowledge_sources.methods.localization.place_search import Search
 from knowledge_sources.methods.verification.line_check import predict_lines
 from knowledge_sources.questions import find_building
 from knowledge_sources.settings import DEFAULT
@@ -80,19 +82,24 @@ def test_by_one_look_it_asks_for_another() -> None:
 
 
 @pytest.mark.parametrize("direction", [0.0, 0.6, -0.6, math.pi])
-def test_no_move_leads_to_what_it_has_felt(direction: float) -> None:
-    """And what was felt is named among the reasons."""
-    bench = lose()
+def test_what_it_has_felt_is_part_of_the_search_and_of_the_reasons(direction: float) -> None:
+    """At its rim; that no move leads there is the law of the search (tests/laws/localization/test_laws_touched.py)."""
+    bench, asked = lose(), list[Search]()
     command, _ = bench.move(0.0, 0.0)
-    report = bench.view["MotionReport-1"]
-    bench.revise(bench.view["Hypothesis-1"], motion=report.id)
+    bench.revise(bench.view["Hypothesis-1"], motion="MotionReport-1")
     touch = bench.put(Contact("bumper", direction, 0.2, 1.0), command)
-    effects: Any = bench.ask(SOURCE, look_round(bench, (0.0,)))
+
+    def note(robots: Any, what: Search, _: Any) -> tuple[LocalizationResult, int]:
+        asked.append(what)
+        return LocalizationResult(LocalizationStatus.PROBE, (), SensingAction(1.0, 0.0, 0.0)), len([*robots]) - 1
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("knowledge_sources.goal.localizer.search", note)
+        effects: Any = bench.ask(SOURCE, look_round(bench, (0.0,)))
+    ((felt,),) = [what.touched for what in asked]
+    assert felt == pytest.approx(ROBOT.radius_m * np.array([math.cos(direction), math.sin(direction)]))
     assert isinstance(effects[0], Post) and touch.id in reasons(effects[0])
-    turn, move_m = effects[0].value.probe or (0.0, 0.0)
-    ahead, aside = (ROBOT.radius_m * f(direction - turn) for f in (math.cos, math.sin))
-    is_clear = ahead <= 0.0 or abs(aside) >= ROBOT.radius_m + MOVE_CLEARANCE_M
-    assert move_m == 0.0 or is_clear
+    assert effects[0].value.probe == (1.0, 0.0)
 
 
 def go(x: float, y: float, heading: float, step: Pose2) -> tuple[float, float, float]:
