@@ -14,10 +14,10 @@ from blackboard.change import Posted
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from generated_boards import Bench, effect_on, made, plain_robot, reasons, to_world, wakes
+from generated_boards import HALL, Bench, effect_on, made, plain_robot, reasons, to_world, wakes
 from knowledge_sources.plan.alias_monitor import AliasMonitor
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.location import Twin, TwinOdds
+from world_models.entries.location import PlaceOdds, Twin, TwinOdds
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Certificate, MilestoneVerdict, Outcome
 from world_models.frames import Pose2
@@ -112,6 +112,17 @@ def test_it_weighs_only_what_it_has_seen_where_it_may_be_elsewhere(lacks: str) -
     elif lacks == "place":
         bench.doubt()
     assert (bench.ask(SOURCE, certificate) is not None) == (lacks == "nothing")
+
+
+@pytest.mark.parametrize("refuted", [0, 1, 3])
+def test_a_place_that_was_believed_by_odds_and_refuted_is_believed_less(refuted: int) -> None:
+    """Each time the odds are a fifth; recomputed without the method."""
+    bench = Bench(plain_robot())
+    bench.believe()
+    bench.put(PlaceOdds(HALL, 2, "told", 0.9, 0.99, refuted))
+    found = effect_on(bench.ask(SOURCE, verify(bench)), TwinOdds).value
+    odds = S.p_told / (1.0 - S.p_told) * S.lost_again_odds**refuted
+    assert found.p_prior == pytest.approx(odds / (1.0 + odds))
 
 
 def test_found_again_it_begins_anew() -> None:

@@ -37,6 +37,15 @@ def test_the_sketch_leads_from_the_robot_to_the_goal_step_by_step(pose: Pose2, a
     assert bench.ask(SOURCE, goal) is None
 
 
+@pytest.mark.parametrize("basis", ["command", "odometry", "tracks", "milestone", "relocalization", "ride"])
+def test_where_a_search_has_just_found_it_the_first_milestone_holds(basis: str) -> None:
+    """The same look is not asked for twice; once it has moved, or was corrected otherwise, it is."""
+    bench = Bench(plain_robot())
+    bench.believe(basis=basis)
+    drawn = effect_on(bench.ask(SOURCE, bench.pursue(AIM)), PlanSketch).value
+    assert drawn.verified is (basis == "relocalization")
+
+
 @pytest.mark.parametrize(("status", "halts"), [("halted", 3), ("superseded", 0)])
 def test_halts_are_counted_in_a_row(status: SketchStatus, halts: int) -> None:
     bench = Bench(plain_robot())

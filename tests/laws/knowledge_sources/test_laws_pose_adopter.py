@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -33,7 +34,7 @@ def find(bench: Bench, pose: Pose2, covariance: Covariance, *, as_told: bool = F
 def test_the_belief_is_what_was_found_with_the_motions_it_had(
     pose: Pose2, covariance: Covariance, as_told: bool, locale: str, has_learnt: bool
 ) -> None:
-    bench = Bench(plain_robot())
+    bench, robot = Bench(plain_robot()), plain_robot()
     _, report = bench.move()
     belief, doubt = bench.believe(motion=report.id), bench.doubt()
     told = bench.view["CameraState-1"]
@@ -45,6 +46,12 @@ def test_the_belief_is_what_was_found_with_the_motions_it_had(
     assert change.entry.id == belief.id
     assert change.value == replace(
         place.value, status="held", weight=1.0, motion=report.id, correction=change.value.correction)
+    before, after = (h.world_from_robot(robot.world) for h in (belief.value, place.value))
+    dx, dy = after.x_m - before.x_m, after.y_m - before.y_m  # as seen from where it was believed to be
+    c, s, by = math.cos(before.heading_rad), math.sin(before.heading_rad), change.value.correction
+    assert (by.x_m, by.y_m) == pytest.approx((c * dx + s * dy, c * dy - s * dx), abs=1e-9)
+    turn = after.heading_rad - before.heading_rad - by.heading_rad
+    assert math.remainder(turn, math.tau) == pytest.approx(0.0, abs=1e-9)
     assert reasons(change) == {search.id, place.id, doubt.id, belief.id}
     (gone,) = [e for e in effects or () if isinstance(e, Retract)]
     assert gone.entry.id == place.id and reasons(gone) == {search.id}

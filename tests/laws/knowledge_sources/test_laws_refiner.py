@@ -36,6 +36,14 @@ def test_a_subgoal_becomes_straight_legs_from_the_robot_to_its_end(pose: Pose2) 
         assert bench.ask(SOURCE, sketch) is None
 
 
+@pytest.mark.parametrize("basis", ["command", "odometry", "tracks", "milestone", "relocalization", "ride"])
+def test_where_a_search_has_just_found_it_the_first_milestone_holds(basis: str) -> None:
+    bench = Bench(plain_robot())
+    bench.believe(basis=basis)
+    drawn = effect_on(bench.ask(SOURCE, bench.sketch(*WAY, primitive=False)), PlanSketch).value
+    assert drawn.verified is (basis == "relocalization")
+
+
 @pytest.mark.parametrize("lacks", ["nothing", "belief", "goal", "need", "mission"])
 def test_it_refines_only_what_is_needed(lacks: str) -> None:
     bench = Bench(plain_robot())
