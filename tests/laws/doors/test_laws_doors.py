@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +13,11 @@ from hypothesis import strategies as st
 
 from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_LOG_RATIO, MIN_PICTURES, SHUT_LOG_ODDS, update_door
 from knowledge_sources.methods.doors.leaf import (
+    ALIKE_FOOT,
+    MAX_BARE,
     MAX_DISTANCE_M,
     MAX_LOG_RATIO,
+    MIN_LEAF_SINE,
     LeafEvidence,
     describe,
     find_largest_share,
@@ -196,3 +200,73 @@ def test_an_overexposed_opening_says_nothing(
     robot: RobotModel, doorway: Doorway, buildings: dict[str, SimulatedBuilding], state: str
 ) -> None:
     assert weigh(robot, doorway, buildings[state], before_door(doorway, 2.0, 0.0), gain=9.0) is None
+
+
+LEAF = LeafEvidence(200, 150, 1.0, 0.5, 0.0, 0.0, 1.0, 1.0, 0.0)
+"""All of one color where several and the floor are expected, in its frame, from the front."""
+
+
+@pytest.mark.parametrize(("changed", "tells"), [
+    ({}, True), ({"sine": MIN_LEAF_SINE}, True), ({"sine": MIN_LEAF_SINE - 1e-6}, False),
+    ({"expected_uniform": 1.0, "expected_foot": ALIKE_FOOT}, True),
+    ({"expected_uniform": MAX_BARE + 1e-6, "expected_foot": ALIKE_FOOT - 1e-6}, False),
+    ({"expected_uniform": MAX_BARE + 1e-6, "expected_foot": math.nan}, False),
+    ({"expected_uniform": MAX_BARE, "expected_foot": math.nan}, True)])
+def test_nothing_speaks_for_a_leaf_where_an_open_door_would_show_the_same(
+    changed: dict[str, float], tells: bool
+) -> None:
+    """Aslant, or before one bare wall; for an open door such a picture speaks as ever."""
+    ratio = weigh_leaf(replace(LEAF, **changed))
+    assert (ratio > 0.0) is tells and ratio >= 0.0
+    seen_open = replace(LEAF, uniform=0.5, agreeing=1.0, foot=1.0)
+    assert weigh_leaf(replace(seen_open, **changed)) < 0.0
+
+
+def see(known: DoorState | None, ratio: float, x_m: float, heading_rad: float = 0.0) -> DoorState | None:
+    shown = replace(picture(ratio, x_m), heading_rad=heading_rad)
+    return update_door(known, "d", ("a", "b"), shown, 1.0, is_believed_shut=False) or known
+
+
+@given(st.floats(2.0, 4.5), st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=6))
+def test_however_it_turns_at_one_place_a_door_is_seen_once(ratio: float, turns: list[float]) -> None:
+    first = known = see(None, ratio, 0.0)
+    for turn in turns:
+        known = see(known, ratio, 0.0, turn)
+    assert known == first
+
+
+apart = st.lists(st.tuples(st.floats(2.0, 4.5), st.integers(0, 9)), min_size=1, max_size=4, unique_by=lambda at: at[1])
+
+
+@given(apart, st.randoms(use_true_random=False))
+def test_the_order_of_pictures_that_agree_does_not_matter(
+    looks: list[tuple[float, int]], chance: random.Random
+) -> None:
+    def end(order: list[tuple[float, int]]) -> float:
+        known: DoorState | None = None
+        for ratio, place in order:
+            known = see(known, ratio, 0.7 * place)
+        assert known is not None
+        return known.log_odds
+
+    shuffled = list(looks)
+    chance.shuffle(shuffled)
+    assert end(shuffled) == pytest.approx(end(looks))
+
+
+@given(st.floats(2.0, 4.5), st.floats(-4.5, -2.0))
+def test_a_picture_that_contradicts_what_was_seen_from_there_takes_its_place(shut: float, opened: float) -> None:
+    known = see(see(None, shut, 0.0), opened, 0.1)
+    alone = see(None, opened, 0.1)
+    assert known is not None and alone is not None
+    assert (known.log_odds, known.pictures) == (alone.log_odds, alone.pictures)
+
+
+@given(st.floats(0.0, 0.6), st.floats(2.0, 4.5))
+def test_of_two_pictures_the_second_adds_what_is_new(way_m: float, ratio: float) -> None:
+    """Half-way to an independent place it is kept beside the first; nearer it is the same view."""
+    known = see(see(None, ratio, 0.0), ratio, way_m)
+    assert known is not None
+    part = way_m / 0.6
+    if abs(part - 0.5) > 1e-6:
+        assert known.log_odds == pytest.approx(-4.0 + ratio * (1.0 + (part if part >= 0.5 else 0.0)), abs=1e-6)
