@@ -34,10 +34,6 @@ TREES = {stem: ast.parse(path.read_text(encoding="utf-8")) for stem, path in FIL
 FROM_OUTSIDE = set(load_kinds().of_role(Role.OBSERVATION))
 """What no knowledge source writes, but the user, the body and the clock of the mission."""
 LAWS = Path(__file__).parents[2] / "laws" / "knowledge_sources"
-WITHOUT_LAWS = {
-    "shut_door_explainer",
-}
-"""Sources that have no laws of their own yet. May only shrink."""
 
 
 def sources_in(stem: str) -> list[type[KnowledgeSource]]:
@@ -63,9 +59,7 @@ def test_it_stands_in_the_folder_of_its_level() -> None:
 def test_each_has_its_laws() -> None:
     """In a file of its own: when it acts and when not, what it writes, and what it names as its reasons."""
     without = {stem for stem in KNOWLEDGE_SOURCES if not (LAWS / f"test_laws_{stem}.py").exists()}
-    assert without - WITHOUT_LAWS == set()
-    assert not {stem for stem in WITHOUT_LAWS if (LAWS / f"test_laws_{stem}.py").exists()}, "take it off the list"
-    assert set(KNOWLEDGE_SOURCES) >= WITHOUT_LAWS
+    assert without == set()
 
 
 def test_every_knowledge_source_is_wired() -> None:

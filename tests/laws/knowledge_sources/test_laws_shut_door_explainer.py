@@ -1,0 +1,140 @@
+"""Laws of the shut door explainer: a shut door explains a picture that refutes the place; an open one is never so."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+from blackboard.change import Revised
+from blackboard.entry import Entry
+from blackboard.level import Level
+from generated_boards import Bench, effect_on, made, reasons, wakes
+from knowledge_sources.plan.line_finder import LineFinder
+from knowledge_sources.plan.shut_door_explainer import (
+    MAX_DOUBTED_SIGMA_M,
+    MAX_DOUBTED_SIGMA_RAD,
+    REFUTED_LOG_RATIO,
+    ShutDoorExplainer,
+)
+from sim.body.simulated_building import SimulatedBuilding
+from sim.ground_truth.table import TrueDoor
+from sim.ground_truth.true_changes import build_leaf
+from sim.render.sensor import SensorParameters, compress_jpeg, expose
+from sim.scenario import CameraSettings
+from world_models.actuator import ActuatorModel
+from world_models.building.locales import Doorway
+from world_models.entries.body import CameraPicture
+from world_models.entries.door_state import DoorState
+from world_models.entries.location import diagonal
+from world_models.entries.percepts import Segments
+from world_models.entries.task import Milestone
+from world_models.files.world_files import WORLDS, load_world
+from world_models.frames import Pose2, flattened
+from world_models.robot import RobotModel
+
+SOURCE, HALL, DOOR = ShutDoorExplainer(), "north-hall", "archive-north-door"
+WORLD = load_world(WORLDS / "two_ways.toml")
+SETTINGS = CameraSettings()
+ROBOT = RobotModel(WORLD, SETTINGS.camera, SETTINGS.mount, ActuatorModel())
+PRIOR = 4.0
+"""Log odds that a door is as the file says, before anything is seen."""
+
+
+@cache
+def doorway() -> Doorway:
+    return next(door for door in WORLD.doorways if door.name == DOOR)
+
+
+@cache
+def building(is_shut: bool) -> SimulatedBuilding:
+    leaf = build_leaf(TrueDoor(name=DOOR), doorway(), WORLD.floor_m(HALL)) if is_shut else []
+    return SimulatedBuilding.of_faces([*WORLD.faces, *leaf])
+
+
+def before_door(away_m: float, aside_m: float) -> Pose2:
+    """A pose in the world that faces the door."""
+    middle = doorway().pose_from(HALL)
+    at = middle @ Pose2(-away_m, aside_m, 0.0)
+    return Pose2(at.x_m, at.y_m, math.atan2(middle.y_m - at.y_m, middle.x_m - at.x_m))
+
+
+@cache
+def photograph(pose: Pose2, is_shut: bool) -> bytes:
+    radiance = building(is_shut).renderer.radiance(ROBOT.lens, ROBOT.camera_from_world(pose))
+    sensor = SensorParameters()
+    return compress_jpeg(expose(radiance, sensor, np.random.default_rng(1)), sensor.jpeg_quality)
+
+
+def refute(
+    pose: Pose2, *, is_shut: bool, sigma_m: float = 0.02, sigma_rad: float = 0.01, off: Pose2 | None = None
+) -> tuple[Bench, Entry[Milestone]]:
+    """A board on which a milestone was refuted by a picture from a pose, which is not as far ``off`` the belief."""
+    bench = Bench(ROBOT)
+    own = flattened(WORLD.world_from_locale(HALL)).inverse() @ (pose @ (off or Pose2(0.0, 0.0, 0.0)))
+    bench.believe(own, diagonal(sigma_m, sigma_rad), locale=HALL)
+    milestone = bench.await_milestone(status="expected", look_heading_rad=pose.heading_rad)
+    frame = bench.put(CameraPicture(photograph(pose, is_shut), 1, 3.0, "milestone"))
+    bench.apply(effect_on(bench.ask(LineFinder(), frame), Segments))
+    bench.doubt(Level.PLAN, math.inf)
+    return bench, bench.revise(milestone, status="refuted")
+
+
+@pytest.mark.parametrize(("away_m", "aside_m"), [(2.0, 0.2), (3.0, -0.3), (4.0, 0.1)])
+def test_a_shut_door_is_named_and_the_place_is_not_doubted(away_m: float, aside_m: float) -> None:
+    bench, milestone = refute(before_door(away_m, aside_m), is_shut=True)
+    effects = bench.ask(SOURCE, milestone)
+    state = effect_on(effects, DoorState)
+    assert (state.value.door, state.value.state, state.value.pictures) == (DOOR, "shut", 1)
+    odds = min(state.value.last.log_ratio - PRIOR + REFUTED_LOG_RATIO, 7.0)
+    assert state.value.log_odds == pytest.approx(odds)
+    assert state.value.certainty == pytest.approx(1.0 / (1.0 + math.exp(-odds)))
+    assert reasons(state) == {"CameraPicture-1", milestone.id, "Hypothesis-1", "Segments-1"}
+    assert [d.status for d in made(effects, type(bench.view["Discrepancy-1"].value))] == ["corrected"]
+
+
+@pytest.mark.parametrize(("away_m", "aside_m"), [(1.2, 0.7), (2.0, 0.2), (3.0, -0.3), (4.0, 0.1), (2.5, 0.8)])
+def test_an_open_door_is_never_called_shut(away_m: float, aside_m: float) -> None:
+    bench, milestone = refute(before_door(away_m, aside_m), is_shut=False)
+    assert made(bench.ask(SOURCE, milestone), DoorState) == []
+
+
+def test_nor_is_one_that_is_not_where_the_robot_believes_it() -> None:
+    """The picture fits with the door shut, but from another place: then it is the belief that is wrong."""
+    bench, milestone = refute(before_door(3.0, 0.0), is_shut=True, off=Pose2(0.0, 0.6, 0.0))
+    assert made(bench.ask(SOURCE, milestone), DoorState) == []
+
+
+@pytest.mark.parametrize(("sigma_m", "sigma_rad", "acts"), [
+    (MAX_DOUBTED_SIGMA_M - 1e-6, 0.01, True), (MAX_DOUBTED_SIGMA_M + 1e-6, 0.01, False),
+    (0.02, MAX_DOUBTED_SIGMA_RAD - 1e-6, True), (0.02, MAX_DOUBTED_SIGMA_RAD + 1e-6, False)])
+def test_it_acts_only_where_the_place_is_known_so_well(sigma_m: float, sigma_rad: float, acts: bool) -> None:
+    bench, milestone = refute(before_door(3.0, 0.0), is_shut=True, sigma_m=sigma_m, sigma_rad=sigma_rad)
+    assert (SOURCE.find_case(bench.view, Revised(milestone)) is not None) is acts
+
+
+@pytest.mark.parametrize("lacks", ["nothing", "belief", "doubt", "measure", "picture", "rest", "place"])
+def test_it_acts_only_on_a_picture_that_refutes_a_place_it_believes(lacks: str) -> None:
+    bench, milestone = refute(before_door(3.0, 0.0), is_shut=True)
+    if lacks == "belief":
+        bench.revise(bench.view["Hypothesis-1"], status="doubted")
+    elif lacks == "doubt":
+        bench.revise(bench.view["Discrepancy-1"], status="corrected")
+    elif lacks == "measure":
+        bench.revise(bench.view["Discrepancy-1"], magnitude=None)
+    elif lacks == "picture":
+        bench.retract(bench.view["CameraPicture-1"])
+    elif lacks == "rest":
+        bench.move()
+    elif lacks == "place":
+        bench.doubt()
+    assert (SOURCE.find_case(bench.view, Revised(milestone)) is not None) is (lacks == "nothing")
+
+
+@pytest.mark.parametrize("status", ["turning", "expected", "verified", "refuted", "not testable", "withdrawn"])
+def test_what_it_watches(status: str) -> None:
+    bench = Bench()
+    milestone = bench.revise(bench.await_milestone(), status=status)
+    assert wakes(SOURCE, Revised(milestone)) is (status in ("refuted", "not testable"))
