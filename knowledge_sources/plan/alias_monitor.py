@@ -60,7 +60,7 @@ class AliasMonitor(RobotKnowledgeSource):
         belief, fix = find_belief(view), view.get(trigger.entry.value.fix)
         if is_over(view) or open_discrepancy(view, Level.GOAL) is not None or belief is None or fix is None:
             return None
-        known, match = _find_odds(view), view.get(fix.value.match)
+        known, match = view.latest(TwinOdds), view.get(fix.value.match)
         looked = None if match is None else view.get(match.value.segments)
         is_new = known is None or (known.value.twins and self._is_new(known.value, fix.value))
         return Case(trigger.entry, fix, looked, belief, known) if is_new and looked is not None else None
@@ -122,10 +122,3 @@ class AliasMonitor(RobotKnowledgeSource):
                 ratio = math.copysign(max(0.0, abs(ratio) - self._settings.localization.alike_log_noise), ratio)
             weighed.append(replace(twin, log_ratio=twin.log_ratio + ratio))
         return tuple(weighed)
-
-
-def _find_odds(view: View) -> Entry[TwinOdds] | None:
-    """The odds since the robot was found last; None where nothing is counted since."""
-    known = view.latest(TwinOdds)
-    found = view.latest(Discrepancy, lambda d: d.level is Level.GOAL)
-    return None if known is None or (found is not None and found.cycle > known.cycle) else known

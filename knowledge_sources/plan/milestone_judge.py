@@ -92,7 +92,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         weighed = self.weigh(view, case)
         verdict = self._hold_against_others(view, case, weighed, judge_place(weighed, self._settings))
         names = milestone.id, case.fix.id
-        certificate = Post(certify(names, weighed, verdict, case.fix.value, case.match.value), (case.fix, milestone))
+        certificate = Post(certify(names, weighed, verdict, case.fix.value), (case.fix, milestone))
         yield certificate
         yield Revise(milestone, replace(milestone.value, status=verdict.kind), (certificate,))
         if verdict.kind == "not testable" and not is_last_look(milestone.value, self._settings.plan):

@@ -298,7 +298,8 @@ class Certificate:
         fix: id of the pose fix that it rests on, or "".
         verdict: verified, refuted or not testable.
         reason: in words.
-        expected, matched, inliers: numbers of model lines.
+        expected, matched: numbers of model lines that should be in view at the pose, and of those that are found there.
+        inliers: of the pairs of line and segment by which the pose was solved for.
         coverage: part of the expected line length that was found, 0..1.
         residual_px: RMS distance of the inliers.
         deviation_m, deviation_rad, deviation_px: from the belief that predicted it.
@@ -326,7 +327,7 @@ class Certificate:
 
     def sentence(self) -> str:
         agree = (f"{words.count(self.inliers, 'segment')} agree to {words.quantity(self.residual_px, 'px')} with"
-                 f" {self.matched} of the {words.count(self.expected, 'line')} that were expected from the belief")
+                 f" {self.matched} of the {words.count(self.expected, 'line')} that should be in view")
         shift = (f"{words.quantity(self.deviation_px, 'px')} of the {words.quantity(self.tolerance_px, 'px')} that may"
                  " be corrected")
         return (f"{self.verdict}: {self.reason}; {self.milestone}; {agree}; {words.metres(self.deviation_m)} and"

@@ -19,7 +19,7 @@ from knowledge_sources.methods.verification.pose_confidence import (
     compute_motion_tolerance_px,
 )
 from knowledge_sources.settings import PlanSettings, Settings
-from world_models.entries.percepts import LineMatch, PoseFix, Segments
+from world_models.entries.percepts import PoseFix, Segments
 from world_models.entries.task import Certificate, Milestone, MilestoneVerdict
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
@@ -67,7 +67,8 @@ class Weighed:
         lines: how they agree with the segments; faces: how the faces' colours agree.
         p_false: probability that the pose is wrong, by lines and colours.
         p_wrong: the same with what was believed before, and with the looks in other directions.
-        is_enough: whether that is little enough to accept the pose; where no other look is left, to believe it.
+        most_p_wrong: how much of that is accepted; where no other look is left, as much as is believed.
+        is_enough: whether it is.
         shift_px: median distance of the lines from where they were expected.
         tolerance_px: the largest that may be.
         is_inexact: whether the model's lines may be displaced.
@@ -87,6 +88,7 @@ class Weighed:
     faces: ColorCheck
     p_false: float
     p_wrong: float
+    most_p_wrong: float
     is_enough: bool
     shift_px: float
     tolerance_px: float
@@ -126,7 +128,7 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed
     p_wrong = update(s.plan.p_wrong_in_doubt if before.in_doubt else p_wrong, _sum_told(milestone))
     p_after = update(p_wrong, to_log_odds(p_false))
-    is_believed = is_last_look(milestone, s.plan) and p_after <= 1.0 - s.localization.min_p_believed
+    most = 1.0 - s.localization.min_p_believed if is_last_look(milestone, s.plan) else POSE_CONFIDENCE.accept
     return Weighed(
         robot=robot,
         segments=seen.segments,
@@ -138,7 +140,8 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         faces=faces,
         p_false=p_false,
         p_wrong=p_after,
-        is_enough=is_believed or POSE_CONFIDENCE.accepts(p_false, p_wrong),
+        most_p_wrong=most,
+        is_enough=p_after <= most or POSE_CONFIDENCE.accepts(p_false, p_wrong),
         shift_px=_median_shift(expected_px, plain_px),
         tolerance_px=_find_tolerance_px(before, motion_px, POSE_CONFIDENCE.accepts(p_false), s),
         is_weak=before.in_doubt or not followed,
@@ -181,7 +184,9 @@ def judge_place(w: Weighed, settings: Settings) -> Verdict:
     if w.camera_chi2 > settings.camera_state.max_chi2:
         return Verdict("refuted", f"{where}: only with a camera that is mounted otherwise than it can be", w.p_false)
     if not w.is_enough or a.matched < settings.verification.min_matched_lines:
-        return Verdict("not testable", f"{where}: not enough to tell the place by", w.p_false)
+        asked = f"wrong with {w.p_wrong:.1%}, and at most {w.most_p_wrong:.1%} may be" * (not w.is_enough)
+        few = f"fewer than {settings.verification.min_matched_lines} lines" * w.is_enough
+        return Verdict("not testable", f"{where}: not enough to tell the place by ({asked}{few})", w.p_false)
     if w.shift_px > w.tolerance_px:
         most = f"more than the {w.tolerance_px:.0f} px that the plan may be adjusted by"
         return Verdict("refuted", f"{where}: {most}", w.p_false)
@@ -203,7 +208,7 @@ def compute_coverage_elsewhere(w: Weighed, there: Pose2, settings: Settings) -> 
                        find_errors(w.robot, lines), settings.pose).coverage
 
 
-def certify(names: tuple[str, str], w: Weighed, verdict: Verdict, fix: PoseFix, match: LineMatch) -> Certificate:
+def certify(names: tuple[str, str], w: Weighed, verdict: Verdict, fix: PoseFix) -> Certificate:
     """The certificate of a verdict; ``names``: of the milestone and of the pose fix on the board."""
     residuals = fix.residuals_px[fix.inliers]
     return Certificate(
@@ -211,8 +216,8 @@ def certify(names: tuple[str, str], w: Weighed, verdict: Verdict, fix: PoseFix, 
         fix=names[1],
         verdict=verdict.kind,
         reason=verdict.reason,
-        expected=w.expected,
-        matched=len(np.unique(match.pairs[:, 0])),
+        expected=w.lines.agreement.visible,
+        matched=w.lines.agreement.matched,
         inliers=int(np.count_nonzero(fix.inliers)),
         coverage=w.lines.coverage,
         residual_px=float(np.sqrt(np.mean(residuals**2))) if len(residuals) else math.inf,

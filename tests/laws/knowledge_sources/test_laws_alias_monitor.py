@@ -15,9 +15,10 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from generated_boards import HALL, Bench, effect_on, made, plain_robot, reasons, to_world, wakes
+from knowledge_sources.goal.pose_adopter import PoseAdopter
 from knowledge_sources.plan.alias_monitor import AliasMonitor
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.location import PlaceOdds, Twin, TwinOdds
+from world_models.entries.location import Hypothesis, PlaceOdds, PlaceSearch, Twin, TwinOdds, diagonal
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Certificate, MilestoneVerdict, Outcome
 from world_models.frames import Pose2
@@ -129,7 +130,11 @@ def test_found_again_it_begins_anew() -> None:
     bench = Bench(plain_robot())
     bench.believe()
     old = bench.put(known([0.0], 0.123, Pose2(HERE.x_m - 3.0, HERE.y_m, 0.0)))
-    bench.revise(bench.doubt(), status="corrected")
+    bench.put(Hypothesis(HALL, Pose2(3.0, 1.0, 0.5), diagonal(0.02, 0.01), "relocalization", status="candidate"))
+    doubt = bench.doubt()
+    bench.apply(*bench.ask(PoseAdopter(), bench.put(PlaceSearch("found", "one place"))) or ())
+    assert bench.view.get(old.id) is None
+    bench.revise(doubt, status="corrected")
     effect = effect_on(bench.ask(SOURCE, verify(bench)), TwinOdds)
     assert effect.value.p_prior != old.value.p_prior and old.id not in reasons(effect)
 

@@ -51,7 +51,7 @@ def weigh(**changed: Any) -> Any:
         "segments": Segments("CameraPicture-1", "Milestone-1", NO_LINES, np.zeros(0), contrast), "expected": 20,
         "lines": SimpleNamespace(agreement=agreement, coverage=0.9), "faces": changed.pop("faces", NO_FACES),
         "p_false": 0.5 * POSE_CONFIDENCE.accept, "p_wrong": 0.1 * POSE_CONFIDENCE.accept,
-        "is_enough": True, "shift_px": 3.0, "tolerance_px": 10.0,
+        "most_p_wrong": POSE_CONFIDENCE.accept, "is_enough": True, "shift_px": 3.0, "tolerance_px": 10.0,
         "is_weak": False, "is_inexact": False, "camera_chi2": 0.0, "is_camera_known": True,
     }
     return SimpleNamespace(**(plain | changed))

@@ -128,6 +128,7 @@ SHARED: dict[str, tuple[int, str]] = {
     "PictureRequest": (3, "who needs a picture asks for it"),
     "PlanSketch": (8, "a chain: drawn, refined, advanced, led round, withdrawn"),
     "Tracks": (4, "followed, taken anew, and dropped on another floor or with what is gone"),
+    "TwinOdds": (2, "kept by pictures, ended where a search finds another place"),
     "Travel": (4, "gone on, begun anew by either calibration, broken off"),
 }
 """The kinds that several knowledge sources write: how many at most, and why. It may only shrink."""
