@@ -39,6 +39,9 @@ class BelievedPlace:
 def compute_p_rivals(believed: BelievedPlace, here: Pose2, rivals: Sequence[tuple[Pose2, float]]) -> float:
     """The probability that the robot is at any of the rival places, and not here.
 
+    How far this pose is from the believed one does not speak for a rival: elsewhere it would be off in the same way, as
+    by a camera that is mounted otherwise.
+
     Args:
         believed: with the covariance of the belief and of ``here`` together.
         here: the pose in question, world.
@@ -47,11 +50,9 @@ def compute_p_rivals(believed: BelievedPlace, here: Pose2, rivals: Sequence[tupl
     if not rivals:
         return 0.0
     share = (1.0 - believed.p_there) / (1 + len(rivals))
-    own = _weigh(believed, here, share)
-    others = [_weigh(believed, pose, share) * math.exp(ratio) for pose, ratio in rivals]
-    return math.fsum(others) / (own + math.fsum(others))
-
-
-def _weigh(believed: BelievedPlace, pose: Pose2, share: float) -> float:
-    """How likely a pose is before the look: as far as the belief leaves it open, and if the robot is elsewhere."""
-    return believed.p_there * math.exp(-0.5 * min(believed.compute_chi2(pose), 1400.0)) + share + 1e-300
+    own_chi2, odds = believed.compute_chi2(here), list[float]()
+    for pose, ratio in rivals:
+        farther = max(believed.compute_chi2(pose) - own_chi2, 0.0)
+        odds.append((believed.p_there * math.exp(-0.5 * min(farther, 1400.0)) + share) * math.exp(ratio))
+    against = math.fsum(odds)
+    return against / (believed.p_there + share + against)

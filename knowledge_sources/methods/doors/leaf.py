@@ -214,7 +214,6 @@ MIN_FRAME_SAMPLES = 12  # fewest samples round an opening by which it is told wh
 MIN_FRAME_SHARE = 0.6  # least share of them that has the model's color, up to one gain, where nothing stands before it
 MAX_FRAME_LEAF_SHARE = 0.4  # largest share of them that has the color of the opening, where that is a leaf
 MIN_LEAF_SINE = 0.6  # least sine of the angle at which a leaf is told from an open doorway: 37 degrees
-MAX_BARE = 0.85  # beyond a doorway is one bare surface where the model has more of it in one color
 MAX_LOG_RATIO = 4.5  # most that one picture may add to the log odds of a door: 90 to 1
 
 MAX_COMPARED = 60
@@ -338,19 +337,13 @@ def weigh_leaf(evidence: LeafEvidence) -> float:
     """The log likelihood ratio of a leaf against an open doorway, as much as one picture may say.
 
     A leaf stands in its frame: where what is round the opening is not as the model has it, or has the color of the
-    opening, something may stand before it. And nothing speaks for a leaf where an open doorway would show the same: a
-    bare wall beyond it, or seen aslant little but its jamb.
+    opening, something may stand before it. And nothing speaks for a leaf seen aslant: an open doorway shows little but
+    its jamb and a bare wall from there.
     """
     ratio = float(np.dot(evidence.features, WEIGHTS))
-    if ratio > 0.0 and not (is_framed(evidence) and is_telling(evidence)):
+    if ratio > 0.0 and not (is_framed(evidence) and evidence.sine >= MIN_LEAF_SINE):
         return 0.0
     return min(max(ratio, -MAX_LOG_RATIO), MAX_LOG_RATIO)
-
-
-def is_telling(evidence: LeafEvidence) -> bool:
-    """Whether a leaf would look otherwise than what the model has beyond: from the front, and not one bare surface."""
-    has_floor = not math.isnan(evidence.expected_foot) and evidence.expected_foot >= ALIKE_FOOT
-    return evidence.sine >= MIN_LEAF_SINE and (has_floor or evidence.expected_uniform <= MAX_BARE)
 
 
 def is_framed(evidence: LeafEvidence) -> bool:
