@@ -71,12 +71,12 @@ def is_dark(segments: Segments, settings: GoalSettings) -> bool:
 
 
 def _has_just_ridden(view: View) -> bool:
-    """Whether no milestone has borne out an elevator ride yet: then it may be on any floor."""
+    """Whether no milestone was verified since an elevator ride: then it may be on any floor."""
     return view.latest(PlanSketch, lambda s: s.is_active and s.at > 0 and not s.verified
                        and s.subgoals[s.at - 1].is_ride) is not None
 
 
 FLOOR_KNOWN = Condition("a known floor", lambda view: not _has_just_ridden(view),
-                        "no milestone had borne out the elevator ride yet")
+                        "no milestone was verified since the elevator ride")
 WHILE_LOST: tuple[Condition[Any], ...] = (GOING_ON, HELD, LOST, STANDING, FLOOR_KNOWN)
 """What a lost robot needs to look round: it stands, and knows on which floor."""

@@ -163,6 +163,23 @@ class Bench:
         return command, self.put(MotionReport(turn_rad, move_m, 1.0, 1.0), command)
 
 
+motions = st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(0.0, 0.8)), min_size=1, max_size=3)
+"""Turns [rad], each with the way after it [m]."""
+
+
+def go(x: float, y: float, heading: float, step: Pose2) -> tuple[float, float, float]:
+    """From a pose by a step of the robot's own frame; the plainest composition."""
+    return (x + math.cos(heading) * step.x_m - math.sin(heading) * step.y_m,
+            y + math.sin(heading) * step.x_m + math.cos(heading) * step.y_m, heading + step.heading_rad)
+
+
+def drive(bench: Bench, way: list[tuple[float, float]]) -> None:
+    """Motions that are reported and believed."""
+    for turn_rad, move_m in way:
+        _, report = bench.move(turn_rad, move_m)
+        bench.revise(bench.view["Hypothesis-1"], motion=report.id)
+
+
 def to_world(pose: Pose2, locale: str = HALL) -> Pose2:
     """A pose in a locale's frame as one of the world."""
     return flattened(house().world_from_locale(locale)) @ pose

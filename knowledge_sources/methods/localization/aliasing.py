@@ -79,15 +79,6 @@ class Alias(NamedTuple):
     margin: float
 
 
-def find_strongest_alias(
-    robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, *, search: bool = False,
-    settings: Settings = DEFAULT,
-) -> Alias | None:
-    """Find the other pose of a room that segments (k, 2, 2) speak least against; None if there is no other."""
-    found = list_aliases(robot, segments_px, room, pose, search=search, settings=settings)
-    return min(found, key=lambda alias: alias.margin, default=None)
-
-
 def list_aliases(
     robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, *, search: bool = False,
     settings: Settings = DEFAULT,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from blackboard.change import Posted
 from blackboard.effect import Post, Retract
 from blackboard.entry import Entry
-from generated_boards import HALL, Bench, made, plain_robot, poses, reasons, to_world, wakes
+from generated_boards import HALL, Bench, drive, go, made, motions, plain_robot, poses, reasons, to_world, wakes
 from knowledge_sources.goal.localizer import Localizer, _follow
 from knowledge_sources.methods.localization.global_localization import LocalizationResult, LocalizationStatus
 from knowledge_sources.methods.localization.next_view import SensingAction
@@ -31,7 +31,6 @@ from world_models.frames import Pose2, flattened
 SOURCE, ROOM = Localizer(), "reception"
 ROBOT = plain_robot(load_world(WORLDS / "two_ways.toml"))
 TRUTH = Pose2(3.4, 2.2, 0.4)
-motions = st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(0.0, 0.8)), min_size=1, max_size=3)
 
 
 def in_world(pose: Pose2) -> Pose2:
@@ -100,19 +99,6 @@ def test_what_it_has_felt_is_part_of_the_search_and_of_the_reasons(direction: fl
     assert felt == pytest.approx(ROBOT.radius_m * np.array([math.cos(direction), math.sin(direction)]))
     assert isinstance(effects[0], Post) and touch.id in reasons(effects[0])
     assert effects[0].value.probe == (1.0, 0.0)
-
-
-def go(x: float, y: float, heading: float, step: Pose2) -> tuple[float, float, float]:
-    """From a pose by a step of the robot's own frame; the plainest composition."""
-    return (x + math.cos(heading) * step.x_m - math.sin(heading) * step.y_m,
-            y + math.sin(heading) * step.x_m + math.cos(heading) * step.y_m, heading + step.heading_rad)
-
-
-def drive(bench: Bench, way: list[tuple[float, float]]) -> None:
-    """Motions that are reported and believed."""
-    for turn_rad, move_m in way:
-        _, report = bench.move(turn_rad, move_m)
-        bench.revise(bench.view["Hypothesis-1"], motion=report.id)
 
 
 @settings(max_examples=40, deadline=None)

@@ -7,35 +7,20 @@ import math
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from blackboard.change import Posted
 from blackboard.entry import Entry
-from generated_boards import Bench, effect_on, plain_robot, reasons, wakes
+from generated_boards import Bench, drive, effect_on, go, motions, plain_robot, reasons, wakes
 from knowledge_sources.goal.panorama_builder import PanoramaBuilder
 from world_models.actuator import ActuatorModel
 from world_models.entries.percepts import Panorama, Segments
 from world_models.frames import Pose2
 
 SOURCE = PanoramaBuilder()
-motions = st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(0.0, 0.8)), min_size=1, max_size=3)
 
 
 def looked(bench: Bench, contrast: float = 40.0, brightness: float = 120.0, milestone: str = "") -> Entry[Segments]:
     return bench.put(Segments("CameraPicture-1", milestone, np.zeros((0, 2, 2)), np.zeros(0), contrast, brightness))
-
-
-def go(x: float, y: float, heading: float, step: Pose2) -> tuple[float, float, float]:
-    """From a pose by a step of the robot's own frame; the plainest composition."""
-    return (x + math.cos(heading) * step.x_m - math.sin(heading) * step.y_m,
-            y + math.sin(heading) * step.x_m + math.cos(heading) * step.y_m, heading + step.heading_rad)
-
-
-def drive(bench: Bench, way: list[tuple[float, float]]) -> None:
-    """Motions that are reported and believed."""
-    for turn_rad, move_m in way:
-        _, report = bench.move(turn_rad, move_m)
-        bench.revise(bench.view["Hypothesis-1"], motion=report.id)
 
 
 @settings(max_examples=30, deadline=None)

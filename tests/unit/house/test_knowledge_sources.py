@@ -139,7 +139,7 @@ def test_each_kind_is_written_by_one_knowledge_source_but_for_a_short_list() -> 
     for source in KNOWLEDGE_SOURCES.values():
         for kind in source.writes:
             writers[kind.__name__] = writers.get(kind.__name__, 0) + 1
-    writers.pop(FrameRequest.__name__)  # whoever lacks a frame asks for it
+    writers.pop(FrameRequest.__name__)  # a source that lacks a frame asks for it
     assert {kind: count for kind, count in writers.items() if count > 1} == {
         kind: count for kind, (count, _) in SHARED.items()}
     assert writers[LocaleFrame.__name__] == writers[Outcome.__name__] == 1
