@@ -1,4 +1,4 @@
-"""Which tests run a line: only they can notice a fault in it. Measured once by pytest-cov, with each test's name.
+"""Which tests run a line: only they can notice a fault in it. Measured by pytest-cov, room by room.
 
 What numba compiles is not seen by the measurement, nor what runs in a process of its own, as the reading of IFC: for a
 line of a compiled function, or of a file of which nothing was seen, all tests that run a line of its file, or of a file
@@ -22,14 +22,16 @@ COMPILED = re.compile("jit|compiled")
 PASSED = re.compile(r"^PASSED (\S.*?)\s*$", re.MULTILINE)
 
 
-def measure_coverage(tree: Path, home: Path, python: Path, packages: Sequence[str], tests: Sequence[str]) -> int:
+def measure_coverage(tree: Path, home: Path, python: Path, files: Sequence[str], tests: Sequence[str]) -> int:
     """Run tests in a copy of the project: ``home`` gets ``coverage`` and the durations of the tests that pass.
+
+    ``files``: files and folders of which it is measured which lines run.
 
     Returns how many these are.
     """
     settings = home / "settings.ini"  # not coverage.*: pytest-cov removes such files before it measures
-    sources = "".join(f"\n    {package}" for package in packages)
-    settings.write_text(f"[run]\nrelative_files = true\nsource ={sources}\n")
+    included = "".join(f"\n    {file}" + "/*" * (not file.endswith(".py")) for file in files)
+    settings.write_text(f"[run]\nrelative_files = true\ninclude ={included}\n")
     own = {
         "PYTHONPATH": str(tree),
         "COVERAGE_FILE": str(home / "coverage"),
@@ -77,10 +79,8 @@ class CoveringTests:
         split = [line.partition(" ") for line in (home / "durations.txt").read_text("utf-8").splitlines()]
         self._durations_s = {name: float(seconds) for seconds, _, name in split}
 
-    def choose(
-        self, source: Path, file: str, lines: Iterable[int], users: Iterable[str], room: Sequence[str], limit_s: float
-    ) -> list[str]:
-        """Tests that can notice a fault in these lines, those of the room first, the quickest of them first.
+    def choose(self, source: Path, file: str, lines: Iterable[int], users: Iterable[str], limit_s: float) -> list[str]:
+        """Tests that can notice a fault in these lines: the laws of the file first, then the quickest.
 
         So many that they take ``limit_s`` together. Of a line that is run on import, as a constant, every test of the
         file is asked. Empty where no test runs the line: none can notice.
@@ -98,7 +98,8 @@ class CoveringTests:
             )
         elif not tests and any(line in by_line for line in statements.lines):
             tests = of_file
-        ordered = sorted(tests, key=lambda name: (not name.startswith(tuple(room)), self._durations_s[name], name))
+        own = f"/test_laws_{source.stem}.py::"
+        ordered = sorted(tests, key=lambda name: (own not in name, self._durations_s[name], name))
         chosen: list[str] = []
         left_s = limit_s
         for name in ordered:

@@ -29,7 +29,6 @@ from run_tests import NO_TEST, TIMED_OUT, TIMEOUT_S
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-HOME = ROOT / ".mutants"
 FATES = (
     "caught by a test",
     "caught: its tests do not end",
@@ -49,14 +48,15 @@ def main() -> int:
     parser.add_argument("--python", default=sys.executable, help="interpreter that runs the tests")
     parser.add_argument("--report", action="store_true", help="only tell what was found so far")
     asked = parser.parse_args()
-    folder = HOME / f"{asked.room}-{asked.sample or 'all'}-{asked.seed}"
+    home = ROOT / ".mutants" / asked.room
+    folder = home / f"{asked.sample or 'all'}-{asked.seed}"
     session = folder / "session.sqlite"
     if not asked.report:
-        tree, config, python = HOME / "tree", folder / "config.toml", Path(asked.python).absolute()
-        _prepare(python)
+        tree, config, python = home / "tree", folder / "config.toml", Path(asked.python).absolute()
+        _prepare(home, asked.room, python)
         _copy_project(tree)
         folder.mkdir(exist_ok=True)
-        _write_config(config, asked.room, python)
+        _write_config(config, home, asked.room, python)
         if not session.exists():
             begun = session.with_suffix(".begun")  # drawn as a whole, or anew: an interruption leaves no half of it
             begun.unlink(missing_ok=True)
@@ -70,24 +70,25 @@ def main() -> int:
     return _report(session, asked.room)
 
 
-def _prepare(python: Path) -> None:
-    """A copy of the project without mutants, and which of its tests run which line; anew when a file has changed.
+def _prepare(home: Path, room: str, python: Path) -> None:
+    """A copy of the project without mutants, and which tests of a room run which line; anew when a file has changed.
 
     Measured where the mutants are put: numba keeps what it compiled by the place of the file.
     """
-    pristine, measured, stamp = HOME / "pristine", HOME / "measured", hashlib.sha256()
+    pristine, measured, stamp = home / "pristine", home / "measured", hashlib.sha256()
     for name in _list_files():
         if name.endswith(".py") and (ROOT / name).parent != HERE:
             stamp.update(name.encode() + (ROOT / name).read_bytes())
-    mark = HOME / "sources.sha256"
+    mark = home / "sources.sha256"
     if mark.exists() and mark.read_text() == stamp.hexdigest():
         return
-    shutil.rmtree(HOME, ignore_errors=True)
+    shutil.rmtree(home, ignore_errors=True)
     measured.mkdir(parents=True)
-    for copy in (pristine, HOME / "tree"):
+    for copy in (pristine, home / "tree"):
         _copy_project(copy)
     print("measuring which tests run which line", flush=True)
-    found = measure_coverage(HOME / "tree", measured, python, TABLE["measured"]["packages"], TABLE["measured"]["tests"])
+    table = TABLE["rooms"][room]
+    found = measure_coverage(home / "tree", measured, python, table["files"], table["tests"])
     if not found:
         raise SystemExit(f"no test passes without a mutant: {measured / 'tests.log'}")
     print(f"{found} tests pass without a mutant", flush=True)
@@ -107,8 +108,8 @@ def _list_files() -> list[str]:
     return [name for name in listed.split("\0") if name and (ROOT / name).is_file()]
 
 
-def _write_config(config: Path, room: str, python: Path) -> None:
-    command = f"{sys.executable} {HERE / 'run_tests.py'} {HOME} {room} {python}"
+def _write_config(config: Path, home: Path, room: str, python: Path) -> None:
+    command = f"{sys.executable} {HERE / 'run_tests.py'} {home} {room} {python}"
     config.write_text(
         f"[cosmic-ray]\nmodule-path = {TABLE['rooms'][room]['files']!r}\ntimeout = {2.0 * TIMEOUT_S}\n"
         f'excluded-modules = []\ntest-command = "{command}"\n[cosmic-ray.distributor]\nname = "local"\n'

@@ -1,7 +1,7 @@
 """What cosmic-ray calls for each mutant: find the line that it changed, and run the tests that can notice it.
 
-``run_tests.py MUTANTS ROOM PYTHON`` is run in the copy of the project that has the mutant. ``MUTANTS/pristine`` is the
-same without it, ``MUTANTS/measured`` tells which tests run which line, and has what numba compiled of the copy.
+``run_tests.py HOME ROOM PYTHON`` is run in the copy of the project that has the mutant. ``HOME/pristine`` is the same
+without it, ``HOME/measured`` tells which tests run which line, and has what numba compiled of the copy.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def main() -> int:
     tree, table = Path.cwd(), tomllib.loads((Path(__file__).parent / "rooms.toml").read_text("utf-8"))["rooms"][room]
     file, lines = _find_change(tree, home / "pristine", table["files"])
     source, users = home / "pristine" / file, _list_users(tree, file)
-    tests = CoveringTests(home / "measured").choose(source, file, lines, users, table["tests"], LIMIT_S)
+    tests = CoveringTests(home / "measured").choose(source, file, lines, users, LIMIT_S)
     if not tests:
         print(f"{file}, lines {sorted(lines)}: {NO_TEST}", flush=True)
         return 0

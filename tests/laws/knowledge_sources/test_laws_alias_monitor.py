@@ -14,34 +14,65 @@ from blackboard.change import Posted
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from generated_boards import HALL, Bench, effect_on, made, plain_robot, reasons, to_world, wakes
+from generated_boards import (
+    HALL,
+    LENGTH_M,
+    STUDY,
+    WIDTH_M,
+    Bench,
+    effect_on,
+    made,
+    plain_robot,
+    reasons,
+    to_world,
+    wakes,
+)
 from knowledge_sources.goal.pose_adopter import PoseAdopter
+from knowledge_sources.methods.localization.global_localization import make_alias_test
+from knowledge_sources.methods.localization.next_view import MIN_NEW_VIEW_RAD, MOVE_M
+from knowledge_sources.methods.localization.refinement import compute_pose_likelihood
+from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.methods.verification.line_check import predict_lines
 from knowledge_sources.plan.alias_monitor import AliasMonitor
 from knowledge_sources.settings import DEFAULT
 from world_models.entries.location import Hypothesis, PlaceOdds, PlaceSearch, Twin, TwinOdds, diagonal
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Certificate, MilestoneVerdict, Outcome
-from world_models.frames import Pose2
+from world_models.frames import Pose2, wrap_angle
 
-SOURCE, S = AliasMonitor(), DEFAULT.localization
+SOURCE, S, ROBOT, SMALL = AliasMonitor(), DEFAULT.localization, plain_robot(), 1e-6
+EVERY_TWIN = AliasMonitor(replace(DEFAULT, localization=replace(S, min_p_twin=0.0)))
+"""It keeps a twin in mind however unlikely that is."""
 HERE = to_world(Pose2(2.0, 2.0, 0.0))
 SAME = Pose2(0.0, 0.0, 0.0)
 """A twin at the very same place: what the picture says of it is what it says of the believed one."""
 BARE = np.zeros((0, 2, 2))
 
 
-def verify(bench: Bench, pose: Pose2 = HERE, verdict: MilestoneVerdict = "verified") -> Entry[Certificate]:
-    """A milestone that is verified by a bare picture from a pose (world)."""
-    looked = bench.put(Segments("CameraPicture-1", "Milestone-1", BARE, np.zeros(0), 40.0))
-    match = bench.put(LineMatch("Milestone-1", looked.id, np.zeros((0, 2), np.int64), np.zeros((0, 2, 3)), BARE, 0.0,
-                                np.zeros(0)))
+def verify(
+    bench: Bench, pose: Pose2 = HERE, verdict: MilestoneVerdict = "verified", seen: np.ndarray = BARE
+) -> Entry[Certificate]:
+    """A milestone that is verified from a pose (world) by a picture with such segments, a bare one by default."""
+    looked = bench.put(Segments("CameraPicture-1", "Milestone-1", seen, np.zeros(len(seen)), 40.0))
+    match = bench.put(
+        LineMatch("Milestone-1", looked.id, np.zeros((0, 2), np.int64), np.zeros((0, 2, 3)), BARE, 0.0, np.zeros(0))
+    )
     fix = bench.put(PoseFix(match.id, pose, np.diag([1e-4, 1e-4, 1e-5]), np.ones(0, bool), np.zeros(0), ()))
     return bench.put(Certificate("Milestone-1", fix.id, verdict, "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0, 0.001))
 
 
+def say(seen: np.ndarray, here: Pose2, there: Pose2) -> float:
+    """By how much a picture is likelier there than here [log], less what is noise where both look alike."""
+    view, unmoved = CameraView(seen, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))), Pose2(0.0, 0.0, 0.0)
+    one, other = (compute_pose_likelihood(ROBOT, [view], pose).log_likelihood for pose in (here, there))
+    noise = S.alike_log_noise * make_alias_test(ROBOT, [unmoved])(here, there)
+    return math.copysign(max(abs(other - one) - noise, 0.0), other - one)
+
+
 def known(ratios: list[float], p_prior: float, last: Pose2) -> TwinOdds:
-    return TwinOdds(p_prior, 0.9, tuple(Twin(f"twin-{k}", SAME, r) for k, r in enumerate(ratios)),
-                    ("Certificate-9",), last)
+    return TwinOdds(
+        p_prior, 0.9, tuple(Twin(f"twin-{k}", SAME, r) for k, r in enumerate(ratios)), ("Certificate-9",), last
+    )
 
 
 @settings(max_examples=40, deadline=None)
@@ -90,8 +121,70 @@ def test_the_first_time_the_odds_are_those_that_were_told() -> None:
     assert found.p_prior == pytest.approx(S.p_told) and len(found.counted) == 1
 
 
-@pytest.mark.parametrize(("apart_m", "turn_rad", "counts"), [
-    (0.0, 0.0, False), (5.0, 0.0, True), (0.0, 3.0, True), (0.0, -3.0, True), (0.01, 0.01, False)])
+@pytest.mark.parametrize("there", [Pose2(5.2, 2.3, -1.2), Pose2(4.1, 1.7, 0.6), Pose2(9.5, 1.0, 2.8)])
+@pytest.mark.parametrize("seen_from", ["here", "there", "between"])
+def test_each_is_weighed_where_the_robot_would_be_there(there: Pose2, seen_from: str) -> None:
+    """Wherever it has driven since the twin was found; between places that look alike what is noise says nothing."""
+    here, other = to_world(Pose2(3.2, 1.8, 1.9)), to_world(there)
+    shot = {"here": here, "there": other, "between": to_world(Pose2(3.2, 1.9, 1.85))}[seen_from]
+    seen = predict_lines(ROBOT, shot).segments_px
+    bench = Bench(ROBOT)
+    bench.believe(Pose2(3.2, 1.8, 1.9))
+    twin = Twin(HALL, other @ here.inverse(), 0.7)
+    bench.put(TwinOdds(0.5, 0.9, (twin,), ("Certificate-9",), Pose2(HERE.x_m - 3.0, HERE.y_m, 0.0)))
+    (found,) = effect_on(bench.ask(EVERY_TWIN, verify(bench, here, seen=seen)), TwinOdds).value.twins
+    assert found.there_from_here == twin.there_from_here
+    assert found.log_ratio == pytest.approx(0.7 + say(seen, here, other))
+
+
+def test_what_is_noise_between_places_that_look_alike_says_nothing() -> None:
+    """The hall is the same turned round; a few centimetres aside a picture is likelier at one of both than it may."""
+    here = to_world(Pose2(3.2, 1.8, -2.4))
+    told = []
+    for aside_m in (0.0, 0.02, 0.05, 0.08):
+        other = to_world(Pose2(LENGTH_M - 3.2 + aside_m, WIDTH_M - 1.8 - aside_m, math.pi - 2.4))
+        for shot in (here, other):
+            seen = predict_lines(ROBOT, shot).segments_px
+            bench = Bench(ROBOT)
+            bench.believe(Pose2(3.2, 1.8, -2.4))
+            bench.put(TwinOdds(0.5, 0.9, (Twin(HALL, other @ here.inverse(), 0.0),), (), Pose2(0.0, 0.0, 0.0)))
+            (found,) = effect_on(bench.ask(EVERY_TWIN, verify(bench, here, seen=seen)), TwinOdds).value.twins
+            assert found.log_ratio == pytest.approx(say(seen, here, other))
+            told.append(found.log_ratio)
+    assert min(told) < 0.0 < max(told) and told.count(0.0) > 0
+
+
+@pytest.mark.parametrize("pose", [Pose2(6.0, 2.6, 1.4), Pose2(3.0, 1.1, -2.0), Pose2(6.8, 3.0, 3.0)])
+def test_twins_are_where_walls_and_doors_are_as_here(pose: Pose2) -> None:
+    """The hall turned round, and behind its door what lies to that as the robot does; each goes with the robot."""
+    bench, here = Bench(ROBOT), to_world(pose)
+    bench.believe(pose)
+    twins = effect_on(bench.ask(EVERY_TWIN, verify(bench, here)), TwinOdds).value.twins
+    wanted = [
+        (HALL, Pose2(LENGTH_M - pose.x_m, WIDTH_M - pose.y_m, pose.heading_rad + math.pi)),
+        (STUDY, Pose2(LENGTH_M + 8.2 - pose.x_m, WIDTH_M - pose.y_m, pose.heading_rad + math.pi)),
+    ]
+    for move in (Pose2(0.0, 0.0, 0.0), Pose2(0.7, -0.2, 0.5)):
+        found = [(twin.locale, twin.there_from_here @ (here @ move)) for twin in twins]
+        for (locale, there), (room, at) in zip(sorted(found, key=lambda f: f[0]), wanted, strict=True):
+            off = (to_world(at) @ move).inverse() @ there
+            assert locale == room and (off.x_m, off.y_m) == pytest.approx((0.0, 0.0), abs=1e-9)
+            assert wrap_angle(off.heading_rad) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("apart_m", "turn_rad", "counts"),
+    [
+        (0.0, 0.0, False),
+        (0.5 * MOVE_M + SMALL, 0.0, True),
+        (0.5 * MOVE_M - SMALL, 0.0, False),
+        (0.0, MIN_NEW_VIEW_RAD + SMALL, True),
+        (0.0, -MIN_NEW_VIEW_RAD - SMALL, True),
+        (0.0, MIN_NEW_VIEW_RAD - SMALL, False),
+        (0.0, 6.2, False),
+        (0.0, -6.2, False),
+    ],
+)
 def test_only_another_view_counts(apart_m: float, turn_rad: float, counts: bool) -> None:
     bench = Bench(plain_robot())
     bench.believe()

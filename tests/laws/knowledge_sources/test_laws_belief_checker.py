@@ -13,6 +13,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from generated_boards import Bench, effect_on, plain_robot, poses, reasons, to_world
 from knowledge_sources.looking import list_told
+from knowledge_sources.methods.verification.view_quality import turn_headings
 from knowledge_sources.plan.belief_checker import BeliefChecker
 from knowledge_sources.settings import DEFAULT
 from world_models.entries.task import Certificate, Milestone, MilestoneStatus, Outcome
@@ -54,6 +55,17 @@ def test_the_second_is_another_view_and_never_one_that_was_tried() -> None:
         assert all(abs(wrap_angle(check.look_heading_rad - heading)) > 0.05 for heading in tried)
         tried.append(check.look_heading_rad)
         bench.revise(bench.put(check), status="not testable")
+
+
+@pytest.mark.parametrize("left_out", [0, 1])
+def test_where_all_was_tried_it_looks_as_it_stands(left_out: int) -> None:
+    bench, doubt = doubtful()
+    here = to_world(Pose2(2.0, 2.0, 0.0))
+    around = turn_headings(here, DEFAULT)
+    tried = (*around[:len(around) - left_out], here.heading_rad)
+    bench.revise(bench.await_milestone(look_heading_rad=tried[-1], tried=tried[:-1]), status="not testable")
+    check = effect_on(bench.ask(SOURCE, doubt), Milestone).value
+    assert check.look_heading_rad == pytest.approx(around[-1] if left_out else here.heading_rad)
 
 
 @pytest.mark.parametrize("when", ["before", "after"])

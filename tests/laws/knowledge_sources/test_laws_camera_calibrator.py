@@ -79,7 +79,7 @@ def test_only_where_the_yaw_is_less_sure_than_before_does_its_way_end(more: floa
     travel = bench.put(begin_travel(Pose2(0.0, 0.0, 0.0), diagonal(0.1, 0.1), 0.0, 0.1))
     sigmas = [0.01] * 7
     sigmas[YAW] = before + more
-    _, certificate = verify(bench, (0.0, 0.0, 0.005) + (0.0,) * 4, tuple(sigmas))
+    fix, certificate = verify(bench, (0.0, 0.0, 0.005) + (0.0,) * 4, tuple(sigmas))
     effects = bench.ask(SOURCE, certificate)
     ways = made(effects, Travel)
     assert bool(ways) == (more > 0.0)
@@ -88,6 +88,7 @@ def test_only_where_the_yaw_is_less_sure_than_before_does_its_way_end(more: floa
         assert (way.began, way.gone_m, way.heading_rad) == (HERE, 0.0, HERE.heading_rad)
         assert way.yaw_rad == pytest.approx(camera.mount.yaw_rad + 0.005)
         assert way.yaw_variance == pytest.approx(sigmas[YAW] ** 2)
+        assert np.array_equal(way.covariance, fix.value.covariance)  # of the pose, not of the camera
         effect = effect_on(effects, Travel)
         assert isinstance(effect, Revise) and effect.entry.id == travel.id and reasons(effect) == {"CameraState"}
 

@@ -55,6 +55,8 @@ def test_a_part_of_the_route_that_is_not_driven_as_it_is_tells_no_direction() ->
 
 
 SOURCE = ViewChooser()
+TURN = to_world(Pose2(0.0, 0.0, 0.0)).heading_rad
+"""Of the hall in the world."""
 FROM, TO, AHEAD = Place("hall", 2.0, 2.0), Place("hall", 6.0, 2.0), Pose2(2.0, 2.0, 0.0)
 
 
@@ -84,6 +86,19 @@ def test_it_looks_in_one_of_the_directions_that_come_into_question(pose: Pose2, 
     assert (chosen.sketch, chosen.index, chosen.status, chosen.tried, chosen.told) == (
         sketch.id, at, "turning", (), ())
     assert reasons(effect_on(effects, Milestone)) == {sketch.id, "Hypothesis-1"}
+
+
+@pytest.mark.parametrize("ahead", [0.3, math.pi - TURN, math.pi - TURN - 0.01, math.pi - TURN + 0.01, -2.9])
+@pytest.mark.parametrize("off", [-0.5, 0.5, -0.9, 0.9, -1.1, 1.1])
+def test_a_direction_that_the_robot_faces_already_is_the_one_that_it_faces(ahead: float, off: float) -> None:
+    """Also where the numbers of both lie a whole turn apart."""
+    pose = Pose2(2.0, 2.0, wrap_angle(ahead))
+    wanted = wrap_angle(ahead + off * MAX_LOOK_ERROR_RAD)
+    bench, sketch = due(pose, at=1, to=Place("hall", 2.0, 2.0, wanted))
+    one = ViewChooser()
+    one.list_headings = lambda *_: iter([wanted + TURN])  # type: ignore[method-assign]
+    chosen = milestone_of(bench.ask(one, sketch)).look_heading_rad
+    assert wrap_angle(chosen - (to_world(pose).heading_rad if abs(off) < 1.0 else wanted + TURN)) == pytest.approx(0.0)
 
 
 @settings(max_examples=25)
