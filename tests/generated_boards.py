@@ -23,11 +23,13 @@ from blackboard.entry import Entry, Ref
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.action.model_reviser import ModelReviser
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries.body import MotionReport, MotorCommand
 from world_models.entries.location import Covariance, Hypothesis, Place, covariance_tuple, diagonal
+from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Goal, Leg, Milestone, PlanSketch, Subgoal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
@@ -148,6 +150,22 @@ class Bench:
         start, end = (place.in_world(house()) for place in (step.origin, step.destination))
         return self.put(replace(Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m,
                                     step.tolerance_m), **fields), sketch)
+
+    def stand(self, x_m: float, y_m: float, along_m: float, across_m: float, locale: str = HALL,
+              core: Sequence[tuple[float, float]] = (), **fields: Any) -> Entry[Obstacle]:
+        """Something that stands round a place of a locale, half so long and wide; the locale's frame has it.
+
+        ``core``: corners of what was seen of it, in the locale's frame; by default all.
+        """
+        def corners(points: Iterable[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+            return tuple((float(x), float(y)) for x, y in (to_world(Pose2(*p, 0.0), locale).position for p in points))
+
+        box = [(x_m + i * along_m, y_m + k * across_m) for i, k in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        number = 1 + len(self.view.all(Obstacle))
+        thing = self.put(Obstacle(f"{locale}/obstacle-{number}", locale, corners(box), 0.02, x_m, y_m,
+                                  2.0 * max(along_m, across_m), core=corners(core), **fields))
+        self.apply(*self.ask(ModelReviser(), thing) or ())
+        return thing
 
     def await_milestone(self, sketch: str = "", index: int = 0, **fields: Any) -> Entry[Milestone]:
         """A milestone that the robot has yet to turn to, unless ``fields`` say otherwise."""

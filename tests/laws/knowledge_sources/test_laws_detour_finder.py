@@ -6,7 +6,7 @@ import pytest
 
 from blackboard.change import Posted, Revised
 from blackboard.entry import Entry
-from generated_boards import HALL, Bench, effect_on, made, plain_robot, wakes
+from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, wakes
 from knowledge_sources.plan.detour_finder import DetourFinder
 from knowledge_sources.settings import DEFAULT
 from world_models.entries.location import Place
@@ -18,11 +18,11 @@ FROM, TO = Place(HALL, 1.0, 2.0), Place(HALL, 6.0, 2.0)
 MOST = DEFAULT.plan.max_adjustments
 
 
-def halt(halts: int = 0) -> tuple[Bench, Entry[Leg]]:
+def halt(halts: int = 0, aim: Place = TO) -> tuple[Bench, Entry[Leg]]:
     """A board on which a leg across the hall was halted, after so many in a row."""
     bench = Bench(plain_robot())
     bench.believe(Pose2(1.5, 2.0, 0.0))
-    goal = bench.pursue(TO)
+    goal = bench.pursue(aim)
     bench.revise(bench.sketch(FROM, TO, goal=goal, primitive=False), halts=halts)
     below = bench.sketch(FROM, TO, goal=goal, path=(0,))
     return bench, bench.revise(bench.leg(below), status="halted")
@@ -43,6 +43,16 @@ def test_so_many_times_in_a_row_all_sketches_end_and_then_it_sees_no_way_on(halt
         effect = effect_on(effects, Impasse)
         assert not ended and (effect.value.kind, effect.value.goal, effect.value.behind) == ("blocked", "Goal-1", ())
         assert {r.id for r in effect.because} == {leg.id, "Hypothesis-1"}
+
+
+def test_it_sees_no_way_on_where_none_leads_round_all_that_may_stand_there() -> None:
+    """What was seen of a thing leaves a way; what it may take does not: that is what halted the leg."""
+    bench, leg = halt(aim=Place(STUDY, 3.0, 2.0))
+    seen = ((4.0, 3.8), (4.2, 3.8), (4.2, 3.9), (4.0, 3.9))
+    thing = bench.stand(4.1, 2.0, 0.2, 1.95, core=seen)
+    effect = effect_on(bench.ask(SOURCE, leg), Impasse)
+    assert effect.value.behind == (thing.id,) and thing.value.words() in effect.value.reason
+    assert {r.id for r in effect.because} == {leg.id, "Hypothesis-1", thing.id}
 
 
 @pytest.mark.parametrize("stale", ["index", "sketch ended", "first level ended", "goal", "belief"])

@@ -8,8 +8,11 @@ from hypothesis import strategies as st
 
 from blackboard.change import Posted, Revised
 from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, wakes
+from knowledge_sources.action.model_reviser import ModelReviser
 from knowledge_sources.plan.goal_sketcher import GoalSketcher
+from knowledge_sources.questions import find_frames
 from knowledge_sources.sketching import GOAL_TOLERANCE_M
+from world_models.entries.door_state import DoorPicture, DoorState
 from world_models.entries.location import Place
 from world_models.entries.task import Goal, Impasse, Outcome, PlanSketch, SketchStatus
 from world_models.frames import Pose2
@@ -32,7 +35,8 @@ def test_the_sketch_leads_from_the_robot_to_the_goal_step_by_step(pose: Pose2, a
     assert (first.origin.x_m, first.origin.y_m) == pytest.approx((pose.x_m, pose.y_m))
     passages = [step.passage for step in drawn.subgoals if step.passage]
     assert passages == (["study-door"] if aim.locale == STUDY else [])
-    assert {goal.id, belief.id} <= reasons(effect)
+    crossed = {place.locale for step in drawn.subgoals for place in (step.origin, step.destination)}
+    assert reasons(effect) == {goal.id, belief.id, *(f.id for f in find_frames(bench.view, crossed))}
     bench.apply(*bench.ask(SOURCE, goal) or ())
     assert bench.ask(SOURCE, goal) is None
 
@@ -54,6 +58,57 @@ def test_halts_are_counted_in_a_row(status: SketchStatus, halts: int) -> None:
     old = bench.revise(bench.sketch(goal=goal), status=status, halts=2)
     effect = effect_on(bench.ask(SOURCE, old), PlanSketch)
     assert effect.value.halts == halts and old.id in reasons(effect)
+
+
+def test_halts_on_the_way_to_another_goal_do_not_count() -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    before = bench.pursue()
+    old = bench.revise(bench.sketch(goal=before), status="halted", halts=2)
+    bench.revise(before, status="abandoned")
+    effect = effect_on(bench.ask(SOURCE, bench.pursue(AIM)), PlanSketch)
+    assert effect.value.halts == 0 and old.id not in reasons(effect)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_only_what_takes_the_goal_is_behind_it_and_named(side: float) -> None:
+    bench = Bench(plain_robot())
+    belief = bench.believe(Pose2(1.0, 2.0, 0.0))
+    other, thing = bench.stand(3.0, 2.0 - side, 0.1, 0.1), bench.stand(6.0, 2.0 + 0.7 * side, 0.2, 0.2)
+    goal = bench.pursue(Place(HALL, 6.0, 2.0 + 0.7 * side))
+    effect = effect_on(bench.ask(SOURCE, goal), Impasse)
+    assert effect.value.behind == (thing.id,) and reasons(effect) == {goal.id, belief.id, thing.id}
+    assert thing.value.words() in effect.value.reason and other.value.words() not in effect.value.reason
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_of_what_was_seen_without_its_feet_the_rest_may_be_free(side: float) -> None:
+    """As far as its footprint reaches it takes the goal, or all of the way there; what was seen of it does not."""
+    far = 2.0 + 1.7 * side
+    seen = ((5.8, far), (6.2, far), (6.2, far - 0.1 * side), (5.8, far - 0.1 * side))
+    for length, aim in ((0.6, Place(HALL, 6.0, 2.0 - 0.5 * side)), (0.2, AIM)):
+        for core in ((), seen):
+            bench = Bench(plain_robot())
+            bench.believe(Pose2(1.0, 2.0, 0.0))
+            bench.stand(6.0, 2.0, length, 1.95, core=core)
+            assert bool(made(bench.ask(SOURCE, bench.pursue(aim)), PlanSketch)) == bool(core)
+
+
+@pytest.mark.parametrize("is_shut", [False, True])
+def test_where_no_way_is_left_it_says_what_leaves_none(is_shut: bool) -> None:
+    """All that stands there, as each may be wrong; or the door that is shut, which nothing that stands is behind."""
+    bench = Bench(plain_robot())
+    if is_shut:
+        picture = DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), 1.0, 2.0, 0.3, 4.0, "")
+        door = bench.put(DoorState("study-door", (HALL, STUDY), "shut", 0.99, 5.0, 2, picture, 1.0))
+        bench.apply(*bench.ask(ModelReviser(), door) or ())
+    belief, things = bench.believe(Pose2(1.0, 2.0, 0.0)), [bench.stand(5.0, y, 0.2, 1.0) for y in (1.0, 3.0)]
+    goal = bench.pursue(AIM)
+    effect = effect_on(bench.ask(SOURCE, goal), Impasse)
+    assert effect.value.behind == tuple(thing.id for thing in things)
+    assert reasons(effect) == {goal.id, belief.id, *(thing.id for thing in things)}
+    assert ("study-door is shut" in effect.value.reason) == is_shut
+    assert all((thing.value.words() in effect.value.reason) != is_shut for thing in things)
 
 
 def test_sketches_for_earlier_goals_are_superseded() -> None:

@@ -6,9 +6,10 @@ import pytest
 
 from blackboard.change import Posted, Revised
 from blackboard.entry import Entry
-from generated_boards import HALL, Bench, effect_on, made, plain_robot, to_world, wakes
+from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, reasons, to_world, wakes
 from knowledge_sources.plan.lookout_planner import LookoutPlanner
 from knowledge_sources.settings import DEFAULT
+from world_models.building.locale_frame import FRAME_OF
 from world_models.entries.location import Place
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Impasse, PlanSketch
@@ -50,6 +51,30 @@ def test_it_leads_to_a_look_so_often_a_goal(looked: int) -> None:
     (step,) = drawn.subgoals
     assert (step.origin.x_m, step.origin.y_m) == pytest.approx((1.2, 2.0)) and step.destination.locale == HALL
     assert step.destination.x_m < 5.0 - 0.1 - plain_robot().radius_m  # on this side of what it looks at
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_first_what_alone_leaves_a_way_the_nearest_first_and_another_each_time(side: float) -> None:
+    """Two things that bar the hall together; a nearer one that bars nothing; and one that nobody takes to be behind."""
+    bench = Bench(plain_robot())
+    bench.believe(Pose2(1.2, 2.0, 0.0))
+    goal = bench.pursue(Place(STUDY, 3.0, 2.0))
+    bench.stand(1.6, 2.0 - 1.6 * side, 0.1, 0.1)
+    beside = bench.stand(2.4, 2.0 + 1.6 * side, 0.1, 0.1)
+    far, near = bench.stand(4.9, 2.0 + 0.95 * side, 0.1, 1.0), bench.stand(4.3, 2.0 - 0.95 * side, 0.1, 1.0)
+    behind = (far.id, beside.id, near.id)
+    looked_at = []
+    for looked in range(MOST):
+        effects = bench.ask(SOURCE, bench.put(Impasse("blocked", "no way", goal.id, behind)))
+        drawn = effect_on(effects, PlanSketch)
+        (seen,) = {id for id in reasons(drawn) if id.startswith("Obstacle")}
+        looked_at.append(seen)
+        frame = bench.view.newest(FRAME_OF, HALL)
+        assert frame is not None and looked == len(looked_at) - 1
+        assert reasons(drawn) == {goal.id, "Hypothesis-1", seen, "Impasse", frame.id}
+        bench.apply(*effects or ())
+        bench.revise(bench.view.latest(PlanSketch), status="done")  # type: ignore[arg-type]
+    assert looked_at == [(near.id, far.id)[k % 2] for k in range(MOST)]
 
 
 @pytest.mark.parametrize("stale", ["goal", "belief", "gone"])

@@ -6,10 +6,13 @@ import pytest
 from hypothesis import given, settings
 
 from blackboard.change import Posted, Revised
-from generated_boards import HALL, Bench, effect_on, plain_robot, poses, reasons, wakes
+from blackboard.entry import Entry
+from generated_boards import HALL, HOUSE, STUDY, Bench, effect_on, plain_robot, poses, reasons, wakes
 from knowledge_sources.plan.refiner import Refiner
 from world_models.entries.location import Place
-from world_models.entries.task import Outcome, PlanSketch
+from world_models.entries.task import Impasse, Outcome, PlanSketch, Subgoal
+from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
 from world_models.frames import Pose2
 
 SOURCE = Refiner()
@@ -34,6 +37,49 @@ def test_a_subgoal_becomes_straight_legs_from_the_robot_to_its_end(pose: Pose2) 
         assert {sketch.id, belief.id} <= reasons(effect)
         bench.apply(*bench.ask(SOURCE, sketch) or ())
         assert bench.ask(SOURCE, sketch) is None
+
+
+TWO_DOORS = HOUSE + """
+other-door = { between = ["hall", "study"], wall = "east", along = 0.7, width = 1.0, open = true }
+"""
+
+
+def blocked(doors: int, *, at: int = 0) -> tuple[Bench, Entry[PlanSketch]]:
+    """A board on which the way to a door is blocked in the hall, and something else stands in the study.
+
+    The sketch led through another passage before.
+    """
+    world = read_world(Source.parse(TWO_DOORS if doors == 2 else HOUSE, "house.toml"))
+    bench = Bench(plain_robot(world))
+    bench.believe(Pose2(6.0, 2.8, 0.0))
+    goal = bench.pursue(Place(STUDY, 4.0, 2.0))
+    here, before, behind = Place(HALL, 6.0, 2.8), Place(HALL, 7.35, 2.0), Place(STUDY, 0.65, 2.0)
+    came = Subgoal(here, here, primitive=True, passage="a door before")
+    steps = (Subgoal(here, before, primitive=False), Subgoal(before, behind, primitive=True, passage="study-door"),
+             Subgoal(behind, goal.value.destination, primitive=False))
+    if doors == 2:
+        bench.stand(7.3, 2.7, 0.6, 1.2)
+    else:
+        bench.stand(6.9, 2.0, 0.2, 1.9)
+    bench.stand(3.0, 3.5, 0.1, 0.1, STUDY)
+    return bench, bench.put(PlanSketch(goal.id, (), "", (came,) * at + steps, at, verified=True), goal)
+
+
+@pytest.mark.parametrize("at", [0, 1])
+def test_where_no_other_way_leads_there_what_stands_in_the_room_is_behind_it(at: int) -> None:
+    bench, sketch = blocked(1, at=at)
+    effect = effect_on(bench.ask(SOURCE, sketch), Impasse)
+    assert (effect.value.kind, effect.value.goal, effect.value.behind) == ("blocked", "Goal-1", ("Obstacle-1",))
+    assert reasons(effect) == {sketch.id, "Hypothesis-1", "Obstacle-1"}
+
+
+def test_where_another_way_leads_to_the_goal_the_sketch_ends_for_that_one() -> None:
+    bench, sketch = blocked(2)
+    below = bench.sketch(*WAY, goal=bench.view["Goal-1"], path=(4,))
+    effects = bench.ask(SOURCE, sketch)
+    assert {(e.entry.id, e.value.status) for e in effects or ()} == {  # type: ignore[union-attr]
+        (sketch.id, "superseded"), (below.id, "superseded")}
+    assert all(reasons(effect) == {sketch.id} for effect in effects or ())
 
 
 @pytest.mark.parametrize("basis", ["command", "odometry", "tracks", "milestone", "relocalization", "ride"])
