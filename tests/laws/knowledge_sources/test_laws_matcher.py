@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,27 +11,41 @@ import pytest
 from blackboard.change import Posted
 from blackboard.entry import Entry
 from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
-from knowledge_sources.plan.matcher import Matcher
+from knowledge_sources.plan import matcher
+from knowledge_sources.plan.matcher import MAX_RIGID_SIGMA_PX, Matcher
 from knowledge_sources.plan.med_r_and_t import MedRAndT
 from knowledge_sources.plan.view_predictor import ViewPredictor
-from world_models.entries.location import diagonal
+from world_models.entries.location import Covariance, diagonal
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Milestone, MilestoneStatus
 from world_models.frames import Pose2
+from world_models.robot import RobotModel
 
 MATCHER, SOLVER, ROBOT = Matcher(), MedRAndT(), plain_robot()
 BELIEF = Pose2(2.0, 1.6, 0.15)
 OFFS = [Pose2(0.0, 0.0, 0.0), Pose2(0.04, 0.03, 0.008), Pose2(-0.03, 0.05, -0.01)]
 
 
-def look(belief: Pose2, truth: Pose2) -> tuple[Bench, Entry[Segments], Entry[Milestone]]:
-    """A board with the lines that are expected from the believed pose, and those seen from the true one; hall frame."""
-    bench = Bench(ROBOT)
-    bench.believe(belief, diagonal(0.03, 0.008))
+KNOWN = tuple(map(tuple, np.diag(np.square((1e-3, 1e-3, 2e-3, 3e-3, 2e-3, 0.5, 0.5))).tolist()))
+"""The covariance of a camera that is well known, but for what may knock it."""
+FIRM = diagonal(0.03, 0.008)
+
+
+def look(belief: Pose2, truth: Pose2, knock: tuple[float, ...] | None = None,
+         spread: Covariance = FIRM) -> tuple[Bench, Entry[Segments], Entry[Milestone]]:
+    """A board with the lines that are expected from the believed pose, and those seen from the true one; hall frame.
+
+    ``knock``: by how much a well known camera is turned since, (tilt, roll, yaw); by default it is not well known.
+    """
+    bench, robot = Bench(ROBOT), ROBOT
+    bench.believe(belief, spread)
+    if knock is not None:
+        camera = bench.revise(bench.view["CameraState-1"], covariance=KNOWN).value.moved((*knock, 0.0, 0.0, 0.0, 0.0))
+        robot = RobotModel(ROBOT.world, camera.pinhole, camera.mount, ROBOT.actuator)
     milestone = bench.await_milestone(look_heading_rad=to_world(belief).heading_rad)
     expected = bench.apply(effect_on(bench.ask(ViewPredictor(), milestone), Milestone))[0].entry
     lines = np.array(expected.value.expected)
-    seen = ROBOT.camera.project_segments(lines, ROBOT.camera_from_world(to_world(truth)))[0]
+    seen = robot.camera.project_segments(lines, robot.camera_from_world(to_world(truth)))[0]
     assert np.isfinite(seen).all()
     return bench, bench.put(Segments("CameraPicture-1", expected.id, seen, np.full(len(seen), 0.3), 40.0)), expected
 
@@ -59,6 +74,69 @@ def test_each_line_is_matched_to_its_own_and_all_tell_the_pose(off: Pose2, is_mi
     assert solved.value.match == entry.id and reasons(solved) == {entry.id, milestone.id, "Hypothesis-1"}
     assert len(solved.value.inliers) == len(solved.value.rejected) == len(match.pairs)
     assert np.all(np.linalg.eigvalsh(solved.value.covariance) > 0.0)
+
+
+def solve(bench: Bench, segments: Entry[Segments]) -> tuple[LineMatch, PoseFix]:
+    """What matcher and solver make of segments."""
+    match = bench.apply(effect_on(bench.ask(MATCHER, segments), LineMatch))[0].entry
+    return match.value, effect_on(bench.ask(SOLVER, match), PoseFix).value
+
+
+@pytest.mark.parametrize("off", OFFS)
+@pytest.mark.parametrize("knock", [(0.0, 0.0, 0.0), (0.03, 0.0, 0.0), (-0.03, 0.0, 0.0), (0.03, 0.01, -0.05),
+                                   (-0.02, -0.02, 0.05)])
+def test_a_camera_that_was_knocked_is_found_out_and_the_pose_with_it(off: Pose2, knock: tuple[float, ...]) -> None:
+    """Its tilt and roll are solved for; a turn of it is taken for the robot's, as nothing in the picture differs."""
+    truth = BELIEF @ off
+    match, fix = solve(*look(BELIEF, truth, knock)[:2])
+    assert match.is_camera_open == any(knock)
+    assert np.mean(match.pairs[:, 0] == match.pairs[:, 1]) > 0.9
+    assert np.allclose(fix.camera_step[:3] or (0.0,) * 3, (*knock[:2], 0.0), atol=1e-3)
+    there = to_world(truth)
+    assert fix.world_from_robot.distance_to(there) < 0.015
+    turned = math.remainder(fix.world_from_robot.heading_rad - there.heading_rad, math.tau)
+    assert turned == pytest.approx(knock[2], abs=3e-3)
+
+
+@pytest.mark.parametrize("kept", [0.45, 0.6, 1.0])
+def test_where_lines_are_missing_or_the_belief_was_bold_no_camera_was_knocked(kept: float) -> None:
+    """So much more must agree with another camera; that a pose is three deviations off is no such thing."""
+    bench, segments, _ = look(BELIEF, BELIEF @ Pose2(0.03, -0.03, 0.01), (0.0, 0.0, 0.0), diagonal(0.01, 0.0035))
+    seen = segments.value.segments_px
+    few = bench.put(replace(segments.value, segments_px=seen[:math.ceil(kept * len(seen))],
+                            sigma_px=segments.value.sigma_px[:math.ceil(kept * len(seen))]))
+    match, fix = solve(bench, few)
+    assert not match.is_camera_open and len(match.pairs) >= 0.8 * kept * len(seen)
+    assert fix.world_from_robot.distance_to(to_world(BELIEF @ Pose2(0.03, -0.03, 0.01))) < 0.02
+
+
+@pytest.mark.parametrize("more", [-0.02, 0.02])
+@pytest.mark.parametrize("by_heading", [0.0, 0.5, 1.0])
+def test_up_to_so_many_pixels_the_lines_are_one_figure_and_beyond_a_pose_on_the_floor(
+    more: float, by_heading: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the belief leaves open of a thing 2.5 m away, by place and heading together."""
+    px = MAX_RIGID_SIGMA_PX * (1.0 + more) / ROBOT.camera.fx
+    sigma_rad, sigma_m = px * math.sqrt(by_heading), 2.5 * px * math.sqrt(1.0 - by_heading)
+    asked = []
+    for name in ("match_lines", "match_on_floor"):
+        plain = getattr(matcher, name)
+        monkeypatch.setattr(matcher, name, lambda *given, _n=name, _p=plain: asked.append(_n) or _p(*given))
+    spread = diagonal(max(sigma_m, 1e-6), max(sigma_rad, 1e-6))
+    bench, segments, _ = look(BELIEF, BELIEF, (0.0, 0.0, 0.0), spread)
+    match, _ = solve(bench, segments)
+    assert asked == ["match_lines" if more < 0.0 else "match_on_floor"] and len(match.pairs) > 10
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_order_of_the_segments_does_not_matter(seed: int) -> None:
+    bench, segments, _ = look(BELIEF, BELIEF @ OFFS[1], (0.0, 0.0, 0.0))
+    order = np.random.default_rng(seed).permutation(len(segments.value.segments_px))
+    other = replace(segments.value, segments_px=segments.value.segments_px[order])
+    (one, fix), (two, again) = solve(bench, segments), solve(bench, bench.put(other))
+    assert {(i, order[k]) for i, k in two.pairs.tolist()} == {tuple(pair) for pair in one.pairs.tolist()}
+    assert again.world_from_robot.distance_to(fix.world_from_robot) < 1e-6
+    assert np.allclose(again.covariance, fix.covariance, rtol=1e-3)
 
 
 def test_what_is_expected_of_nothing_matches_nothing() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +13,11 @@ from hypothesis import strategies as st
 from blackboard.change import Posted
 from blackboard.entry import Entry
 from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance, loosen
+from knowledge_sources.plan import med_r_and_t
 from knowledge_sources.plan.med_r_and_t import MedRAndT
 from knowledge_sources.plan.view_predictor import ViewPredictor
+from knowledge_sources.settings import DEFAULT
 from world_models.entries.location import diagonal
 from world_models.entries.percepts import LineMatch, PoseFix
 from world_models.entries.task import Milestone
@@ -101,6 +105,43 @@ def test_it_is_no_surer_than_it_may_be() -> None:
         fix = solve(bench, match)
         chi2.append(measure_chi2(fix, truth))
     assert np.mean(chi2) < 6.0 and max(chi2) < MAX_CHI2
+
+
+@pytest.mark.parametrize("counted", ["never", "here", "elsewhere", "another way"])
+@pytest.mark.parametrize("is_open", [False, True])
+def test_the_camera_is_moved_by_a_picture_that_has_not_counted_and_adds_what_is_open_of_it(
+    counted: str, is_open: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The covariance is that of a camera as it is, and by its slopes what is left open of the camera."""
+    bench, match, _ = match_lines(BELIEF, BELIEF @ Pose2(0.03, -0.02, 0.01), noise_px=0.3)
+    here = to_world(BELIEF)
+    looks = {"here": here, "elsewhere": Pose2(here.x_m + 0.5, here.y_m, here.heading_rad),
+             "another way": Pose2(here.x_m, here.y_m, here.heading_rad - 0.4)}
+    if counted != "never":
+        pose = looks[counted]
+        bench.revise(bench.view["CameraState-1"], counted=((pose.x_m, pose.y_m, pose.heading_rad),))
+    match = bench.revise(match, is_camera_open=is_open)
+    found: dict[str, Any] = {}
+    for name in ("estimate_camera_and_pose", "planar_from_lines"):
+        plain = getattr(med_r_and_t, name)
+        monkeypatch.setattr(med_r_and_t, name, lambda *given, _n=name, _p=plain, **named: found.setdefault(
+            _n, (given, _p(*given, **named)))[1])
+    fix = solve(bench, match)
+    (given, learnt), (used, planar) = found["estimate_camera_and_pose"], found["planar_from_lines"]
+    camera = bench.view["CameraState-1"].value
+    known = compute_camera_covariance(camera, DEFAULT.camera_state)
+    s = DEFAULT.camera_state
+    opened = known + np.diag(np.square((s.sigma_tilt_rad, s.sigma_roll_rad, s.sigma_yaw_rad, 0.0, 0.0, 0.0, 0.0)))
+    assert np.allclose(given[6], opened if is_open else known)
+    assert given[5][2, 2] - loosen(bench.view["Hypothesis-1"].value.covariance_world(ROBOT.world))[2, 2] == (
+        pytest.approx(s.sigma_yaw_rad**2 if is_open else 0.0))
+    moves = is_open or counted != "here"
+    assert fix.camera_step == (tuple(learnt.step.tolist()) if moves else ())
+    assert (fix.camera_covariance != ()) == moves and fix.camera_chi2 == (learnt.prior_chi2 if moves else 0.0)
+    mount = (camera.moved(learnt.step.tolist()) if moves else camera).mount
+    assert used[3].angle_to(mount.camera_from_robot) < 1e-9
+    open_of_it = learnt.covariance if moves else known
+    assert np.allclose(fix.covariance, planar.covariance + learnt.pose_slopes @ open_of_it @ learnt.pose_slopes.T)
 
 
 @pytest.mark.parametrize("lacks", ["nothing", "belief", "milestone"])
