@@ -37,6 +37,17 @@ SOURCES = {source.called(): source for source in KNOWLEDGE_SOURCES}
 CHANGES: Mapping[str, type[Change]] = {kind.__name__: kind for kind in (Posted, Revised, Retracted)}
 
 
+def copy_of(board: Blackboard) -> Blackboard:
+    """A board with the same entries, that can be changed without it."""
+    other = Blackboard()
+    other._numbers.update(board._numbers)
+    for store in board._stores.values():
+        for entry in store.entries.values():
+            other._current[entry.id] = entry
+            other._store(type(entry.value)).put(entry)
+    return other
+
+
 @dataclass(frozen=True)
 class Act:
     """What a knowledge source makes of a board.

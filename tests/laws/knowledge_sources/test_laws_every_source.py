@@ -28,7 +28,7 @@ from hidden_reasons import HidingView, describe, find_named, list_unnamed
 from knowledge_sources.settings import DEFAULT
 from logs.records import read_records, ref_of
 from logs.run_directory import RunDirectory
-from rebuilt_board import CHANGES, SOURCES, rebuild
+from rebuilt_board import CHANGES, SOURCES, copy_of, rebuild
 from recorded_runs import Recorded, cut_off
 from sim.stage import Stage
 from world_models.entries.body import BodyFault, CameraPicture, MotorCommand
@@ -67,16 +67,6 @@ class Act(NamedTuple):
     trigger: Change
     earlier: Entry[Any] | None
     effects: tuple[Effect, ...] | None
-
-
-def copy_of(board: Blackboard) -> Blackboard:
-    other = Blackboard()
-    other._numbers.update(board._numbers)
-    for store in board._stores.values():
-        for entry in store.entries.values():
-            other._current[entry.id] = entry
-            other._store(type(entry.value)).put(entry)
-    return other
 
 
 def list_acts(name: str, run: RunDirectory, left: Counter[str]) -> Iterator[Act]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -9,7 +11,10 @@ import pytest
 from blackboard.change import Posted, Revised
 from blackboard.entry import Entry
 from generated_boards import Bench, effect_on, plain_robot, reasons, wakes
+from knowledge_sources.methods.features.lines import find_lines
+from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.plan.line_finder import MIN_SEGMENT_LENGTH_PX, LineFinder
+from knowledge_sources.settings import DEFAULT
 from world_models.entries.body import CameraPicture
 from world_models.entries.percepts import Segments
 from world_models.entries.task import MilestoneStatus
@@ -55,6 +60,36 @@ def test_the_flipped_picture_has_the_flipped_lines() -> None:
         found.append(segments[np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).argmax()])
     one, other = found
     assert one[:, 0].mean() == pytest.approx(255.0 - other[:, 0].mean(), abs=0.2)
+
+
+@pytest.mark.parametrize("k1", [-0.25, 0.1])
+@pytest.mark.parametrize("edge", [50.0, 200.0])
+def test_what_the_lens_bends_is_straight_again_where_a_pinhole_sees_it(k1: float, edge: float) -> None:
+    robot = plain_robot()
+    lens = replace(robot.camera, distortion=(k1, 0.0, 0.0, 0.0, 0.0))
+    rows, columns = np.mgrid[0:256, 0:256]
+    straight = lens.pinhole.project(lens.rays(np.stack([columns, rows], axis=-1)))[..., 0]
+    image = np.repeat(np.where(straight < edge - 0.5, 60, 180).astype(np.uint8)[..., None], 3, axis=2)
+    bench = Bench(robot)
+    bench.revise(bench.view["CameraState-1"], lens=lens)
+    segments = effect_on(bench.ask(SOURCE, take(bench, image)), Segments).value.segments_px
+    lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    near = np.abs(segments[..., 0] - (edge - 0.5)).max(axis=1) < 1.5
+    assert lengths[near].sum() > 150.0  # a pinhole of the same focal length sees at least so much of it
+
+
+def test_how_sure_each_line_is_goes_with_it() -> None:
+    """As the finder of lines says it: a bright edge is surer than a faint one."""
+    image = draw(edge=80.0, low=60, high=110)
+    image[:, 170:] = 250
+    bench = Bench(plain_robot())
+    frame = take(bench, image)
+    seen = effect_on(bench.ask(SOURCE, frame), Segments).value
+    found = find_lines(read_picture(frame.value.jpeg).rectified(plain_robot().lens, plain_robot().camera),
+                       min_length_px=MIN_SEGMENT_LENGTH_PX, settings=DEFAULT.features)
+    assert np.array_equal(seen.segments_px, found.segments_px) and np.array_equal(seen.sigma_px, found.sigma_offset_px)
+    faint, bright = (seen.sigma_px[np.abs(seen.segments_px[..., 0].mean(axis=1) - at).argmin()] for at in (80.0, 170.0))
+    assert bright < faint
 
 
 def test_a_blank_picture_has_no_lines_and_no_contrast() -> None:

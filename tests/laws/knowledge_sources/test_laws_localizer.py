@@ -13,18 +13,27 @@ from hypothesis import strategies as st
 from blackboard.change import Posted
 from blackboard.effect import Post, Retract
 from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
 from generated_boards import HALL, Bench, drive, go, made, motions, plain_robot, poses, reasons, to_world, wakes
-from knowledge_sources.goal.localizer import Localizer, _follow
-from knowledge_sources.methods.localization.global_localization import LocalizationResult, LocalizationStatus
+from knowledge_sources.action.model_reviser import ModelReviser
+from knowledge_sources.goal.localizer import MAX_PROBES, Localizer, _follow
+from knowledge_sources.methods.localization.global_localization import (
+    LocalizationResult,
+    LocalizationStatus,
+    PlaceCandidate,
+)
 from knowledge_sources.methods.localization.next_view import SensingAction
 from knowledge_sources.methods.localization.place_search import Search
+from knowledge_sources.methods.localization.refinement import PoseLikelihood
 from knowledge_sources.methods.verification.line_check import predict_lines
 from knowledge_sources.questions import find_building
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.entries.location import Hypothesis, PlaceOdds, PlaceSearch, diagonal
-from world_models.entries.obstacle import Contact
+from world_models.entries.obstacle import Contact, Obstacle
 from world_models.entries.percepts import Glimpse, Panorama, Segments
+from world_models.entries.task import Certificate
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, flattened
 
@@ -99,6 +108,117 @@ def test_what_it_has_felt_is_part_of_the_search_and_of_the_reasons(direction: fl
     assert felt == pytest.approx(ROBOT.radius_m * np.array([math.cos(direction), math.sin(direction)]))
     assert isinstance(effects[0], Post) and touch.id in reasons(effects[0])
     assert effects[0].value.probe == (1.0, 0.0)
+
+
+FOUND, PROBE, AMBIGUOUS = LocalizationStatus.FOUND, LocalizationStatus.PROBE, LocalizationStatus.AMBIGUOUS
+ACTION = SensingAction(1.0, 0.3, 2.0)
+
+
+def candidate(pose: Pose2, log_likelihood: float, weight: float = 0.5) -> PlaceCandidate:
+    """A place that the looks bear out; its pose in the room."""
+    fits = PoseLikelihood(20, 18, log_likelihood, 0.9, 0.9)
+    return PlaceCandidate(ROOM, in_world(pose), np.diag([1e-3, 2e-3, 1e-4]), fits, True, weight)
+
+
+def search_says(bench: Bench, panorama: Entry[Panorama], result: LocalizationResult, which: int = 0
+                ) -> tuple[Any, list[Any]]:
+    """What the localizer makes of a result of the search; and of whom that was asked."""
+    asked: list[Any] = []
+
+    def answer(robots: Any, what: Search, _: Any) -> tuple[LocalizationResult, int]:
+        asked.extend(robots)
+        return result, which
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("knowledge_sources.goal.localizer.search", answer)
+        patch.setattr("knowledge_sources.goal.localizer.find_far_action", lambda *_: None)
+        return bench.ask(SOURCE, panorama), asked
+
+
+FEW = DEFAULT.localization.max_doubted_pictures
+
+
+@pytest.mark.parametrize("counted", [0, FEW, FEW + 1])
+@pytest.mark.parametrize("learnt", [False, True])
+@pytest.mark.parametrize("finds", [False, True])
+def test_what_may_have_been_learnt_at_the_wrong_place_is_tried_as_it_was_told(
+    counted: int, learnt: bool, finds: bool
+) -> None:
+    """A camera that few pictures taught, and the building without what it was found to have; which of them fitted."""
+    bench = lose()
+    camera = bench.view["CameraState-1"]
+    if learnt:
+        moved = camera.value.moved((0.01,) + (0.0,) * 6)
+        bench.revise(camera, lens=moved.lens, mount=moved.mount, told_lens=moved.told_lens,
+                     told_mount=moved.told_mount, counted=((0.0, 0.0, 0.0),) * counted)
+    if finds:
+        box = tuple((float(x), float(y)) for x, y in (in_world(Pose2(1.0 + dx, 1.0 + dy, 0.0)).position
+                                                      for dx, dy in ((-.1, -.1), (.1, -.1), (.1, .1), (-.1, .1))))
+        thing = bench.put(Obstacle(f"{ROOM}/obstacle-1", ROOM, box, 0.02, 1.0, 1.0, 0.2))
+        bench.apply(*bench.ask(ModelReviser(), thing) or ())
+    tilts = [camera.value.mount.tilt_rad + 0.01 * learnt]
+    tilts += [camera.value.mount.tilt_rad] * (learnt and counted <= FEW)
+    things = [1, 0] if finds else [0]
+    panorama = look_round(bench, (0.0,))
+    for which in range(len(tilts) * len(things)):
+        effects, asked = search_says(bench, panorama, LocalizationResult(PROBE, (), ACTION), which)
+        assert [robot.mount.tilt_rad for robot in asked] == pytest.approx([t for t in tilts for _ in things])
+        assert [sum(t.name.endswith("obstacle-1") for t in robot.world.things_of(ROOM)) for robot in asked] == (
+            things * len(tilts))
+        (found,) = made(effects, PlaceSearch)
+        assert found.is_camera_as_told == (which >= len(things))
+
+
+@pytest.mark.parametrize("places", [0, 2])
+@pytest.mark.parametrize("more", [-1, 0])
+def test_so_many_looks_are_taken(places: int, more: int) -> None:
+    """More of them where some place fits."""
+    bench = lose()
+    most = DEFAULT.goal.max_far_probes if places else MAX_PROBES
+    one = look_round(bench, (0.0,)).value.glimpses[0]
+    panorama = bench.put(Panorama((one,) * (most + more)))
+    fits = tuple(candidate(Pose2(1.0 + k, 1.0, 0.0), 9.0) for k in range(places))
+    effects, _ = search_says(bench, panorama, LocalizationResult(PROBE, fits, ACTION))
+    (found,) = made(effects, PlaceSearch)
+    assert found.probe == (None if more == 0 else (ACTION.turn_rad, ACTION.move_m))
+
+
+def test_all_places_that_fit_stay_until_one_is_found() -> None:
+    bench = lose()
+    fits = tuple(candidate(Pose2(1.0 + 0.5 * k, 1.0, 0.2 * k), 9.0 - k, 0.5 - 0.1 * k) for k in range(3))
+    effects, _ = search_says(bench, look_round(bench, (0.0,)), LocalizationResult(PROBE, fits, ACTION))
+    posted = made(effects, Hypothesis)
+    assert [h.weight for h in posted] == pytest.approx([0.5, 0.4, 0.3])
+    for h, c in zip(posted, fits, strict=True):
+        assert (h.locale, h.status, h.basis) == (ROOM, "candidate", "relocalization")
+        assert h.world_from_robot(ROBOT.world).distance_to(c.world_from_robot) < 1e-9
+        assert np.allclose(h.covariance_world(ROBOT.world), c.covariance)
+    effect = next(e for e in effects if not isinstance(e, Retract) and isinstance(e.value, Hypothesis))
+    assert reasons(effect) == {"PlaceSearch", "Panorama-1", "Hypothesis-1"}
+
+
+@pytest.mark.parametrize("refuted", [0, 1])
+@pytest.mark.parametrize("verified", [False, True])
+def test_the_odds_by_which_a_place_is_found_are_told_with_it(refuted: int, verified: bool) -> None:
+    """Of two places that fit as well and look otherwise the one where it was told to be; Bayes' rule by hand."""
+    bench = lose()
+    if refuted:
+        bench.revise(bench.view["Discrepancy-1"], status="corrected")
+        bench.put(PlaceOdds(ROOM, 2, "told", 0.9, 0.99, 0))
+        bench.put(Discrepancy(Level.GOAL, "it is elsewhere", None, (0.0, 0.0), "px"))
+    if verified:
+        bench.put(Certificate("Milestone-1", "", "verified", "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0, 0.001))
+    here, there = candidate(TRUTH, 30.0), candidate(Pose2(1.0, 4.0, -2.0), 26.0)
+    result = LocalizationResult(AMBIGUOUS, (there, here), None)
+    effects, _ = search_says(bench, look_round(bench, (math.pi / 2, 0.0)), result)
+    (odds,) = made(effects, PlaceOdds)
+    s = DEFAULT.localization
+    prior = s.p_told / (1.0 - s.p_told) * s.lost_again_odds**refuted
+    assert odds.p_prior == pytest.approx(prior / (1.0 + prior)) and odds.refuted == refuted
+    assert odds.probability == pytest.approx(1.0 / (1.0 + math.exp(-4.0) / prior), abs=1e-6)
+    assert (odds.locale, odds.source) == (ROOM, "tracked" if verified else "told")
+    (kept,) = made(effects, Hypothesis)
+    assert kept.world_from_robot(ROBOT.world).distance_to(in_world(TRUTH)) < 1e-9
 
 
 @settings(max_examples=40, deadline=None)

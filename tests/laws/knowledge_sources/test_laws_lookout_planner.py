@@ -63,6 +63,9 @@ def test_first_what_alone_leaves_a_way_the_nearest_first_and_another_each_time(s
     beside = bench.stand(2.4, 2.0 + 1.6 * side, 0.1, 0.1)
     far, near = bench.stand(4.9, 2.0 + 0.95 * side, 0.1, 1.0), bench.stand(4.3, 2.0 - 0.95 * side, 0.1, 1.0)
     behind = (far.id, beside.id, near.id)
+    for alone in (beside, far):  # only what is behind is looked at
+        named = bench.ask(SOURCE, bench.put(Impasse("blocked", "no way", goal.id, (alone.id,))))
+        assert alone.id in reasons(effect_on(named, Impasse))
     looked_at = []
     for looked in range(MOST):
         effects = bench.ask(SOURCE, bench.put(Impasse("blocked", "no way", goal.id, behind)))

@@ -7,34 +7,46 @@ the robot is in doubt, has followed landmarks, or has not: each state has its ow
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import pytest
 
 from blackboard.board import Blackboard, TracedView, View
 from blackboard.change import Change
-from blackboard.effect import Effect
+from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry
 from blackboard.entry_store import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
 from experiments.generated.missions import OFFICE
+from generated_boards import effect_on, reasons
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.belief.odds import to_log_odds, update
+from knowledge_sources.methods.localization.aliasing import Alias
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
-from knowledge_sources.methods.verification.weigh import Weighed, is_last_look, judge_place
-from knowledge_sources.plan.milestone_judge import Case, MilestoneJudge
+from knowledge_sources.methods.verification.weigh import Verdict, Weighed, is_last_look, judge_place
+from knowledge_sources.place_believed import find_p_not_alias
+from knowledge_sources.plan import milestone_judge
+from knowledge_sources.plan.milestone_judge import (
+    MAX_P_FALSE_CLEAR,
+    MAX_P_FALSE_UNMISTAKABLE,
+    Case,
+    MilestoneJudge,
+)
 from knowledge_sources.questions import HELD, find_belief
 from knowledge_sources.settings import DEFAULT, Settings
+from rebuilt_board import copy_of
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
-from world_models.entries.location import diagonal
+from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.percepts import Segments, Track, Tracks
+from world_models.entries.task import Certificate, Milestone
+from world_models.frames import Pose2
 
 T = TypeVar("T")
 PLAN, VERIFICATION = DEFAULT.plan, DEFAULT.verification
@@ -156,8 +168,18 @@ def case_on(view: View, trigger: Change) -> Case:
     return case
 
 
-def run_with(check: Callable[[Blackboard, Change], None]) -> None:
-    """Drive a mission, and check something on the board before each judgement."""
+class Judged(NamedTuple):
+    """A judgement of a mission: the board before it, a copy, and what woke the judge."""
+
+    board: Blackboard
+    trigger: Change
+
+
+@pytest.fixture(scope="module")
+def judged() -> list[Judged]:
+    """The judgements of a mission."""
+    found: list[Judged] = []
+
     def sources(settings: Settings) -> list[Any]:
         out: list[Any] = list(knowledge_sources(settings))
         judge = next(source for source in out if isinstance(source, MilestoneJudge))
@@ -168,17 +190,18 @@ def run_with(check: Callable[[Blackboard, Change], None]) -> None:
             bound[:] = [trigger]
             return bind(view, trigger)
 
-        def checked(view: View, case: Any) -> Iterable[Effect]:
-            check(view._board, bound[0])
+        def noted(view: View, case: Any) -> Iterable[Effect]:
+            found.append(Judged(copy_of(view._board), bound[0]))
             return act(view, case)
 
-        judge.bind, judge.act = remember, checked
+        judge.bind, judge.act = remember, noted
         return out
 
     run_mission(build_stage(parse_scenario(OFFICE)), 3, sources=sources)
+    return found
 
 
-def test_each_state_of_the_robot_asks_for_its_own_evidence() -> None:
+def test_each_state_of_the_robot_asks_for_its_own_evidence(judged: list[Judged]) -> None:
     """In doubt, with landmarks followed, and without: on the board of each judgement of a mission."""
     least, checked = DEFAULT.action.min_followed_landmarks, []
     states = {"p_wrong_in_doubt": ((True, least), (True, 0)), "p_wrong_followed": ((False, least), (False, least + 1)),
@@ -187,7 +210,7 @@ def test_each_state_of_the_robot_asks_for_its_own_evidence() -> None:
     def check(board: Blackboard, trigger: Change) -> None:
         for own, boards in states.items():
             for in_doubt, followed in boards:
-                view = StateView(board, in_doubt, followed)
+                view = StateView(board, in_doubt, followed, 1e-3)
                 weighed = MilestoneJudge().weigh(view, case_on(view, trigger))
                 assert weighed.is_weak is (in_doubt or followed < least)
                 bound = find_prior_at_bound(weighed.p_false)
@@ -198,11 +221,12 @@ def test_each_state_of_the_robot_asks_for_its_own_evidence() -> None:
                     assert is_enough is enough, (own, in_doubt, followed, value)
                 checked.append(own)
 
-    run_with(check)
+    for board, trigger in judged:
+        check(board, trigger)
     assert set(checked) == set(states) and len(checked) >= 6
 
 
-def test_where_no_other_view_is_left_all_looks_together_need_only_be_believed() -> None:
+def test_where_no_other_view_is_left_all_looks_together_need_only_be_believed(judged: list[Judged]) -> None:
     """By the standard of the search that would find the same place again; before the last look by the stricter one."""
     most, believed, checked = PLAN.max_looks, 1.0 - DEFAULT.localization.min_p_believed, set()
 
@@ -222,11 +246,14 @@ def test_where_no_other_view_is_left_all_looks_together_need_only_be_believed() 
                 assert weighed.is_enough is (wanted <= may_be)
                 checked.add((tried, weighed.is_enough))
 
-    run_with(check)
+    for board, trigger in judged:
+        check(board, trigger)
     assert len(checked) == 4
 
 
-def test_landmarks_that_were_followed_speak_for_no_place_where_the_belief_leaves_much_open() -> None:
+def test_landmarks_that_were_followed_speak_for_no_place_where_the_belief_leaves_much_open(
+    judged: list[Judged]
+) -> None:
     """And what is surely seen may lie as far off as the belief leaves open, though the plan level's window is less.
 
     Along level lines, which are half of some views, nothing moves as the robot turns: so the uncertainty is large.
@@ -243,11 +270,106 @@ def test_landmarks_that_were_followed_speak_for_no_place_where_the_belief_leaves
         wide = weigh_at(16.0 * PLAN.max_deviation_px * by_pixel)
         checked.append((sure.is_weak, unsure.is_weak, POSE_CONFIDENCE.accepts(wide.p_false), wide.tolerance_px))
 
-    run_with(check)
+    for board, trigger in judged:
+        check(board, trigger)
     assert any(is_sure for _, _, is_sure, _ in checked)
     for sure_is_weak, unsure_is_weak, is_sure, tolerance_px in checked:
         assert (sure_is_weak, unsure_is_weak) == (False, True)
         assert tolerance_px > 1.5 * PLAN.max_deviation_px if is_sure else tolerance_px == PLAN.max_deviation_px
+
+
+def judge_on(one: Judged, view: View | None = None) -> tuple[Case, Weighed, tuple[Effect, ...]]:
+    """What the judge finds on a board, how it weighs that, and what it makes of it."""
+    judge, view = MilestoneJudge(), view or one.board.view
+    case = case_on(view, one.trigger)
+    return case, judge.weigh(view, case), tuple(judge.act(view, case))
+
+
+@pytest.mark.parametrize("in_doubt", [False, True])
+def test_what_it_writes_follows_from_the_verdict(judged: list[Judged], in_doubt: bool) -> None:
+    """A certificate by fix and milestone; all else by that; the deviation as the plan level's, within its window."""
+    for one in judged:
+        board = copy_of(one.board)
+        for doubt in board.view.where(Discrepancy, lambda d: d.level is Level.PLAN):
+            board.apply([Retract(doubt)], author="test", cycle=10**6)
+        if in_doubt:
+            board.apply([Post(Discrepancy(Level.PLAN, "by a law", 9.0, (0.0, 30.0), "px"))], author="test", cycle=10**6)
+        case, weighed, effects = judge_on(Judged(board, one.trigger))
+        said = effect_on(effects, Certificate)
+        assert reasons(said) == {case.fix.id, case.milestone.id}
+        assert (said.value.milestone, said.value.fix) == (case.milestone.id, case.fix.id)
+        judged_one = effect_on(effects, Milestone)
+        assert judged_one.entry is case.milestone and reasons(judged_one) == {"Certificate"}
+        assert judged_one.value == replace(case.milestone.value, status=said.value.verdict)
+        found = effect_on(effects, Discrepancy)
+        most_px = max(PLAN.max_deviation_px, weighed.tolerance_px)
+        is_measured = said.value.verdict == "verified" or weighed.shift_px > most_px
+        assert (found.value.level, found.value.unit, found.value.bounds) == (Level.PLAN, "px", (0.0, most_px))
+        assert found.value.magnitude == (weighed.shift_px if is_measured else math.inf)
+        assert reasons(found) == {"Certificate"} and isinstance(found, Revise) == in_doubt
+
+
+@pytest.mark.parametrize("there", ["here", "far"])
+def test_where_as_much_agrees_at_a_candidate_of_a_search_nothing_is_verified(judged: list[Judged], there: str) -> None:
+    asked = 0
+    for one in judged:
+        board = copy_of(one.board)
+        belief = board.view.newest(HELD, True)
+        assert belief is not None
+        pose = belief.value.locale_from_robot
+        pose = pose if there == "here" else Pose2(pose.x_m, pose.y_m, pose.heading_rad + math.pi)
+        was = judge_on(one)
+        if effect_on(was[2], Certificate).value.verdict != "verified":
+            continue
+        asked += 1
+        board.apply([Post(Hypothesis(belief.value.locale, pose, diagonal(0.02, 0.01), "relocalization",
+                                     status="candidate"))], author="test", cycle=10**6)
+        said = effect_on(judge_on(Judged(board, one.trigger))[2], Certificate).value
+        assert said.verdict == ("not testable" if there == "here" else "verified")
+        assert there == "far" or (said.p_false == 0.5 and "Hypothesis-" in said.reason and "50%" in said.reason)
+    assert asked > 0
+
+
+@pytest.mark.parametrize("margin", [-9.0, -1.0, 0.0, 1.0, 9.0])
+@pytest.mark.parametrize("is_near", [False, True])
+def test_a_place_that_repeats_itself_is_held_against_it_by_bayes_rule(
+    judged: list[Judged], margin: float, is_near: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By how much more agrees here, up to what is chance; and by how much nearer to the belief this place is."""
+    one, most = judged[0], DEFAULT.localization.max_alike_log_ratio
+    view = StateView(one.board, True, 0)
+    judge, case = MilestoneJudge(), case_on(view, one.trigger)
+    weighed = replace(judge.weigh(view, case), p_false=1e-3, is_weak=True)
+    near = Pose2(weighed.pose.x_m + 0.05, weighed.pose.y_m, weighed.pose.heading_rad)
+    other = near if is_near else Pose2(weighed.pose.x_m + 3.0, weighed.pose.y_m, weighed.pose.heading_rad)
+    monkeypatch.setattr(milestone_judge, "list_aliases", lambda *_, **__: [Alias(other, margin)])
+    verdict = judge._hold_against_others(view, case, weighed, Verdict("verified", "so", 1e-3))
+    spread = weighed.covariance + case.fix.value.covariance + 1e-9 * np.eye(3)
+    (own, away) = (float(d @ np.linalg.solve(spread, d)) for d in (
+        pose.minus(weighed.before) for pose in (weighed.pose, other)))
+    p_there = find_p_not_alias(view, DEFAULT.localization)
+    share = 0.5 * (1.0 - p_there)
+    against = (p_there * math.exp(-0.5 * max(away - own, 0.0)) + share) * math.exp(min(max(-margin, -most), most))
+    p = against / (p_there + share + against)
+    assert verdict.kind == ("verified" if p <= PLAN.max_p_rival else "not testable")
+    assert verdict.p_false == pytest.approx(1e-3 if p <= PLAN.max_p_rival else max(1e-3, p), rel=1e-3)
+
+
+@pytest.mark.parametrize(("p_false", "is_weak", "asked"), [
+    (MAX_P_FALSE_UNMISTAKABLE * 0.99, True, None), (MAX_P_FALSE_UNMISTAKABLE * 1.01, True, False),
+    (MAX_P_FALSE_UNMISTAKABLE * 1.01, False, None), (MAX_P_FALSE_CLEAR * 0.99, True, False),
+    (MAX_P_FALSE_CLEAR * 1.01, True, True), (MAX_P_FALSE_CLEAR * 1.01, False, None)])
+def test_how_far_it_is_held_against_the_rest_of_the_room(
+    judged: list[Judged], p_false: float, is_weak: bool, asked: bool | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is unmistakable, or was expected, is not; what is clear with its repetitions; else with the whole room."""
+    one, searched = judged[0], []
+    judge, view = MilestoneJudge(), one.board.view
+    case = case_on(view, one.trigger)
+    weighed = replace(judge.weigh(view, case), p_false=p_false, is_weak=is_weak)
+    monkeypatch.setattr(milestone_judge, "list_aliases", lambda *_, search, **__: searched.append(search) or [])
+    assert judge._hold_against_others(view, case, weighed, Verdict("verified", "so", p_false)).kind == "verified"
+    assert searched == ([] if asked is None else [asked])
 
 
 def test_in_doubt_more_is_asked_than_without_landmarks_and_there_more_than_with_them() -> None:

@@ -11,7 +11,7 @@ import pytest
 from blackboard.change import Posted
 from blackboard.entry import Entry
 from blackboard.level import Level
-from generated_boards import Bench, effect_on, plain_robot, reasons, wakes
+from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
 from knowledge_sources.plan.obstruction_finder import MIN_OBSTRUCTION_LOOKS, ObstructionFinder
 from world_models.entries.obstacle import Obstruction
 from world_models.entries.percepts import Segments
@@ -59,6 +59,25 @@ def test_in_so_many_looks_it_is_no_chance(count: int, flipped: bool) -> None:
         assert {f"Segments-{k + 1}" for k in range(count)} == reasons(effect)
         bench.apply(*effects)
         assert bench.ask(SOURCE, last) is None  # the board says it
+
+
+@pytest.mark.parametrize("first", ["with it", "without it"])
+def test_what_the_last_looks_show_counts(first: str) -> None:
+    """It may have come since; what they do not show any more is not before the camera."""
+    bench = Bench(plain_robot())
+    bench.believe()
+    bench.pursue()
+    bare = np.zeros((0, 2, 2))
+    shown = [FRAME, FRAME, FRAME, bare, bare] if first == "with it" else [bare, bare, FRAME, FRAME, FRAME]
+    last = [look(bench, number, sides) for number, sides in enumerate(shown)][-1]
+    assert bool(made(bench.ask(SOURCE, last), Obstruction)) == (first == "without it")
+
+
+def test_what_was_known_is_a_reason_of_what_is_known_now() -> None:
+    bench, last = looks(MIN_OBSTRUCTION_LOOKS)
+    known = bench.put(Obstruction(((0.0, 0.0), (30.0, 0.0), (30.0, 30.0), (0.0, 30.0))))
+    effect = effect_on(bench.ask(SOURCE, last), Obstruction)
+    assert effect.entry is known and known.id in reasons(effect)
 
 
 def test_looks_before_the_goal_do_not_count() -> None:

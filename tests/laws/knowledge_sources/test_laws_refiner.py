@@ -7,7 +7,7 @@ from hypothesis import given, settings
 
 from blackboard.change import Posted, Revised
 from blackboard.entry import Entry
-from generated_boards import HALL, HOUSE, STUDY, Bench, effect_on, plain_robot, poses, reasons, wakes
+from generated_boards import HALL, HOUSE, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, wakes
 from knowledge_sources.plan.refiner import Refiner
 from world_models.entries.location import Place
 from world_models.entries.task import Impasse, Outcome, PlanSketch, Subgoal
@@ -80,6 +80,25 @@ def test_where_another_way_leads_to_the_goal_the_sketch_ends_for_that_one() -> N
     assert {(e.entry.id, e.value.status) for e in effects or ()} == {  # type: ignore[union-attr]
         (sketch.id, "superseded"), (below.id, "superseded")}
     assert all(reasons(effect) == {sketch.id} for effect in effects or ())
+
+
+@pytest.mark.parametrize("at", [0, 1])
+def test_a_way_is_another_one_than_what_is_left_of_the_sketch(at: int) -> None:
+    """Back through the door by which it came: another way only once it has come."""
+    bench = Bench(plain_robot())
+    bench.believe(Pose2(6.0, 2.8, 0.0))
+    goal = bench.pursue(Place(STUDY, 4.0, 2.0))
+    thing = bench.stand(2.0, 1.0, 0.3, 0.3)
+    here, there = Place(HALL, 6.0, 2.8), Place(HALL, 2.0, 1.0)
+    came = Subgoal(here, here, primitive=True, passage="study-door")
+    leads_there = Subgoal(here, there, primitive=False)
+    steps = (came, leads_there) if at else (leads_there, came)
+    sketch = bench.put(PlanSketch(goal.id, (), "", steps, at, verified=True), goal)
+    effects = bench.ask(SOURCE, sketch)
+    if at:
+        assert [s.status for s in made(effects, PlanSketch)] == ["superseded"]
+    else:
+        assert effect_on(effects, Impasse).value.behind == (thing.id,)
 
 
 @pytest.mark.parametrize("basis", ["command", "odometry", "tracks", "milestone", "relocalization", "ride"])
