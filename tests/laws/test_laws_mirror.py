@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from generated_boards import Bench, effect_on, mirrored, plain_robot, to_world
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.doors.belief import MIN_LOG_RATIO, PRIOR_LOG_ODDS, update_door
+from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_LOG_RATIO, PRIOR_LOG_ODDS, update_door
 from knowledge_sources.methods.features.lines import find_lines
 from knowledge_sources.methods.motion.pure_pursuit import (
     compute_bearing,
@@ -187,6 +187,21 @@ def test_what_a_door_looks_like_from_one_place_counts_once_and_open_as_shut(rati
             known = update_door(known, "door", ("a", "b"), picture, 1.0, is_believed_shut=sign < 0.0) or known
             odds, said = odds + sign * max(ratio - said, 0.0), max(ratio, said)
             assert known is not None and known.log_odds == pytest.approx(odds)
+
+
+@settings(max_examples=40)
+@given(st.floats(-6.0, 6.0), st.floats(MIN_LOG_RATIO, 4.0), st.sampled_from((1.0, -1.0)))
+def test_what_was_believed_of_a_door_by_pictures_that_are_not_kept_stays(
+    odds: float, ratio: float, sign: float
+) -> None:
+    """A picture from elsewhere is added to it; one from the same place counts once."""
+    last = DoorPicture("CameraPicture-0", (0.0, 0.0, 9.0, 9.0), 1.0, 2.0, 0.3, sign * MIN_LOG_RATIO, "")
+    known = DoorState("door", ("a", "b"), "unknown", 0.5, odds, 2, last, 1.0)
+    new = DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), 5.0, 2.0, 0.3, sign * ratio, "")
+    again = update_door(known, "door", ("a", "b"), new, 2.0, is_believed_shut=False)
+    wanted = min(max(odds + sign * ratio, -MAX_LOG_ODDS), MAX_LOG_ODDS)
+    assert again is None or again.log_odds == pytest.approx(wanted)
+    assert again is not None or wanted == pytest.approx(odds)
 
 
 colours = st.tuples(*[st.floats(0.05, 1.0)] * 3)

@@ -123,7 +123,8 @@ def decide(mission: Mission, world: World) -> list[tuple[str, tuple[float, ...],
 MISSIONS = (
     Mission(Pose2(1.23, 1.31, 0.4), Place(STUDY, 2.53, 1.62), ()),
     Mission(Pose2(1.21, 2.43, 0.5), Place(HALL, 6.87, 1.13), (("table", 4.03, 1.37, 0.0),)),
-    Mission(Pose2(6.04, 3.11, -1.0), Place(STUDY, 4.53, 1.22), (("table", 4.01, 2.63, 20.0), ("table", 2.02, 0.74, 90.0))),
+    Mission(Pose2(6.04, 3.11, -1.0), Place(STUDY, 4.53, 1.22),
+            (("table", 4.01, 2.63, 20.0), ("table", 2.02, 0.74, 90.0))),
 )
 
 

@@ -28,8 +28,14 @@ from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.belief.odds import to_log_odds, update
 from knowledge_sources.methods.localization.aliasing import Alias
-from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
-from knowledge_sources.methods.verification.weigh import Verdict, Weighed, is_last_look, judge_place
+from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, compute_motion_tolerance_px
+from knowledge_sources.methods.verification.weigh import (
+    Verdict,
+    Weighed,
+    _find_tolerance_px,
+    is_last_look,
+    judge_place,
+)
 from knowledge_sources.place_believed import find_p_not_alias
 from knowledge_sources.plan import milestone_judge
 from knowledge_sources.plan.milestone_judge import (
@@ -298,6 +304,9 @@ def test_what_it_writes_follows_from_the_verdict(judged: list[Judged], in_doubt:
         said = effect_on(effects, Certificate)
         assert reasons(said) == {case.fix.id, case.milestone.id}
         assert (said.value.milestone, said.value.fix) == (case.milestone.id, case.fix.id)
+        off = case.fix.value.world_from_robot.minus(case.belief.value.world_from_robot(weighed.robot.world))
+        assert said.value.deviation_m == pytest.approx(math.hypot(*off[:2]))
+        assert said.value.deviation_rad == pytest.approx(off[2])
         judged_one = effect_on(effects, Milestone)
         assert judged_one.entry is case.milestone and reasons(judged_one) == {"Certificate"}
         assert judged_one.value == replace(case.milestone.value, status=said.value.verdict)
@@ -307,6 +316,43 @@ def test_what_it_writes_follows_from_the_verdict(judged: list[Judged], in_doubt:
         assert (found.value.level, found.value.unit, found.value.bounds) == (Level.PLAN, "px", (0.0, most_px))
         assert found.value.magnitude == (weighed.shift_px if is_measured else math.inf)
         assert reasons(found) == {"Certificate"} and isinstance(found, Revise) == in_doubt
+
+
+@pytest.mark.parametrize("in_doubt", [False, True])
+@pytest.mark.parametrize("as_put_down", [False, True])
+@pytest.mark.parametrize("is_sure", [False, True])
+@pytest.mark.parametrize("motion_px", [1.0, 1000.0])
+def test_how_far_the_lines_may_be_by_all_that_it_depends_on(
+    in_doubt: bool, as_put_down: bool, is_sure: bool, motion_px: float
+) -> None:
+    """What the wheels can do, as it was put down, or the matcher's window: at most that, or for what is sure at least.
+    """
+    before: Any = SimpleNamespace(in_doubt=in_doubt, is_as_put_down=as_put_down)
+    window_px, wheels_px = PLAN.max_deviation_px, DEFAULT.action.min_tolerance_px + motion_px
+    wanted = {(False, False): min(wheels_px, window_px), (False, True): max(wheels_px, window_px)}.get(
+        (in_doubt, is_sure), window_px)
+    if as_put_down:
+        wanted = max(wheels_px, window_px) if in_doubt or is_sure else wheels_px
+    assert _find_tolerance_px(before, motion_px, is_sure, DEFAULT) == pytest.approx(wanted)
+
+
+def test_what_the_wheels_can_do_and_what_the_picture_leaves_open_count_together(judged: list[Judged]) -> None:
+    """Twice as unsure a solution leaves as much more open as twice as unsure a belief."""
+    asked, judge = 0, MilestoneJudge(tune(max_deviation_px=0.01))  # so small a window that it decides nothing
+    for one in judged:
+        view = StateView(one.board, False, 9, 0.02)
+        case = case_on(view, one.trigger)
+        for more in (0.0, 1e-2):
+            fix = replace(case.fix.value, covariance=case.fix.value.covariance + np.diag([more, more, 1e-2 * more]))
+            entry: Any = SimpleNamespace(value=fix, id=case.fix.id)
+            weighed = judge.weigh(view, case._replace(fix=entry))
+            if POSE_CONFIDENCE.accepts(weighed.p_false):
+                open_px = compute_motion_tolerance_px(
+                    weighed.robot, np.array(case.milestone.value.expected), weighed.before,
+                    weighed.covariance + fix.covariance, VERIFICATION)
+                assert weighed.tolerance_px == pytest.approx(DEFAULT.action.min_tolerance_px + open_px)
+                asked += 1
+    assert asked > 1
 
 
 @pytest.mark.parametrize("there", ["here", "far"])

@@ -24,9 +24,11 @@ from knowledge_sources.methods.localization.aliasing import (
 )
 from knowledge_sources.methods.verification.line_check import compute_coverage, predict_lines
 from knowledge_sources.settings import DEFAULT
+from towers import tower
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.files.world_files import WORLDS, load_world
+from world_models.files.toml.source import Source
+from world_models.files.world_files import WORLDS, load_world, read_world
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
@@ -150,6 +152,26 @@ def test_settings_are_read_where_they_are_passed() -> None:
     """Longer lines only: fewer are predicted, and the kept views of other settings are not returned."""
     here = Pose2(*WORLD.world_from_locale("hallway").apply([7.31, 1.17, 0.0])[:2], 0.013)
     default = predict_views_on_grid(ROBOT, [here])[0]
-    short = replace(DEFAULT, verification=replace(DEFAULT.verification, min_line_length_px=40.0))
+    short = replace(DEFAULT, verification=replace(DEFAULT.verification, min_line_length_px=90.0))
     assert len(predict_views_on_grid(ROBOT, [here], short)[0]) < len(default)
     assert np.array_equal(predict_views_on_grid(ROBOT, [here])[0], default)
+
+
+def test_the_same_place_on_another_floor_or_with_another_camera_is_another_view() -> None:
+    """Each question has its own answer, whatever was asked before: floor, lens, and how lines are looked for."""
+    tall = read_world(Source.parse(tower(2), "tower.toml"))
+    robot = RobotModel(tall, Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1), ActuatorModel())
+    longer = replace(DEFAULT, verification=replace(DEFAULT.verification, min_line_length_px=90.0))
+    wide = Camera.from_field_of_view(math.radians(80.0))
+    asked = [(robot.on_floor_of("hall-1"), DEFAULT), (robot.on_floor_of("hall-2"), DEFAULT),
+             (RobotModel(tall, wide, robot.mount, ActuatorModel()).on_floor_of("hall-1"), DEFAULT),
+             (robot.on_floor_of("hall-1"), longer)]
+    pose = Pose2(9.0, -0.7, 2.9)
+    plain = []
+    for one, tuning in asked:
+        fresh = replace(one, world=read_world(Source.parse(tower(2), "tower.toml")))
+        plain.append(predict_views_on_grid(fresh, [pose], tuning)[0])
+    for (one, tuning), wanted in (*zip(asked, plain, strict=True), *zip(asked[::-1], plain[::-1], strict=True)):
+        (found,) = predict_views_on_grid(one, [pose], tuning)
+        assert found.shape == wanted.shape and np.allclose(found, wanted)
+    assert all(a.shape != b.shape or not np.allclose(a, b) for k, a in enumerate(plain) for b in plain[:k])

@@ -17,6 +17,7 @@ import pytest
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from experiments.generated.floors import generated_floor
+from knowledge_sources.methods.localization import place_search
 from knowledge_sources.methods.localization.global_localization import (
     LocalizationResult,
     LocalizationStatus,
@@ -32,7 +33,7 @@ from knowledge_sources.methods.localization.place_odds import (
     is_within_reach,
     weigh_told,
 )
-from knowledge_sources.methods.localization.place_search import prefer_reachable
+from knowledge_sources.methods.localization.place_search import describe, find_far_action, prefer_reachable
 from knowledge_sources.methods.localization.refinement import PoseLikelihood
 from knowledge_sources.place_believed import count_refuted, find_p_not_alias, find_p_there
 from knowledge_sources.settings import DEFAULT
@@ -48,6 +49,7 @@ FOUND, PROBE, AMBIGUOUS = LocalizationStatus.FOUND, LocalizationStatus.PROBE, Lo
 S = DEFAULT.localization
 LOOKS = [Pose2(0.0, 0.0, 0.5 * k) for k in range(8)]
 SMALL = 1e-6
+ACTION = SensingAction(0.3, 0.6, 1.0)
 ROBOT = RobotModel(generated_floor(11, 4, symmetric=True).world, Camera.from_field_of_view(1.1), CameraMount(1.0, 0.1),
                    ActuatorModel())
 
@@ -195,6 +197,35 @@ def test_the_only_place_within_reach_is_believed_if_it_stands_by_itself(
     found = prefer_reachable(building, LocalizationResult(AMBIGUOUS, places), "here")
     assert found.status is status
     assert status is not FOUND or [c.room for c in found.candidates] == [room]
+
+
+@pytest.mark.parametrize(("accepted", "status", "looks", "has_next", "asks"), [
+    (2, AMBIGUOUS, S.min_views, True, True), (3, AMBIGUOUS, S.min_views, True, True),
+    (1, AMBIGUOUS, S.min_views, True, False), (2, FOUND, S.min_views, True, False),
+    (2, AMBIGUOUS, S.min_views - 1, True, False), (2, PROBE, S.min_views, False, True),
+    (2, PROBE, S.max_searched_views - 1, True, False), (2, PROBE, S.max_searched_views, True, True),
+    (2, PROBE, DEFAULT.goal.max_far_probes - 1, True, True), (2, PROBE, DEFAULT.goal.max_far_probes, True, False)])
+def test_a_far_view_is_looked_for_between_places_that_nothing_near_tells_apart(
+    accepted: int, status: LocalizationStatus, looks: int, has_next: bool, asks: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr(place_search, "choose_far_action", lambda *given: asked.append(given) or ACTION)
+    places = (*(place(2.0 + 4.0 * k) for k in range(accepted)), place(20.0, accepted=False))
+    result = LocalizationResult(status, places, ACTION if has_next else None)
+    found = find_far_action(ROBOT, result, LOOKS[:1] * looks, ["corridor-0"], DEFAULT)
+    assert (found is ACTION) == bool(asked) == asks
+    if asks:
+        assert [h.world_from_robot for h in asked[0][1]] == [c.world_from_robot for c in places]
+
+
+@pytest.mark.parametrize("degrees", [30.0, -30.0])
+@pytest.mark.parametrize("move_m", [0.0, 0.6])
+def test_what_is_said_of_a_probe_is_what_is_done(degrees: float, move_m: float) -> None:
+    action = SensingAction(math.radians(degrees), move_m, 1.0)
+    for is_far in (False, True):
+        said = describe(LocalizationResult(PROBE, (place(),), action), is_far=is_far)
+        assert f"a turn by {degrees:.0f} degrees" in said and (f"a move of {move_m:.1f} m" in said) == (move_m > 0.0)
+        assert ("view that tells" in said) == is_far
 
 
 def test_a_dark_frame_is_dark_by_contrast_and_brightness_together() -> None:

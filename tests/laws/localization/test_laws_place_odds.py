@@ -95,6 +95,15 @@ def test_a_wider_covariance_reaches_no_less(x: float, y: float, turn: float, sig
     assert is_within_reach(pose, here, told, wide) >= is_within_reach(pose, here, told, narrow)
 
 
+@given(small, small, small, st.floats(0.01, 1.0), st.floats(0.01, 1.0))
+def test_how_sure_the_place_is_reaches_as_far_as_how_surely_it_was_told(
+    x: float, y: float, turn: float, one: float, other: float
+) -> None:
+    pose, told = Pose2(x, y, turn), Pose2(0.0, 0.0, 0.0)
+    first, second = np.diag([one, one, 0.1]) ** 2, np.diag([other, other, 0.2]) ** 2
+    assert is_within_reach(pose, first, told, second) == is_within_reach(pose, second, told, first)
+
+
 def test_a_room_away_is_out_of_reach() -> None:
     narrow = np.diag([0.02, 0.02, 0.02]) ** 2
     assert is_within_reach(Pose2(0.05, -0.05, 0.03), narrow, Pose2(0.0, 0.0, 0.0), narrow)

@@ -1,0 +1,111 @@
+"""Laws of the floor that is free without being seen: under the robot, where it drove, and where it was put down."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blackboard.entry import Entry
+from generated_boards import HALL, Bench, plain_robot, to_world
+from knowledge_sources.floor_ahead import (
+    MAX_DRIVEN_GAP_M,
+    PUT_DOWN_FREE_M,
+    SEEN_MARGIN_M,
+    FloorAhead,
+    list_free_discs,
+)
+from knowledge_sources.settings import DEFAULT
+from world_models.entries.floor import FloorSense, FreeFloor
+from world_models.entries.location import Place
+from world_models.frames import Pose2, wrap_angle
+
+ROBOT = plain_robot()
+SMALL = 1e-6
+FAR = Pose2(50.0, 50.0, 0.0)
+
+
+def see(bench: Bench, x: float, y: float, sense: FloorSense = "camera", heading: float = 0.0) -> Entry[FreeFloor]:
+    """A look at the floor that shows none of it."""
+    ahead = (heading - 0.1, heading, heading + 0.1)
+    return bench.put(FreeFloor(sense, HALL, x, y, ahead, (1.0,) * 3, (1.0,) * 3, ("sight",) * 3, (0.02,) * 3, (), 1.0))
+
+
+def covered(discs: list[tuple[float, float, float]]) -> shapely.Geometry:
+    return shapely.union_all([shapely.Point(x, y).buffer(r, quad_segs=64) for x, y, r in discs])
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(-math.pi, math.pi), st.floats(0.3 * ROBOT.radius_m + SMALL, MAX_DRIVEN_GAP_M - SMALL))
+def test_between_two_looks_that_are_near_it_drove_straight(direction: float, gap_m: float) -> None:
+    """Whatever the direction: what it swept is free, and nothing beside it."""
+    bench = Bench(ROBOT)
+    a = see(bench, 20.0, -7.0)
+    b = see(bench, 20.0 + gap_m * math.cos(direction), -7.0 + gap_m * math.sin(direction))
+    under, *driven = list_free_discs(bench.view, ROBOT, FAR, [a, b])
+    assert under.circle == (FAR.x_m, FAR.y_m, ROBOT.radius_m + SEEN_MARGIN_M) and under.because == ()
+    line = shapely.LineString([(20.0, -7.0), (b.value.x_m, b.value.y_m)])
+    free = covered([disc.circle for disc in driven])
+    assert free.within(line.buffer(1.001 * ROBOT.radius_m, quad_segs=64))
+    assert line.buffer(0.97 * ROBOT.radius_m).within(free)
+    assert all(disc.because == (a, b) for disc in driven)
+
+
+@pytest.mark.parametrize(("gap_m", "sense", "drove"), [
+    (MAX_DRIVEN_GAP_M - SMALL, "camera", True), (MAX_DRIVEN_GAP_M + SMALL, "camera", False),
+    (0.3 * ROBOT.radius_m - SMALL, "camera", False), (0.5, "ranges", False)])
+def test_looks_that_are_further_apart_tell_no_way(gap_m: float, sense: FloorSense, drove: bool) -> None:
+    bench = Bench(ROBOT)
+    looks = [see(bench, 20.0, -7.0, sense), see(bench, 20.0 + gap_m, -7.0, sense)]
+    assert (len(list_free_discs(bench.view, ROBOT, FAR, looks)) > 1) == drove
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.3, -2.4])
+@pytest.mark.parametrize("sense", ["camera", "ranges"])
+@pytest.mark.parametrize("off_m", [0.0, 0.5, MAX_DRIVEN_GAP_M + 0.2])
+def test_where_it_was_put_down_is_behind_the_first_picture_if_that_is_near(
+    heading: float, sense: FloorSense, off_m: float
+) -> None:
+    """The robot's axis is behind its camera; ranges are told from the axis."""
+    bench = Bench(ROBOT)
+    bench.pursue(Place(HALL, 6.0, 2.0))
+    start = Place(HALL, 1.0, 2.0).in_world(ROBOT.world)
+    axis = Pose2(start.x_m + off_m, start.y_m, heading)
+    eye = axis @ Pose2(ROBOT.mount.forward_m if sense == "camera" else 0.0, 0.0, 0.0)
+    first = see(bench, eye.x_m, eye.y_m, sense, heading)
+    *_, put = list_free_discs(bench.view, ROBOT, FAR, [])
+    there = start if off_m > MAX_DRIVEN_GAP_M else axis
+    assert put.circle == pytest.approx((there.x_m, there.y_m, PUT_DOWN_FREE_M)) and put.because == (first,)
+    bench.pursue()  # a later goal begins elsewhere
+    bench.revise(bench.view["Goal-1"], status="reached")
+    assert len(list_free_discs(bench.view, ROBOT, FAR, [])) == 1
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.2, 4.0), st.floats(-1.0, 1.0))
+def test_pictures_will_be_taken_every_increment_up_to_the_end_and_there_to_where_it_goes_on(
+    to_go_m: float, aside: float
+) -> None:
+    bench = Bench(ROBOT)
+    here = Pose2(1.5, 2.0, 0.2)
+    belief = bench.believe(here)
+    end = Place(HALL, 1.5 + to_go_m * math.cos(0.3), 2.0 + to_go_m * math.sin(0.3) * 0.3)
+    beyond = Place(HALL, end.x_m + 1.0, end.y_m + aside)
+    sketch = bench.sketch(Place(HALL, 1.0, 2.0), end, beyond, path=(0,))
+    floor = FloorAhead(bench.view, bench.leg(sketch).value, belief, DEFAULT)
+    start, stop, on = to_world(here), end.in_world(ROBOT.world), beyond.in_world(ROBOT.world)
+    way_m = start.distance_to(stop)
+    *ahead, last = floor._list_poses_ahead(way_m)
+    step_m = ROBOT.actuator.increment_m
+    assert [start.distance_to(p) for p in ahead] == pytest.approx(
+        [min(way_m, step_m * (k + 1)) for k in range(len(ahead))])
+    assert way_m - step_m * 0.1 - SMALL <= start.distance_to(ahead[-1]) <= way_m + SMALL
+    heading = math.atan2(stop.y_m - start.y_m, stop.x_m - start.x_m)
+    assert all(wrap_angle(p.heading_rad - heading) == pytest.approx(0.0) for p in ahead)
+    assert all(abs(p.minus(start) @ np.array([-math.sin(heading), math.cos(heading), 0.0])) < SMALL for p in ahead)
+    assert last.distance_to(stop) < SMALL
+    assert wrap_angle(last.heading_rad - math.atan2(on.y_m - stop.y_m, on.x_m - stop.x_m)) == pytest.approx(0.0)
