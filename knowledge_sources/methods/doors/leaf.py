@@ -179,8 +179,6 @@ def _pass_through(
     first: tuple[Floats, Floats, Floats] | None = None
     for room in (locale, doorway.other(locale)):
         left, right = doorway.threshold_of(room)
-        if room != locale:
-            left, right = right, left
         along = (right - left) / doorway.width_m
         slope = rays[:, :2] @ outward
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_LOG_RATIO, MIN_PICTURES, SHUT_LOG_ODDS, update_door
 from knowledge_sources.methods.doors.leaf import (
+    JAMB_MARGIN_M,
     MAX_DISTANCE_M,
     MAX_LOG_RATIO,
     MIN_LEAF_SINE,
@@ -96,6 +97,31 @@ def test_a_leaf_is_told_from_what_is_beyond_in_any_light(
     shut, opened = (weigh(robot, doorway, buildings[state], pose, gain) for state in ("shut", "open"))
     assert shut is not None and shut >= MIN_LOG_RATIO
     assert opened is not None and opened <= -MIN_LOG_RATIO
+
+
+@pytest.mark.parametrize("sigma_m", [0.001, 0.02, 0.06])
+@pytest.mark.parametrize("sigma_rad", [0.001, 0.03])
+@pytest.mark.parametrize("aside_m", [-0.5, 0.0, 0.5])
+def test_samples_keep_off_the_jambs_by_what_the_pose_leaves_open(
+    robot: RobotModel, doorway: Doorway, sigma_m: float, sigma_rad: float, aside_m: float
+) -> None:
+    """Two deviations of the place and of the heading at that distance; and every sample passes both thresholds so."""
+    pose = before_door(doorway, 2.5, aside_m)
+    opening = predict_opening(robot, pose, np.diag([sigma_m, sigma_m, sigma_rad]) ** 2, doorway, HALL, robot.world)
+    assert opening is not None
+    margin_m = JAMB_MARGIN_M + 2.0 * math.hypot(sigma_m, sigma_rad * opening.distance_m)
+    center = robot.camera_from_world(pose).inverse()
+    rays = robot.camera.rays(opening.pixels) @ center.rotation.T
+    for k, room in enumerate((HALL, doorway.other(HALL))):
+        left, right = doorway.threshold_of(room)
+        outward = doorway.outward_from(HALL)
+        deep = ((left - center.translation[:2]) @ outward) / (rays[:, :2] @ outward)
+        hit = center.translation + deep[:, None] * rays
+        across, height = (hit[:, :2] - left) @ (right - left) / doorway.width_m, hit[:, 2]
+        for off in (across, doorway.width_m - across, height, doorway.height_m - height):
+            assert off.min() > margin_m - 1e-6
+        if k == 0:
+            assert np.allclose(across / doorway.width_m, opening.across) and np.allclose(height, opening.height_m)
 
 
 def test_a_wall_where_the_door_should_be_is_no_leaf(

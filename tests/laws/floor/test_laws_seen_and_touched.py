@@ -1,0 +1,129 @@
+"""Laws of what a further sight or a touch makes of a thing that is known: it loses nothing that was surely there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from generated_boards import HALL, house, plain_robot, to_world
+from knowledge_sources.methods.floor.found_things import keep_touched
+from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M, see_ranges
+from knowledge_sources.methods.floor.weigh_sight import Sight, see_again
+from knowledge_sources.methods.floor.weigh_touch import TOUCHED_SIDE_M, Touched, touch_again
+from knowledge_sources.methods.motion.footprints import build_polygon
+from knowledge_sources.settings import DEFAULT
+from world_models.entries.floor import FloorThing, FreeFloor
+from world_models.entries.obstacle import Contact, Obstacle, Ranges
+from world_models.frames import Pose2
+
+NONE = shapely.Polygon()
+Corners = tuple[tuple[float, float], ...]
+
+
+def box(x: float, y: float, half_x: float, half_y: float) -> Corners:
+    """Corners in the world of a box in the hall's frame."""
+    return tuple((float(a), float(b)) for a, b in (
+        to_world(Pose2(x + i * half_x, y + k * half_y, 0.0)).position for i, k in ((-1, -1), (1, -1), (1, 1), (-1, 1))))
+
+
+WHOLE, PART = box(4.0, 2.0, 0.5, 0.4), box(3.7, 2.0, 0.2, 0.4)
+THING = Obstacle("hall/obstacle-1", HALL, WHOLE, 0.05, 4.0, 2.0, 1.0, 0.8, 0.3, certainty=0.9, core=PART, by="sight")
+
+
+def is_part(small: Corners, large: Corners) -> bool:
+    """Whether one lies in another, to the grain in which corners are told."""
+    return bool(build_polygon(small).within(build_polygon(large).buffer(6e-3)))
+
+
+@settings(max_examples=30)
+@given(st.floats(-math.pi, math.pi), st.booleans())
+def test_touched_it_reaches_to_where_it_was_touched_and_what_was_seen_of_it_too(
+    direction: float, has_core: bool
+) -> None:
+    """Neither loses anything, what was seen stays a part of the whole, and no more is added than the touched square."""
+    here = to_world(Pose2(4.0 - 1.0 * math.cos(direction), 2.0 - 1.0 * math.sin(direction), 0.0))
+    out = to_world(Pose2(0.0, 0.0, direction)).heading_rad
+    contact = Contact("bumper", 0.0, 0.2, 7.0)
+    touched = Touched(np.array(here.position), np.array([math.cos(out), math.sin(out)]), contact)
+    known = THING if has_core else replace(THING, core=())
+    new = touch_again(house(), touched, known, DEFAULT.action)
+    square = touched.build_square(TOUCHED_SIDE_M)
+    for before, after in ((known.footprint, new.footprint), (known.core, new.core)):
+        assert bool(after) == bool(before)
+        if before:
+            hull = shapely.convex_hull(shapely.union(build_polygon(before), build_polygon(square)))
+            assert build_polygon(after).hausdorff_distance(hull) < 8e-3
+    assert not has_core or is_part(new.core, new.footprint)
+    assert (new.status, new.seen_s, new.looked_s, new.touched_s) == ("there", 7.0, 7.0, 7.0)
+    assert new.certainty == DEFAULT.action.max_obstacle_certainty
+
+
+@pytest.mark.parametrize("core", [(), PART])
+@pytest.mark.parametrize("touched_s", [None, 3.0])
+def test_no_picture_takes_back_what_was_touched(core: Corners, touched_s: float | None) -> None:
+    """What was seen of it then; not the rest of what it was taken to cover."""
+    seen = build_polygon(box(4.6, 2.0, 0.1, 0.1))
+    kept = keep_touched(replace(THING, core=core, touched_s=touched_s), seen)
+    wanted = seen if touched_s is None else shapely.union(seen, build_polygon(core or WHOLE))
+    assert kept.symmetric_difference(wanted).area < 1e-9
+
+
+def look(*, p: float = 0.6, sigma_m: float = 0.05, sigma_height_m: float = 0.3, seen_s: float = 9.0,
+         way_m: float = 0.0, known: Obstacle = THING, height_m: float = 0.7) -> Obstacle | None:
+    """A thing after another sight of all of it from a way away."""
+    eye = to_world(Pose2(1.5, 2.0, 0.0))
+    floor = FreeFloor("camera", HALL, eye.x_m, eye.y_m, (0.0,), (1.0,), (1.0,), ("thing",), (0.02,), (), seen_s)
+    thing = FloorThing(known.footprint, sigma_m, height_m, sigma_height_m, p, (0.0, 0.0, 9.0, 9.0), "unlike the floor")
+    sight = Sight(floor, "CameraPicture-1", house(), 0.4, NONE, NONE)
+    return see_again(sight, known, way_m, thing, build_polygon(known.footprint), NONE, DEFAULT.action)
+
+
+@pytest.mark.parametrize("sigma_m", [0.02, 0.05, 0.2])
+@pytest.mark.parametrize("sigma_height_m", [0.05, 0.3, 1.0])
+def test_of_two_sights_the_sharper_tells_place_and_height(sigma_m: float, sigma_height_m: float) -> None:
+    new = look(sigma_m=sigma_m, sigma_height_m=sigma_height_m)
+    assert new is not None and new.sigma_m == min(sigma_m, THING.sigma_m)
+    is_higher = sigma_height_m < 0.7 * THING.sigma_height_m
+    assert (new.height_m, new.sigma_height_m) == ((0.7, sigma_height_m) if is_higher else (
+        THING.height_m, THING.sigma_height_m))
+
+
+@pytest.mark.parametrize("p", [0.3, 0.6, 0.95])
+@pytest.mark.parametrize("way_m", [0.0, 20.0])
+@pytest.mark.parametrize("status", ["suspected", "there", "gone"])
+def test_only_from_elsewhere_it_is_further_evidence(p: float, way_m: float, status: str) -> None:
+    """There the odds multiply; from the same place the stronger counts; gone, it begins anew."""
+    known = replace(THING, status=status, certainty=0.4)
+    new = look(p=p, way_m=way_m, known=known)
+    assert new is not None
+    odds = 0.4 / 0.6 * p / (1.0 - p)
+    wanted = p if status == "gone" else odds / (1.0 + odds) if way_m else max(p, 0.4)
+    assert new.certainty == pytest.approx(min(wanted, DEFAULT.action.max_obstacle_certainty))
+    is_there = status == "there" or new.certainty >= DEFAULT.action.min_obstacle_certainty
+    assert new.status == ("there" if is_there else "suspected")
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("sigma_m", "sigma_rad", "is_new"), [
+    (0.001, 0.001, True), (0.001, 0.1, False), (0.05, 0.001, True), (0.4, 0.001, False)])
+def test_an_echo_may_be_of_the_wall_beside_the_cone_as_far_as_the_pose_leaves_it_open(
+    side: float, sigma_m: float, sigma_rad: float, is_new: bool
+) -> None:
+    """A wall 1.2 m aside; an echo ahead that is nearer than where the cone meets it, but for heading and place."""
+    robot, half, away_m = plain_robot(), 0.2, 4.0
+    pose = to_world(Pose2(2.0, 2.0 + 0.8 * side, 0.0))
+    heard = Ranges((0.0,), (away_m + robot.radius_m,), 0.01, half, 8.0, 1.0)
+    seen = see_ranges(robot, HALL, pose, sigma_m, sigma_rad, heard, ())
+    place_m = math.hypot(0.01, sigma_m)
+    wide = half + 3.0 * sigma_rad + math.atan2(3.0 * sigma_m, away_m)
+    far_end = 6.0 - robot.radius_m
+    nearest = min(1.2 / math.sin(wide), far_end)
+    assert is_new == (away_m < nearest - RANGE_SLACK_M - 3.0 * place_m)  # what the table is by
+    ahead = int(np.argmin(np.abs(np.array(seen.bearings_rad) - pose.heading_rad)))
+    assert (seen.ends[ahead] == "thing") == is_new
