@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, NamedTuple, Self, TypeVar
 
+from blackboard.journal import Decision, Sink
 from experiments.report import Cell, Report
 from experiments.trials import RESULTS, at_least, at_most, campaign_folder, run_trials
+from harvey.campaign.campaign import Task, run_task
 from harvey.runner.result import MissionResult
+from knowledge_sources.methods.belief.odds import to_probability
+from sim.ground_truth.table import TrueDoor
+from world_models.entries.door_state import DoorState
 
 WORST_SHOWN = 6
 NO_PEER = "no peer with one camera and a building's model is known."
 JUDGED = "; no constant was chosen on them. Bounds are one-sided, of 95 %, by Clopper and Pearson."
 Claim = tuple[str, bool]
+MAX_P_SHUT = 0.9
+"""No door that is open is ever believed to be shut above this probability."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +33,40 @@ class Trial:
     seed: int
 
 
+@dataclass
+class DoorBeliefs:
+    """A sink that keeps which doors are open in truth and were believed to be shut, with the time of the picture.
+
+    A door that was shut before counts as open no more: the robot cannot know when it was opened.
+
+    Attributes:
+        doors: that are otherwise than the model says.
+    """
+
+    doors: Sequence[TrueDoor]
+    shut: dict[str, float] = field(default_factory=dict)
+
+    def __call__(self, decision: Decision) -> None:
+        for change in decision.made:
+            value = change.entry.value
+            if isinstance(value, DoorState) and to_probability(value.log_odds) > MAX_P_SHUT and not any(
+                    d.name == value.door and d.state != "open" and d.at_s <= value.seen_s for d in self.doors):
+                self.shut.setdefault(value.door, value.seen_s)
+
+
+class Mission(NamedTuple):
+    """How a mission went, and the open doors that were believed to be shut."""
+
+    result: MissionResult
+    shut: Mapping[str, float]
+
+
+def drive_task(task: Task, *sinks: Sink) -> Mission:
+    """Drive a mission in the simulator, which alone knows the truth."""
+    beliefs = DoorBeliefs(task.stage().scenario.truth.doors)
+    return Mission(run_task(task, sinks=[*sinks, beliefs]), beliefs.shut)
+
+
 @dataclass(frozen=True, slots=True)
 class End:
     """How a mission ended, in plain types.
@@ -34,6 +75,7 @@ class End:
         error_m: true distance from the goal.
         false_accepts: milestones that were verified while the robot was elsewhere.
         robot_s: time of the robot; wall_s: of the processor, and waiting.
+        believed_shut: doors that are open, and were believed to be shut above :data:`MAX_P_SHUT`.
     """
 
     row: str
@@ -51,14 +93,16 @@ class End:
     replans: int
     robot_s: float
     wall_s: float
+    believed_shut: list[str]
 
     @classmethod
-    def of(cls, trial: Trial, r: MissionResult, **more: Any) -> Self:
+    def of(cls, trial: Trial, mission: Mission, **more: Any) -> Self:
         """The end of a trial; ``more`` are the fields of the experiment's own kind."""
+        r, shut = mission.result, [f"{door} at {seen_s:.1f} s" for door, seen_s in sorted(mission.shut.items())]
         count = {key: value or 0 for key, value in r.milestones.items()}
         return cls(trial.row, trial.seed, r.outcome, r.reason, r.error_m, r.path_length_m, count["verified"],
                    count["refuted"], count["not_testable"], r.false_accepts, r.collisions or 0, r.relocalizations,
-                   r.replans, r.sim_time_s, r.wall_time_s, **more)
+                   r.replans, r.sim_time_s, r.wall_time_s, shut, **more)
 
     @property
     def is_reached(self) -> bool:
@@ -101,6 +145,11 @@ COMMON: Mapping[str, Figure[End]] = {
 }
 
 
+OPEN_HELD_SHUT: Figure[End] = total(lambda e: len(e.believed_shut))
+HELD_SHUT = (f"open held shut: doors that are open by the truth, and were at some time believed to be shut above"
+             f" {MAX_P_SHUT:g}.")
+
+
 def pick(*names: str) -> Mapping[str, Figure[End]]:
     """Columns that several experiments have."""
     return {name: COMMON[name] for name in names}
@@ -121,6 +170,11 @@ def claim_none(what: str, ends: Sequence[E], is_wrong: Callable[[E], bool] = has
     """That something happens in no mission; ``what``: "no milestone is accepted at a wrong place"."""
     wrong = sum(map(is_wrong, ends))
     return f"{what}: {wrong} of {len(ends)} missions, so in at most {at_most(wrong, len(ends)):.2%}", not wrong
+
+
+def claim_open_doors(ends: Sequence[End]) -> Claim:
+    """That no open door was believed to be shut."""
+    return claim_none(f"no open door is ever believed shut above {MAX_P_SHUT:g}", ends, lambda e: bool(e.believed_shut))
 
 
 def spread(shares: Mapping[str, float], first: int, number: int | None) -> list[Trial]:
@@ -146,7 +200,7 @@ class Driven(Generic[E]):
         is_flawed: Callable[[E], bool], tell: Callable[[E], str] = lambda end: f"{end.outcome}: {end.reason}",
         worst: Callable[[E], Any] = lambda end: end.seed, sides: Sequence[str] = ("paper", "peer"), about: str = JUDGED,
     ) -> Report:
-        """The table, a row a line, written into the folder too.
+        """The table, a row a line, written into the folder too; all of them tell of open doors believed to be shut.
 
         Args:
             what: the missions of a row differ in.
@@ -154,15 +208,17 @@ class Driven(Generic[E]):
             sides: columns of others, who have no figures.
             about: what is to be said of the seeds.
         """
-        none = (None,) * len(sides)
+        none, columns = (None,) * len(sides), {**figures, "open held shut": OPEN_HELD_SHUT}
         report = Report(
-            title, (what, *sides, *figures),
-            tuple((row, *none, *(figure(ends) for figure in figures.values())) for row, ends in self.rows.items()),
+            title, (what, *sides, *columns),
+            tuple((row, *none, *(figure(ends) for figure in columns.values())) for row, ends in self.rows.items()),
             notes=(
-                f"{self.seeds}{about}", *notes, *self.name_flawed(is_flawed, tell, worst),
+                f"{self.seeds}{about}", *notes, HELD_SHUT,
+                *self.name_flawed(lambda e: is_flawed(e) or bool(e.believed_shut),
+                                  lambda e: "; held shut: ".join([tell(e), *e.believed_shut]), worst),
                 f"One line per mission: {self.folder / RESULTS}",
             ),
-            claims=tuple(claims),
+            claims=(*claims, claim_open_doors(self.ends)),
         )
         return self.keep(report)
 

@@ -6,12 +6,16 @@ import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 
+import shapely
+
 from blackboard.board import View
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
+from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
 from knowledge_sources.questions import find_building, find_robot
 from knowledge_sources.settings import PlanSettings
+from world_models import words
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Goal, PlanSketch, SketchStatus, Subgoal
@@ -99,3 +103,19 @@ def has_missed(view: View, belief: Hypothesis, sketch: PlanSketch, *, is_inexact
     wider_m = INEXACT_TOLERANCE_SIGMAS * belief.sigma_m if is_inexact else 0.0
     is_off = here.distance_to(there) > math.hypot(subgoal.tolerance_m, wider_m)
     return is_off or abs(error) > GOAL_HEADING_TOLERANCE_RAD
+
+
+def tell_missed(
+    view: View, belief: Hypothesis, sketch: PlanSketch
+) -> tuple[str, tuple[Entry[Obstacle], ...]]:
+    """What was tried so often in vain, how far from it the last try ended, and what may stand there; and that itself.
+    """
+    there, then = sketch.subgoals[sketch.at - 1].destination, sketch.current
+    building, robot = find_building(view), find_robot(view)
+    at = there.in_world(building)
+    off_m, rim = belief.world_from_robot(building).distance_to(at), shapely.Point(at.position).buffer(robot.radius_m)
+    what = "the goal" if then is None else f"the elevator {then.passage}" if then.is_ride else "the way"
+    taking = view.where(Obstacle, lambda o: o.status != "gone" and build_polygon(o.footprint).intersects(rim))
+    occupied = f"; it is occupied by {' and '.join(o.value.words() for o in taking)}" if taking else ""
+    tries, last = words.count(sketch.adjustments + 1, "try", "tries"), f"the last ended {words.metres(off_m)} from it"
+    return f"{what} at {there} was not come to in {tries}: {last}{occupied}", taking

@@ -16,7 +16,7 @@ from experiments import drives
 from experiments.drives import Claim, Driven, End, Trial
 from experiments.generated.door_missions import write_door_mission
 from experiments.report import Report
-from harvey.campaign.campaign import Task, run_task
+from harvey.campaign.campaign import Task
 from sim.scenario import load_scenario
 from world_models.entries.door_state import DoorState
 from world_models.words import listed
@@ -69,14 +69,14 @@ def drive(trial: Trial) -> DoorEnd:
     with TemporaryDirectory() as folder:
         mission = write_door_mission(Path(folder), trial.seed, trial.row)
         doors = load_scenario(mission.path).truth.doors
-        result = run_task(Task(str(mission.path), (), trial.seed), sinks=[note])
+        driven = drives.drive_task(Task(str(mission.path), (), trial.seed), note)
     wrong = []
     for (door, state), seen_s in sorted(states.items()):
         true = {d.state for d in doors if d.name == door and d.at_s <= seen_s < d.until_s} or {"open"}
         if (state == "open") != (true == {"open"}):
             wrong.append(f"{door} is {state} at {seen_s:.1f} s")
     found = any(door == mission.door and state != "open" for door, state in states)
-    return DoorEnd.of(trial, result, door=mission.door, is_found=found, false_states=wrong)
+    return DoorEnd.of(trial, driven, door=mission.door, is_found=found, false_states=wrong)
 
 
 FIGURES: Mapping[str, drives.Figure[DoorEnd]] = {

@@ -16,7 +16,7 @@ import numpy as np
 
 from blackboard.journal import Decision
 from experiments import drives
-from experiments.drives import Claim, Driven, End, Trial
+from experiments.drives import Claim, DoorBeliefs, Driven, End, Mission, Trial
 from experiments.generated.missions import WHEELS_WORSE, write_inexact_mission
 from experiments.report import Cell, Report
 from experiments.trials import at_most
@@ -92,14 +92,15 @@ def drive(trial: Trial) -> InexactEnd:
         path = write_inexact_mission(Path(folder), trial.seed, truth, stated_m=sigma_m,
                                      more="" if sigma_m else WHEELS_WORSE)
         stage = Task(str(path), (), trial.seed).stage()
-        head = build_head(stage, trial.seed)
+        head, beliefs = build_head(stage, trial.seed), DoorBeliefs(stage.scenario.truth.doors)
         agent = build_agent(head)
-        with SimulatedRun(stage, head, agent, RunRecorder(None, head, agent.world, agent.robot), [witness]) as driving:
+        recorder = RunRecorder(None, head, agent.world, agent.robot)
+        with SimulatedRun(stage, head, agent, recorder, [witness, beliefs]) as driving:
             witness.body = driving.simulated_body
             result = driving.drive(None)
     most_m = math.hypot(MAX_ERROR_M, MODEL_SIGMAS * sigma_m)
     wrong = sum(off_m > most_m or (turn > MAX_ERROR_RAD and chi2 > CHI2_9999) for off_m, turn, chi2 in witness.errors)
-    return InexactEnd.of(trial, result, chi2=[chi2 for *_, chi2 in witness.errors], wrong=wrong)
+    return InexactEnd.of(trial, Mission(result, beliefs.shut), chi2=[chi2 for *_, chi2 in witness.errors], wrong=wrong)
 
 
 def _held(ends: Sequence[InexactEnd]) -> tuple[int, int]:

@@ -16,7 +16,7 @@ from experiments.drives import End, Trial
 from experiments.generated.door_missions import write_door_mission
 from experiments.generated.light import LIGHT_KINDS, draw_light, format_light
 from experiments.report import Cell, Report
-from harvey.campaign.campaign import Task, run_task
+from harvey.campaign.campaign import Task
 
 FLAT = "flat"
 MISSIONS = 1_000
@@ -27,7 +27,7 @@ MIN_REACHED = 0.995
 def drive(trial: Trial) -> End:
     """Drive the mission of a trial."""
     with TemporaryDirectory() as folder:
-        return End.of(trial, run_task(Task(str(write_light_mission(Path(folder), trial)), (), trial.seed)))
+        return End.of(trial, drives.drive_task(Task(str(write_light_mission(Path(folder), trial)), (), trial.seed)))
 
 
 def write_light_mission(folder: Path, trial: Trial) -> Path:

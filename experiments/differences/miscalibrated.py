@@ -19,7 +19,7 @@ from experiments import drives
 from experiments.drives import Claim, Driven, End, Trial
 from experiments.generated.missions import write_camera_mission
 from experiments.report import Cell, Report
-from harvey.campaign.campaign import Task, run_task
+from harvey.campaign.campaign import Task
 from sim.faults.built_in_faults import CameraKnocked
 from sim.scenario import Scenario, load_scenario
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, subtract_cameras
@@ -84,14 +84,14 @@ def drive(trial: Trial) -> CameraEnd:
     with TemporaryDirectory() as folder:
         path = write_camera_mission(Path(folder), trial.seed, trial.row)
         scenario = load_scenario(path)
-        result = run_task(Task(str(path), (), trial.seed), sinks=[watch])
-    is_knocked = trial.row == "knocked" and not any("knocked" in words for words in result.amiss)
+        driven = drives.drive_task(Task(str(path), (), trial.seed), watch)
+    is_knocked = trial.row == "knocked" and not any("knocked" in words for words in driven.result.amiss)
     state = (watch.state if trial.row == "knocked" else watch.far) or watch.state
     lens, mount = (scenario.camera.camera, scenario.camera.mount) if state is None else (state.lens, state.mount)
     found = subtract_cameras(lens, mount, *find_true_camera(scenario, is_knocked))
     is_learnt = state is not None and bool(state.covariance)
     sigmas = np.sqrt(np.diag(np.array(state.covariance))).tolist() if state is not None and is_learnt else []
-    return CameraEnd.of(trial, result, found=list(found), sigmas=sigmas)
+    return CameraEnd.of(trial, driven, found=list(found), sigmas=sigmas)
 
 
 def find_true_camera(scenario: Scenario, is_knocked: bool) -> tuple[Camera, CameraMount]:

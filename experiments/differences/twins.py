@@ -21,7 +21,7 @@ from experiments.drives import Claim, Driven, End, Trial
 from experiments.generated.missions import write_twin_mission
 from experiments.report import Cell, Report
 from experiments.trials import at_most
-from harvey.campaign.campaign import Task, run_task
+from harvey.campaign.campaign import Task
 from world_models.entries.location import PlaceOdds
 
 REACHED_M = 0.3
@@ -77,8 +77,8 @@ def drive(trial: Trial) -> TwinEnd:
 
     with TemporaryDirectory() as folder:
         mission = write_twin_mission(Path(folder), trial.seed, is_told_right=trial.row == RIGHT)
-        result = run_task(Task(str(mission.path), (), trial.seed), sinks=[note])
-    return TwinEnd.of(trial, result, rooms=mission.rooms, doubts=len(doubts), by_odds=len(odds))
+        driven = drives.drive_task(Task(str(mission.path), (), trial.seed), note)
+    return TwinEnd.of(trial, driven, rooms=mission.rooms, doubts=len(doubts), by_odds=len(odds))
 
 
 def _wrong_at_most(ends: Sequence[TwinEnd]) -> Cell:

@@ -16,7 +16,7 @@ import numpy as np
 from experiments import drives
 from experiments.drives import Claim, Driven, End, Trial
 from experiments.report import OURS, PAPER, PEER, Cell, Report, chart, count_kinds
-from harvey.campaign.campaign import Task, run_task
+from harvey.campaign.campaign import Task
 from world_models.units import INCH_M
 from world_models.words import count
 
@@ -44,7 +44,7 @@ class MissionEnd(End):
 
 def drive(trial: Trial) -> MissionEnd:
     """Drive a mission of the scenario that the row is named after."""
-    return MissionEnd.of(trial, run_task(Task(trial.row, (), trial.seed)))
+    return MissionEnd.of(trial, drives.drive_task(Task(trial.row, (), trial.seed)))
 
 
 def _errors_mm(ends: Sequence[MissionEnd], percent: float | None) -> Cell:

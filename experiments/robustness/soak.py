@@ -20,7 +20,7 @@ from experiments.generated.light import LIGHT_KINDS, MOST_SAG_DEG, SAG_DEG_PER_D
 from experiments.report import Cell, Report
 from experiments.scale.agenda_memory import resident_bytes
 from experiments.trials import at_most
-from harvey.campaign.campaign import Task, run_task
+from harvey.campaign.campaign import Task
 
 MISSIONS, QUICK_MISSIONS, A_DAY = 20_000, 2, 10
 SEEDS_APART = 100_000
@@ -50,8 +50,8 @@ def drive(trial: Trial) -> SoakEnd:
     """Drive the mission of a trial."""
     with TemporaryDirectory() as folder:
         path = write_soak_mission(Path(folder), find_day(trial.seed), trial.seed)
-        result = run_task(Task(str(path), (), trial.seed))
-    return SoakEnd.of(trial, result, memory_mb=resident_bytes() / MB, process=os.getpid())
+        driven = drives.drive_task(Task(str(path), (), trial.seed))
+    return SoakEnd.of(trial, driven, memory_mb=resident_bytes() / MB, process=os.getpid())
 
 
 def _wrong_at_most(ends: Sequence[SoakEnd]) -> Cell:

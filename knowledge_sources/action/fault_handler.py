@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
@@ -15,7 +15,7 @@ from knowledge_sources.conditions import NOT_GIVEN_UP
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import OPEN_FAULT
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import STOP_KEY, BodyFault, Recovery
+from world_models.entries.body import STOP_KEY, BodyFault, Recovery, Ride
 from world_models.entries.task import Impasse
 
 
@@ -29,7 +29,8 @@ class Case(NamedTuple):
 class FaultHandler(RobotKnowledgeSource):
     """Asks for recovery from a fault of the body that is open, each time after twice the pause.
 
-    After the stop key, and after ``max_fault_s``, there is no way on.
+    After the stop key, and after ``max_fault_s``, there is no way on. An elevator that does not come is no fault of the
+    robot: then it is blocked.
     """
 
     level, priority = Level.ACTION, Priority.ENTER
@@ -53,8 +54,16 @@ class FaultHandler(RobotKnowledgeSource):
         elif recovery is None or asked is None:
             yield Post(Recovery(fault.id, f.request, f.when_s, s.min_retry_wait_s), because)
         elif asked.waited_s >= s.max_fault_s:
-            reason = f"{f.what}, and it was not over after {asked.waited_s:.0f} s; nothing more is commanded"
-            yield Post(Impasse("failed", reason), because)
+            yield Post(self._give_up(view.get(f.request), f, asked), because)
         else:
             again = replace(asked, status="asked", wait_s=min(2.0 * asked.wait_s, s.max_retry_wait_s))
             yield Revise(recovery, again, because)
+
+    def _give_up(self, request: Entry[Any] | None, fault: BodyFault, tried: Recovery) -> Impasse:
+        """How the mission ends: without an elevator there is no way; else the body has failed."""
+        if request is not None and isinstance(request.value, Ride):
+            ride, why = request.value, tried.detail or fault.detail
+            return Impasse("blocked", f"the elevator {ride.passage} from {ride.origin} to {ride.destination} does not"
+                           f" come: {why}; it was called for {tried.waited_s:.0f} s")
+        return Impasse("failed", f"{fault.what}, and it was not over after {tried.waited_s:.0f} s; nothing more is"
+                       " commanded")

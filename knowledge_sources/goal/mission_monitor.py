@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from blackboard.board import View
@@ -11,9 +12,10 @@ from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import open_discrepancy, open_impasse, open_milestone
+from knowledge_sources.questions import find_camera, open_discrepancy, open_impasse, open_milestone
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis, Place
+from world_models.entries.obstacle import Obstruction
 from world_models.entries.task import Goal, Impasse, Outcome
 
 
@@ -25,7 +27,10 @@ class Case(NamedTuple):
 
 
 class MissionMonitor(RobotKnowledgeSource):
-    """Declares how the mission ends: the goal is reached, somebody sees no way on, or nothing is left to do."""
+    """Declares how the mission ends: the goal is reached, somebody sees no way on, or nothing is left to do.
+
+    Where it is not reached, what hides a part of each picture is said too.
+    """
 
     level, priority = Level.GOAL, Priority.ENTER
     on = (
@@ -47,7 +52,12 @@ class MissionMonitor(RobotKnowledgeSource):
         return _find_what_is_left(view, trigger.entry)
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        yield Post(case.outcome, case.because)
+        (outcome, because), hidden = case, view.latest(Obstruction)
+        if outcome.kind != "reached" and hidden is not None:
+            camera = find_camera(view).pinhole
+            said = f"{outcome.reason}; {hidden.value.words(camera.width, camera.height)}"
+            outcome, because = replace(outcome, reason=said), (*because, hidden)
+        yield Post(outcome, because)
 
 
 def _find_what_is_left(view: View, still: Entry[Quiescence]) -> Case:

@@ -64,7 +64,8 @@ class GoalSketcher(RobotKnowledgeSource):
         unfit = planners[-1].explain_unfit(goal.destination)
         if unfit:
             taking = [o for o in find_obstacles(view, (goal.destination.locale,)) if o.value.name in unfit]
-            reason = f"the goal {goal.destination} {unfit}{name_obstacles(taking)}"
+            occupied = f"is occupied by {' and '.join(o.value.words() for o in taking)}: it " if taking else ""
+            reason = f"the goal {goal.destination} {occupied}{unfit}"
             yield Post(Impasse("blocked", reason, case.goal.id, tuple(o.id for o in taking)), (*_all(case), *taking))
             return
         way = find_way_to_goal(planners, here, goal)

@@ -15,7 +15,7 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_building
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.sketching import has_missed
+from knowledge_sources.sketching import has_missed, tell_missed
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.task import Goal, Impasse, Milestone, PlanSketch
 
@@ -59,11 +59,11 @@ class MilestonePasser(RobotKnowledgeSource):
         if s.adjustments < self._settings.plan.max_adjustments:
             yield Revise(sketch, _repeat(view, s, belief.value), (milestone, belief))
             return
-        in_vain, is_first = f"{sketch.id} was adjusted {s.adjustments} times in vain", len(view.all(Goal)) == 1
+        (in_vain, taking), is_first = tell_missed(view, belief.value, s), len(view.all(Goal)) == 1
         if is_first:
-            yield Post(Discrepancy(Level.GOAL, in_vain, None, (0.0, 0.0), "px"), (milestone, goal))
+            yield Post(Discrepancy(Level.GOAL, in_vain, None, (0.0, 0.0), "px"), (milestone, goal, *taking))
         else:
-            yield Post(Impasse("blocked", in_vain, goal.id), (milestone, sketch))
+            yield Post(Impasse("blocked", in_vain, goal.id), (milestone, sketch, *taking))
 
 
 def _repeat(view: View, sketch: PlanSketch, belief: Hypothesis) -> PlanSketch:

@@ -64,7 +64,7 @@ def test_the_ride_is_believed_when_told_and_verified_before_going_on(
 
 def test_where_nobody_presses_the_button_the_mission_ends_with_that_reason(tmp_path: Path) -> None:
     result, decisions = driven(tmp_path, "")
-    assert result.outcome == "failed" and "no ride" in result.reason
+    assert result.outcome == "blocked" and "elevator" in result.reason and "nobody comes by" in result.reason
     assert not made(decisions, "RideReport") and result.collisions == 0
 
 

@@ -213,6 +213,12 @@ class Obstruction:
         """Of segments (n, 2, 2) those that are not its outline, nor lie within it."""
         return np.asarray(segments_px[self.hidden_part(segments_px, ROUND_PX) < 1.0])
 
+    def words(self, width: int, height: int) -> str:
+        """How much of a picture of this size it hides; in a verdict."""
+        u, v = np.array(self.outline_px).T
+        area = 0.5 * abs(float(u @ np.roll(v, -1) - v @ np.roll(u, -1)))
+        return f"something on the lens or before it hides {area / (width * height):.0%} of each picture"
+
     def sentence(self) -> str:
         corners = ", ".join(f"({u:.0f}, {v:.0f})" for u, v in self.outline_px)
         return f"something before the camera hides a part of every picture; within {corners} px"

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Image, Mask
+from knowledge_sources.methods.doors.rival_views import ALIKE, Views, fit_views
 from knowledge_sources.methods.verification.predicted_colors import RAYS, cast_rays
 from world_models.building.building import Building
 from world_models.building.locales import Doorway
@@ -212,6 +213,7 @@ MIN_FRAME_SAMPLES = 12  # fewest samples round an opening by which it is told wh
 MIN_FRAME_SHARE = 0.6  # least share of them that has the model's color, up to one gain, where nothing stands before it
 MAX_FRAME_LEAF_SHARE = 0.4  # largest share of them that has the color of the opening, where that is a leaf
 MIN_LEAF_SINE = 0.6  # least sine of the angle at which a leaf is told from an open doorway: 37 degrees
+MAX_RIVAL_BETTER = 0.15  # most by which a rival may explain an opening better than what is told of it [mean log]
 MAX_LOG_RATIO = 4.5  # most that one picture may add to the log odds of a door: 90 to 1
 
 MAX_COMPARED = 60
@@ -232,6 +234,7 @@ class LeafEvidence:
         frame: share of the samples round the opening that have the model's color, 0..1; NaN where there are too few.
         frame_leaf: share of them that has the opening's own color.
         sine: of the angle at which the opening is seen, 1 from the front.
+        views: how badly a leaf explains the opening, and its rivals.
     """
 
     samples: int
@@ -244,6 +247,7 @@ class LeafEvidence:
     frame: float
     frame_leaf: float
     sine: float = 1.0
+    views: Views = ALIKE
 
     @property
     def features(self) -> tuple[float, ...]:
@@ -290,13 +294,15 @@ def measure_opening(
     frame, frame_leaf = _compare_frame(
         np.log(around + DARK_OFFSET), opening.frame_colors, np.median(colors, axis=0))
     one, other = MAX_LEAF_BRIGHTNESS, MAX_LEAF_TINT
+    surfaces = np.unique(np.round(opening.colors[compared], 3), axis=0, return_inverse=True)[1].ravel()
+    views = fit_views(colors[compared], surfaces, opening.across[compared], opening.height_m[compared])
     return LeafEvidence(
         len(colors), len(expected),
         find_largest_share(colors, one, other), find_largest_share(expected, one, other),
         find_largest_share(colors[compared] - expected, MAX_GAIN_BRIGHTNESS, MAX_GAIN_TINT),
         _compare_foot(colors, opening.height_m),
         _compare_foot(expected, opening.height_m[compared]),
-        frame, frame_leaf, opening.sine,
+        frame, frame_leaf, opening.sine, views,
     )
 
 
@@ -336,10 +342,13 @@ def weigh_leaf(evidence: LeafEvidence) -> float:
 
     A leaf stands in its frame: where what is round the opening is not as the model has it, or has the color of the
     opening, something may stand before it. And nothing speaks for a leaf seen aslant: an open doorway shows little but
-    its jamb and a bare wall from there.
+    its jamb and a bare wall from there. What a rival explains better says nothing: what is beyond, in other colors than
+    the model has; or a leaf that is ajar, which is neither shut nor open.
     """
-    ratio = float(np.dot(evidence.features, WEIGHTS))
+    ratio, (shut, opened, ajar) = float(np.dot(evidence.features, WEIGHTS)), evidence.views
     if ratio > 0.0 and not (is_framed(evidence) and evidence.sine >= MIN_LEAF_SINE):
+        return 0.0
+    if (shut - opened if ratio > 0.0 else opened - ajar) > MAX_RIVAL_BETTER:
         return 0.0
     return min(max(ratio, -MAX_LOG_RATIO), MAX_LOG_RATIO)
 

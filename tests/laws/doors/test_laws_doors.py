@@ -16,6 +16,7 @@ from knowledge_sources.methods.doors.leaf import (
     JAMB_MARGIN_M,
     MAX_DISTANCE_M,
     MAX_LOG_RATIO,
+    MAX_RIVAL_BETTER,
     MIN_LEAF_SINE,
     LeafEvidence,
     describe,
@@ -25,6 +26,7 @@ from knowledge_sources.methods.doors.leaf import (
     predict_opening,
     weigh_leaf,
 )
+from knowledge_sources.methods.doors.rival_views import Views
 from knowledge_sources.methods.features.picture import read_picture
 from sim.body.simulated_building import SimulatedBuilding
 from sim.ground_truth.table import TrueDoor
@@ -238,8 +240,20 @@ def test_nothing_speaks_for_a_leaf_that_is_seen_aslant(
     """For an open door such a picture speaks as ever."""
     ratio = weigh_leaf(replace(LEAF, **changed))
     assert (ratio > 0.0) is tells and ratio >= 0.0
-    seen_open = replace(LEAF, uniform=0.5, agreeing=1.0, foot=1.0)
-    assert weigh_leaf(replace(seen_open, **changed)) < 0.0
+    assert weigh_leaf(replace(SEEN_OPEN, **changed)) < 0.0
+
+
+SEEN_OPEN = replace(LEAF, uniform=0.5, agreeing=1.0, foot=1.0)
+
+
+@pytest.mark.parametrize("off", [1e-6, -1e-6])
+def test_what_a_rival_explains_better_says_nothing(off: float) -> None:
+    """For a leaf, where what is beyond explains it better; for an open doorway, where a leaf that is ajar does."""
+    better, told = MAX_RIVAL_BETTER + off, off < 0.0
+    assert (weigh_leaf(replace(LEAF, views=Views(0.0, -better, 0.0))) > 0.0) is told
+    assert (weigh_leaf(replace(SEEN_OPEN, views=Views(0.0, 0.0, -better))) < 0.0) is told
+    assert weigh_leaf(replace(LEAF, views=Views(0.0, 0.0, -better))) > 0.0  # ajar is as little open
+    assert weigh_leaf(replace(SEEN_OPEN, views=Views(0.0, -better, -better))) < 0.0
 
 
 def see(known: DoorState | None, ratio: float, x_m: float, heading_rad: float = 0.0) -> DoorState | None:

@@ -12,9 +12,10 @@ from acting import answer
 from blackboard.board import Blackboard
 from blackboard.change import Posted, Revised
 from blackboard.effect import Post, Revise
+from blackboard.entry import Entry
 from knowledge_sources.action.fault_handler import FaultHandler
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.body import STOP_KEY, BodyFault, Recovery, RecoveryStatus
+from world_models.entries.body import STOP_KEY, BodyFault, Recovery, RecoveryStatus, Ride
 from world_models.entries.task import Impasse, Outcome
 
 SOURCE, S = FaultHandler(), DEFAULT.action
@@ -78,3 +79,22 @@ def test_the_oldest_open_fault_for_which_nobody_waits_is_answered(drawn: list[An
         assert isinstance(effect, Revise) and effect.entry is tried
         wait_s = min(2.0 * tried.value.wait_s, S.max_retry_wait_s)
         assert effect.value == replace(tried.value, status="asked", wait_s=wait_s)
+
+
+@given(st.sampled_from((0.0, 0.99, 1.0, 2.0)), st.sampled_from(("", "nobody comes by")))
+def test_an_elevator_that_does_not_come_is_named(part: float, detail: str) -> None:
+    """It blocks the way, as long as it was called in vain for long enough; what the last try found counts."""
+    board = Blackboard()
+
+    def put(value: Any) -> Entry[Any]:
+        return board.apply([Post(value)], author="test", cycle=1)[0].entry
+
+    ride = put(Ride("PlanSketch-1", 1, "lift-a", "car-1", "car-2"))
+    fault = put(BodyFault("elevator", "no ride", "first", ride.id, 1.0))
+    tried = put(Recovery(fault.id, ride.id, 1.0, 1.0, 3, part * PATIENCE_S, "in vain", "no ride", detail))
+    (effect,) = answer(SOURCE, board.view, Revised(tried)) or ()
+    if part < 1.0:
+        assert isinstance(effect, Revise) and effect.value.status == "asked"
+        return
+    assert isinstance(effect, Post) and effect.value.kind == "blocked" and effect.value.is_open
+    assert all(word in effect.value.reason for word in ("lift-a", "car-1", "car-2", detail or "first"))

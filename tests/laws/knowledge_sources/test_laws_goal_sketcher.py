@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard.change import Posted, Revised
-from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, wakes
+from blackboard.effect import Revise
+from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, to_world, wakes
 from knowledge_sources.action.model_reviser import ModelReviser
+from knowledge_sources.methods.floor.revise_frame import revise_by_thing
 from knowledge_sources.plan.goal_sketcher import GoalSketcher
 from knowledge_sources.questions import find_frames
 from knowledge_sources.sketching import GOAL_TOLERANCE_M
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries.door_state import DoorPicture, DoorState
 from world_models.entries.location import Place
+from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Goal, Impasse, Outcome, PlanSketch, SketchStatus
 from world_models.frames import Pose2
 
@@ -165,3 +171,23 @@ def test_what_it_watches(status: SketchStatus, path: tuple[int, ...], is_look: b
     goal = bench.pursue()
     assert wakes(SOURCE, Posted(goal)) and isinstance(goal.value, Goal)
     assert not wakes(SOURCE, Revised(bench.revise(goal, status="reached")))
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(("off_m", "is_taken"), [(0.2, True), (1.2, False)])
+def test_a_goal_that_is_occupied_is_called_so(side: float, off_m: float, is_taken: bool) -> None:
+    """By the frame of its room, in which the thing is by its name."""
+    bench = Bench(plain_robot())
+    bench.believe(Pose2(1.0, 2.0, 0.0))
+    goal = bench.pursue(Place(HALL, 6.0, 2.0))
+    y_m = 2.0 + side * off_m
+    corners: Any = tuple(tuple(to_world(Pose2(6.0 + dx, y_m + dy, 0.0)).position.tolist())
+                         for dx, dy in ((-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)))
+    thing = bench.put(Obstacle(f"{HALL}/obstacle-1", HALL, corners, 0.02, 6.0, y_m, 0.2))
+    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == HALL)
+    bench.apply(Revise(frame, revise_by_thing(frame.value, thing.value, "test", 0.0), (frame, thing)))
+    effects = bench.ask(SOURCE, goal)
+    assert bool(made(effects, Impasse)) is is_taken
+    if is_taken:
+        effect = effect_on(effects, Impasse)
+        assert "is occupied by something 0.2 m wide" in effect.value.reason and effect.value.behind == (thing.id,)

@@ -21,6 +21,7 @@ from knowledge_sources.settings import DEFAULT
 from knowledge_sources.sketching import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS
 from sim.scenario import load_scenario
 from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries.obstacle import Obstacle, ObstacleStatus
 from world_models.entries.task import Goal, Impasse, Milestone, MilestoneStatus, PlanSketch, SketchStatus, Subgoal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_store import FrameStore
@@ -40,7 +41,7 @@ def decide(off_m: float, adjustments: int, earlier_goals: int = 0, **other: Any)
 def decide_all(
     off_m: float, adjustments: int, earlier_goals: int = 0, *, left_m: float = 0.0, heading: float | None = None,
     off_rad: float = 0.0, sigma_m: float = 0.01, modes: tuple[str, ...] = (), way: tuple[Subgoal, ...] = (),
-    at: int = 1,
+    at: int = 1, thing: tuple[float, ObstacleStatus] | None = None,
 ) -> tuple[Effect, ...]:
     """What it does when the milestone at the end of a subgoal is verified, so far from where it should be."""
     world, board = load_world(WORLDS / "two_ways.toml"), Blackboard()
@@ -55,6 +56,11 @@ def decide_all(
     apply(*map(Post, robot.entries()), *(Post(store.frame(name)) for name in ("", HALL, "reception", "archive")),
           Post(Hypothesis(HALL, Pose2(TO.x_m - off_m, TO.y_m + left_m, (heading or 0.0) + off_rad),
                           diagonal(sigma_m, 0.005), "milestone")))
+    if thing is not None:
+        (x_m, status), at_goal = thing, TO.in_world(world).position
+        corners: Any = tuple((float(at_goal[0] + x_m + dx), float(at_goal[1] + dy))
+                             for dx, dy in ((-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)))
+        apply(Post(Obstacle("north-hall/obstacle-1", HALL, corners, 0.02, 1.0, 1.0, 0.2, status=status)))
     for _ in range(earlier_goals):
         (old,) = apply(Post(Goal(FROM, TO)))
         apply(Revise(old.entry, replace(old.entry.value, status="abandoned")))
@@ -157,3 +163,28 @@ def test_what_it_watches(status: MilestoneStatus) -> None:
     milestone = bench.revise(bench.await_milestone(), status=status)
     assert wakes(MilestonePasser(), Revised(milestone)) == (status == "verified")
     assert not wakes(MilestonePasser(), Posted(milestone))
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(("status", "off_m", "is_told"), [
+    ("there", -SMALL, True), ("suspected", -SMALL, True), ("gone", -SMALL, False), ("there", SMALL, False)])
+def test_what_stands_where_it_should_have_come_is_told(
+    status: ObstacleStatus, off_m: float, is_told: bool, side: float
+) -> None:
+    """Before and behind it, as far as the robot's rim."""
+    radius_m = build_robot_model(load_scenario("shut-door"), load_world(WORLDS / "two_ways.toml")).radius_m
+    x_m = side * (radius_m + 0.1 + off_m)
+    effect = decide(0.5, MOST, thing=(x_m, status))
+    assert isinstance(effect, Post) and isinstance(effect.value, Discrepancy)
+    assert ("occupied by something" in effect.value.what) is is_told
+    assert "Obstacle-1" in reasons(effect) if is_told else "Obstacle-1" not in reasons(effect)
+
+
+def test_in_vain_it_says_what_was_not_come_to_and_by_how_much() -> None:
+    ride = Subgoal(TO, replace(TO, locale="reception"), primitive=False, passage="lift-a")
+    step = Subgoal(FROM, TO, primitive=True, tolerance_m=TOLERANCE_M)
+    for way, said in (((step,), "the goal"), ((step, step), "the way"), ((step, ride), "the elevator lift-a")):
+        effect = decide(0.5, MOST, way=way)
+        assert isinstance(effect, Post) and isinstance(effect.value, Discrepancy)
+        assert effect.value.what.startswith(f"{said} at {TO} was not come to in {MOST + 1} tries")
+        assert effect.value.what.endswith("0.50 m from it")

@@ -10,6 +10,7 @@ from blackboard.level import Level
 from generated_boards import HALL, Bench, all_reasons, made, plain_robot, wakes
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.obstacle import Obstruction
 from world_models.entries.task import Impasse, Outcome
 from world_models.frames import Pose2
 
@@ -100,3 +101,21 @@ def test_what_it_watches() -> None:
     for is_open in (True, False):
         impasse = bench.put(Impasse("lost", "", is_open=is_open))
         assert wakes(SOURCE, Posted(impasse)) == is_open and not wakes(SOURCE, Revised(impasse))
+
+
+@pytest.mark.parametrize("is_reached", [True, False])
+@pytest.mark.parametrize("clockwise", [True, False])
+def test_what_hides_a_part_of_the_pictures_is_said_where_the_goal_is_not_reached(
+    is_reached: bool, clockwise: bool
+) -> None:
+    bench = Bench(plain_robot())
+    goal = bench.pursue()
+    impasse = bench.put(Impasse("blocked", "a wall"))
+    if is_reached:
+        goal = bench.revise(goal, status="reached")
+    corners = ((0.0, 0.0), (128.0, 0.0), (128.0, 64.0), (0.0, 64.0))  # of 256 x 256
+    hidden = bench.put(Obstruction(corners[::-1] if clockwise else corners))
+    found = end(bench, goal if is_reached else impasse)
+    assert found is not None
+    assert (hidden.id in found[2]) is not is_reached
+    assert found[1].endswith("hides 12% of each picture") is not is_reached

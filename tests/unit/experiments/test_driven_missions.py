@@ -4,24 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
-from typing import Any
+from types import ModuleType, SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
 import experiments
 from driven_here import run_here
 from experiments.differences import doors, inexact, light, miscalibrated, obstacles, twins
-from experiments.drives import End, Trial
+from experiments.drives import DoorBeliefs, End, Trial
 from experiments.generated.door_missions import DoorMission
 from experiments.generated.missions import OFFICE, TwinMission
 from experiments.robustness import missions, soak
 from harvey.errors import BadInput
+from knowledge_sources.methods.belief.odds import to_log_odds
+from sim.ground_truth.table import TrueDoor
+from world_models.entries.door_state import DoorPicture, DoorState
+
+if TYPE_CHECKING:
+    from blackboard.journal import Decision
 
 COMMON: dict[str, Any] = {
     "outcome": "reached", "reason": "there", "error_m": 0.01, "path_m": 11.0, "verified": 9, "refuted": 0,
     "not_testable": 1, "false_accepts": 0, "contacts": 0, "relocations": 0, "replans": 0, "robot_s": 60.0,
-    "wall_s": 4.0}
+    "wall_s": 4.0, "believed_shut": []}
 OWN: dict[ModuleType, tuple[type[End], dict[str, Any]]] = {
     doors: (doors.DoorEnd, {"door": "d", "is_found": True, "false_states": []}),
     inexact: (inexact.InexactEnd, {"chi2": [1.0] * 19 + [9.0], "wrong": 0}),  # 19 of 20 ellipsoids hold
@@ -89,6 +95,8 @@ def test_flawless_missions_hold_every_claim(
     (twins, ("wrong",), {"doubts": 0}, "told wrong"),
     (twins, ("wrong",), {"error_m": 4.4}, "wrong and confident"),
     (soak, (), {"false_accepts": 1}, "no milestone"),
+    *((every, (), {"believed_shut": ["d at 3.0 s"]}, "no open door")
+      for every in (doors, inexact, light, miscalibrated, obstacles, twins, soak)),
     (soak, (), {"outcome": "lost"}, "reach"),
 ])
 def test_a_flaw_fails_its_claim(
@@ -133,6 +141,22 @@ def test_the_memory_of_each_process_is_told_apart() -> None:
     both: Any = [end(soak, Trial("flat", k), process=k % 2, memory_mb=300.0 + 100.0 * (k % 2) + 2.0 * k)
                  for k in range(80)]
     assert soak._find_growth_mb(both) == pytest.approx(4.0)  # each runs every second one
+
+
+@pytest.mark.parametrize(("doors", "p_shut", "shut"), [
+    ((), 0.901, {"d": 5.0}), ((), 0.899, {}), ((TrueDoor(name="d"),), 0.99, {}),
+    ((TrueDoor(name="d", state="ajar"),), 0.99, {}), ((TrueDoor(name="d", state="open"),), 0.99, {"d": 5.0}),
+    ((TrueDoor(name="another"),), 0.99, {"d": 5.0}), ((TrueDoor(name="d", at_s=5.1),), 0.99, {"d": 5.0}),
+    ((TrueDoor(name="d", until_s=4.9),), 0.99, {})])
+def test_an_open_door_that_is_believed_shut_is_kept(
+    doors: tuple[TrueDoor, ...], p_shut: float, shut: dict[str, float]
+) -> None:
+    """As long as it never was otherwise; whatever its state is called."""
+    picture, beliefs = DoorPicture("p", (0.0, 0.0, 9.0, 9.0), 0.0, 0.0, 0.0, 3.0, "a leaf"), DoorBeliefs(doors)
+    known = DoorState("d", ("a", "b"), "unknown", p_shut, to_log_odds(p_shut), 1, picture, 5.0)
+    change = SimpleNamespace(entry=SimpleNamespace(value=known))
+    beliefs(cast("Decision", SimpleNamespace(made=(change, SimpleNamespace(entry=SimpleNamespace(value=1))))))
+    assert beliefs.shut == shut
 
 
 def test_only_an_experiment_that_drives_missions_by_number_takes_their_number() -> None:

@@ -15,11 +15,11 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 9_960,
-    "knowledge_sources": 21_426,
+    "knowledge_sources": 21_530,
     "sim": 5_830,
     "logs": 7_450,
     "harvey": 10_520,
-    "experiments": 10_000,
+    "experiments": 10_030,
     "tests": 41_000,
     "extras": 14_910,
 }
