@@ -15,7 +15,7 @@ from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.motion.routes import compute_free_space
-from knowledge_sources.methods.tracking.edge_alignment import EdgeAlignment, align_to_edges
+from knowledge_sources.methods.tracking.edge_alignment import EdgeAlignment, _intersect_lines, align_to_edges
 from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
@@ -124,3 +124,20 @@ def test_a_belief_far_too_loose_is_left_alone(loose: float) -> None:
     for _ in range(10):
         true = draw_pose(rng)
         assert align(true, np.diag(np.square([loose, loose, loose])), render(true, rng)) is None
+
+
+@few
+@given(seeds, st.floats(0.0, 1.0))
+def test_a_part_of_a_line_in_the_picture_is_that_part_of_it_in_space(seed: int, part: float) -> None:
+    """By perspective: the point that is meant is seen where it should be between the ends, and lies on the line."""
+    rng = np.random.default_rng(seed)
+    pose = Pose2(rng.uniform(-3.0, 3.0), rng.uniform(-3.0, 3.0), rng.uniform(-3.0, 3.0))
+    ahead = rng.uniform((1.0, -0.8, 0.0), (9.0, 0.8, 2.0), (6, 2, 3))
+    lines = pose.lifted().apply(ahead.reshape(-1, 3)).reshape(-1, 2, 3)
+    points = _intersect_lines(robot(), lines, pose, np.full(6, part))
+    sees = robot().camera_from_world(pose)
+    ends_px = robot().camera.project(sees.apply(lines.reshape(-1, 3))).reshape(-1, 2, 2)
+    seen = robot().camera.project(sees.apply(points))
+    assert np.allclose(seen, (1.0 - part) * ends_px[:, 0] + part * ends_px[:, 1], atol=1e-6)
+    along, to = lines[:, 1] - lines[:, 0], points - lines[:, 0]
+    assert np.allclose(np.cross(along, to), 0.0, atol=1e-6)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from numpy.typing import NDArray
 
 from consistency import assert_consistent, compute_error, compute_nees
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.methods.tracking.template_tracking import correct_pose
+from knowledge_sources.methods.tracking import template_tracking
+from knowledge_sources.methods.tracking.template_tracking import MAX_SCALE, MIN_SCALE, correct_pose, follow_landmarks
 from knowledge_sources.methods.tracking.tolerance import action_px
 from knowledge_sources.questions import NOWHERE
 from knowledge_sources.settings import DEFAULT
@@ -32,6 +34,7 @@ CAMERA, MOUNT = Camera.from_field_of_view(np.radians(65.0)), CameraMount(1.0, 0.
 ROBOT = RobotModel(NOWHERE, CAMERA, MOUNT, ActuatorModel())
 AT_FIRST, STEP = np.diag([0.01, 0.01, 0.02]) ** 2, np.diag([0.01, 0.01, 0.005]) ** 2
 SIGMA_PX, LANDMARKS, PICTURES = 0.3, 12, 4
+TEMPLATE: Any = None
 Array = NDArray[np.float64]
 
 
@@ -119,3 +122,20 @@ def test_the_tolerance_ends_at_the_plans_bound_and_not_before() -> None:
     assert compute_tolerance_px(0.0, 0.98 * at_bound, 3.0) < most_px
     for more in (1.02, 2.0, 10.0):
         assert compute_tolerance_px(0.0, more * at_bound, 3.0) == most_px
+
+
+@pytest.mark.parametrize("now_m", [1.2, 2.0, 4.0, 6.0, 8.0, 0.5])
+def test_what_is_nearer_than_when_its_template_was_cut_is_looked_for_as_much_larger(
+    now_m: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And not at all where it looks too different by that, or where nothing of it is in view."""
+    then_m, scales = 3.0, list[float]()
+    monkeypatch.setattr(template_tracking, "correlate", lambda *_, scale: scales.append(scale))
+    point = (now_m + MOUNT.forward_m, 0.0, 1.0)
+    track = Track("a", point, "CameraPicture-1", (0.0, 0.0), then_m, (0.0, 0.0), (1.0, 1.0), 1.0, 0.3)
+    image = np.zeros((CAMERA.height, CAMERA.width), np.uint8)
+    (update,) = follow_landmarks(ROBOT, (track,), lambda _: TEMPLATE, image, Pose2(0.0, 0.0, 0.0), AT_FIRST)
+    depth_m = now_m * math.cos(MOUNT.tilt_rad)
+    is_like = MIN_SCALE <= then_m / depth_m <= MAX_SCALE
+    assert update.expected == is_like and scales == pytest.approx([then_m / depth_m] * is_like)
+    assert update.track.found_px is None and update.track.misses == is_like

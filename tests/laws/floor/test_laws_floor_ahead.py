@@ -12,13 +12,16 @@ from hypothesis import strategies as st
 
 from blackboard.entry import Entry
 from generated_boards import HALL, Bench, plain_robot, to_world
+from knowledge_sources import floor_ahead
 from knowledge_sources.floor_ahead import (
+    LOOK_FROM_M,
     MAX_DRIVEN_GAP_M,
     PUT_DOWN_FREE_M,
     SEEN_MARGIN_M,
     FloorAhead,
     list_free_discs,
 )
+from knowledge_sources.methods.floor.seen_floor import Lookout
 from knowledge_sources.settings import DEFAULT
 from world_models.entries.floor import FloorSense, FreeFloor
 from world_models.entries.location import Place
@@ -109,3 +112,27 @@ def test_pictures_will_be_taken_every_increment_up_to_the_end_and_there_to_where
     assert all(abs(p.minus(start) @ np.array([-math.sin(heading), math.cos(heading), 0.0])) < SMALL for p in ahead)
     assert last.distance_to(stop) < SMALL
     assert wrap_angle(last.heading_rad - math.atan2(on.y_m - stop.y_m, on.x_m - stop.x_m)) == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(("to_go_m", "looked", "goes_on", "asks"), [
+    (LOOK_FROM_M - SMALL, 0, True, True), (LOOK_FROM_M + SMALL, 0, True, False), (1.0, 0, False, False),
+    (1.0, DEFAULT.action.max_looks - 1, True, True), (1.0, DEFAULT.action.max_looks, True, False)])
+def test_from_so_near_it_looks_at_what_is_behind_the_end_so_often(
+    to_go_m: float, looked: int, goes_on: bool, asks: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Never again where it has looked from about here."""
+    bench = Bench(ROBOT)
+    here = Pose2(1.5, 2.0, 0.0)
+    belief = bench.believe(here)
+    end, beyond = Place(HALL, 1.5 + to_go_m, 2.0), Place(HALL, 1.5 + to_go_m, 3.0)
+    sketch = bench.sketch(Place(HALL, 1.0, 2.0), end, *([beyond] if goes_on else []), path=(0,))
+    at = to_world(here)
+    for turn_rad, is_new in ((0.0, True), (0.39, False), (0.41, True)):
+        look = Lookout(at.heading_rad + turn_rad, 0.1)
+        asked: list[object] = []
+        monkeypatch.setattr(floor_ahead, "choose_look", lambda *given, _l=look, _a=asked: _a.append(given) or _l)
+        was = ((at.x_m + 0.29, at.y_m, at.heading_rad),) if turn_rad else ((at.x_m + 0.31, at.y_m, at.heading_rad),)
+        leg = bench.leg(sketch, looked_at=was * looked).value
+        found = FloorAhead(bench.view, leg, belief, DEFAULT).choose_look()
+        assert bool(asked) == asks
+        assert (found is look) == (asks and (is_new or looked == 0))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,10 +13,17 @@ import pytest
 from blackboard.change import Posted
 from blackboard.entry import Entry
 from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
+from knowledge_sources.methods.calibration.camera_state import (
+    PRIOR_COVARIANCE_FACTOR,
+    PRIOR_SIGMA_M,
+    PRIOR_SIGMA_RAD,
+)
+from knowledge_sources.methods.localization.camera_matching import CameraMatch
 from knowledge_sources.plan import matcher
 from knowledge_sources.plan.matcher import MAX_RIGID_SIGMA_PX, Matcher
 from knowledge_sources.plan.med_r_and_t import MedRAndT
 from knowledge_sources.plan.view_predictor import ViewPredictor
+from knowledge_sources.settings import DEFAULT
 from world_models.entries.location import Covariance, diagonal
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Milestone, MilestoneStatus
@@ -108,6 +117,37 @@ def test_where_lines_are_missing_or_the_belief_was_bold_no_camera_was_knocked(ke
     match, fix = solve(bench, few)
     assert not match.is_camera_open and len(match.pairs) >= 0.8 * kept * len(seen)
     assert fix.world_from_robot.distance_to(to_world(BELIEF @ Pose2(0.03, -0.03, 0.01))) < 0.02
+
+
+C = DEFAULT.camera_state
+
+
+@pytest.mark.parametrize(("sharp", "chi2", "gain", "asks", "is_open"), [
+    (C.min_sharp_part, C.max_chi2, 0.4, False, False), (C.min_sharp_part - 1e-9, 0.0, C.min_knock_gain, True, True),
+    (C.min_sharp_part - 1e-9, 0.0, C.min_knock_gain - 1e-6, True, False),
+    (1.0, C.max_chi2 + 1e-6, C.min_knock_gain, True, True), (1.0, C.max_chi2 + 1e-6, -0.1, True, False)])
+def test_what_is_asked_before_a_camera_is_taken_for_knocked(
+    sharp: float, chi2: float, gain: float, asks: bool, is_open: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The belief is loosened as a prior of lines, its heading as the camera's yaw is open; both sides of each bound."""
+    asked: dict[str, Any] = {}
+    match: Any = SimpleNamespace(pairs=np.zeros((0, 2), np.int64), e_match=0.0, coverage=np.zeros(0))
+    monkeypatch.setattr(matcher, "rate_match", lambda *given: asked.update(rate=given) or CameraMatch(
+        match, sharp, chi2))
+    monkeypatch.setattr(matcher, "match_with_camera", lambda *given: asked.update(knock=given) or CameraMatch(
+        match, sharp + gain, 0.0))
+    bench, segments, _ = look(BELIEF, BELIEF, (0.0, 0.0, 0.0))
+    assert effect_on(bench.ask(MATCHER, segments), LineMatch).value.is_camera_open == is_open
+    assert ("knock" in asked) == asks
+    belief = bench.view["Hypothesis-1"].value
+    plain = belief.covariance_world(ROBOT.world)
+    more = np.diag(np.square((PRIOR_SIGMA_M, PRIOR_SIGMA_M, PRIOR_SIGMA_RAD)))
+    assert asked["rate"][5] == to_world(BELIEF) and np.allclose(
+        asked["rate"][6], PRIOR_COVARIANCE_FACTOR * plain + more) and np.allclose(asked["rate"][7], KNOWN)
+    if asks:
+        turns = np.square((C.sigma_tilt_rad, C.sigma_roll_rad, C.sigma_yaw_rad))
+        assert np.allclose(asked["knock"][5], plain + np.diag([0.0, 0.0, turns[2]]))
+        assert np.allclose(asked["knock"][6], np.array(KNOWN) + np.diag([*turns, 0.0, 0.0, 0.0, 0.0]))
 
 
 @pytest.mark.parametrize("more", [-0.02, 0.02])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -142,6 +143,21 @@ def test_the_camera_is_moved_by_a_picture_that_has_not_counted_and_adds_what_is_
     assert used[3].angle_to(mount.camera_from_robot) < 1e-9
     open_of_it = learnt.covariance if moves else known
     assert np.allclose(fix.covariance, planar.covariance + learnt.pose_slopes @ open_of_it @ learnt.pose_slopes.T)
+
+
+def test_each_line_is_of_its_own_landmark_whichever_segment_shows_it(
+    monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench, match, milestone = match_lines(BELIEF, BELIEF)
+    kept = np.arange(len(match.value.pairs))[::-1][:-3]
+    pairs = np.column_stack([kept, np.roll(kept, 5)])
+    given: dict[str, Any] = {}
+    plain = med_r_and_t.planar_from_lines
+    monkeypatch.setattr(med_r_and_t, "planar_from_lines", lambda *lines, **named: given.update(named) or plain(
+        *lines, **named))
+    solve(bench, bench.put(replace(match.value, pairs=pairs, lines_world=match.value.lines_world[kept],
+                                   segments_px=match.value.segments_px[kept], coverage=np.ones(len(kept)))))
+    assert given["landmark_ids"] == [milestone.value.landmark_of[i] for i in kept]
 
 
 @pytest.mark.parametrize("lacks", ["nothing", "belief", "milestone"])

@@ -86,6 +86,7 @@ def test_in_vain_is_doubt_for_the_first_goal_and_blocked_for_a_later_one() -> No
     assert isinstance(last, Revise) and isinstance(last.value, PlanSketch) and last.value.adjustments == MOST
     doubt, blocked = decide(0.5, MOST), decide(0.5, MOST, earlier_goals=1)
     assert isinstance(doubt, Post) and isinstance(doubt.value, Discrepancy) and doubt.value.level is Level.GOAL
+    assert (doubt.value.magnitude, doubt.value.bounds, doubt.value.unit) == (None, (0.0, 0.0), "px")
     assert isinstance(blocked, Post) and isinstance(blocked.value, Impasse) and blocked.value.kind == "blocked"
 
 

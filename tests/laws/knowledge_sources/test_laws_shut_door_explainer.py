@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import cache
 
 import numpy as np
@@ -91,6 +92,7 @@ def test_a_shut_door_is_named_and_the_place_is_not_doubted(away_m: float, aside_
     odds = min(state.value.last.log_ratio - PRIOR + REFUTED_LOG_RATIO, 7.0)
     assert state.value.log_odds == pytest.approx(odds)
     assert state.value.certainty == pytest.approx(1.0 / (1.0 + math.exp(-odds)))
+    assert re.search(r"with it shut (\d+) of \d+ lines are where they should be", state.value.last.shows)
     assert reasons(state) == {"CameraPicture-1", milestone.id, "Hypothesis-1", "Segments-1"}
     assert [d.status for d in made(effects, type(bench.view["Discrepancy-1"].value))] == ["corrected"]
 

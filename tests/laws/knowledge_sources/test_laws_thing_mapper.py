@@ -22,7 +22,8 @@ from knowledge_sources.methods.floor.weigh_sight import FREE_FLOOR_ODDS, MAX_OBS
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall, carton
 from world_models.building.world import World
-from world_models.entries.floor import FreeFloor
+from world_models.entries.body import CameraPicture
+from world_models.entries.floor import FloorSense, FreeFloor
 from world_models.entries.location import Place
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
 from world_models.entries.task import Goal, Leg, PlanSketch, Subgoal
@@ -92,6 +93,17 @@ def test_what_was_not_known_is_as_certain_as_its_sight(world: World, p_thing: fl
     assert found.status == ("there" if p_thing >= S.min_obstacle_certainty else "suspected")
     assert (found.name, found.seen_s, found.looked_s, found.touched_s) == (f"{HALL}/obstacle-1", 7.0, 7.0, None)
     assert shapely.hausdorff_distance(shapely.Polygon(found.footprint), shapely.Polygon(CARTON)) < 2e-3
+
+
+@pytest.mark.parametrize("sense", ["camera", "ranges"])
+@pytest.mark.parametrize("has_picture", [False, True])
+def test_it_is_told_by_which_picture_or_reading(world: World, sense: FloorSense, has_picture: bool) -> None:
+    hall = Hall(world, ())
+    frame = hall.put(CameraPicture(b"", 0, 7.0, "track"))
+    scan = hall.put(replace(hall.look(carton(0.9), seen_s=7.0), sense=sense), *([frame] if has_picture else []))
+    (effect,) = answer(SOURCE, hall.board.view, Posted(scan)) or ()
+    told_by = frame.id if sense == "camera" and has_picture else scan.id
+    assert isinstance(effect, Post) and effect.value.evidence.startswith(told_by)
 
 
 @given(st.floats(0.5, 0.95), st.floats(S.min_thing_certainty, 0.95), st.floats(0.0, 2.0 * FLOOR_VIEW_DISTANCE_M))

@@ -229,7 +229,8 @@ def test_where_the_model_is_inexact_nothing_is_told() -> None:
 def test_it_wakes_where_a_milestone_has_corrected_the_belief() -> None:
     bench = Bench()
     belief = bench.believe()
-    for basis, status in (("milestone", "held"), ("tracks", "held"), ("milestone", "candidate")):
+    for basis, status in (("milestone", "held"), ("tracks", "held"), ("milestone", "candidate"), ("command", "held"),
+                          ("odometry", "held"), ("relocalization", "held"), ("milestone", "doubted")):
         revised = bench.revise(belief, basis=basis, status=status)
         assert wakes(YawCalibrator(), Revised(revised)) == ((basis, status) == ("milestone", "held"))
     assert not wakes(YawCalibrator(), Posted(belief))

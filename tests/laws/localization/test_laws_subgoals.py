@@ -1,0 +1,124 @@
+"""Laws of subgoals round what the model lacks: by which doors, past what stands before them, and from where to look."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from generated_boards import HALL, HOUSE, LENGTH_M, STUDY, WIDTH_M, Bench, plain_robot, to_world
+from knowledge_sources.methods.motion.subgoals import (
+    LOOKOUT_DIRECTIONS,
+    LOOKOUT_DISTANCES_M,
+    LOOKOUT_SAME_SIDE_M,
+    MIN_LOOKOUT_CHANGE_M,
+    SubgoalPlanner,
+)
+from knowledge_sources.questions import find_robot
+from knowledge_sources.settings import DEFAULT
+from world_models.entries.location import Place
+from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
+from world_models.frames import Pose2
+
+S = DEFAULT.plan
+WEST = HOUSE.replace('along = 2.0', 'along = 3.2').replace("[doors]", """[locales.west]
+kind = "office"
+in = "house"
+at = [-4.2, 0]
+size = [4, 4]
+
+[doors]
+low-door = { between = ["west", "hall"], wall = "east", along = 0.8, width = 1.0, open = true }
+high-door = { between = ["west", "hall"], wall = "east", along = 3.2, width = 1.0, open = true }""")
+"""The house of the kit with a room west of the hall, from which two doors lead there."""
+
+
+def plan(bench: Bench, *, by_cores: bool = False) -> SubgoalPlanner:
+    things = [bench.view[f"Obstacle-{k}"].value for k in range(1, 9) if bench.view.get(f"Obstacle-{k}")]
+    return SubgoalPlanner(find_robot(bench.view), S, things, by_cores=by_cores)
+
+
+@pytest.mark.parametrize("bars", ["nothing", "along the hall", "the far door"])
+@pytest.mark.parametrize("y_m", [0.8, 3.2])
+def test_where_the_room_behind_a_door_is_barred_it_comes_in_by_another(bars: str, y_m: float) -> None:
+    """From either part of the room; only the part with the door by which it goes on is of use."""
+    bench = Bench(plain_robot(read_world(Source.parse(WEST, "house.toml"))))
+    if bars == "along the hall":
+        bench.stand(4.0, 2.0, 3.95, 0.1)
+    elif bars == "the far door":
+        bench.stand(7.6, 3.2, 0.2, 0.75)
+    way = plan(bench).plan_between_locales(Place("west", 1.0, y_m), Place(STUDY, 3.0, 3.2), 0.01)
+    passages = None if way is None else [step.passage for step in way if step.passage]
+    if bars == "the far door":
+        assert way is None
+    else:
+        assert passages is not None and passages[1:] == ["study-door"]
+        assert bars == "nothing" or passages[0] == "high-door"
+
+
+@pytest.mark.parametrize("y_m", [0.8, 3.2])
+def test_what_is_free_at_a_door_is_so_whatever_was_asked_before(y_m: float) -> None:
+    """Each question has its own answer: the door, the margin, what stands there, and how much of it is taken."""
+    def stage() -> Bench:
+        bench = Bench(plain_robot(read_world(Source.parse(WEST, "house.toml"))))
+        seen = tuple((7.3 + x, 3.2 + y) for x, y in ((-0.05, -0.05), (0.05, -0.05), (0.05, 0.05), (-0.05, 0.05)))
+        bench.stand(7.3, 3.2, 0.3, 0.3, core=seen)
+        bench.stand(0.8, y_m, 0.2, 0.2)
+        return bench
+
+    bench = stage()
+    robot = find_robot(bench.view)
+    things = [bench.view[f"Obstacle-{k}"].value for k in (1, 2)]
+    questions = [(by_cores, door, margin_m, few) for by_cores in (False, True) for margin_m in S.clearances_m
+                 for door in ("study-door", "high-door", "low-door") for few in (things, things[:1])]
+
+    def ask(robot: object, by_cores: bool, door: str, margin_m: float, few: list[object]) -> shapely.Geometry:
+        planner = SubgoalPlanner(robot, S, few, by_cores=by_cores)  # type: ignore[arg-type]
+        passage = next(d for d in planner._building.doorways_of(HALL) if d.name == door)
+        return planner._find_free_passage(passage, (HALL, passage.other(HALL)), margin_m)
+
+    plain = [ask(find_robot(stage().view), *question) for question in questions]
+    for question, wanted in (*zip(questions, plain, strict=True), *zip(questions[::-1], plain[::-1], strict=True)):
+        assert ask(robot, *question).symmetric_difference(wanted).area < 1e-9
+    assert len({round(free.area, 6) for free in plain}) >= len(plain) // 2
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(1.0, 2.5), st.floats(0.9, 3.1), st.sampled_from((3.2, 4.0, 5.5)), st.floats(1.6, 2.4))
+def test_it_looks_again_from_where_that_is_best_by_way_and_by_side(
+    x: float, y: float, at_x: float, at_y: float
+) -> None:
+    """Redone one place after the other: near, but rather from another side than that where the robot is."""
+    bench = Bench(plain_robot())
+    belief = bench.believe(Pose2(x, y, 0.0)).value
+    thing = bench.stand(at_x, at_y, 0.1, 0.1).value
+    found = plan(bench).plan_look(belief, thing)
+    r = plain_robot().radius_m + S.clearances_m[0]
+    floor = shapely.box(0.0, 0.0, LENGTH_M, WIDTH_M)
+    free = floor.buffer(-r, join_style="mitre").difference(shapely.box(
+        at_x - 0.1, at_y - 0.1, at_x + 0.1, at_y + 0.1).buffer(r, quad_segs=32))
+    hall = to_world(Pose2(0.0, 0.0, 0.0))
+    best = math.inf
+    for far_m in LOOKOUT_DISTANCES_M:
+        for k in range(LOOKOUT_DIRECTIONS):
+            out = 2.0 * math.pi * k / LOOKOUT_DIRECTIONS - hall.heading_rad  # directions are counted in the world
+            there = np.array([at_x + far_m * math.cos(out), at_y + far_m * math.sin(out)])
+            away_m = math.dist(there, (x, y))
+            if away_m < MIN_LOOKOUT_CHANGE_M or not free.contains(shapely.Point(there)):
+                continue
+            before, after = np.array([at_x - x, at_y - y]), np.array([at_x, at_y]) - there
+            same = max(0.0, float(before @ after) / (math.hypot(*before) * math.hypot(*after)))
+            best = min(best, away_m + LOOKOUT_SAME_SIDE_M * same)
+    if found is None:
+        assert best == math.inf
+        return
+    end = found.destination
+    before, after = np.array([at_x - x, at_y - y]), np.array([at_x - end.x_m, at_y - end.y_m])
+    same = max(0.0, float(before @ after) / (math.hypot(*before) * math.hypot(*after)))
+    assert math.dist((end.x_m, end.y_m), (x, y)) + LOOKOUT_SAME_SIDE_M * same == pytest.approx(best, abs=0.05)
+    assert end.heading_rad == pytest.approx(math.atan2(after[1], after[0]))
