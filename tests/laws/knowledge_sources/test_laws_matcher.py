@@ -186,6 +186,7 @@ def test_what_is_expected_of_nothing_matches_nothing() -> None:
     segments = bench.put(Segments("CameraPicture-1", milestone.id, np.ones((3, 2, 2)), np.ones(3), 40.0))
     match = effect_on(bench.ask(MATCHER, segments), LineMatch).value
     assert match.pairs.shape == (0, 2) and len(match.lines_world) == len(match.segments_px) == 0
+    assert match.error == 0.0 and not match.is_camera_open and len(match.coverage) == 0
 
 
 @pytest.mark.parametrize("status", ["turning", "expected", "verified", "withdrawn"])

@@ -23,10 +23,11 @@ from blackboard.entry_store import Index
 from blackboard.level import Level
 from blackboard.servoing import OPEN, Discrepancy
 from experiments.generated.missions import OFFICE
-from generated_boards import effect_on, reasons
+from generated_boards import effect_on, made, reasons
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.belief.odds import to_log_odds, update
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
 from knowledge_sources.methods.localization.aliasing import Alias
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, compute_motion_tolerance_px
 from knowledge_sources.methods.verification.weigh import (
@@ -44,14 +45,15 @@ from knowledge_sources.plan.milestone_judge import (
     Case,
     MilestoneJudge,
 )
-from knowledge_sources.questions import HELD, find_belief
+from knowledge_sources.questions import HELD, find_belief, find_camera
 from knowledge_sources.settings import DEFAULT, Settings
 from rebuilt_board import copy_of
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
+from world_models.camera import YAW
 from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.percepts import Segments, Track, Tracks
-from world_models.entries.task import Certificate, Milestone
+from world_models.entries.task import Certificate, Milestone, MilestoneVerdict
 from world_models.frames import Pose2
 
 T = TypeVar("T")
@@ -318,6 +320,32 @@ def test_what_it_writes_follows_from_the_verdict(judged: list[Judged], in_doubt:
         assert reasons(found) == {"Certificate"} and isinstance(found, Revise) == in_doubt
 
 
+@pytest.mark.parametrize("tolerance_px", [1.0, 99.0])
+@pytest.mark.parametrize(("off", "verdict"), [(0.5, "verified"), (2.0, "refuted"), (0.5, "refuted"), (2.0, "verified"),
+                                              (0.5, "not testable"), (2.0, "not testable")])
+@pytest.mark.parametrize("is_last", [False, True])
+def test_the_deviation_is_measured_where_the_place_is_known_or_is_beyond_the_window(
+    judged: list[Judged], tolerance_px: float, off: float, verdict: MilestoneVerdict, is_last: bool
+) -> None:
+    """The window is the plan level's at least; where nothing was told and another look is left, nothing is said."""
+    one, judge = judged[0], MilestoneJudge()
+    view = one.board.view
+    case, most_px = case_on(view, one.trigger), max(PLAN.max_deviation_px, tolerance_px)
+    weighed = replace(judge.weigh(view, case), tolerance_px=tolerance_px, shift_px=off * most_px)
+    tried = (1.0,) * (PLAN.max_looks - 1 if is_last else 0)
+    milestone: Any = case.milestone._replace(value=replace(case.milestone.value, tried=tried, told=(0.0,) * len(tried)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judge, "weigh", lambda *_: weighed)
+        patch.setattr(judge, "_hold_against_others", lambda *_: Verdict(verdict, "so", 1e-3))
+        effects = tuple(judge.act(view, case._replace(milestone=milestone)))
+    found = made(effects, Discrepancy)
+    assert bool(found) == (verdict != "not testable" or is_last)
+    if found:
+        is_measured = verdict == "verified" or off > 1.0
+        assert found[0].bounds == (0.0, most_px)
+        assert found[0].magnitude == (pytest.approx(off * most_px) if is_measured else math.inf)
+
+
 @pytest.mark.parametrize("in_doubt", [False, True])
 @pytest.mark.parametrize("as_put_down", [False, True])
 @pytest.mark.parametrize("is_sure", [False, True])
@@ -353,6 +381,22 @@ def test_what_the_wheels_can_do_and_what_the_picture_leaves_open_count_together(
                 assert weighed.tolerance_px == pytest.approx(DEFAULT.action.min_tolerance_px + open_px)
                 asked += 1
     assert asked > 1
+
+
+@pytest.mark.parametrize("more", [-0.5, 0.0, 3.0])
+def test_where_the_yaw_of_the_camera_is_open_again_so_is_the_heading(judged: list[Judged], more: float) -> None:
+    """The heading follows the camera; a yaw that is surer than before makes no heading surer."""
+    one = judged[0]
+    view = one.board.view
+    case = case_on(view, one.trigger)
+    known = compute_camera_covariance(find_camera(view), DEFAULT.camera_state)
+    now = known.copy()
+    now[YAW, YAW] *= 1.0 + more
+    fix = replace(case.fix.value, camera_step=(0.0,) * 7, camera_covariance=tuple(map(tuple, now.tolist())))
+    entry: Any = SimpleNamespace(value=fix, id=case.fix.id)
+    plain, weighed = MilestoneJudge().weigh(view, case), MilestoneJudge().weigh(view, case._replace(fix=entry))
+    before = case.belief.value.covariance_world(plain.robot.world)
+    assert np.allclose(weighed.covariance, before + np.diag([0.0, 0.0, max(more, 0.0) * known[YAW, YAW]]))
 
 
 @pytest.mark.parametrize("there", ["here", "far"])

@@ -207,6 +207,10 @@ def test_a_way_that_begins_anew_begins_with_the_yaw_as_it_was_learnt() -> None:
     (travel,) = made(way.effects, Travel)
     assert way.camera is not None and way.camera.mount.yaw_rad < -0.005
     assert travel.yaw_rad == pytest.approx(way.camera.mount.yaw_rad) and travel.gone_m == 0.0
+    (turned,) = made(way.effects, Hypothesis)  # and where the robot is by the turned headings
+    here = turned.world_from_robot(house())
+    assert travel.began.distance_to(here) < 1e-9
+    assert travel.heading_rad == travel.began.heading_rad == pytest.approx(here.heading_rad)
 
 
 def test_a_short_bent_way_is_not_spent_yet() -> None:
