@@ -92,13 +92,13 @@ def find_first_level(view: View) -> Entry[PlanSketch] | None:
 def has_missed(view: View, belief: Hypothesis, sketch: PlanSketch, *, is_inexact: bool) -> bool:
     """Whether the end of the subgoal before a milestone is further than its tolerance.
 
-    A model that is inexact makes it wider.
+    A model that is inexact makes it wider. From a lookout the robot has looked when it came there: it may turn since.
     """
     if sketch.at == 0:
         return False
     subgoal, building = sketch.subgoals[sketch.at - 1], find_building(view)
     here, there = belief.world_from_robot(building), subgoal.destination.in_world(building)
-    heading = subgoal.destination.heading_rad
+    heading = None if sketch.is_look else subgoal.destination.heading_rad
     error = 0.0 if heading is None else wrap_angle(here.heading_rad - there.heading_rad)
     wider_m = INEXACT_TOLERANCE_SIGMAS * belief.sigma_m if is_inexact else 0.0
     is_off = here.distance_to(there) > math.hypot(subgoal.tolerance_m, wider_m)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
 import shapely
 
 from blackboard.board import View
@@ -19,26 +20,28 @@ from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_building, find_frames, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.sketching import find_obstacles, find_way_to_goal, list_planners, supersede
+from world_models.entries.door_state import DoorState
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Goal, Impasse, PlanSketch, Subgoal
 
 
 class Case(NamedTuple):
-    """An impasse, the goal, the belief, an obstacle that may be behind it, and the way to where that is seen."""
+    """An impasse, the goal, the belief, the obstacle or door that may be behind it, and the way to where it is seen."""
 
     impasse: Entry[Impasse]
     goal: Entry[Goal]
     belief: Entry[Hypothesis]
-    obstacle: Entry[Obstacle]
+    about: Entry[Obstacle] | Entry[DoorState]
     subgoal: Subgoal
 
 
 class LookoutPlanner(RobotKnowledgeSource):
-    """Leads to where one of the obstacles that leave no way can be looked at from elsewhere, so often a goal.
+    """Leads to where a door that may be shut is seen from the front, or an obstacle from elsewhere; so often a goal.
 
-    First those without which there is a way, the nearest of them first, then the next ones. What was seen of one, from
-    one place or when it was too near, may be wrong. Where no look is left, the mission monitor ends the mission.
+    A leaf is a thing in the way, too: so first the doors of this room. Then the obstacles that leave no way; those
+    without which there is one first, and the nearest of them. What was seen of one, from one place or when it was too
+    near, may be wrong. Where no look is left, the mission monitor ends the mission.
     """
 
     level, priority = Level.PLAN, Priority.ADVANCE
@@ -51,6 +54,10 @@ class LookoutPlanner(RobotKnowledgeSource):
         if goal is None or belief is None or looked >= self._settings.plan.max_lookouts:
             return None
         planner = list_planners(view, self._settings.plan)[0]
+        for door in view.where(DoorState, lambda d: d.may_be_shut and belief.value.locale in d.between):
+            subgoal = _plan_door_look(view, planner, belief.value, door.value)
+            if subgoal is not None:
+                return Case(impasse, goal, belief, door, subgoal)
         for obstacle in self._list_in_order(view, impasse.value, goal.value, belief.value, looked):
             subgoal = planner.plan_look(belief.value, obstacle.value)
             if subgoal is not None:
@@ -58,12 +65,12 @@ class LookoutPlanner(RobotKnowledgeSource):
         return None
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        impasse, goal, belief, obstacle, subgoal = case
+        impasse, goal, belief, about, subgoal = case
         yield from supersede(view, impasse)
-        looked = Revise(impasse, replace(impasse.value, is_open=False), (impasse, obstacle, belief))
+        looked = Revise(impasse, replace(impasse.value, is_open=False), (impasse, about, belief))
         yield looked
         frames = find_frames(view, {belief.value.locale})
-        yield Post(PlanSketch(goal.id, (), "", (subgoal,), is_look=True), (goal, belief, obstacle, looked, *frames))
+        yield Post(PlanSketch(goal.id, (), "", (subgoal,), is_look=True), (goal, belief, about, looked, *frames))
 
     def _list_in_order(
         self, view: View, impasse: Impasse, goal: Goal, belief: Hypothesis, looked: int
@@ -84,6 +91,13 @@ class LookoutPlanner(RobotKnowledgeSource):
         obstacles = [replace(o.value, core=least if o.id == without.id else ()) for o in find_obstacles(view)]
         planner = SubgoalPlanner(find_robot(view), self._settings.plan, obstacles, by_cores=True)
         return not planner.explain_unfit(goal.destination) and find_way_to_goal((planner,), belief, goal) is not None
+
+
+def _plan_door_look(view: View, planner: SubgoalPlanner, belief: Hypothesis, door: DoorState) -> Subgoal | None:
+    (frame,) = find_frames(view, {belief.locale})
+    doorway = next((d for d in frame.value.doorways if d.name == door.door), None)
+    seen_from = [np.array([picture.x_m, picture.y_m]) for picture in (*door.views, door.last)]
+    return None if doorway is None else planner.plan_door_look(belief, doorway, seen_from)
 
 
 def _count_looks(view: View, goal: str) -> int:

@@ -63,6 +63,11 @@ class DoorState:
     def is_passable(self) -> bool:
         return self.state not in ("shut", "ajar")
 
+    @property
+    def may_be_shut(self) -> bool:
+        """Whether that is likelier than not, and not certain."""
+        return self.state == "unknown" and self.log_odds > 0.0
+
     def sentence(self) -> str:
         said = f"{self.door} is {self.state}"
         if self.state == "unknown":

@@ -32,6 +32,7 @@ from world_models.building.passages import Route
 from world_models.entries.location import Hypothesis, Place
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Subgoal
+from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
 DOORWAY_DISTANCES_M = (0.65, 0.55, 0.47, 0.40)
@@ -42,6 +43,9 @@ LOOKOUT_DISTANCES_M = (1.8, 2.4, 3.0)  # distances from which it does so: the fl
 LOOKOUT_DIRECTIONS = 24  # directions round it from which that is tried
 LOOKOUT_SHORT_M = 0.4  # so near before it something else may be in the line of sight: it may be a part of it
 LOOKOUT_SAME_SIDE_M = 3.0  # so much farther another side of it may be than the one from which it was seen last
+DOOR_LOOK_DISTANCES_M = (1.2, 1.6, 2.0, 2.6)  # distances from which a door is looked at from the front
+DOOR_LOOK_APART_M = 0.7  # so far from where it was seen before: then it is another view
+MIN_DOOR_LOOK_SINE = 0.7  # least sine of the angle at which it is seen there, 1 from the front
 MIN_LOOKOUT_CHANGE_M = 0.4  # a place nearer than this to where the robot stands shows nothing new
 WAY_TOLERANCE_M = 0.15  # tolerance at the end of a leg on the way
 MIN_DOORWAY_CLEARANCE_M = 0.10  # a doorway with less room on each side of the robot is approached more exactly
@@ -254,11 +258,33 @@ class SubgoalPlanner:
         middle = np.mean(build_polygon(obstacle.footprint).exterior.coords[:-1], axis=0)
         side_rad = math.atan2(*(middle - here.position)[::-1])
         same_side = np.maximum(0.0, np.cos(poses[:, 2] - side_rad))
-        for k in np.argsort(away + LOOKOUT_SAME_SIDE_M * same_side, kind="stable"):
-            if away[k] < MIN_LOOKOUT_CHANGE_M:
-                continue
-            if self._find_way(locale, here.position, poses[k, :2]) is not None:
-                x, y, heading = (float(v) for v in poses[k])
+        order = np.argsort(away + LOOKOUT_SAME_SIDE_M * same_side, kind="stable")
+        return self._lead_to_first(locale, here, poses[order[away[order] >= MIN_LOOKOUT_CHANGE_M]])
+
+    def plan_door_look(self, belief: Hypothesis, doorway: Doorway, seen_from: Sequence[Floats]) -> Subgoal | None:
+        """The nearest place in the robot's room from which a doorway is seen from the front; None where none is left.
+
+        Args:
+            seen_from: places (2,) [world] from which it was seen; no nearer ones show anything new.
+        """
+        locale, here = belief.locale, belief.world_from_robot(self._building)
+        poses = list_lookouts(
+            self._free_space(locale, self._settings.clearances_m[0], is_round=True),
+            find_floor(self._building, {locale}), doorway.threshold_of(locale), DOOR_LOOK_DISTANCES_M,
+            LOOKOUT_DIRECTIONS, LOOKOUT_SHORT_M)
+        outward = doorway.outward_from(locale)
+        kept = np.column_stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])]) @ outward >= MIN_DOOR_LOOK_SINE
+        for place in seen_from:
+            kept &= np.linalg.norm(poses[:, :2] - place, axis=1) >= DOOR_LOOK_APART_M
+        poses = poses[kept]
+        away = np.linalg.norm(poses[:, :2] - here.position, axis=1)
+        return self._lead_to_first(locale, here, poses[np.argsort(away, kind="stable")])
+
+    def _lead_to_first(self, locale: str, here: Pose2, poses: Floats) -> Subgoal | None:
+        """The subgoal to the first of some poses (n, 3) to which a way leads."""
+        for pose in poses:
+            if self._find_way(locale, here.position, pose[:2]) is not None:
+                x, y, heading = (float(v) for v in pose)
                 return self._build_subgoal(
                     Place.of_world(self._building, locale, here.x_m, here.y_m),
                     Place.of_world(self._building, locale, x, y, heading), WAY_TOLERANCE_M)

@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import pytest
 
 from blackboard.change import Posted, Revised
 from blackboard.entry import Entry
-from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, reasons, to_world, wakes
+from generated_boards import (
+    HALL,
+    LENGTH_M,
+    STUDY,
+    WIDTH_M,
+    Bench,
+    effect_on,
+    made,
+    plain_robot,
+    reasons,
+    to_world,
+    wakes,
+)
+from knowledge_sources.methods.motion.subgoals import DOOR_LOOK_APART_M, MIN_DOOR_LOOK_SINE
 from knowledge_sources.plan.lookout_planner import LookoutPlanner
 from knowledge_sources.settings import DEFAULT
 from world_models.building.locale_frame import FRAME_OF
+from world_models.entries.door_state import DoorCondition, DoorPicture, DoorState
 from world_models.entries.location import Place
 from world_models.entries.obstacle import Obstacle
 from world_models.entries.task import Impasse, PlanSketch
@@ -97,3 +114,46 @@ def test_there_is_nothing_to_look_at_or_nobody_to_look(stale: str) -> None:
 def test_what_it_watches(is_open: bool, behind: tuple[str, ...]) -> None:
     impasse = Bench().put(Impasse("blocked", "", "Goal-1", behind, is_open))
     assert wakes(SOURCE, Posted(impasse)) == (is_open and bool(behind)) and not wakes(SOURCE, Revised(impasse))
+
+
+def see_door(bench: Bench, log_odds: float, state: DoorCondition, seen_from: tuple[float, float]) -> Entry[DoorState]:
+    """What is believed of the study's door, by a picture from a place of the hall."""
+    at = to_world(Pose2(*seen_from, 0.0))
+    picture = DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), at.x_m, at.y_m, 0.0, 4.5, "a leaf")
+    return bench.put(DoorState("study-door", (HALL, STUDY), state, 0.6, log_odds, 1, picture, 1.0, -4.0, (picture,)))
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(("log_odds", "state", "is_looked_at"), [
+    (0.1, "unknown", True), (-0.1, "unknown", False), (5.0, "shut", False), (-5.0, "open", False)])
+def test_a_door_that_may_be_shut_is_looked_at_from_the_front_before_it_ends(
+    log_odds: float, state: DoorCondition, is_looked_at: bool, side: float
+) -> None:
+    """From elsewhere than it was seen from, to either side; a thing is looked at where no door is in doubt."""
+    bench = Bench(plain_robot())
+    bench.believe(Pose2(5.5, 2.0 + 0.5 * side, 0.0))
+    goal, before = bench.pursue(Place(STUDY, 3.0, 2.0)), (6.4, 2.0 + 0.2 * side)
+    thing = bench.stand(7.5, 2.0, 0.1, 0.4)
+    door = see_door(bench, log_odds, state, before)
+    effects = bench.ask(SOURCE, bench.put(Impasse("blocked", "no way", goal.id, (thing.id,))))
+    named = set() if effects is None else reasons(effect_on(effects, PlanSketch))
+    assert (door.id in named) is is_looked_at and not {door.id, thing.id} <= named
+    if is_looked_at:
+        (step,) = effect_on(effects, PlanSketch).value.subgoals
+        there, middle = step.destination, (LENGTH_M, 0.5 * WIDTH_M)
+        away = (middle[0] - there.x_m, middle[1] - there.y_m)
+        assert there.heading_rad == pytest.approx(math.atan2(away[1], away[0]), abs=0.05)
+        assert away[0] >= (MIN_DOOR_LOOK_SINE - 0.02) * math.hypot(*away)
+        assert math.hypot(there.x_m - before[0], there.y_m - before[1]) >= DOOR_LOOK_APART_M - 1e-6
+
+
+def test_a_door_that_was_seen_from_everywhere_is_not_looked_at_again() -> None:
+    bench = Bench(plain_robot())
+    bench.believe(Pose2(5.5, 2.0, 0.0))
+    goal, thing = bench.pursue(Place(STUDY, 3.0, 2.0)), bench.stand(7.5, 2.0, 0.1, 0.4)
+    door = see_door(bench, 0.5, "unknown", (6.4, 2.0))
+    places = [to_world(Pose2(5.0 + 0.5 * i, 0.5 * k, 0.0)) for i in range(6) for k in range(9)]
+    pictures = tuple(replace(door.value.last, x_m=at.x_m, y_m=at.y_m) for at in places)
+    door = bench.revise(door, views=pictures)
+    effects = bench.ask(SOURCE, bench.put(Impasse("blocked", "no way", goal.id, (thing.id,))))
+    assert effects is None or door.id not in reasons(effect_on(effects, PlanSketch))

@@ -42,6 +42,7 @@ def decide_all(
     off_m: float, adjustments: int, earlier_goals: int = 0, *, left_m: float = 0.0, heading: float | None = None,
     off_rad: float = 0.0, sigma_m: float = 0.01, modes: tuple[str, ...] = (), way: tuple[Subgoal, ...] = (),
     at: int = 1, thing: tuple[float, ObstacleStatus] | None = None,
+    is_look: bool = False,
 ) -> tuple[Effect, ...]:
     """What it does when the milestone at the end of a subgoal is verified, so far from where it should be."""
     world, board = load_world(WORLDS / "two_ways.toml"), Blackboard()
@@ -66,7 +67,7 @@ def decide_all(
         apply(Revise(old.entry, replace(old.entry.value, status="abandoned")))
     (goal,) = apply(Post(Goal(FROM, TO)))
     steps = way or (Subgoal(FROM, replace(TO, heading_rad=heading), primitive=True, tolerance_m=TOLERANCE_M),)
-    (sketch,) = apply(Post(PlanSketch(goal.entry.id, (), "", steps, at=at, adjustments=adjustments)))
+    (sketch,) = apply(Post(PlanSketch(goal.entry.id, (), "", steps, at=at, adjustments=adjustments, is_look=is_look)))
     (expected,) = apply(Post(Milestone(sketch.entry.id, at, "the end", 0.0, displacement_modes=modes)))
     (verified,) = apply(Revise(expected.entry, replace(expected.entry.value, status="verified")))
     effects = answer(MilestonePasser(DEFAULT), board.view, verified)
@@ -189,3 +190,12 @@ def test_in_vain_it_says_what_was_not_come_to_and_by_how_much() -> None:
         assert isinstance(effect, Post) and isinstance(effect.value, Discrepancy)
         assert effect.value.what.startswith(f"{said} at {TO} was not come to in {MOST + 1} tries")
         assert effect.value.what.endswith("0.50 m from it")
+
+
+@pytest.mark.parametrize("is_look", [True, False])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_lookout_is_come_to_however_it_turned_since(is_look: bool, side: float) -> None:
+    """It has looked when it came there; what verifies the place may be in another direction."""
+    off_rad = side * (GOAL_HEADING_TOLERANCE_RAD + SMALL)
+    assert is_repeated(decide(0.0, 0, heading=1.0, off_rad=off_rad, is_look=is_look)) is not is_look
+    assert is_repeated(decide(TOLERANCE_M + SMALL, 0, heading=1.0, is_look=is_look))
