@@ -131,13 +131,15 @@ def test_what_is_asked_before_a_camera_is_taken_for_knocked(
 ) -> None:
     """The belief is loosened as a prior of lines, its heading as the camera's yaw is open; both sides of each bound."""
     asked: dict[str, Any] = {}
-    match: Any = SimpleNamespace(pairs=np.zeros((0, 2), np.int64), e_match=0.0, coverage=np.zeros(0))
-    monkeypatch.setattr(matcher, "rate_match", lambda *given: asked.update(rate=given) or CameraMatch(
+    match, other = (SimpleNamespace(pairs=np.zeros((0, 2), np.int64), e_match=error, coverage=np.zeros(0))
+                    for error in (1.0, 2.0))
+    monkeypatch.setattr(matcher, "rate_match", lambda *given: asked.update(rate=given) or CameraMatch(  # type: ignore[arg-type]
         match, sharp, chi2))
     monkeypatch.setattr(matcher, "match_with_camera", lambda *given: asked.update(knock=given) or CameraMatch(
-        match, sharp + gain, 0.0))
+        other, sharp + gain, 0.0))
     bench, segments, _ = look(BELIEF, BELIEF, (0.0, 0.0, 0.0))
-    assert effect_on(bench.ask(MATCHER, segments), LineMatch).value.is_camera_open == is_open
+    made = effect_on(bench.ask(MATCHER, segments), LineMatch).value
+    assert (made.is_camera_open, made.error) == (is_open, 2.0 if is_open else 1.0)  # the pairs of the better one
     assert ("knock" in asked) == asks
     belief = bench.view["Hypothesis-1"].value
     plain = belief.covariance_world(ROBOT.world)
