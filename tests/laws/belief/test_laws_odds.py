@@ -121,3 +121,11 @@ def test_rivals_share_what_the_belief_leaves(p_there: float, one: float, other: 
     assert both == compute_p_rivals(believed, HERE, [(FARTHER, other), (FAR, one)])
     assert both <= (1.0 - p_there) * math.exp(max(one, other, 0.0)) / p_there + 1e-9
     assert compute_p_rivals(believed, HERE, []) == 0.0
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-0.5, 0.5), st.integers(-2, 2))
+def test_headings_that_are_whole_turns_apart_are_the_same(heading: float, off: float, turns: int) -> None:
+    alike, one = Alike(0.5, 0.6), Pose2(1.0, 2.0, heading)
+    near, far = Pose2(1.0, 2.0, heading + off), Pose2(1.0, 2.0, heading + off + turns * math.tau)
+    assert measure_common(one, far, alike) == pytest.approx(measure_common(one, near, alike), abs=1e-9)
+    assert measure_common(one, near, alike) == pytest.approx(max(0.0, 1.0 - abs(off) / 0.6))

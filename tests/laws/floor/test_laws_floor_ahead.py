@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard.entry import Entry
-from generated_boards import HALL, Bench, plain_robot, to_world
+from generated_boards import HALL, STUDY, Bench, plain_robot, to_world
 from knowledge_sources import floor_ahead
 from knowledge_sources.floor_ahead import (
     LOOK_FROM_M,
@@ -19,12 +19,14 @@ from knowledge_sources.floor_ahead import (
     PUT_DOWN_FREE_M,
     SEEN_MARGIN_M,
     FloorAhead,
+    _find_way_beyond,
     list_free_discs,
 )
 from knowledge_sources.methods.floor.seen_floor import Lookout
 from knowledge_sources.settings import DEFAULT
 from world_models.entries.floor import FloorSense, FreeFloor
 from world_models.entries.location import Place
+from world_models.entries.task import Subgoal
 from world_models.frames import Pose2, wrap_angle
 
 ROBOT = plain_robot()
@@ -136,3 +138,32 @@ def test_from_so_near_it_looks_at_what_is_behind_the_end_so_often(
         found = FloorAhead(bench.view, leg, belief, DEFAULT).choose_look()
         assert bool(asked) == asks
         assert (found is look) == (asks and (is_new or looked == 0))
+
+
+RIDE = Subgoal(Place(HALL, 5.0, 2.0), Place(STUDY, 3.0, 2.0), primitive=False, passage="lift")
+
+
+@pytest.mark.parametrize("levels", [1, 2])
+@pytest.mark.parametrize("at", [0, 1, 2])
+@pytest.mark.parametrize("rides", [False, True])
+def test_the_way_goes_on_as_the_sketches_say_so_far_and_no_further_than_a_ride(
+    levels: int, at: int, rides: bool
+) -> None:
+    """What follows the current leg, then what follows the subgoal of which that is a part; three places at most."""
+    bench = Bench(ROBOT)
+    way = [Place(HALL, 1.0 + k, 2.0) for k in range(4)]
+    above = [Place(HALL, 6.0, 2.0), Place(HALL, 6.5, 2.0), Place(STUDY, 1.0, 2.0), Place(STUDY, 2.0, 2.0)]
+    goal = bench.pursue(above[-1])
+    if levels == 2:
+        first = bench.sketch(*above, goal=goal)
+        if rides:
+            steps = first.value.subgoals
+            bench.revise(first, subgoals=(steps[0], RIDE, *steps[2:]))
+    bench.sketch(*way, goal=goal, path=(0,) if levels == 2 else (), at=at)
+    points, locales = _find_way_beyond(bench.view, ROBOT)
+    wanted = way[at + 2:]
+    if levels == 2 and not rides:
+        wanted = [*wanted, *above[2:]][:3]
+    assert np.allclose(points or np.zeros((0, 2)), np.array([p.in_world(ROBOT.world).position for p in wanted]).reshape(
+        -1, 2))
+    assert locales == {HALL, *(p.locale for p in wanted)}

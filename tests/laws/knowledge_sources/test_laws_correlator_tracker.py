@@ -10,6 +10,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,14 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from generated_boards import reasons
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.action.correlator_tracker import MIN_DRIFT_STRETCH_M, MIN_LANDMARKS, CorrelatorTracker
+from knowledge_sources.action import correlator_tracker
+from knowledge_sources.action.correlator_tracker import (
+    ENOUGH_LANDMARKS,
+    MIN_DRIFT_STRETCH_M,
+    MIN_LANDMARKS,
+    MIN_REMAINING_PART,
+    CorrelatorTracker,
+)
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.tracking.template_tracking import select_landmarks
 from knowledge_sources.settings import DEFAULT
@@ -249,3 +257,28 @@ def test_few_landmarks_are_added_to_and_many_are_not() -> None:
 def test_the_part_that_must_agree_is_enough() -> None:
     assert ACTION.min_agreeing_part * 6 == 2.0
     assert math.inf not in [one.magnitude for one in discrepancies(follow(2, 4))]
+
+
+@pytest.mark.parametrize("taken", [0, 6, 20, 60])
+@pytest.mark.parametrize("more", [-1, 0, 1, 5])
+def test_landmarks_are_taken_anew_where_fewer_are_left_than_serve(
+    taken: int, more: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those count that should be in sight, were not missed too often, and whose template is of near here."""
+    least = max(MIN_LANDMARKS, math.ceil(min(ENOUGH_LANDMARKS, MIN_REMAINING_PART * taken)))
+    most = DEFAULT.action.max_misses
+
+    def follow(expected: bool, misses: int, frame: str) -> Any:
+        return SimpleNamespace(expected=expected, track=SimpleNamespace(misses=misses, template_frame=frame))
+
+    monkeypatch.setattr(correlator_tracker, "find_near_frames", lambda *_: {"near"})
+    monkeypatch.setattr(correlator_tracker, "with_anchors", lambda *_: "as they are")
+    monkeypatch.setattr(correlator_tracker, "take_new", lambda *_: "anew")
+    old = SimpleNamespace(value=SimpleNamespace(anchors=(), taken=taken))
+    case: Any = SimpleNamespace(frame=SimpleNamespace(id="CameraPicture-9"), old=old,
+                                belief=SimpleNamespace(seeing=SimpleNamespace(world=None)))
+    belief: Any = SimpleNamespace(world_from_robot=lambda _: None)
+    useless = [follow(False, 0, "near"), follow(True, most, "near"), follow(True, 0, "far")]
+    followed = [*useless, *[follow(True, most - 1, "near")] * (least + more)]
+    found: Any = CorrelatorTracker()._renew(case, np.zeros((2, 2), np.uint8), followed, belief)
+    assert (found != "anew") == (more >= 0)

@@ -31,7 +31,7 @@ from knowledge_sources.questions import find_building
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.entries.location import Hypothesis, PlaceOdds, PlaceSearch, diagonal
-from world_models.entries.obstacle import Contact, Obstacle
+from world_models.entries.obstacle import Contact, Obstacle, Obstruction
 from world_models.entries.percepts import Glimpse, Panorama, Segments
 from world_models.entries.task import Certificate
 from world_models.files.world_files import WORLDS, load_world
@@ -183,14 +183,43 @@ def test_so_many_looks_are_taken(places: int, more: int) -> None:
     assert found.probe == (None if more == 0 else (ACTION.turn_rad, ACTION.move_m))
 
 
+@pytest.mark.parametrize("is_hidden", [False, True])
+def test_what_is_looked_for_is_all_that_it_knows_of_where_it_may_be(is_hidden: bool) -> None:
+    """The looks without the lines of what stands before the camera; the rooms from where it was; what it followed."""
+    bench = lose(Pose2(0.4, -0.3, 0.2))
+    if is_hidden:
+        box = ((20.0, 20.0), (80.0, 20.0), (80.0, 120.0), (20.0, 120.0))
+        bench.put(Obstruction(box))
+    old = bench.put(Hypothesis(ROOM, Pose2(1.0, 1.0, 0.3), diagonal(0.1, 0.1), "relocalization", status="candidate"))
+    own = np.array([[(20.0, 25.0), (20.0, 110.0)], [(80.0, 30.0), (80.0, 100.0)]])
+    other = np.array([[(150.0, 30.0), (150.0, 200.0)], [(100.0, 210.0), (220.0, 215.0)]])
+    seen = bench.put(Segments("CameraPicture-1", "", np.concatenate([own, other]), np.full(4, 0.4), 40.0, 120.0))
+    asked: list[Search] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("knowledge_sources.goal.localizer.search", lambda robots, what, _: asked.append(what) or (
+            LocalizationResult(PROBE, (), ACTION), len([*robots]) - 1))
+        bench.ask(SOURCE, bench.put(Panorama((Glimpse(seen.id, Pose2(0.0, 0.0, 0.1), diagonal(0.0, 0.0)),))))
+    (what,) = asked
+    here = in_world(TRUTH @ Pose2(0.4, -0.3, 0.2))
+    assert what.here[0] == ROOM and what.here[1].distance_to(here) < 1e-9
+    assert set(what.rooms) == set(ROBOT.world.rooms)
+    away = [min(math.dist(corner, here.position) for corner in ROBOT.world.outline(room)) for room in what.rooms]
+    assert away == sorted(away)
+    ((room, there),) = what.followed
+    assert room == ROOM and there.distance_to(old.value.world_from_robot(ROBOT.world)) < 1e-9
+    (look,) = what.looks
+    assert np.array_equal(look.segments_px, other if is_hidden else np.concatenate([own, other]))
+
+
 def test_all_places_that_fit_stay_until_one_is_found() -> None:
     bench = lose()
+    bench.revise(bench.view["Hypothesis-1"], motion="MotionReport-7")
     fits = tuple(candidate(Pose2(1.0 + 0.5 * k, 1.0, 0.2 * k), 9.0 - k, 0.5 - 0.1 * k) for k in range(3))
     effects, _ = search_says(bench, look_round(bench, (0.0,)), LocalizationResult(PROBE, fits, ACTION))
     posted = made(effects, Hypothesis)
     assert [h.weight for h in posted] == pytest.approx([0.5, 0.4, 0.3])
     for h, c in zip(posted, fits, strict=True):
-        assert (h.locale, h.status, h.basis) == (ROOM, "candidate", "relocalization")
+        assert (h.locale, h.status, h.basis, h.motion) == (ROOM, "candidate", "relocalization", "MotionReport-7")
         assert h.world_from_robot(ROBOT.world).distance_to(c.world_from_robot) < 1e-9
         assert np.allclose(h.covariance_world(ROBOT.world), c.covariance)
     effect = next(e for e in effects if not isinstance(e, Retract) and isinstance(e.value, Hypothesis))

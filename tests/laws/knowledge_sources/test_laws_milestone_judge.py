@@ -392,10 +392,15 @@ def test_where_the_yaw_of_the_camera_is_open_again_so_is_the_heading(judged: lis
     known = compute_camera_covariance(find_camera(view), DEFAULT.camera_state)
     now = known.copy()
     now[YAW, YAW] *= 1.0 + more
-    fix = replace(case.fix.value, camera_step=(0.0,) * 7, camera_covariance=tuple(map(tuple, now.tolist())))
+    step = (0.004, -0.003, 0.002, 0.01, 0.0, 0.0, 0.0)
+    fix = replace(case.fix.value, camera_step=step, camera_covariance=tuple(map(tuple, now.tolist())))
     entry: Any = SimpleNamespace(value=fix, id=case.fix.id)
     plain, weighed = MilestoneJudge().weigh(view, case), MilestoneJudge().weigh(view, case._replace(fix=entry))
     before = case.belief.value.covariance_world(plain.robot.world)
+    was = find_camera(view).mount
+    moved = was.tilt_rad + 0.004, was.roll_rad - 0.003, was.height_m + 0.01
+    mount = weighed.robot.mount  # the picture is weighed with the camera as it was solved for
+    assert (mount.tilt_rad, mount.roll_rad, mount.height_m) == pytest.approx(moved)
     assert np.allclose(weighed.covariance, before + np.diag([0.0, 0.0, max(more, 0.0) * known[YAW, YAW]]))
 
 

@@ -199,3 +199,21 @@ def test_a_lookout_is_come_to_however_it_turned_since(is_look: bool, side: float
     off_rad = side * (GOAL_HEADING_TOLERANCE_RAD + SMALL)
     assert is_repeated(decide(0.0, 0, heading=1.0, off_rad=off_rad, is_look=is_look)) is not is_look
     assert is_repeated(decide(TOLERANCE_M + SMALL, 0, heading=1.0, is_look=is_look))
+
+
+@pytest.mark.parametrize("index", [0, 1, 2])
+@pytest.mark.parametrize("lacks", ["nothing", "sketch", "goal", "belief", "life"])
+def test_only_the_milestone_that_is_next_lets_its_sketch_go_on(index: int, lacks: str) -> None:
+    bench = Bench(plain_robot())
+    belief = bench.believe()
+    sketch = bench.sketch(at=1, verified=False)
+    milestone = bench.revise(bench.await_milestone(sketch.id, index), status="verified")
+    if lacks == "sketch":
+        bench.retract(sketch)
+    elif lacks == "goal":
+        bench.retract(bench.view["Goal-1"])
+    elif lacks == "belief":
+        bench.revise(belief, status="doubted")
+    elif lacks == "life":
+        bench.revise(sketch, status="superseded")
+    assert (bench.ask(MilestonePasser(), milestone) is not None) == (index == 1 and lacks == "nothing")
