@@ -166,6 +166,9 @@ def test_what_is_believed_of_a_door_is_as_in_a_mirror_and_as_elsewhere(
                                   ratio, "")
             known = update_door(known, "door", ("a", "b"), picture, 1.0, is_believed_shut=False) or known
             said.append(0.0 if known is None else known.log_odds)
+            if known is not None:  # as certain as what it says is likely
+                sign = -1.0 if known.state == "open" else 1.0
+                assert known.certainty == pytest.approx(1.0 / (1.0 + math.exp(-sign * known.log_odds)))
         return said
 
     plain = believe(lambda pose: pose)

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from blackboard.board import Blackboard, TracedView, View
 from blackboard.change import Change
@@ -34,6 +36,7 @@ from knowledge_sources.methods.verification.weigh import (
     Verdict,
     Weighed,
     _find_tolerance_px,
+    _median_shift,
     is_last_look,
     judge_place,
 )
@@ -318,6 +321,18 @@ def test_what_it_writes_follows_from_the_verdict(judged: list[Judged], in_doubt:
         assert (found.value.level, found.value.unit, found.value.bounds) == (Level.PLAN, "px", (0.0, most_px))
         assert found.value.magnitude == (weighed.shift_px if is_measured else math.inf)
         assert reasons(found) == {"Certificate"} and isinstance(found, Revise) == in_doubt
+
+
+@settings(max_examples=40)
+@given(st.lists(st.tuples(*[st.floats(0.0, 200.0)] * 4, *[st.floats(-30.0, 30.0)] * 4, st.booleans()), max_size=7))
+def test_how_far_lines_are_off_is_the_median_of_their_middles(lines: list[tuple[float, ...]]) -> None:
+    """Turned about its middle a line is where it was; what is out of view tells nothing."""
+    numbers = np.array([line[:8] for line in lines]).reshape(-1, 2, 2, 2)
+    before, after = numbers[:, 0], numbers[:, 0] + numbers[:, 1]
+    after[np.array([line[8] for line in lines], bool)] = np.nan
+    off = [math.dist(a.mean(axis=0), b.mean(axis=0)) for a, b in zip(before, after, strict=True)
+           if np.isfinite(b).all()]
+    assert _median_shift(before, after) == (pytest.approx(float(np.median(off))) if off else math.inf)
 
 
 @pytest.mark.parametrize("tolerance_px", [1.0, 99.0])

@@ -77,8 +77,13 @@ def test_the_first_good_view_is_taken_else_the_surest_of_those_with_enough_lines
     views: tuple[ViewQuality, ...], chosen: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     headings = [0.5 * k for k in range(len(views))]
-    monkeypatch.setattr(view_quality, "_compute_quality", lambda _, pose, *__: views[headings.index(pose.heading_rad)])
-    assert choose_heading(ROBOT, Pose2(0.0, 0.0, 9.0), headings, 0.1) == headings[chosen]
+
+    def rate(_: object, pose: Pose2, *__: object) -> ViewQuality:
+        assert (pose.x_m, pose.y_m) == (1.0, 2.0)  # from where the robot stands
+        return views[headings.index(pose.heading_rad)]
+
+    monkeypatch.setattr(view_quality, "_compute_quality", rate)
+    assert choose_heading(ROBOT, Pose2(1.0, 2.0, 9.0), headings, 0.1) == headings[chosen]
 
 
 TOWER = read_world(Source.parse(tower(2, turn_deg=20.0), "tower.toml"))
