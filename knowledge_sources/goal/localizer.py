@@ -86,7 +86,8 @@ class Localizer(RobotKnowledgeSource):
         cameras, buildings = self._list_cameras(view), self._list_buildings(view)
         robots = [find_robot(view, camera).in_building(among).with_obstruction(obstruction).on_floor_of(locale)
                   for camera in cameras for among in buildings]
-        seen, which = search(robots, Search(looks, rooms, (locale, here), followed, touched), self._settings)
+        what = Search(looks, rooms, (locale, here), followed, touched, told.p_told)
+        seen, which = search(robots, what, self._settings)
         is_last = len(looks) >= (self._settings.goal.max_far_probes if seen.candidates else MAX_PROBES)
         seen = replace(seen, next_action=None) if is_last else seen
         look_alike = make_alias_test(robots[which], looked, self._settings)

@@ -11,6 +11,8 @@ from enum import Enum
 from functools import lru_cache
 from typing import NamedTuple
 
+import shapely
+
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.localization.aliasing import find_repetitions
 from knowledge_sources.methods.localization.next_view import (
@@ -27,8 +29,8 @@ from knowledge_sources.methods.localization.next_view import (
 from knowledge_sources.methods.localization.pose_candidates import (
     FINE_CLIMB_M,
     FINE_CLIMB_RAD,
+    PictureSearch,
     are_distinct,
-    find_pose_candidates,
 )
 from knowledge_sources.methods.localization.refinement import (
     PoseLikelihood,
@@ -38,12 +40,14 @@ from knowledge_sources.methods.localization.refinement import (
 )
 from knowledge_sources.methods.localization.views import CameraView, align_headings
 from knowledge_sources.methods.verification.line_check import predict_lines
-from knowledge_sources.settings import DEFAULT, Settings
+from knowledge_sources.settings import DEFAULT, LocalizationSettings, Settings
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 MAX_VIEWS_OF_SEARCH = 8  # most views, the last, by which the floor is searched; what is found is refined by all
 MAX_CANDIDATES = 14  # most candidates of a floor that are refined
+BUMP_REACH_M = 2.0  # so far from where it was believed a robot may be that nobody carried off
+MIN_ALIAS_SCORE = 0.6  # another place shows at least this part of what agrees at the one that is kept
 
 LookAlike = Callable[[Pose2, Pose2], bool]
 """Whether two poses would look the same in all views."""
@@ -108,29 +112,31 @@ class RefinedPose(NamedTuple):
 def localize(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT,
     guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (),
-    touched: Sequence[Floats] = (),
+    touched: Sequence[Floats] = (), p_guess: float = 0.0,
 ) -> LocalizationResult:
     """Find the robot in these rooms by its views, the last of which was taken from where it is now.
 
     Args:
         guess: a room and a pose that are always tried: of many places that look alike only some are.
+        p_guess: how likely it was there, before these views.
         followed: the candidates of the last localization, moved as the robot moved since: they are tried too.
         touched: where something was touched, (2,) [m] in the robot's frame now: no move leads there.
     """
     aligned = align_headings(views, robot.camera, robot.mount.camera_from_robot, settings)
-    candidates = find_candidates(robot, aligned, rooms, settings, guess, followed)
+    candidates = find_candidates(robot, aligned, rooms, settings, guess, followed, p_guess)
     return decide(robot, candidates, [view.now_from_then for view in aligned], settings, touched)
 
 
 def find_candidates(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT,
-    guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (),
+    guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (), p_guess: float = 0.0,
 ) -> tuple[PlaceCandidate, ...]:
     """Find the places in these rooms that explain all views (with aligned headings), the likeliest first.
 
-    A place to which ``guess`` leads is tried first, and kept if it is not refuted. After many views places are followed
-    and not searched for, while two of them are accepted. If one accepted place is left, its aliases on the whole floor
-    are weighed too.
+    In the order of belief: a place to which ``guess`` leads is tried first, and kept if it is not refuted; then what is
+    near it. The rest of the floor is searched where that leaves it open (:func:`choose_rooms`). After many views places
+    are followed and not searched for, while two of them are accepted. If one accepted place is left, its aliases on the
+    whole floor are weighed too.
     """
     look_alike, tuning = make_alias_test(robot, [view.now_from_then for view in views], settings), settings.localization
     found = _build_distinct(robot, views, [] if guess is None else [guess], settings)
@@ -139,8 +145,9 @@ def find_candidates(
         known = _build_distinct(robot, views, followed, settings, found)
     if sum(bool(c.is_accepted) for c in (*found, *known)) >= 2:
         return rank_candidates([*found, *known], look_alike, len(views), settings, found[0] if found else None)
-    searched = [*found]
-    for pose in _find_refined(robot, views, rooms, settings):
+    pictures = PictureSearch.from_views(robot, views[-MAX_VIEWS_OF_SEARCH:], settings)
+    searched, likely = [*found], choose_rooms(robot, rooms, guess, found, p_guess, len(views), tuning)
+    for pose in _find_refined(robot, views, likely, settings, pictures):
         _keep_likelier(searched, _build_candidate(robot, views, pose, settings))
     first = None
     if found:  # the place of the guess, though the search may have found more exactly where it is
@@ -150,11 +157,47 @@ def find_candidates(
     kept = rank_candidates(searched, look_alike, len(views), settings, first)
     if len(kept) != 1 or not kept[0].is_accepted:
         return kept
-    aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, settings)
+    aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, settings, likely)
     beside = [_build_candidate(robot, views, pose, settings) for pose in aliases]
-    repeated = _list_repetitions(robot, kept[0], rooms)
+    repeated = _sift(pictures, kept[0].room, kept[0].world_from_robot, _list_repetitions(robot, kept[0], rooms))
     beside += _build_distinct(robot, views, repeated, settings, [*kept, *beside])
-    return rank_candidates([*kept, *beside], look_alike, len(views), settings, kept[0])
+    rivals = [_polish(robot, views, c, settings) for c in (*kept, *beside)]
+    return rank_candidates(rivals, look_alike, len(views), settings, rivals[0])
+
+
+def choose_rooms(
+    robot: RobotModel, rooms: Sequence[str], guess: tuple[str, Pose2] | None, found: Sequence[PlaceCandidate],
+    p_guess: float, looks: int, tuning: LocalizationSettings = DEFAULT.localization,
+) -> list[str]:
+    """Choose the rooms in which places are searched for, in the order in which they are given: the nearest first.
+
+    Where the robot was believed to be, and is accepted to be by what it sees, it is nowhere else but where everything
+    looks the same, which the plan tells without a search; so only what is within a bump's reach is searched. With too
+    few looks for any place to be accepted the rest waits too. Otherwise all rooms are searched.
+
+    Args:
+        found: the places to which the guess leads.
+        p_guess: how likely the robot was there, before these looks.
+    """
+    if guess is None or p_guess < tuning.min_p_tracked:
+        return list(rooms)
+    if looks >= tuning.min_views and not any(c.is_accepted for c in found):
+        return list(rooms)
+    here = shapely.Point(guess[1].position)
+    return [room for room in rooms if shapely.Polygon(robot.world.outline(room)).distance(here) <= BUMP_REACH_M]
+
+
+def _sift(
+    pictures: PictureSearch | None, room: str, pose: Pose2, places: Iterable[tuple[str, Pose2]]
+) -> Iterator[tuple[str, Pose2]]:
+    """Of the places where the plan repeats itself those that show about as much of the pictures as a pose in a room."""
+    if pictures is None:
+        yield from places
+        return
+    least = MIN_ALIAS_SCORE * pictures.rate(room, pose)
+    for there, other in places:
+        if pictures.rate(there, other) >= least:
+            yield there, other
 
 
 def _build_distinct(
@@ -177,6 +220,15 @@ def _keep_likelier(found: list[PlaceCandidate], new: PlaceCandidate) -> None:
         found[:] = [*(c for c in found if c not in near), new]
 
 
+def _polish(
+    robot: RobotModel, views: Sequence[CameraView], rough: PlaceCandidate, settings: Settings
+) -> PlaceCandidate:
+    """The candidate refined once more, from where it ended: what decides between two is not from where each began."""
+    again = refine_pose(robot, views, rough.world_from_robot, settings)
+    better = _build_candidate(robot, views, RefinedPose(rough.room, *again), settings)
+    return max((rough, better), key=lambda c: c.likelihood.log_likelihood)
+
+
 def _list_repetitions(
     robot: RobotModel, candidate: PlaceCandidate, rooms: Sequence[str]
 ) -> Iterator[tuple[str, Pose2]]:
@@ -186,13 +238,15 @@ def _list_repetitions(
 
 
 def find_aliases(
-    robot: RobotModel, views: Sequence[CameraView], pose: Pose2, rooms: Sequence[str], settings: Settings = DEFAULT
+    robot: RobotModel, views: Sequence[CameraView], pose: Pose2, rooms: Sequence[str], settings: Settings = DEFAULT,
+    likely: Sequence[str] | None = None,
 ) -> tuple[RefinedPose, ...]:
     """Find the other places of these rooms that would look the same in all views, by the model alone.
 
     The pictures are not used: missed, hidden or additional lines may make one of two aliases much less likely than the
     other. The search is for what should be visible from ``pose``. Where few lines are, the grid may be too coarse to
-    find an alias, so the places at which the plan repeats itself are tried too.
+    find an alias, so the places at which the plan repeats itself are tried too. ``likely``: the rooms that are
+    searched, all of them by default.
     """
     lines = [predict_lines(robot, view.pose_then(pose), settings.verification) for view in views]
     predicted = [replace(view, segments_px=seen.segments_px) for view, seen in zip(views, lines, strict=True)]
@@ -203,10 +257,12 @@ def find_aliases(
         known = (pose, *(alias.world_from_robot for alias in found))
         return all(are_distinct(other, one) for one in known) and look_alike(pose, other)
 
-    for refined in _find_refined(robot, predicted, rooms, settings):
+    pictures = PictureSearch.from_views(robot, predicted[-MAX_VIEWS_OF_SEARCH:], settings)
+    for refined in _find_refined(robot, predicted, rooms if likely is None else likely, settings, pictures):
         if is_alias(refined.world_from_robot):
             found.append(refined)
-    for room, other in find_repetitions(robot.world, _find_room(robot, rooms[0], pose), pose, rooms):
+    here = _find_room(robot, rooms[0], pose)
+    for room, other in _sift(pictures, here, pose, find_repetitions(robot.world, here, pose, rooms)):
         if is_alias(other):
             found.append(RefinedPose(room, *refine_pose(robot, predicted, other, settings)))
     return tuple(found)
@@ -268,12 +324,12 @@ def decide(
 
 
 def _find_refined(
-    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings
+    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings,
+    pictures: PictureSearch | None,
 ) -> list[RefinedPose]:
     """The best candidates by the last views, refined by all; not the same pose twice."""
     found = list[RefinedPose]()
-    last = views[-MAX_VIEWS_OF_SEARCH:]
-    for candidate in find_pose_candidates(robot, last, rooms, MAX_CANDIDATES, settings):
+    for candidate in () if pictures is None else pictures.find(rooms, MAX_CANDIDATES):
         pose, covariance = refine_pose(robot, views, candidate.world_from_robot, settings)
         if all(pose.distance_to(other.world_from_robot) > FINE_CLIMB_M
                or abs(wrap_angle(pose.heading_rad - other.world_from_robot.heading_rad)) > FINE_CLIMB_RAD

@@ -31,6 +31,7 @@ class Search(NamedTuple):
         here: room and pose (world) of the last belief.
         followed: rooms and poses of the candidates of the last search, as the robot has moved since.
         touched: where something was touched, (2,) [m] in the robot's frame now.
+        p_here: how likely it was there, before these looks.
     """
 
     looks: Sequence[CameraView]
@@ -38,11 +39,12 @@ class Search(NamedTuple):
     here: tuple[str, Pose2]
     followed: Sequence[tuple[str, Pose2]]
     touched: Sequence[Floats] = ()
+    p_here: float = 0.0
 
 
 def search(robots: Iterable[RobotModel], what: Search, settings: Settings) -> tuple[LocalizationResult, int]:
     """The result of the robot, camera and building, in which the best place fits best, and which it is."""
-    tried = [localize(robot, what.looks, what.rooms, settings, what.here, what.followed, what.touched)
+    tried = [localize(robot, what.looks, what.rooms, settings, what.here, what.followed, what.touched, what.p_here)
              for robot in robots]
     best = max(range(len(tried)), key=lambda k: _measure_fit(tried[k]))  # of equals the first
     return tried[best], best

@@ -48,6 +48,9 @@ CHAMFER_SHRINK = 4  # pixels of the picture along each side of a pixel of the ma
 MIN_POINT_DEPTH_M = 0.3  # smallest depth of a projected point
 PRIOR_POINTS = 50.0  # points that agree by chance, added to each score: few points are little evidence
 GRID_STRIDE = 2  # one of so many points is projected when the grid is scored
+SIEVE_STRIDE = 8  # the same when the grid is sieved
+SIEVED_PART = 0.05  # part of the grid that goes through the sieve, the best of it
+MIN_SIEVED = 3_000  # a smaller grid is not sieved
 MIN_CANDIDATE_DISTANCE_M = 0.45  # distance from which two candidates are distinct
 MIN_CANDIDATE_ANGLE_RAD = math.radians(10.0)  # angle from which two candidates are distinct
 MAX_CLIMBED = 60  # best poses of the grid that are improved by hill climbing
@@ -167,26 +170,10 @@ def find_pose_candidates(
 ) -> tuple[PoseCandidate, ...]:
     """Find the poses in these rooms that fit all views best, the best first, distinct from each other.
 
-    Empty where no view shows level lines.
+    Empty where no view shows level lines. A large grid is sieved by few of the points.
     """
-    search = _Search.from_views(robot, views, settings)
-    if search is None:
-        return ()
-    poses, owners, scores = [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros(0)]
-    maps = [get_visibility_map(robot.world, room, robot.mount.height_m) for room in rooms]
-    for number, room_map in enumerate(maps):
-        if len(room_map.positions):
-            poses.append(search.build_grid(room_map))
-            owners.append(np.full(len(poses[-1]), number))
-            scores.append(search.score(room_map, poses[-1], np.tile(room_map.cell, 4), GRID_STRIDE))
-    at, owner, score = np.concatenate(poses), np.concatenate(owners), np.concatenate(scores)
-    first = _suppress(at, score, MAX_CLIMBED)
-    climbed = [search.climb(maps[owner[i]], at[i]) for i in first]
-    ends = np.array([pose for pose, _ in climbed]).reshape(-1, 3)
-    fits = np.array([fit for _, fit in climbed])
-    min_score = MIN_RELATIVE_SCORE * float(np.max(fits, initial=0.0))
-    return tuple(PoseCandidate(rooms[owner[first[i]]], Pose2(*ends[i]), float(fits[i]))
-                 for i in _suppress(ends, fits, max_count) if fits[i] >= min_score)
+    search = PictureSearch.from_views(robot, views, settings)
+    return () if search is None else search.find(rooms, max_count)
 
 
 def are_distinct(a: Pose2, b: Pose2) -> bool:
@@ -196,8 +183,10 @@ def are_distinct(a: Pose2, b: Pose2) -> bool:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Search:
+class PictureSearch:
     """What poses are scored by: the views, their chamfer maps, and the direction of level lines in the robot's frame.
+
+    It is computed once for the pictures, and shared by all poses that are held against them.
     """
 
     robot: RobotModel
@@ -206,7 +195,7 @@ class _Search:
     direction_rad: float
 
     @staticmethod
-    def from_views(robot: RobotModel, views: Sequence[CameraView], settings: Settings) -> _Search | None:
+    def from_views(robot: RobotModel, views: Sequence[CameraView], settings: Settings) -> PictureSearch | None:
         """None where no view shows level lines. The view with the longest segments that does is taken."""
         mount = robot.mount.camera_from_robot
         for view in sorted(views, key=lambda v: -_total_length(v.segments_px)):
@@ -214,8 +203,40 @@ class _Search:
             if direction is not None:
                 maps = tuple(compute_chamfer_maps(v.segments_px, robot.camera) for v in views)
                 heading = direction + view.now_from_then.heading_rad
-                return _Search(robot, tuple(views), maps, heading)
+                return PictureSearch(robot, tuple(views), maps, heading)
         return None
+
+    def find(self, rooms: Sequence[str], max_count: int) -> tuple[PoseCandidate, ...]:
+        """The poses in these rooms that fit all views best, the best first, distinct from each other."""
+        maps = [get_visibility_map(self.robot.world, room, self.robot.mount.height_m) for room in rooms]
+        grids = [self.build_grid(room_map) for room_map in maps]
+        kept = self._sieve(maps, grids)
+        at = np.concatenate([np.zeros((0, 3)), *(grid[some] for grid, some in zip(grids, kept, strict=True))])
+        owner = np.repeat(np.arange(len(maps)), [len(some) for some in kept])
+        score = np.concatenate([np.zeros(0), *(
+            self.score(m, grid[some], np.tile(m.cell, 4)[some], GRID_STRIDE)
+            for m, grid, some in zip(maps, grids, kept, strict=True) if len(some))])
+        first = _suppress(at, score, MAX_CLIMBED)
+        climbed = [self.climb(maps[owner[i]], at[i]) for i in first]
+        ends = np.array([pose for pose, _ in climbed]).reshape(-1, 3)
+        fits = np.array([fit for _, fit in climbed])
+        min_score = MIN_RELATIVE_SCORE * float(np.max(fits, initial=0.0))
+        return tuple(PoseCandidate(rooms[owner[first[i]]], Pose2(*ends[i]), float(fits[i]))
+                     for i in _suppress(ends, fits, max_count) if fits[i] >= min_score)
+
+    def rate(self, room: str, pose: Pose2) -> float:
+        """The score of one pose in a room, at the best of the poses close to it."""
+        here = np.array([pose.position])
+        return self.climb(_build_map(self.robot.world, room, self.robot.mount.height_m, here), pose.vector)[1]
+
+    def _sieve(self, maps: Sequence[VisibilityMap], grids: Sequence[Floats]) -> list[Ints]:
+        """Of the grid of each room the indices that are scored by more than a few points."""
+        count = sum(map(len, grids))
+        if count < MIN_SIEVED:
+            return [np.arange(len(grid)) for grid in grids]
+        scores = [self.score(m, grid, np.tile(m.cell, 4), SIEVE_STRIDE) for m, grid in zip(maps, grids, strict=True)]
+        least = float(np.quantile(np.concatenate(scores), 1.0 - max(SIEVED_PART, MIN_SIEVED / count)))
+        return [np.flatnonzero(some >= least) for some in scores]
 
     def build_grid(self, room_map: VisibilityMap) -> Floats:
         """(4 n, 3) the positions of a room, with each of the four headings that its walls leave."""
@@ -295,7 +316,7 @@ class VisibilityMap:
 def get_visibility_map(building: Building, room: str, eye_m: float) -> VisibilityMap:
     """Return the visibility map of a room for a camera at a height above the world's zero. Cached."""
     return building.cached("visibility maps", MAX_MAPS, (room, eye_m),
-                           lambda: _build_map(building, room, eye_m))
+                           lambda: _build_map(building, room, eye_m, _find_positions(building, room)))
 
 
 def sample_lines(lines_world: Floats) -> tuple[Floats, Floats, Ints]:
@@ -311,8 +332,7 @@ def sample_lines(lines_world: Floats) -> tuple[Floats, Floats, Ints]:
     return lines[owner, 0] + t[:, None] * along[owner], unit[owner], owner
 
 
-def _build_map(building: Building, room: str, eye_m: float) -> VisibilityMap:
-    positions = _find_positions(building, room)
+def _build_map(building: Building, room: str, eye_m: float, positions: Floats) -> VisibilityMap:
     cells, cell = np.unique(np.floor(positions / VISIBILITY_CELL_M).astype(np.int64), axis=0, return_inverse=True)
     cell = cell.reshape(-1).astype(np.int64)
     eyes = _choose_eyes(positions, cell, cells)

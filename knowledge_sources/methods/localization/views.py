@@ -9,9 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
+from numba import njit
 from scipy.sparse.csgraph import connected_components
 
 from knowledge_sources.methods.arrays import Floats, Ints, Mask
@@ -37,8 +39,12 @@ MAX_OBSTRUCTION_AREA = 0.5
 SIDE_END_QUANTILE = 0.8  # quantile of segment ends that is the end of a side: longer ones go on in something else
 MIN_SIDES = 3  # fewest sides of an outline
 MAX_DROPPED_SIDES = 4  # most sides that are left out as chance
+MAX_COMPARED_VIEWS = 8  # most views, the last, that are compared
+MAX_COMPARED_SEGMENTS = 300  # most segments of a view, the longest, that may be sides: bricks and tiles have many more
+MAX_SIDES = 12  # most sides of an outline that are tried, those that are seen at the greatest length
 INSIDE_MARGIN_PX = 8.0  # distance within the outline from which a segment lies inside
 MAX_INSIDE_FRACTION = 0.1  # largest length of segments inside an opaque outline, as a part of the outline's own
+MAX_TRIED_FRACTION = 5.0  # where more lies inside, as of a texture, no single side is left out as chance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,20 +171,25 @@ def find_obstruction(views: Sequence[CameraView], camera: Camera, min_area: floa
 
     Stationary segments are those with counterparts in views of other directions. The outline is their convex hull. If
     it is not opaque, since other segments lie within, one side after the other is left out as chance; then the number
-    of counterparts that is asked for grows.
+    of counterparts that is asked for grows. Of many views and segments only some are compared, so that a textured room
+    takes no longer than another.
     """
     if min_area is None:
         min_area = MIN_OBSTRUCTION_AREA
+    views = views[-MAX_COMPARED_VIEWS:]
     counts = [_count_counterparts(views, k) for k in range(len(views))]
     for least in range(MIN_STATIONARY_VIEWS, len(views)):
         stationary = [count >= max(least, MIN_STATIONARY_FRACTION * total) for count, total in counts]
         sides = _build_sides([v.segments_px[some] for v, some in zip(views, stationary, strict=True)])
         others = [v.segments_px[~some] for v, some in zip(views, stationary, strict=True)]
+        others[0] = np.concatenate([others[0], *(side.segments_px for side in sides[MAX_SIDES:])])
+        sides = sides[:MAX_SIDES]
         for _ in range(1 + MAX_DROPPED_SIDES):
             obstruction = _enclose(sides, camera, min_area)
-            if obstruction is not None and is_opaque(obstruction, others):
+            inside = math.inf if obstruction is None else _measure_inside(obstruction, others)
+            if inside <= MAX_INSIDE_FRACTION:
                 return obstruction
-            if len(sides) <= MIN_SIDES:
+            if len(sides) <= MIN_SIDES or MAX_TRIED_FRACTION < inside < math.inf:
                 break
             sides, others = _drop_worst_side(sides, others, camera)
     return None
@@ -199,8 +210,11 @@ def _count_counterparts(views: Sequence[CameraView], which: int) -> tuple[Ints, 
     one = views[which]
     others = [v for v in views if abs(wrap_angle(v.now_from_then.heading_rad - one.now_from_then.heading_rad))
               > MIN_TURN_BETWEEN_VIEWS_RAD]
-    found = [has_counterpart(one.segments_px, other.segments_px) for other in others]
-    return np.sum([np.zeros(len(one.segments_px), np.int64), *found], axis=0), len(others)
+    longest = np.argsort(-_measure(one.segments_px), kind="stable")[:MAX_COMPARED_SEGMENTS]
+    counts = np.zeros(len(one.segments_px), np.int64)
+    for other in others:
+        counts[longest] += has_counterpart(one.segments_px[longest], other.segments_px)
+    return counts, len(others)
 
 
 def _measure_inside(obstruction: Obstruction, segments_px: Sequence[Floats]) -> float:
@@ -223,13 +237,15 @@ class _Side:
 def _build_sides(stationary: Sequence[Floats]) -> list[_Side]:
     """Group the stationary segments (n, 2, 2) of all views: those that lie on each other are one side.
 
-    In some views a side continues in an edge of the building, or is seen in part only.
+    In some views a side continues in an edge of the building, or is seen in part only. The side that is seen at the
+    greatest length comes first.
     """
     segments = np.concatenate([np.zeros((0, 2, 2)), *stationary])
     if not len(segments):
         return []
     count, which = connected_components(_lie_on(segments, segments), directed=False)
     groups = [segments[which == k] for k in range(count)]
+    groups.sort(key=lambda group: -float(np.sum(_measure(group))))
     return [_Side(_find_ends(group, SIDE_END_QUANTILE), group) for group in groups]
 
 
@@ -273,18 +289,37 @@ def _drop_worst_side(sides: list[_Side], others: list[Floats], camera: Camera) -
 
 def _lie_on(one_px: Floats, other_px: Floats) -> Mask:
     """(n, m) which segments (n, 2, 2) lie on, and beside, which of others (m, 2, 2)."""
-    if not len(one_px) or not len(other_px):
-        return np.zeros((len(one_px), len(other_px)), bool)
-    length, size = _measure(one_px), _measure(other_px)
-    along = (one_px[:, 1] - one_px[:, 0]) / length[:, None]
-    direction = (other_px[:, 1] - other_px[:, 0]) / size[:, None]
-    turned = np.abs(along[:, None, 0] * direction[None, :, 1] - along[:, None, 1] * direction[None, :, 0])
-    away = other_px[None] - one_px[:, None, None, 0]  # (n, m, 2, 2)
-    across = np.abs(away[..., 0] * along[:, None, None, 1] - away[..., 1] * along[:, None, None, 0]).max(axis=2)
-    at = away[..., 0] * along[:, None, None, 0] + away[..., 1] * along[:, None, None, 1]
-    shared = np.minimum(at.max(axis=2), length[:, None]) - np.maximum(at.min(axis=2), 0.0)
-    beside = shared >= MIN_STATIONARY_OVERLAP * np.minimum(length[:, None], size[None])
-    return np.asarray((turned <= STATIONARY_RAD) & (across <= STATIONARY_PX) & beside)
+    return np.asarray(_find_lying_on(
+        np.array(one_px, float, order="C").reshape(-1, 2, 2), np.array(other_px, float, order="C").reshape(-1, 2, 2),
+        STATIONARY_RAD, STATIONARY_PX, MIN_STATIONARY_OVERLAP))
+
+
+@njit(cache=True, error_model="numpy")
+def _find_lying_on(one: Any, other: Any, most_rad: float, most_px: float, min_overlap: float) -> Any:
+    out = np.zeros((len(one), len(other)), np.bool_)
+    along = np.empty((len(other), 3))  # direction and length of each other segment
+    for j in range(len(other)):
+        u, v = other[j, 1, 0] - other[j, 0, 0], other[j, 1, 1] - other[j, 0, 1]
+        size = max(math.hypot(u, v), 1e-9)
+        along[j, 0], along[j, 1], along[j, 2] = u / size, v / size, size
+    for i in range(len(one)):
+        x0, y0 = one[i, 0, 0], one[i, 0, 1]
+        u, v = one[i, 1, 0] - x0, one[i, 1, 1] - y0
+        length = max(math.hypot(u, v), 1e-9)
+        u, v = u / length, v / length
+        for j in range(len(other)):
+            if abs(u * along[j, 1] - v * along[j, 0]) > most_rad:
+                continue
+            x, y = other[j, 0, 0] - x0, other[j, 0, 1] - y0
+            if abs(x * v - y * u) > most_px:
+                continue
+            start, x, y = x * u + y * v, other[j, 1, 0] - x0, other[j, 1, 1] - y0
+            if abs(x * v - y * u) > most_px:
+                continue
+            end = x * u + y * v
+            shared = min(max(start, end), length) - max(min(start, end), 0.0)
+            out[i, j] = shared >= min_overlap * min(length, along[j, 2])
+    return out
 
 
 def _measure(segments_px: Floats) -> Floats:

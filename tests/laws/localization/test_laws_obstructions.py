@@ -147,6 +147,35 @@ def test_what_hides_a_part_of_every_view_is_found_where_it_is() -> None:
     assert right >= 190
 
 
+def test_a_texture_beside_it_does_not_hide_it_and_is_none_itself() -> None:
+    """Bricks and tiles all round: of a thousand short segments a view none is found; among eighty it is."""
+    right = 0
+    for seed in range(10):
+        rng = np.random.default_rng([seed, 9])
+        obstruction, pose = outline(rng), somewhere(rng)
+        bare, hidden = take_views(pose, None, rng), take_views(pose, obstruction, rng)
+        assert find_obstruction([lay_bricks(view, None, 1000, rng) for view in bare], CAMERA) is None
+        found = find_obstruction([lay_bricks(view, obstruction, 80, rng) for view in hidden], CAMERA)
+        right += found is not None and is_where(found, obstruction)
+    assert right >= 8
+
+
+def is_where(found: Obstruction, truth: Obstruction) -> bool:
+    """Whether most of it is found, and little beside it."""
+    grid = np.stack(np.meshgrid(np.arange(0, 512, 8.0), np.arange(0, 512, 8.0)), axis=-1)
+    hidden, said = truth.covers(grid), found.covers(grid, -4.0)
+    return bool(np.sum(said & hidden) >= 0.4 * np.sum(hidden) and np.mean(said & ~hidden) <= 0.12)
+
+
+def lay_bricks(view: CameraView, before: Obstruction | None, count: int, rng: np.random.Generator) -> CameraView:
+    """The view with so many level and upright segments besides, none of them behind what is before the camera."""
+    start, level = rng.uniform(0, 480, (count, 2)), rng.random(count) < 0.6
+    bricks = np.stack([start, start + rng.uniform(10, 30, (count, 1)) * np.column_stack([level, ~level])], axis=1)
+    if before is not None:
+        bricks = bricks[before.hidden_part(bricks) == 0.0]
+    return CameraView(np.concatenate([view.segments_px, bricks]), view.now_from_then, view.covariance)
+
+
 @few
 @given(seed=seeds)
 def test_where_nothing_is_before_the_camera_nothing_is_found(seed: int) -> None:
