@@ -20,7 +20,7 @@ LINES = {
     "logs": 7_450,
     "harvey": 10_520,
     "experiments": 10_030,
-    "tests": 42_600,
+    "tests": 42_900,
     "extras": 14_910,
 }
 """Of Python files, at most."""
