@@ -11,7 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_LOG_RATIO, MIN_PICTURES, SHUT_LOG_ODDS, update_door
+from knowledge_sources.methods.doors.belief import (
+    MAX_DOUBTED_SIGMAS,
+    MAX_LOG_ODDS,
+    MIN_LOG_RATIO,
+    MIN_PICTURES,
+    SHUT_LOG_ODDS,
+    is_near,
+    update_door,
+)
 from knowledge_sources.methods.doors.leaf import (
     JAMB_MARGIN_M,
     MAX_DISTANCE_M,
@@ -37,8 +45,9 @@ from world_models.actuator import ActuatorModel
 from world_models.building.locales import Doorway
 from world_models.building.world import World
 from world_models.entries.door_state import DoorPicture, DoorState
+from world_models.entries.location import Hypothesis, diagonal
 from world_models.files.world_files import WORLDS, load_world
-from world_models.frames import Pose2
+from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 HALL, DOOR = "north-hall", "archive-north-door"
@@ -304,3 +313,19 @@ def test_of_two_pictures_the_second_adds_what_is_new(way_m: float, ratio: float)
     part = way_m / 0.6
     if abs(part - 0.5) > 1e-6:
         assert known.log_odds == pytest.approx(-4.0 + ratio * (1.0 + (part if part >= 0.5 else 0.0)), abs=1e-6)
+
+
+@pytest.mark.parametrize("sigma_m", [0.01, 0.2])
+@pytest.mark.parametrize("sigma_rad", [0.003, 0.1])
+@pytest.mark.parametrize("direction", [0.0, 2.0, -1.0])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_pose_is_where_it_was_believed_up_to_each_bound_by_itself(
+    sigma_m: float, sigma_rad: float, direction: float, side: float
+) -> None:
+    before = Pose2(1.0, 2.0, 3.0)  # a small turn leads past half a turn
+    belief = Hypothesis(HALL, before, diagonal(sigma_m, sigma_rad), "tracks")
+    for more_m, more_rad, near in ((-1e-6, -1e-6, True), (1e-6, -1e-6, False), (-1e-6, 1e-6, False)):
+        far_m = MAX_DOUBTED_SIGMAS * belief.sigma_m + 0.05 + more_m
+        turn = side * (MAX_DOUBTED_SIGMAS * belief.sigma_rad + 0.02 + more_rad)
+        after = Pose2(1.0 + far_m * math.cos(direction), 2.0 + far_m * math.sin(direction), wrap_angle(3.0 + turn))
+        assert is_near(before, after, belief) == near
