@@ -17,6 +17,7 @@ from blackboard.servoing import Servoing
 from knowledge_sources.action.correlator_tracker import CorrelatorTracker
 from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.action.dependency_withdrawer import DependencyWithdrawer
+from knowledge_sources.action.door_toucher import DoorToucher
 from knowledge_sources.action.door_watcher import DoorWatcher
 from knowledge_sources.action.elevator_rider import ElevatorRider
 from knowledge_sources.action.fault_closer import FaultCloser
@@ -117,6 +118,7 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     HaltExplainer,
     ThingMover,
     DoorWatcher,
+    DoorToucher,
     ShutDoorExplainer,
     DependencyWithdrawer,
     GoalCloser,

@@ -43,7 +43,7 @@ NAMES = [source.__module__.rpartition(".")[2] for source in KNOWLEDGE_SOURCES]
 NOT_NEEDED = {
     "correlator_tracker", "plan_adjuster", "discrepancy_raiser", "fault_handler", "path_follower", "elevator_rider",
     "obstruction_finder", "model_reviser", "goal_changer", "dependency_withdrawer", "thing_mapper", "door_watcher",
-    "touch_finder", "halt_explainer", "thing_mover",
+    "door_toucher", "touch_finder", "halt_explainer", "thing_mover",
     "shut_door_explainer", "range_watcher", "floor_watcher", "camera_calibrator", "yaw_calibrator", "alias_monitor",
     "detour_finder", "lookout_planner", "belief_checker", "view_updater", "probe_photographer", "panorama_builder",
     "localizer", "prober", "pose_adopter", "goal_renewer", "fault_closer", "landmark_chooser",

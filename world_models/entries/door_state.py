@@ -46,6 +46,7 @@ class DoorState:
         seen_s: when that was taken, by the body's clock.
         prior: log odds before any picture.
         views: the pictures that are counted, the last one last; empty where the last one alone is.
+        touched_s: when something was touched in its opening, by the body's clock; None where nothing was.
     """
 
     door: str
@@ -58,6 +59,7 @@ class DoorState:
     seen_s: float
     prior: float = 0.0
     views: tuple[DoorPicture, ...] = ()
+    touched_s: float | None = None
 
     @property
     def is_passable(self) -> bool:
@@ -73,5 +75,6 @@ class DoorState:
         if self.state == "unknown":
             said = f"{self.door} may be shut"
         seen = f"{self.pictures} picture{'s' * (self.pictures != 1)}"
+        touched = "" if self.touched_s is None else f"; something was touched in it at {self.touched_s:.1f} s"
         return f"{said}: its opening shows {self.last.shows}; {self.certainty:.1%} by {seen}, the last at " \
-               f"{self.seen_s:.1f} s"
+               f"{self.seen_s:.1f} s{touched}"

@@ -6,7 +6,7 @@ It is log odds of its not being open.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from knowledge_sources.methods.verification.line_check import check_lines, predi
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, compute_evidence
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.settings import DEFAULT, Settings
+from world_models.building.locales import Doorway
 from world_models.entries.door_state import DoorCondition, DoorPicture, DoorState
 from world_models.entries.location import Hypothesis
 from world_models.frames import Pose2, wrap_angle
@@ -30,7 +31,9 @@ PRIOR_LOG_ODDS = 4.0  # log odds that a door is as it is believed to be, before 
 SHUT_LOG_ODDS = 4.6  # log odds from which a door is shut: 99 %
 OPEN_LOG_ODDS = -3.0  # log odds up to which a door is open: 95 %
 MAX_LOG_ODDS = 7.0  # largest log odds that are kept, that a door may open again
-MIN_PICTURES = 2  # fewest pictures by which a door is shut
+TOUCH_LOG_RATIO = 3.0  # what a touch in the opening adds: 20 to 1, as things stand in open doorways, too
+MAX_TOUCH_M = 0.1  # so far before the wall, or behind it, what is touched may be a leaf
+MIN_PICTURES = 2  # fewest pictures by which a door is shut; a touch counts as one
 SAME_PLACE = Alike(step_m=0.6, turn_rad=math.inf)
 """Pictures of a door from places so far apart are independent; what is seen through it does not change by a turn."""
 MAX_COMMON = 0.5  # of two pictures that have more in common, one is kept
@@ -64,12 +67,31 @@ def update_door(
     views = (*kept, picture)[-MAX_VIEWS:]
     log_odds = prior + add_looks([Look(_pose(view), view.log_ratio) for view in views], SAME_PLACE)
     log_odds = min(max(log_odds, -MAX_LOG_ODDS), MAX_LOG_ODDS)
-    state = _name_state(log_odds, len(views), known)
+    touched_s = None if known is None else known.touched_s
+    state = _name_state(log_odds, len(views) + (touched_s is not None), known)
     if known is not None and (state, log_odds) == (known.state, known.log_odds):
         return None
     p_shut = to_probability(log_odds)
     certainty = 1.0 - p_shut if state == "open" else p_shut
-    return DoorState(door, between, state, certainty, log_odds, len(views), picture, seen_s, prior, views)
+    return DoorState(door, between, state, certainty, log_odds, len(views), picture, seen_s, prior, views, touched_s)
+
+
+def touch_door(known: DoorState, when_s: float) -> DoorState:
+    """What is believed of a door after the first touch in its opening; that counts beside the pictures."""
+    log_odds = min(known.log_odds + TOUCH_LOG_RATIO, MAX_LOG_ODDS)
+    prior = (known.prior if known.views else known.log_odds - known.last.log_ratio) + TOUCH_LOG_RATIO
+    state = _name_state(log_odds, known.pictures + 1, known)
+    return replace(known, state=state, certainty=to_probability(log_odds), log_odds=log_odds, prior=prior,
+                   views=known.views or (known.last,), touched_s=when_s)
+
+
+def is_in_opening(doorway: Doorway, locale: str, at: Floats, margin_m: float) -> bool:
+    """Whether a place (2,) [world] lies in a doorway, by a margin within its jambs, and as deep as a leaf may hang."""
+    (left, right), outward = doorway.threshold_of(locale), doorway.outward_from(locale)
+    behind = doorway.threshold_of(doorway.other(locale))[0]
+    across_m = float((at - left) @ (right - left)) / doorway.width_m
+    deep_m, wall_m = float((at - left) @ outward), float((behind - left) @ outward)
+    return margin_m <= across_m <= doorway.width_m - margin_m and -MAX_TOUCH_M <= deep_m <= wall_m + MAX_TOUCH_M
 
 
 def _keep(views: tuple[DoorPicture, ...], new: DoorPicture) -> tuple[DoorPicture, ...] | None:

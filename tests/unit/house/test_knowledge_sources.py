@@ -114,7 +114,7 @@ MOST_LINES = 150
 SHARED: dict[str, tuple[int, str]] = {
     "CameraState": (3, "learnt from lines, from the way, and told anew to who was lost"),
     "Discrepancy": (12, "who measures a difference posts it; who corrects it says so"),
-    "DoorState": (2, "by a leaf in sight, and by what a shut door explains"),
+    "DoorState": (3, "by a leaf in sight, by a touch, and by what a shut door explains"),
     "Drift": (4, "the belief's other half: who turns the heading restarts it"),
     "FreeFloor": (2, "two senses"),
     "Goal": (4, "set, reached, replaced because lost, replaced because asked"),
