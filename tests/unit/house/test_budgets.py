@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 9_980,
-    "knowledge_sources": 21_680,
+    "knowledge_sources": 21_780,
     "sim": 5_830,
     "logs": 7_450,
     "harvey": 10_520,
