@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generated_boards import HALL, house, plain_robot, to_world
-from knowledge_sources.methods.floor.found_things import keep_touched
+from knowledge_sources.methods.floor.found_things import find_same, keep_touched, with_core
 from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M, see_ranges
 from knowledge_sources.methods.floor.weigh_sight import Sight, see_again
 from knowledge_sources.methods.floor.weigh_touch import TOUCHED_SIDE_M, Touched, touch_again
@@ -72,6 +72,31 @@ def test_no_picture_takes_back_what_was_touched(core: Corners, touched_s: float 
     kept = keep_touched(replace(THING, core=core, touched_s=touched_s), seen)
     wanted = seen if touched_s is None else shapely.union(seen, build_polygon(core or WHOLE))
     assert kept.symmetric_difference(wanted).area < 1e-9
+
+
+@pytest.mark.parametrize("part", [0.0, 0.2, 0.7, 0.89, 0.91, 1.0])
+def test_what_was_seen_is_told_apart_where_it_is_clearly_less_than_the_whole(part: float) -> None:
+    seen = build_polygon(box(4.0 - 0.5 + 0.5 * part, 2.0, 0.5 * part, 0.5)) if part else NONE
+    core = with_core(THING, seen).core
+    assert bool(core) == (0.0 < part < 0.9)
+    if core:
+        assert build_polygon(core).symmetric_difference(build_polygon(WHOLE).intersection(seen)).area < 5e-3
+
+
+@pytest.mark.parametrize("sigmas", [(0.03, 0.04), (0.04, 0.03), (0.0, 0.05), (0.12, 0.05)])
+@pytest.mark.parametrize("more", [-1e-3, 1e-3])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_another_sight_is_of_a_thing_within_twice_what_both_leave_open(
+    sigmas: tuple[float, float], more: float, side: float
+) -> None:
+    """Either sight may be the surer; of two things within reach that which it covers more of."""
+    mine, known_m = sigmas
+    gap_m = 2.0 * math.hypot(mine, known_m) + more
+    known = replace(THING, footprint=box(4.0, 2.0, 0.2, 0.2), sigma_m=known_m)
+    shape = build_polygon(box(4.0 + side * (0.4 + gap_m), 2.0, 0.2, 0.2))
+    assert find_same({"Obstacle-1": known}, shape, mine, math.inf) == ("Obstacle-1" if more < 0.0 else None)
+    other = replace(THING, footprint=box(4.0 + side * 0.7, 2.0, 0.2, 0.2), sigma_m=known_m)
+    assert find_same({"Obstacle-1": known, "Obstacle-2": other}, shape, mine, math.inf) == "Obstacle-2"
 
 
 def look(*, p: float = 0.6, sigma_m: float = 0.05, sigma_height_m: float = 0.3, seen_s: float = 9.0,
