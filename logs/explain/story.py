@@ -39,7 +39,7 @@ WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, UserReport,
 PLANS: tuple[type[Any], ...] = (Goal, PlanSketch)
 MOST_PLACES = 4
 """So many places that came into question are told, the newest."""
-COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong")
+COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p chance")
 MOST_ROWS = 60
 """Of more rows only those are printed that were not verified, and the last ones."""
 MILESTONES = "Milestones"

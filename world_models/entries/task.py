@@ -331,8 +331,8 @@ class Certificate:
         shift = (f"{words.quantity(self.deviation_px, 'px')} of the {words.quantity(self.tolerance_px, 'px')} that may"
                  " be corrected")
         return (f"{self.verdict}: {self.reason}; {self.milestone}; {agree}; {words.metres(self.deviation_m)} and"
-                f" {words.degrees(self.deviation_rad)} from the belief, {shift}; probability of a wrong pose"
-                f" {self.p_false:.2g}")
+                f" {words.degrees(self.deviation_rad)} from the belief, {shift}; the probability that so much"
+                f" agrees at a wrong place is {self.p_false:.2g}")
 
 
 @inference()
