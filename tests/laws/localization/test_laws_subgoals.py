@@ -61,6 +61,31 @@ def test_where_the_room_behind_a_door_is_barred_it_comes_in_by_another(bars: str
         assert bars == "nothing" or passages[0] == "high-door"
 
 
+@pytest.mark.parametrize("thing", [None, (7.5, 2.3, 0.05), (7.5, 1.7, 0.05), (7.35, 1.6, 0.1), (7.0, 2.0, 0.1)])
+@pytest.mark.parametrize("back", [False, True])
+def test_a_way_is_one_step_after_the_other_through_the_door_and_past_what_stands_before_it(
+    thing: tuple[float, float, float] | None, back: bool
+) -> None:
+    """Straight, or aslant: from the room where it is to the one behind, and clear of what stands there."""
+    bench = Bench(plain_robot())
+    if thing is not None:
+        bench.stand(*thing, thing[2])
+    start, goal = Place(HALL, 5.0, 2.8), Place(STUDY, 3.0, 2.0)
+    here, there = (goal, start) if back else (start, goal)
+    way = plan(bench).plan_between_locales(here, there, 0.01)
+    assert way is not None
+    before, through, after = way
+    assert (before.origin, after.destination) == (here, there) and through.passage == "study-door"
+    assert (before.destination, after.origin) == (through.origin, through.destination)
+    assert (through.origin.locale, through.destination.locale) == (here.locale, there.locale)
+    assert before.tolerance_m > 0.0 and through.primitive
+    if thing is not None:
+        line = shapely.LineString([p.in_world(plain_robot().world).position for p in (
+            through.origin, through.destination)])
+        least_m = line.distance(shapely.Polygon(bench.view["Obstacle-1"].value.footprint))
+        assert least_m >= plain_robot().radius_m + S.clearances_m[-1] - 1e-3
+
+
 @pytest.mark.parametrize("y_m", [0.8, 3.2])
 def test_what_is_free_at_a_door_is_so_whatever_was_asked_before(y_m: float) -> None:
     """Each question has its own answer: the door, the margin, what stands there, and how much of it is taken."""
