@@ -15,7 +15,9 @@ from knowledge_sources.methods.motion.subgoals import (
     LOOKOUT_DIRECTIONS,
     LOOKOUT_DISTANCES_M,
     LOOKOUT_SAME_SIDE_M,
+    MIN_DOORWAY_CLEARANCE_M,
     MIN_LOOKOUT_CHANGE_M,
+    WAY_TOLERANCE_M,
     SubgoalPlanner,
 )
 from knowledge_sources.questions import find_robot
@@ -84,6 +86,18 @@ def test_a_way_is_one_step_after_the_other_through_the_door_and_past_what_stands
             through.origin, through.destination)])
         least_m = line.distance(shapely.Polygon(bench.view["Obstacle-1"].value.footprint))
         assert least_m >= plain_robot().radius_m + S.clearances_m[-1] - 1e-3
+
+
+@pytest.mark.parametrize("beside_m", [0.02, 0.05, 0.099, 0.101, 0.3])
+def test_a_narrow_door_is_come_to_as_exactly_as_it_leaves_room_beside_the_robot(beside_m: float) -> None:
+    """But not more exactly than the robot keeps clear of things anyway; a wide one as any place on the way."""
+    width_m = 2.0 * (plain_robot().radius_m + beside_m)
+    text = HOUSE.replace("width = 1.0", f"width = {width_m!r}")
+    way = plan(Bench(plain_robot(read_world(Source.parse(text, "house.toml"))))).plan_between_locales(
+        Place(HALL, 5.0, 2.2), Place(STUDY, 3.0, 2.0), 0.01)
+    assert way is not None
+    wanted = WAY_TOLERANCE_M if beside_m >= MIN_DOORWAY_CLEARANCE_M else max(beside_m, S.clearances_m[-1])
+    assert way[0].tolerance_m == pytest.approx(wanted) and way[-1].tolerance_m == 0.01
 
 
 @pytest.mark.parametrize("y_m", [0.8, 3.2])
