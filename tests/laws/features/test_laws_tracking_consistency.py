@@ -17,7 +17,16 @@ from numpy.typing import NDArray
 from consistency import assert_consistent, compute_error, compute_nees
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.tracking import template_tracking
-from knowledge_sources.methods.tracking.template_tracking import MAX_SCALE, MIN_SCALE, correct_pose, follow_landmarks
+from knowledge_sources.methods.tracking.template_tracking import (
+    MAX_SCALE,
+    MAX_SEARCH_PX,
+    MIN_SCALE,
+    MIN_SEARCH_PX,
+    SEARCH_MARGIN_PX,
+    SEARCH_SIGMAS,
+    correct_pose,
+    follow_landmarks,
+)
 from knowledge_sources.methods.tracking.tolerance import action_px
 from knowledge_sources.questions import NOWHERE
 from knowledge_sources.settings import DEFAULT
@@ -139,3 +148,27 @@ def test_what_is_nearer_than_when_its_template_was_cut_is_looked_for_as_much_lar
     is_like = MIN_SCALE <= then_m / depth_m <= MAX_SCALE
     assert update.expected == is_like and scales == pytest.approx([then_m / depth_m] * is_like)
     assert update.track.found_px is None and update.track.misses == is_like
+
+
+@pytest.mark.parametrize("size", [0.01, 0.3, 1.0, 30.0])
+@pytest.mark.parametrize("aside_m", [0.0, 0.6, -0.6])
+def test_it_is_looked_for_as_far_as_the_belief_may_be_off(
+    size: float, aside_m: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some deviations of where it should be seen, along the picture's worse axis, and a little; derived by steps."""
+    windows = list[tuple[float, float, float]]()
+    monkeypatch.setattr(template_tracking, "correlate", lambda _, __, at, search, scale: windows.append((*at, search)))
+    point, pose, covariance = (3.0, aside_m, 1.3), Pose2(0.1, -0.1, 0.05), size * AT_FIRST
+    track = Track("a", point, "CameraPicture-1", (0.0, 0.0), 2.9, (0.0, 0.0), (1.0, 1.0), 1.0, 0.3)
+    image = np.zeros((CAMERA.height, CAMERA.width), np.uint8)
+    follow_landmarks(ROBOT, (track,), lambda _: TEMPLATE, image, pose, covariance)
+
+    def see(off: Array) -> Array:
+        there = Pose2(pose.x_m + off[0], pose.y_m + off[1], pose.heading_rad + off[2])
+        return np.asarray(CAMERA.project(ROBOT.camera_from_world(there).apply(np.array([point])))[0])
+
+    slopes = np.stack([(see(step) - see(-step)) / 2e-5 for step in 1e-5 * np.eye(3)], axis=1)
+    sigma_px = math.sqrt(max(np.diag(slopes @ covariance @ slopes.T)))
+    wanted_px = min(max(SEARCH_SIGMAS * sigma_px + SEARCH_MARGIN_PX, MIN_SEARCH_PX), MAX_SEARCH_PX)
+    ((u, v, window_px),) = windows
+    assert (u, v) == pytest.approx(tuple(see(np.zeros(3)))) and window_px == pytest.approx(wanted_px, rel=1e-4)
