@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard.entry import Entry
-from generated_boards import HALL, STUDY, Bench, plain_robot, to_world
+from generated_boards import HALL, HOUSE, STUDY, Bench, plain_robot, to_world
 from knowledge_sources import floor_ahead
 from knowledge_sources.floor_ahead import (
     LOOK_FROM_M,
@@ -23,10 +23,14 @@ from knowledge_sources.floor_ahead import (
     list_free_discs,
 )
 from knowledge_sources.methods.floor.seen_floor import Lookout
+from knowledge_sources.questions import find_robot
 from knowledge_sources.settings import DEFAULT
+from world_models.building.locales import EXTRA_KIND
 from world_models.entries.floor import FloorSense, FreeFloor
 from world_models.entries.location import Place
 from world_models.entries.task import Subgoal
+from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
 from world_models.frames import Pose2, wrap_angle
 
 ROBOT = plain_robot()
@@ -167,3 +171,17 @@ def test_the_way_goes_on_as_the_sketches_say_so_far_and_no_further_than_a_ride(
     assert np.allclose(points or np.zeros((0, 2)), np.array([p.in_world(ROBOT.world).position for p in wanted]).reshape(
         -1, 2))
     assert locales == {HALL, *(p.locale for p in wanted)}
+
+
+def test_what_the_file_lacks_stands_on_floor_that_is_asked_after_and_what_it_has_on_none() -> None:
+    text = HOUSE.replace("size = [8, 4]", 'size = [8, 4]\nthings = [["desk", [5.0, 1.0]], ["table", [2.5, 3.0]]]')
+    bench = Bench(plain_robot(read_world(Source.parse(text, "house.toml"))))
+    belief = bench.believe(Pose2(1.5, 2.0, 0.0))
+    bench.stand(3.5, 2.0, 0.3, 0.3)
+    sketch = bench.sketch(Place(HALL, 1.0, 2.0), Place(HALL, 6.0, 2.0), path=(0,))
+    asked = FloorAhead(bench.view, bench.leg(sketch).value, belief, DEFAULT)._asked
+    things = [t for t in find_robot(bench.view).world.things_of(HALL) if t.is_obstacle]
+    assert len(things) == 3
+    for thing in things:
+        middle = shapely.Polygon(thing.footprint_world).centroid
+        assert asked.contains(middle) == (thing.kind == EXTRA_KIND)

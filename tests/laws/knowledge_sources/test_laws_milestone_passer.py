@@ -217,3 +217,19 @@ def test_only_the_milestone_that_is_next_lets_its_sketch_go_on(index: int, lacks
     elif lacks == "life":
         bench.revise(sketch, status="superseded")
     assert (bench.ask(MilestonePasser(), milestone) is not None) == (index == 1 and lacks == "nothing")
+
+
+@pytest.mark.parametrize("at", [1, 2, 3, 4])
+def test_the_subgoal_that_was_missed_alone_is_drawn_anew_from_where_the_robot_is(at: int) -> None:
+    bench = Bench(plain_robot())
+    bench.believe(Pose2(3.3, 1.1, 0.2))
+    places = [Place("hall", 1.0 + k, 2.0) for k in range(5)]
+    sketch = bench.sketch(*places, at=at, verified=False)
+    milestone = bench.revise(bench.await_milestone(sketch.id, at), status="verified")
+    (effect,) = bench.ask(MilestonePasser(), milestone) or ()
+    assert isinstance(effect, Revise)
+    again, before = effect.value.subgoals, sketch.value.subgoals
+    assert len(again) == len(before) and effect.value.at == at - 1
+    assert [k for k, (a, b) in enumerate(zip(again, before, strict=True)) if a != b] == [at - 1]
+    start, end = again[at - 1].origin, again[at - 1].destination
+    assert (start.x_m, start.y_m) == pytest.approx((3.3, 1.1)) and end == before[at - 1].destination
