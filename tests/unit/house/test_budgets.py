@@ -20,7 +20,7 @@ LINES = {
     "logs": 7_450,
     "harvey": 10_520,
     "experiments": 10_030,
-    "tests": 42_900,
+    "tests": 43_100,
     "extras": 14_910,
 }
 """Of Python files, at most."""
