@@ -23,6 +23,8 @@ JUDGED = "; no constant was chosen on them. Bounds are one-sided, of 95 %, by Cl
 Claim = tuple[str, bool]
 MAX_P_SHUT = 0.9
 """No door that is open is ever believed to be shut above this probability."""
+IN_PLACE_M = 0.1
+"""No mission ends lost this near to where the robot believed to be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +78,7 @@ class End:
         false_accepts: milestones that were verified while the robot was elsewhere.
         robot_s: time of the robot; wall_s: of the processor, and waiting.
         believed_shut: doors that are open, and were believed to be shut above :data:`MAX_P_SHUT`.
+        belief_off_m: true distance of where it believed to be at the end; None where it believed nothing.
     """
 
     row: str
@@ -94,6 +97,7 @@ class End:
     robot_s: float
     wall_s: float
     believed_shut: list[str]
+    belief_off_m: float | None
 
     @classmethod
     def of(cls, trial: Trial, mission: Mission, **more: Any) -> Self:
@@ -102,12 +106,17 @@ class End:
         count = {key: value or 0 for key, value in r.milestones.items()}
         return cls(trial.row, trial.seed, r.outcome, r.reason, r.error_m, r.path_length_m, count["verified"],
                    count["refuted"], count["not_testable"], r.false_accepts, r.collisions or 0, r.relocalizations,
-                   r.replans, r.sim_time_s, r.wall_time_s, shut, **more)
+                   r.replans, r.sim_time_s, r.wall_time_s, shut, r.belief_off_m, **more)
 
     @property
     def is_reached(self) -> bool:
         """Whether it says that it reached its goal."""
         return self.outcome == "reached"
+
+    @property
+    def is_lost_in_place(self) -> bool:
+        """Whether it ended lost, though it was where it believed."""
+        return self.outcome == "lost" and self.belief_off_m is not None and self.belief_off_m <= IN_PLACE_M
 
 
 def first_seed(seed: int, first: int = 1_000_000, apart: int = 10_000) -> int:
@@ -177,6 +186,12 @@ def claim_open_doors(ends: Sequence[End]) -> Claim:
     return claim_none(f"no open door is ever believed shut above {MAX_P_SHUT:g}", ends, lambda e: bool(e.believed_shut))
 
 
+def claim_not_lost_in_place(ends: Sequence[End]) -> Claim:
+    """That no mission ended lost where the robot believed to be."""
+    return claim_none(f"no mission ends lost within {100.0 * IN_PLACE_M:g} cm of its belief", ends,
+                      lambda e: e.is_lost_in_place)
+
+
 def spread(shares: Mapping[str, float], first: int, number: int | None) -> list[Trial]:
     """Each row's share of so many missions, from a seed on; one of each row without a number."""
     return [Trial(row, first + k) for row, share in shares.items()
@@ -214,11 +229,11 @@ class Driven(Generic[E]):
             tuple((row, *none, *(figure(ends) for figure in columns.values())) for row, ends in self.rows.items()),
             notes=(
                 f"{self.seeds}{about}", *notes, HELD_SHUT,
-                *self.name_flawed(lambda e: is_flawed(e) or bool(e.believed_shut),
+                *self.name_flawed(lambda e: is_flawed(e) or bool(e.believed_shut) or e.is_lost_in_place,
                                   lambda e: "; held shut: ".join([tell(e), *e.believed_shut]), worst),
                 f"One line per mission: {self.folder / RESULTS}",
             ),
-            claims=(*claims, claim_open_doors(self.ends)),
+            claims=(*claims, claim_open_doors(self.ends), claim_not_lost_in_place(self.ends)),
         )
         return self.keep(report)
 

@@ -396,6 +396,7 @@ def _claims(driven: Driven[ObstacleEnd]) -> list[Claim]:
          time_ratio <= MAX_TIME_RATIO),
         drives.claim_none("no milestone is accepted at a wrong place", driven.ends),
         drives.claim_open_doors(driven.ends),
+        drives.claim_not_lost_in_place(driven.ends),
     ]
 
 

@@ -239,6 +239,33 @@ def write_twin_mission(folder: Path, seed: int, *, is_told_right: bool, rooms: i
     raise ValueError(f"expected a mission on floor {seed}, got none in {MAX_TWIN_DRAWS} draws")
 
 
+def write_large_mission(folder: Path, seed: int, rooms: int) -> Path:
+    """Write a scenario from one of many like rooms to another, put down in a third; returns its path.
+
+    All rooms are as wide and all doors alike; what stands in the rooms differs.
+
+    Raises:
+        ValueError: nothing that fits was found.
+    """
+    floor, rng = generated_floor(seed, rooms, open_share=1.0, repeated=True), np.random.default_rng([seed, 9])
+    files = floor.write(folder)
+    for _ in range(MAX_TWIN_DRAWS):
+        told, goal, true = (str(room) for room in rng.choice(floor.rooms, 3, replace=False))
+        *ends, there = draw_ends(floor, (told, goal, true), rng)
+        text = format_mission(f"A floor of {rooms} rooms.", files, ends, draw_heading_deg(rng))
+        text += (f'\n[truth.start]\nlocale = "{true}"\nx_m = {there.x_m:.4f}\ny_m = {there.y_m:.4f}\n'
+                 f"heading_deg = {draw_heading_deg(rng):.1f}\n")
+        try:
+            stage = build_stage(parse_scenario(text, "large", folder))
+        except ValueError:
+            continue
+        if is_drivable(stage.building.obstacles, stage.put_down_world, stage.goal_world):
+            path = folder / f"large-{seed}.toml"
+            path.write_text(text, "utf-8")
+            return path
+    raise ValueError(f"expected a mission on floor {seed}, got none in {MAX_TWIN_DRAWS} draws")
+
+
 def _side(room: str) -> str:
     """The side of the corridor on which a room lies: those on the same side are alike without being turned."""
     return room.split("-")[2]

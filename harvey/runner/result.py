@@ -42,6 +42,7 @@ class MissionResult:
         camera: what has turned out to be otherwise about the camera than the robot was told.
         amiss: which of the scenario's faults did not happen, or not as they were asked for, in words.
         probes: pictures that it asked for to find out where it is; None in the results of older versions.
+        belief_off_m: true distance of where it believed to be at the end; None where nobody knows it.
     """
 
     scenario: str
@@ -68,6 +69,7 @@ class MissionResult:
     waits: int = 0
     camera: Sequence[CameraLesson] = ()
     probes: int | None = None
+    belief_off_m: float | None = None
 
     @property
     def cycles(self) -> int:

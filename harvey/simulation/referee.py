@@ -74,6 +74,8 @@ class Referee:
             collisions=score.collisions,
             contacts=tuple(self._contacts),
             max_cross_track_m=self._max_cross_track_m,
+            belief_off_m=None if belief is None else belief.world_from_robot(self._world).distance_to(
+                self._body.truth.world_from_robot),
             amiss=self._body.missed_faults,
         )
 

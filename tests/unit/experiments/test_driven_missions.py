@@ -16,6 +16,7 @@ from experiments.drives import DoorBeliefs, End, Trial
 from experiments.generated.door_missions import DoorMission
 from experiments.generated.missions import OFFICE, TwinMission
 from experiments.robustness import missions, soak
+from experiments.scale import large
 from harvey.errors import BadInput
 from knowledge_sources.methods.belief.odds import to_log_odds
 from sim.ground_truth.table import TrueDoor
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 COMMON: dict[str, Any] = {
     "outcome": "reached", "reason": "there", "error_m": 0.01, "path_m": 11.0, "verified": 9, "refuted": 0,
     "not_testable": 1, "false_accepts": 0, "contacts": 0, "relocations": 0, "replans": 0, "robot_s": 60.0,
-    "wall_s": 4.0, "believed_shut": []}
+    "wall_s": 4.0, "believed_shut": [], "belief_off_m": 0.01}
 OWN: dict[ModuleType, tuple[type[End], dict[str, Any]]] = {
     doors: (doors.DoorEnd, {"door": "d", "is_found": True, "false_states": []}),
     inexact: (inexact.InexactEnd, {"chi2": [1.0] * 19 + [9.0], "wrong": 0}),  # 19 of 20 ellipsoids hold
@@ -37,6 +38,7 @@ OWN: dict[ModuleType, tuple[type[End], dict[str, Any]]] = {
         "verdict": "reached", "shortest_m": 10.0, "contact_speeds": [], "answered": 0, "false_obstacles": [],
         "stops": 1, "needless": 0}),
     twins: (twins.TwinEnd, {"rooms": 8, "doubts": 0, "by_odds": 0}),
+    large: (large.LargeEnd, {"cpu_s": 8.0}),
     missions: (missions.MissionEnd, {}),
     soak: (soak.SoakEnd, {"memory_mb": 400.0, "process": 7}),
 }
@@ -98,6 +100,11 @@ def test_flawless_missions_hold_every_claim(
     *((every, (), {"believed_shut": ["d at 3.0 s"]}, "no open door")
       for every in (doors, inexact, light, miscalibrated, obstacles, twins, soak)),
     (soak, (), {"outcome": "lost"}, "reach"),
+    *((every, (), {"outcome": "lost"} | ({"verdict": "lost"} if every is obstacles else {}), "of its belief")
+      for every in (doors, inexact, light, miscalibrated, obstacles, twins, soak)),
+    (large, (), {"cpu_s": 100.0}, "processor"),
+    (large, (), {"outcome": "lost", "belief_off_m": 9.0}, "reach"),
+    (large, (), {"error_m": 5.0}, "wrong and confident"),
 ])
 def test_a_flaw_fails_its_claim(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, experiment: ModuleType, rows: tuple[str, ...],

@@ -18,8 +18,8 @@ LINES = {
     "knowledge_sources": 21_780,
     "sim": 5_830,
     "logs": 7_450,
-    "harvey": 10_520,
-    "experiments": 10_030,
+    "harvey": 10_524,
+    "experiments": 10_170,
     "tests": 43_100,
     "extras": 14_910,
 }
