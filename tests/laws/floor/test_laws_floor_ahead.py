@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -61,6 +62,8 @@ def test_between_two_looks_that_are_near_it_drove_straight(direction: float, gap
     free = covered([disc.circle for disc in driven])
     assert free.within(line.buffer(1.001 * ROBOT.radius_m, quad_segs=64))
     assert line.buffer(0.97 * ROBOT.radius_m).within(free)
+    steps = [math.dist(one.circle[:2], other.circle[:2]) for one, other in pairwise(driven)]
+    assert sum(steps) == pytest.approx(gap_m) and max(steps) <= 0.3 * ROBOT.radius_m + SMALL
     assert all(disc.because == (a, b) for disc in driven)
 
 
