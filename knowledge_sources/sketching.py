@@ -98,11 +98,17 @@ def has_missed(view: View, belief: Hypothesis, sketch: PlanSketch, *, is_inexact
         return False
     subgoal, building = sketch.subgoals[sketch.at - 1], find_building(view)
     here, there = belief.world_from_robot(building), subgoal.destination.in_world(building)
-    heading = None if sketch.is_look else subgoal.destination.heading_rad
+    heading = None if _is_of_look(view, sketch) else subgoal.destination.heading_rad
     error = 0.0 if heading is None else wrap_angle(here.heading_rad - there.heading_rad)
     wider_m = INEXACT_TOLERANCE_SIGMAS * belief.sigma_m if is_inexact else 0.0
     is_off = here.distance_to(there) > math.hypot(subgoal.tolerance_m, wider_m)
     return is_off or abs(error) > GOAL_HEADING_TOLERANCE_RAD
+
+
+def _is_of_look(view: View, sketch: PlanSketch) -> bool:
+    """Whether a sketch leads to a lookout, itself or as a part of one that does."""
+    first = find_first_level(view)
+    return sketch.is_look or (first is not None and first.value.is_look)
 
 
 def tell_missed(
@@ -114,7 +120,10 @@ def tell_missed(
     building, robot = find_building(view), find_robot(view)
     at = there.in_world(building)
     off_m, rim = belief.world_from_robot(building).distance_to(at), shapely.Point(at.position).buffer(robot.radius_m)
-    what = "the goal" if then is None else f"the elevator {then.passage}" if then.is_ride else "the way"
+    is_goal = then is None and not sketch.path and not sketch.is_look
+    what = "the goal" if is_goal else "the way"
+    if then is not None and then.is_ride:
+        what = f"the elevator {then.passage}"
     taking = view.where(Obstacle, lambda o: o.status != "gone" and build_polygon(o.footprint).intersects(rim))
     occupied = f"; it is occupied by {' and '.join(o.value.words() for o in taking)}" if taking else ""
     tries, last = words.count(sketch.adjustments + 1, "try", "tries"), f"the last ended {words.metres(off_m)} from it"

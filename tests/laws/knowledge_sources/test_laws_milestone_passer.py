@@ -18,7 +18,7 @@ from generated_boards import Bench, all_reasons, plain_robot, reasons, wakes
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.plan.milestone_passer import MilestonePasser
 from knowledge_sources.settings import DEFAULT
-from knowledge_sources.sketching import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS
+from knowledge_sources.sketching import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS, has_missed
 from sim.scenario import load_scenario
 from world_models.entries.location import Hypothesis, Place, diagonal
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
@@ -233,3 +233,15 @@ def test_the_subgoal_that_was_missed_alone_is_drawn_anew_from_where_the_robot_is
     assert [k for k, (a, b) in enumerate(zip(again, before, strict=True)) if a != b] == [at - 1]
     start, end = again[at - 1].origin, again[at - 1].destination
     assert (start.x_m, start.y_m) == pytest.approx((3.3, 1.1)) and end == before[at - 1].destination
+
+
+@pytest.mark.parametrize("is_look", [True, False])
+def test_a_part_of_a_way_to_a_lookout_is_come_to_as_that(is_look: bool) -> None:
+    """A sketch in more detail does not say itself that it leads to a lookout."""
+    bench = Bench(plain_robot())
+    goal, belief = bench.pursue(), bench.believe(Pose2(2.0, 2.0, 0.5))
+    bench.put(PlanSketch(goal.id, (), "", (Subgoal(FROM, TO, primitive=False),), is_look=is_look), goal)
+    there = Place("hall", 2.0, 2.0, 0.0)
+    part = PlanSketch(goal.id, (0,), "hall", (Subgoal(Place("hall", 1.0, 2.0), there, primitive=True,
+                                                      tolerance_m=TOLERANCE_M),), at=1, verified=True)
+    assert has_missed(bench.view, belief.value, part, is_inexact=False) is not is_look
