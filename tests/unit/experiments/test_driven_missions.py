@@ -213,5 +213,7 @@ def test_the_small_version_drives(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     if experiment is obstacles:  # what it claims of ways needs more missions
         assert found.rows[0] == ("missions", None, None, 2, 1, 1, 1)
         assert not [claim for claim in found.failing if "milestone" in claim]
+    elif experiment is inexact:  # a model that is 10 cm wrong still ends lost where it believes to be, which it says
+        assert all("of its belief" in claim for claim in found.failing), found.text()
     else:
         assert found.holds, found.text()
