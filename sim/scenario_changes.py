@@ -212,7 +212,8 @@ def _add_thing(scenario: Scenario, i: int, extra: ExtraThing, world: World) -> T
     corners = footprint(extra.kind) @ turn + place.position
     _check_within(scenario, ("truth", "extra", i), f"the {extra.kind}", corners, world, extra.locale)
     name = f"{extra.locale}/extra-{i}-{extra.kind}"
-    return TrueChange(extra, name, added=build_thing(extra.kind, name, extra.locale, world_from_thing))
+    return TrueChange(extra, name, added=build_thing(
+        extra.kind, name, extra.locale, world_from_thing, extra.colour))
 
 
 def _check_within(

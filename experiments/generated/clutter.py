@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -30,12 +30,15 @@ MIN_THINGS, MAX_THINGS = 1, 6
 WAY_MARGIN_M = 0.08
 """Room to either side of the robot on a way that is left: narrow, as in a doorway [m]."""
 KINDS = tuple(sorted(set(SHAPES) - {"partition", "door-leaf"}))
+"""A mat among them is rolled over, and nothing in the way."""
 WIDE = ("box", "cart", "cartons", "table")
 """Things that a row across a way is made of."""
 KEPT_FREE_M = ROBOT_RADIUS_M + 0.4
 """Distance from start and goal within which nothing is put."""
 MAX_GAP_M = 2.0 * ROBOT_RADIUS_M - 0.06
 """Gaps in a row across a way are narrower."""
+PAINTED_SHARE = 0.7
+"""Of camouflaged things."""
 MAX_DRAWS = 300
 
 
@@ -51,12 +54,18 @@ class Clutter:
     things: tuple[ExtraThing, ...]
     leaves_way: bool
 
+    def painted(self, colour: tuple[float, ...], rng: np.random.Generator) -> Clutter:
+        """The same with most things in one colour."""
+        return replace(self, things=tuple(
+            replace(thing, colour=colour) if rng.random() < PAINTED_SHARE else thing for thing in self.things))
+
     @property
     def text(self) -> str:
         """Its part of a scenario's file."""
         return "".join(
             f'\n[[truth.extra]]\nkind = "{t.kind}"\nlocale = "{t.locale}"\nx_m = {t.x_m:.4f}\ny_m = {t.y_m:.4f}\n'
-            f"heading_rad = {t.heading_rad:.4f}\n" for t in self.things)
+            f"heading_rad = {t.heading_rad:.4f}\n{f'colour = {list(t.colour)}' if t.colour else ''}\n"
+            for t in self.things)
 
 
 class ClutterMaker:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -26,6 +26,16 @@ from experiments.generated.floor_plan import FloorPlan, as_toml
 from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
+
+FLOOR_TEXTURES = {"plain": 1.0, "speckle": 0.3, "carpet": 0.1, "tiles": 1.0, "wood": 0.3}
+"""Textures of drawn floors, with the size of their cells [ft]."""
+DRAWN_FLOOR = "drawn-floor"
+
+
+def draw_colour(rng: np.random.Generator) -> list[float]:
+    """Red, green and blue of a floor, from grey to strongly coloured."""
+    grey, tint = rng.uniform(0.25, 0.7), rng.normal(0.0, 0.06, 3)
+    return [round(float(part), 3) for part in np.clip(grey * (1.0 + 3.0 * (tint - tint.mean())), 0.08, 0.9)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +75,21 @@ class Floor:
                     locale["things"] = [thing for thing in locale["things"] if chance.random() >= missing]
         details = Source.parse(self.details, f"floor-{self.seed}-details")
         return read_world(Source.parse(as_toml(data), f"floor-{self.seed}"), [details])
+
+    @property
+    def floor_colour(self) -> tuple[float, ...]:
+        """Of a floor that was drawn."""
+        return tuple(tomllib.loads(self.text)["finishes"][DRAWN_FLOOR]["colour"])
+
+    def refloored(self, rng: np.random.Generator) -> Floor:
+        """The same with floors of one finish, which is drawn."""
+        data = tomllib.loads(self.text)
+        scale, colour = FLOOR_TEXTURES[texture := str(rng.choice(list(FLOOR_TEXTURES)))], draw_colour(rng)
+        data["finishes"][DRAWN_FLOOR] = {"colour": colour, "texture": texture, "scale": scale}
+        for locale in data["locales"].values():
+            if "floor" in locale:
+                locale["floor"] = DRAWN_FLOOR
+        return replace(self, text=as_toml(data))
 
     def write(self, folder: Path) -> tuple[Path, Path]:
         """Write the files of the model and of the details, for scenarios."""

@@ -275,17 +275,21 @@ def _side(room: str) -> str:
 
 
 def write_cluttered_mission(
-    folder: Path, seed: int, *, leaves_way: bool = True, rooms: int = ROOMS, count: int | None = None
+    folder: Path, seed: int, *, leaves_way: bool = True, rooms: int = ROOMS, count: int | None = None,
+    is_camouflaged: bool = False,
 ) -> Path:
     """Write a scenario from one room of a generated floor to another, with the floor's files; returns its path.
 
-    ``leaves_way`` and ``count`` are those of :meth:`~experiments.generated.clutter.ClutterMaker.draw`; all doors of the
+    Where it ``is_camouflaged`` the floors' finish is drawn, and most things have the floor's colour. ``leaves_way``
+    and ``count`` are those of :meth:`~experiments.generated.clutter.ClutterMaker.draw`; all doors of the
     floor are open.
 
     Raises:
         ValueError: nothing that fits was found.
     """
     floor, rng = generated_floor(seed, rooms, open_share=1.0), np.random.default_rng([seed, 2])
+    if is_camouflaged:
+        floor = floor.refloored(np.random.default_rng([seed, 3]))
     files = floor.write(folder)
     for _ in range(MAX_DRAWS):
         ends = draw_ends(floor, draw_rooms(floor, rng), rng)
@@ -296,6 +300,8 @@ def write_cluttered_mission(
             if stage.building.obstacles.clearance_m(stage.goal_world) < KEPT_FREE_M / 2.0:
                 continue
             clutter = ClutterMaker(stage).draw(seed, leaves_way=leaves_way, count=count)
+            if is_camouflaged:
+                clutter = clutter.painted(floor.floor_colour, np.random.default_rng([seed, 4]))
         except ValueError:
             continue
         path = folder / f"cluttered-{seed}.toml"

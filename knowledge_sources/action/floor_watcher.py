@@ -77,7 +77,8 @@ class FloorWatcher(RobotKnowledgeSource):
         lit = _find_lit(view, frame.value.sim_time_s)
         seen, learnt = see_free_floor(
             robot, locale, pose, case.belief.covariance, frame.value.jpeg,
-            [Seen(view[e.value.frame].value.jpeg, _pose_of(e.value)) for e in earlier],
+            [Seen(view[e.value.frame].value.jpeg, _pose_of(e.value), e.value.sigma_m, e.value.sigma_rad)
+             for e in earlier],
             {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings,
             None if lit is None else lit.value.light)
         reasons = (*earlier, *(known[name] for name in (locale,) if name in known), *(() if lit is None else (lit,)))
@@ -87,7 +88,7 @@ class FloorWatcher(RobotKnowledgeSource):
             yield Post(appearance, because) if old is None else Revise(old, appearance, (*because, old))
         if not kept or _measure_way_m(kept[0].value, pose) >= apart_m:
             yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,
-                                 frame.value.sim_time_s), (frame, belief))
+                                 frame.value.sim_time_s, belief.value.sigma_m, belief.value.sigma_rad), (frame, belief))
 
 
 def _find_lit(view: View, now_s: float) -> Entry[FreeFloor] | None:

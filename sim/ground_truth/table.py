@@ -114,6 +114,7 @@ class ExtraThing(Lasting):
     Attributes:
         kind: its shape, one of :data:`~sim.ground_truth.things.SHAPES`.
         locale: the room where it stands; x_m, y_m, heading_rad: the middle of its footprint, in that room's frame.
+        colour: red, green, blue (0..1) of all of it, in place of its own: [0.5, 0.4, 0.3].
     """
 
     kind: str = ""
@@ -121,10 +122,13 @@ class ExtraThing(Lasting):
     x_m: float = bounded(0.0, -FAR_M, FAR_M)
     y_m: float = bounded(0.0, -FAR_M, FAR_M)
     heading_rad: float = bounded(0.0, -TURN, TURN)
+    colour: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         Lasting.__post_init__(self)
         _check_choice("kind", self.kind, tuple(SHAPES))
+        if self.colour and not (len(self.colour) == 3 and all(0.0 <= part <= 1.0 for part in self.colour)):
+            raise ValueError(f"expected colour = [red, green, blue], each from 0 to 1, got {list(self.colour)}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

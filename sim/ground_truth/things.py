@@ -98,17 +98,29 @@ SHAPES: Mapping[str, tuple[Piece, ...]] = {
     "wet-floor-sign": _leaning(SIGN, math.radians(15.0), 0.17),
     "bag": _upright(_box((-0.22, 0.22), (-0.12, 0.12), (0.0, 0.26), CLOTH),
                     _box((-0.07, 0.07), (-0.02, 0.02), (0.26, 0.32), DARK)),
+    "plank": _upright(_box((-0.40, 0.40), (-0.10, 0.10), (0.0, 0.10), OAK)),
+    "mat": _upright(_box((-0.50, 0.50), (-0.35, 0.35), (0.0, 0.008), DARK)),
     "door-leaf": _upright(_box((-0.45, 0.45), (-0.0225, 0.0225), (0.01, 2.05), OAK),
                           _box((0.34, 0.42), (-0.06, 0.06), (0.98, 1.06), STEEL)),
     "partition": _upright(_box((-1.0, 1.0), (-0.05, 0.05), (0.0, 2.4), PLASTER)),
 }
 
 
-def build_thing(kind: str, name: str, locale: str, world_from_thing: Pose) -> tuple[Face, ...]:
-    """The faces of a thing that stands somewhere; its frame's origin is on the floor."""
+def build_thing(
+    kind: str, name: str, locale: str, world_from_thing: Pose, colour: tuple[float, ...] = ()
+) -> tuple[Face, ...]:
+    """The faces of a thing that stands somewhere; its frame's origin is on the floor.
+
+    Args:
+        colour: red, green, blue (0..1) of all of it, in place of its own.
+    """
+    def paint(box: Box) -> Box:
+        return replace(box, finish=replace(box.finish, colour=(colour[0], colour[1], colour[2]))) if colour else box
+
     return tuple(
         face for i, piece in enumerate(SHAPES[kind])
-        for face in Solid(f"{name}/{i}", piece.boxes, world_from_thing @ piece.shape_from_piece).faces(locale))
+        for face in Solid(f"{name}/{i}", tuple(map(paint, piece.boxes)),
+                          world_from_thing @ piece.shape_from_piece).faces(locale))
 
 
 def footprint(kind: str) -> NDArray[np.float64]:

@@ -33,6 +33,7 @@ class FloorThing:
         box_px: (left, top, right, bottom) of it in the rectified picture; of ranges (0, 0, 0, 0).
         evidence: what tells that it is there, in words.
         is_cut: whether the picture's lower border cuts its feet off: it may reach from there to the robot's rim.
+        is_alike: whether it looks like the floor: only an earlier picture tells that it stands there.
     """
 
     footprint: tuple[Point, ...]
@@ -43,6 +44,7 @@ class FloorThing:
     box_px: tuple[float, float, float, float]
     evidence: str
     is_cut: bool = False
+    is_alike: bool = False
 
 
 @inference(keep=LAST_FLOORS)
@@ -62,6 +64,7 @@ class FreeFloor:
         things: what ends it and is not in the model.
         seen_s: when, by the body's clock.
         light: of the picture; None where the floor's looks are not known in it.
+        told_m: (n,) up to here an earlier picture would tell what stands there and looks like the floor; empty without.
     """
 
     sense: FloorSense
@@ -76,6 +79,7 @@ class FreeFloor:
     things: tuple[FloorThing, ...]
     seen_s: float
     light: Light | None = None
+    told_m: tuple[float, ...] = ()
 
     def sentence(self) -> str:
         far = [far for near, far in zip(self.near_m, self.far_m, strict=True) if far > near]
@@ -121,7 +125,7 @@ class FloorView:
 
     Attributes:
         frame: id of the frame entry; belief: that of the hypothesis by which the place is known.
-        x_m, y_m, heading_rad: where the robot was [world].
+        x_m, y_m, heading_rad: where the robot was [world]; sigma_m, sigma_rad: standard deviations of that.
         floor_m: height of the floor there [m, world].
         seen_s: when, by the body's clock.
     """
@@ -133,6 +137,8 @@ class FloorView:
     heading_rad: float
     floor_m: float
     seen_s: float
+    sigma_m: float
+    sigma_rad: float
 
     def sentence(self) -> str:
         return f"{self.frame} is kept: the floor was seen from {words.point(self.x_m, self.y_m)} of the world"

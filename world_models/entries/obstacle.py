@@ -128,6 +128,7 @@ class Obstacle:
         by: what told of it first.
         evidence: what tells of it, in words: which pixels of which picture.
         status: suspected (not certain enough to act on), there, or gone.
+        is_alike: whether it looks like the floor: that it is not seen tells little.
     """
 
     name: str
@@ -147,6 +148,7 @@ class Obstacle:
     evidence: str = ""
     status: ObstacleStatus = "there"
     core: Corners = ()
+    is_alike: bool = False
 
     @property
     def is_there(self) -> bool:

@@ -43,12 +43,6 @@ def tell_status(certainty: float, settings: ActionSettings) -> ObstacleStatus:
     return "there" if certainty >= settings.min_obstacle_certainty else "suspected"
 
 
-def combine_odds(certainty: float, odds: float) -> float:
-    """The probability after further evidence."""
-    product = certainty / max(1e-9, 1.0 - certainty) * odds
-    return product / (1.0 + product)
-
-
 def find_same(
     known: Mapping[str, Obstacle], shape: shapely.Polygon, sigma_m: float, most_hull: float
 ) -> str | None:

@@ -29,16 +29,14 @@ from knowledge_sources.methods.floor.model_floor import (
     build_floor_grid,
     predict_model_floor,
 )
+from knowledge_sources.methods.floor.relief import Relief, TwoPictures, find_relief
 from knowledge_sources.methods.floor.seen_floor import MAX_HIDDEN_M
 from knowledge_sources.methods.floor.standing_regions import (
-    FOOT_PART_STEP,
     StandingRegion,
-    TwoPictures,
     compute_parallax_odds,
     find_footprint,
     find_regions,
     is_on_the_lens,
-    measure_foot_part,
     measure_height,
 )
 from knowledge_sources.settings import DEFAULT, FloorSettings, Settings
@@ -57,6 +55,10 @@ MIN_TINTED_SHARE = 0.6  # share of what should be floor that must look alike, to
 MAX_TINT = 0.12  # largest difference from the floor's colour, in its parts of red and blue, in a tinted picture
 MODEL_MARGIN_PX = 3.0  # pixels so near to an edge of the model tell nothing; the belief's uncertainty comes on top
 P_SEEN_ONCE = 0.7  # probability that what does not look like the floor stands on it, before parallax tells
+P_LIKE_FLOOR = 0.05  # the same of what looks like the floor, and seems to stand up from it
+MIN_UNLIKE_SHARE = 0.2  # of a region of which less than that does not look like the floor, all is said to look like it
+TOLD_HEIGHT_M = 0.3  # what looks like the floor is said to be told where something so high would be
+PART_SIGMA = 0.05  # of the part of the floor's distance at which the earlier picture shows a thing
 
 DRIVEN_HALF_WIDTH_M = 0.25
 """Half the width of the strip that was driven over, from which the floor's looks are learnt."""
@@ -68,10 +70,12 @@ SIGHT_PART = 2.0
 
 
 class Seen(NamedTuple):
-    """A picture and the robot's pose [world] when it was taken."""
+    """A picture and the robot's pose [world] when it was taken, with its standard deviations."""
 
     jpeg: bytes
     pose: Pose2
+    sigma_m: float
+    sigma_rad: float
 
 
 def see_free_floor(
@@ -117,16 +121,35 @@ def see_free_floor(
     if robot.camera.obstruction is not None:  # its looks are those of no floor
         model = model.behind(robot.camera.obstruction.covers(grid.pixels, MODEL_MARGIN_PX))
     unlike, tells, light = find_unlike(picture[grid.top:], model, known, last_light)
-    regions = find_regions(unlike, tells, grid) if s.use_appearance else ()
-    built = [(region, _build_thing(region, grid, robot, pose, covariance, picture, earlier, s)) for region in regions]
-    things = [(region, *thing) for region, thing in built if thing is not None]
+    unlike &= s.use_appearance
+    relief = _find_relief(robot, grid, model, picture, pose, covariance, earlier) if s.use_parallax else None
+    built = [(region, _build_thing(region, grid, robot, pose, covariance, relief, unlike, s))
+             for region in find_regions(unlike, tells, grid, relief)]
+    things = [(region, thing) for region, thing in built if thing is not None]
     scan = _scan(grid, model, tells, things, robot.camera.fy, s)
     learnt = _learn(robot, locale, pose, earlier, known, floor_m)
     return FreeFloor(
         sense="camera", locale=locale, x_m=round(eye.x_m, 4), y_m=round(eye.y_m, 4),
         bearings_rad=tuple(round(math.remainder(pose.heading_rad + b, math.tau), 5) for b in scan.bearings_rad),
         near_m=scan.near_m, far_m=scan.far_m, ends=scan.ends, sigma_m=scan.sigma_m,
-        things=tuple(thing for _, thing, _ in things), seen_s=seen_s, light=light), learnt
+        things=tuple(thing for _, thing in things), seen_s=seen_s, light=light,
+        told_m=_measure_told_m(grid, relief)), learnt
+
+
+def _find_relief(
+    robot: RobotModel, grid: FloorGrid, model: ModelFloor, picture: NDArray[np.uint8], pose: Pose2,
+    covariance: Floats, earlier: Sequence[Seen],
+) -> Relief | None:
+    """By the newest earlier picture."""
+    if not earlier:
+        return None
+    then = earlier[0]
+    before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)
+    now, earlier_grey = (np.asarray(image.astype(np.float32) @ GREY, np.float32) for image in (picture, before))
+    sigma_m, sigma_rad = math.sqrt(float(np.trace(covariance[:2, :2])) / 2.0), math.sqrt(float(covariance[2, 2]))
+    sigmas = math.hypot(then.sigma_m, sigma_m), math.hypot(then.sigma_rad, sigma_rad)
+    both = TwoPictures(grid, now, earlier_grey, then.pose.inverse() @ pose, robot.camera, robot.mount)
+    return find_relief(both, model.is_plain, *sigmas)
 
 
 def find_unlike(
@@ -209,44 +232,56 @@ class _Scan(NamedTuple):
 
 
 def _scan(
-    grid: FloorGrid, model: ModelFloor, tells: NDArray[np.bool_],
-    things: Sequence[tuple[StandingRegion, FloorThing, float]],
+    grid: FloorGrid, model: ModelFloor, tells: NDArray[np.bool_], things: Sequence[tuple[StandingRegion, FloorThing]],
     fy: float, settings: FloorSettings,
 ) -> _Scan:
     """From the lower border up: as far as the model has floor, its looks are known, and no thing is in the way."""
     rows, columns = grid.shape
-    blocked = np.zeros(grid.shape, bool)
-    parts = np.ones(columns)  # how far what ends the floor is, of the distance at which it seems to stand
-    for region, thing, part in things:
+    thing_m = np.full(columns, np.inf)  # how far what ends the floor is, in each column
+    for region, thing in things:
         if thing.p_thing >= 0.5:
-            blocked |= region.mask
-            parts[region.mask.any(axis=0)] = np.minimum(parts[region.mask.any(axis=0)], part)
+            lowest = rows - 1 - np.argmax(region.mask[::-1], axis=0)
+            own_m = np.where(region.mask.any(axis=0), grid.ranges_m[lowest, np.arange(columns)], np.inf)
+            at = region.feet[:, 1]
+            own_m[at] = np.minimum(own_m[at], grid.ranges_m[region.feet[:, 0], at] * region.parts)
+            thing_m = np.minimum(thing_m, own_m)
     is_floor = model.kinds >= 0
     up = np.arange(rows)[::-1]
-    first_thing, first_model = _first(blocked[up]), _first(~is_floor[up])
+    first_model = _first(~is_floor[up])
     groups = np.array_split(np.arange(columns)[::-1], BEARINGS)  # bearings grow to the left
     near, far, ends, sigmas, bearings = [], [], [], [], []
     for group in groups:
         bearings.append(float(grid.bearings_rad[group].mean()))
         lowest_m = float(grid.ranges_m[-1, group].max())
         near_m = lowest_m * max(0.0, 1.0 - MAX_HIDDEN_M / grid.camera_height_m)
-        at_thing, at_model = int(first_thing[group].min()), int(first_model[group].min())
-        stop = min(at_thing, at_model)
+        stop = int(first_model[group].min())
         told = np.flatnonzero(tells[up][:max(stop, 1), group].any(axis=1))
         range_m = SIGHT_M if stop >= rows else float(grid.ranges_m[rows - 1 - stop, group].min())
         if len(told):  # next to the model's own parts the looks tell nothing, and something may stand there
             range_m = min(range_m, float(grid.ranges_m[rows - 1 - told[-1], group].min()) + settings.max_untold_m)
-        if at_thing <= at_model and stop < rows:
-            range_m *= float(parts[group].min())
-        end: FloorEnd = "sight" if range_m >= SIGHT_M else "thing" if at_thing <= at_model else "model"
+        at_thing_m = float(thing_m[group].min())
+        end: FloorEnd = "thing" if at_thing_m <= min(range_m, SIGHT_M) else "sight" if range_m >= SIGHT_M else "model"
+        range_m = min(range_m, at_thing_m)
         if stop == 0 or not len(told):  # nothing of the floor is seen, or its looks are not known
             range_m = 0.0
             end = end if stop == 0 else "sight"
+        elif at_thing_m <= float(grid.ranges_m[-1, group].min()):
+            range_m = 0.0
         near.append(round(near_m, 3))
         far.append(round(min(range_m, SIGHT_M), 3))
         ends.append(end)
         sigmas.append(round(0.01 + STEP_PX * range_m**2 / (grid.camera_height_m * fy), 3))
     return _Scan(tuple(bearings), tuple(near), tuple(far), tuple(ends), tuple(sigmas))
+
+
+def _measure_told_m(grid: FloorGrid, relief: Relief | None) -> tuple[float, ...]:
+    """Up to where the earlier picture tells, in each direction, of something of that height."""
+    if relief is None:
+        return ()
+    part = max(0.0, 1.0 - TOLD_HEIGHT_M / grid.camera_height_m)
+    tells_m = np.where(relief.tells_of(np.full(grid.shape, part)), part * grid.ranges_m, 0.0).max(axis=0)
+    groups = np.array_split(np.arange(grid.shape[1])[::-1], BEARINGS)
+    return tuple(round(min(SIGHT_M, float(tells_m[group].min())), 3) for group in groups)
 
 
 def _first(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
@@ -255,50 +290,44 @@ def _first(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def _build_thing(
-    region: StandingRegion, grid: FloorGrid, robot: RobotModel, pose: Pose2, covariance: Floats,
-    picture: NDArray[np.uint8], earlier: Sequence[Seen], settings: FloorSettings,
-) -> tuple[FloorThing, float] | None:
-    """What stands where a region is, and the part of its seeming distance; None where it is lower than what is rolled
-    over, or is no thing but on the lens.
-    """
-    part = 1.0
+    region: StandingRegion, grid: FloorGrid, robot: RobotModel, pose: Pose2, covariance: Floats, relief: Relief | None,
+    unlike: NDArray[np.bool_], settings: FloorSettings,
+) -> FloorThing | None:
+    """What stands where a region is; None where it is lower than what is rolled over, or no thing but on the lens."""
     height_m, sigma_height_m = measure_height(region, grid)
     if height_m < MAX_ROLLED_OVER_M and math.isfinite(sigma_height_m):
         return None
-    odds = P_SEEN_ONCE / (1.0 - P_SEEN_ONCE)
-    how = "it does not look like the floor"
-    if settings.use_parallax and earlier:
-        then = earlier[0]
-        earlier_from_now = then.pose.inverse() @ pose
-        before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera).astype(np.float32) @ GREY
-        grey = picture.astype(np.float32) @ GREY
-        both = TwoPictures(grid, grey, before, earlier_from_now, robot.camera, robot.mount)
-        if is_on_the_lens(region, both):
+    looks_like_floor = bool(
+        np.count_nonzero(unlike & region.mask) < MIN_UNLIKE_SHARE * np.count_nonzero(region.mask))
+    p_before = P_LIKE_FLOOR if looks_like_floor else P_SEEN_ONCE
+    odds = p_before / (1.0 - p_before)
+    how = "it looks like the floor" if looks_like_floor else "it does not look like the floor"
+    if relief is not None:
+        if is_on_the_lens(region, relief):
             return None
-        told = compute_parallax_odds(region, both)
+        told = compute_parallax_odds(region, relief, grid)
         odds *= told
-        if not region.is_cut and told >= 1.0:
-            part = measure_foot_part(region, both)
-        if part < 1.0:
-            height_m, sigma_height_m = measure_height(region, grid, part)
-        how += "" if told == 1.0 else " and stands up from it" if told > 1.0 else ", but lies flat on it"
+        if told != 1.0:
+            stands = "stands up from it" if told > 1.0 else "lies flat on it"
+            how += f"{' and' if (told > 1.0) != looks_like_floor else ', but'} {stands}"
     elif not settings.use_parallax:
         odds = 1e6
-    corners = find_footprint(region, grid, part)
+    corners = find_footprint(region, grid)
     world = pose.apply(corners)
     foot_m = float(np.linalg.norm(corners, axis=1).min())
     spread = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0) + foot_m**2 * float(covariance[2, 2]))
     at, left_right = np.flatnonzero(region.mask.any(axis=1)), np.flatnonzero(region.mask.any(axis=0))
     (left, top), (right, bottom) = grid.pixels[at[0], left_right[0]], grid.pixels[at[-1], left_right[-1]]
     own = CUT_SIGMA_M if region.is_cut else STEP_PX * foot_m**2 / (grid.camera_height_m * robot.camera.fy)
+    part = float(region.parts.min())
     if part < 1.0:
-        own = math.hypot(own, FOOT_PART_STEP * foot_m / part)
-        how += f", and hangs {grid.camera_height_m * (1.0 - part):.2f} m over it"
+        own = math.hypot(own, PART_SIGMA * foot_m / part)
     return FloorThing(
         footprint=tuple((round(float(x), 3), round(float(y), 3)) for x, y in world),
         sigma_m=round(math.hypot(spread, own), 4),
         height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3), p_thing=round(odds / (1.0 + odds), 4),
-        box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut), part
+        box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut,
+        is_alike=looks_like_floor)
 
 
 def _learn(

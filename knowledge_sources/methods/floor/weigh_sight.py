@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from knowledge_sources.methods.belief.odds import to_log_odds, update
 from knowledge_sources.methods.floor.found_things import (
-    combine_odds,
     find_before,
     find_open_floor,
     find_room,
@@ -41,6 +41,7 @@ from world_models.entries.obstacle import Obstacle, ObstacleStatus
 
 MIN_FREE_PART = 0.5  # part of an obstacle's footprint that must be seen free to tell that it is not there any more
 MAX_SHARED_PART = 0.25  # where a thing that is seen takes more of the footprint, the rest seen free tells nothing of it
+ALIKE_FREE_ODDS = 0.3  # the same of one that looks like the floor, where an earlier picture would tell that it stands
 FREE_FLOOR_ODDS = 0.03  # odds of an obstacle that is there while all of its footprint is seen free
 MIN_EVIDENCE_INTERVAL_S = 0.3  # pictures that follow each other faster are no further evidence of an obstacle
 MAX_OBSTACLE_SIGMA_M = 0.25
@@ -104,6 +105,10 @@ def weigh_sight(
     """
     f, s = sight.floor, settings.action
     free = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
+    told = shapely.Polygon()  # where what looks like the floor would be seen to stand
+    if f.told_m:
+        told = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m,
+                                np.minimum(f.told_m, np.subtract(f.far_m, f.sigma_m)).tolist())
     drafts: dict[str, Sighted] = {}
     fresh = 0
     for thing in f.things:
@@ -135,7 +140,7 @@ def weigh_sight(
         if id in drafts or not may_be_there(obstacle):
             continue
         if measure_free_part(obstacle.footprint, seen) <= MAX_SHARED_PART:
-            gone = miss(sight.world, obstacle, free, f.seen_s, s)
+            gone = miss(sight.world, obstacle, told if obstacle.is_alike else free, f.seen_s, s)
             if gone is not None:
                 yield Sighted(id, gone)
 
@@ -173,7 +178,7 @@ def see_first(
     found = Obstacle(
         f"{locale}/obstacle-{number}", locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m,
         thing.sigma_height_m, min(thing.p_thing, settings.max_obstacle_certainty), f.seen_s, f.seen_s, None, f.sense,
-        _tell(thing, sight), tell_status(thing.p_thing, settings))
+        _tell(thing, sight), tell_status(thing.p_thing, settings), is_alike=thing.is_alike)
     return place(world, found, own)
 
 
@@ -190,7 +195,7 @@ def see_again(
     if known.status == "gone":
         certainty = thing.p_thing
     elif way_m >= FLOOR_VIEW_DISTANCE_M / 2.0:
-        certainty = combine_odds(known.certainty, thing.p_thing / (1.0 - min(thing.p_thing, 0.999)))
+        certainty = update(known.certainty, to_log_odds(min(thing.p_thing, s.max_obstacle_certainty)))
     certainty = min(certainty, s.max_obstacle_certainty)
     own = shapely.intersection(shape, find_open_floor(world, known.locale, 0.0))
     polygon = build_polygon(known.footprint)
@@ -208,7 +213,8 @@ def see_again(
     height, sigma = (thing.height_m, thing.sigma_height_m) if higher else (known.height_m, known.sigma_height_m)
     status: ObstacleStatus = "there" if known.is_there else tell_status(certainty, s)
     new = replace(known, certainty=certainty, seen_s=f.seen_s, looked_s=f.seen_s, status=status, height_m=height,
-                  sigma_height_m=sigma, sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight))
+                  sigma_height_m=sigma, sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight),
+                  is_alike=known.is_alike and thing.is_alike)
     return place(world, replace(new, footprint=footprint), joined) if moved and footprint else new
 
 
@@ -220,7 +226,8 @@ def miss(
         return None
     free_part = measure_free_part(known.footprint, free)
     if free_part >= MIN_FREE_PART:
-        certainty = combine_odds(known.certainty, FREE_FLOOR_ODDS**free_part)
+        odds = ALIKE_FREE_ODDS if known.is_alike else FREE_FLOOR_ODDS
+        certainty = update(known.certainty, free_part * math.log(odds))
         status: ObstacleStatus = "gone" if certainty < settings.min_gone_certainty else known.status
         return replace(known, certainty=certainty, looked_s=seen_s, status=status)
     left = take_free(build_polygon(known.footprint), free)

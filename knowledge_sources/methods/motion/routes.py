@@ -23,6 +23,9 @@ Footprint = tuple[tuple[float, float], ...]
 SLACK_M = 1e-6
 """Distance below which two places are the same: rounding of shapely's geometry."""
 
+TOUCHED_M = 0.002
+"""What comes nearer by less than this is no nearer."""
+
 CORNER_STEPS = 4
 """Corners of a quarter circle round what is no rectangle: the way round it is at most 4.4 % too near (where the
 corner's angle is no multiple of a step, a step may be half as long again: 1 - cos(16.9 degrees))."""
@@ -87,18 +90,19 @@ def is_clear(free: shapely.Geometry, a: Any, b: Any) -> bool:
 
 
 def find_shortest_route(
-    free: shapely.Geometry, start: Any, goal: Any, floor: Callable[[], shapely.Geometry]
+    free: shapely.Geometry, start: Any, goal: Any, floor: Callable[[], shapely.Geometry], radius_m: float = 0.0
 ) -> list[Floats] | None:
     """Find the shortest route through the free space, by Dijkstra's search of its visibility graph.
 
     An end in the margin round the free space is first joined to the nearest free point to which a straight line leads
-    over the open ``floor`` (the free space of a robot without a width), which is computed only then.
+    over the open ``floor`` (the free space of a robot without a width), which is computed only then; rather to one on
+    the way to which the robot, with its ``radius_m``, comes no nearer to what bounds that floor than it is.
 
     Returns:
         Way points [(2,), ...] with both ends; None where there is no route.
     """
     ends = [np.asarray(start, float), np.asarray(goal, float)]
-    inner = [_find_nearest_free(free, p, floor) for p in ends]
+    inner = [_find_nearest_free(free, p, floor, radius_m) for p in ends]
     if any(p is None for p in inner):
         return None
     nodes = np.array([*(p for p in inner if p is not None), *find_bends(free)])
@@ -148,8 +152,12 @@ def find_nearest(
     return min(near)
 
 
-def _find_nearest_free(free: shapely.Geometry, point: Floats, floor: Callable[[], shapely.Geometry]) -> Floats | None:
-    """Of the nearest point of each free part, and all corners: the nearest that is not behind a barrier."""
+def _find_nearest_free(
+    free: shapely.Geometry, point: Floats, floor: Callable[[], shapely.Geometry], radius_m: float
+) -> Floats | None:
+    """Of the nearest point of each free part, and all corners: the nearest that is not behind a barrier, and on the way
+    to which nothing is touched that is not touched already, if there is one.
+    """
     parts = [part for part in shapely.get_parts(free) if not part.is_empty]
     nearest = [shapely.get_coordinates(shapely.shortest_line(shapely.Point(point), part))[-1] for part in parts]
     if any(float(np.linalg.norm(p - point)) <= SLACK_M for p in nearest):
@@ -157,7 +165,10 @@ def _find_nearest_free(free: shapely.Geometry, point: Floats, floor: Callable[[]
     corners = _drop_duplicates(shapely.get_coordinates(free))
     candidates = sorted((*nearest, *corners), key=lambda p: float(np.linalg.norm(p - point)))
     open_floor = floor()
-    return next((np.asarray(p) for p in candidates if is_clear(open_floor, point, p)), None)
+    clear = [np.asarray(p) for p in candidates if is_clear(open_floor, point, p)]
+    width_m = min(radius_m, open_floor.boundary.distance(shapely.Point(point))) - TOUCHED_M
+    return next((p for p in clear if open_floor.boundary.distance(shapely.LineString([point, p])) >= width_m),
+                clear[0] if clear else None)
 
 
 def find_bends(free: shapely.Geometry) -> Floats:

@@ -16,6 +16,7 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.seen_floor import find_floor
 from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.methods.motion.routes import (
+    JOINT_M,
     compute_free_passage,
     compute_free_space,
     find_free_space,
@@ -293,12 +294,17 @@ class SubgoalPlanner:
     def _find_way(self, locale: str, start: Floats, end: Floats) -> list[Floats] | None:
         """The shortest way across a locale, with the largest margin that leaves one; None where none does."""
         def floor() -> Geometry:
+            doorways = self._building.doorways_of(locale)  # it may stand in one
             openings = [shapely.convex_hull(shapely.multipoints(doorway.thresholds_world.reshape(-1, 2)))
-                        for doorway in self._building.doorways_of(locale)]  # it may stand in one
-            return shapely.union_all([self._free_space(locale, -self._robot.radius_m), *openings])
+                        for doorway in doorways]
+            beyond = [shapely.Polygon(self._building.outline(room)) for room in sorted(
+                {room for doorway in doorways for room in doorway.between} - {locale})]
+            parts = [self._free_space(locale, -self._robot.radius_m), *openings, *beyond]
+            return shapely.buffer(shapely.union_all(shapely.buffer(parts, JOINT_M, join_style="mitre")), -JOINT_M,
+                                  join_style="mitre")
 
         for free in self._list_free_spaces(locale):
-            route = find_shortest_route(free, start, end, floor)
+            route = find_shortest_route(free, start, end, floor, self._robot.radius_m)
             if route is not None:
                 return route
         return None

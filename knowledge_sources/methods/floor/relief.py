@@ -1,0 +1,256 @@
+"""Relief: what of a picture stands up from the floor, what lies on it and what is on the lens, by an earlier picture.
+
+The earlier picture is brought into this one as if all that it shows lay on the floor, on planes above and below it, or
+on the lens (plane sweep, Collins, CVPR 1996). What a pixel shows is where the two are most alike. Where there is
+nothing to tell by, nothing is told: in plain surfaces, along lines that lead to where the robot comes from, far away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor.model_floor import STEP_PX, FloorGrid
+from world_models.camera import NEAR_PLANE_M, Camera, CameraMount
+from world_models.frames import Pose2
+
+Grey = NDArray[np.float32]
+UNTOLD, FLAT, STANDING, FIXED = range(4)
+
+HALF = 3
+"""Patches are squares of 2 HALF + 1 pixels of the reduced picture."""
+MIN_DEVIATION = 3.0
+"""A patch with less contrast than this [grey levels] tells nothing."""
+MIN_ALIKE = 0.6
+"""Least correlation of two patches by which anything is told."""
+MIN_LEAD = 0.15
+"""Least lead over the correlations of all that it may be otherwise."""
+MIN_APART_PX = 2.0
+"""What stands is told from what lies flat where it was at least so far from there, in the reduced earlier picture."""
+PARTS = (0.93, 0.86, 0.79, 0.72, 0.65, 0.57, 0.49, 0.41)
+"""What stands is nearer than the floor that it hides: its distances that are tried, as parts of that of the floor."""
+DEPTHS = (1.25, 1.6, 2.1, 3.0)
+"""And those of what a shiny floor mirrors: that of a thing of height h, with the camera at height c above the floor, is
+1 + h / c times as far."""
+LEAST_SIGMAS = (0.002, 0.002, 0.001)
+"""Least standard deviations of the motion between two pictures [m, m, rad], before the floor is asked."""
+ALIGN_STEPS = (0.01, 0.01, 0.004)
+"""By so much it is changed to see what that changes in the picture."""
+ALIGN_ROUNDS = 4
+CONTRAST_SIGMA = 0.5
+"""Of the contrast of floor that agrees."""
+PATCH = 10.0
+"""So many neighbouring pixels tell as much as one that tells on its own."""
+MIN_AGREEING = 0.6
+"""Least part of the floor with texture that must agree; else the motion is not known, and nothing is told."""
+TYPICAL_M, MAX_UNSURE_PX = 2.0, 1.5
+"""Floor at that distance must not be more unsure in the earlier picture, reduced, by the motion that is left open."""
+NEAR_SHIFTS = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
+MIN_ALONG = 0.25
+"""Least share of a patch's texture along the way on which what stands has moved: along a line nothing is told."""
+OUTSIDE = -1e4
+"""Grey level of what is not in the earlier picture: one such pixel makes a patch's mean negative."""
+
+
+class TwoPictures(NamedTuple):
+    """A picture and an earlier one: (h, w) grey, reduced by STEP_PX; and the robot's pose now in its frame then."""
+
+    grid: FloorGrid
+    picture: Grey
+    earlier: Grey
+    earlier_from_now: Pose2
+    camera: Camera
+    mount: CameraMount
+
+    def find_map(self, depth: float) -> Floats | None:
+        """(3, 3) from pixels of the grid to the earlier picture, of what is ``depth`` times as far away as the floor.
+
+        None where the earlier picture looked the other way. All of one depth is in a plane level with the floor.
+        """
+        rows, columns = self.grid.shape
+        r, c = np.array([0, 0, rows - 1, rows - 1]), np.array([0, columns - 1, columns - 1, 0])
+        eye, floor = self.grid.eye_robot, self.grid.points_robot[r, c]
+        height_m = self.mount.height_m - self.grid.camera_height_m * depth
+        flat = self.earlier_from_now.apply(eye + (floor - eye) * depth)
+        there = self.mount.camera_from_robot.apply(np.column_stack([flat, np.full(4, height_m)]))
+        if there[:, 2].min() <= NEAR_PLANE_M:
+            return None
+        pixels = (self.camera.project(there) + 0.5) / STEP_PX - 0.5
+        corners = np.stack([c, r], axis=1).astype(np.float32)
+        return np.asarray(cv2.getPerspectiveTransform(corners, pixels.astype(np.float32)))
+
+
+@dataclass(frozen=True, eq=False)
+class Relief:
+    """What an earlier picture tells of the pixels of a grid.
+
+    Attributes:
+        kinds: (rows, columns) UNTOLD, FLAT (on the floor, or mirrored in it), STANDING, or FIXED (on the lens).
+        parts: (rows, columns) how far what stands is, as a part of the distance of the floor that it hides; else 1.
+        gains_px: (rows, columns) what is at a part p of that distance was ``gain * (1 / p - 1)`` from where the floor
+            was in the earlier picture, reduced; 0 where that is not in it.
+    """
+
+    kinds: NDArray[np.uint8]
+    parts: NDArray[np.float32]
+    gains_px: NDArray[np.float32]
+
+    def tells_of(self, parts: Floats) -> NDArray[np.bool_]:
+        """Where what is at such parts (rows, columns) of the distance is told from the floor, if there is texture."""
+        return np.asarray(self.gains_px * (1.0 / np.maximum(parts, 1e-3) - 1.0) >= MIN_APART_PX)
+
+
+def find_relief(
+    both: TwoPictures, is_floor: NDArray[np.bool_], sigma_m: float = 0.0, sigma_rad: float = 0.0
+) -> Relief | None:
+    """The relief of a picture; None where the earlier one looked the other way, or the motion between is not known.
+
+    Args:
+        is_floor: (rows, columns) where the model has floor.
+        sigma_m, sigma_rad: standard deviations of the motion between the two.
+    """
+    aligned = _align(both, is_floor, np.array([sigma_m, sigma_m, sigma_rad]))
+    if aligned is None:
+        return None
+    both, floor, nearer = aligned, aligned.find_map(1.0), aligned.find_map(PARTS[1])
+    if floor is None or nearer is None:
+        return None
+    sweep = _Sweep(both.picture[both.grid.top:], both.earlier)
+    flat = sweep.place(floor)
+    away = sweep.place(nearer) - flat
+    apart = np.abs(away).max(axis=-1)
+    gains = np.where(sweep.is_in(flat), apart / (1.0 / PARTS[1] - 1.0), 0.0).astype(np.float32)
+    lying = np.max([sweep.compare(_shifted(floor, near)) for near in np.array(NEAR_SHIFTS)], axis=0)
+    asked = sweep.tells & is_floor & (lying > -1.0)
+    if np.count_nonzero(lying[asked] >= MIN_ALIKE) < MIN_AGREEING * np.count_nonzero(asked):
+        return None
+    standing, parts = np.full(sweep.shape, -1.0, np.float32), np.ones(sweep.shape, np.float32)
+    for depth in (*PARTS, *DEPTHS):
+        plane = both.find_map(depth)
+        if plane is None:
+            continue
+        alike = sweep.compare(plane)
+        alike[gains * abs(1.0 / depth - 1.0) < MIN_APART_PX] = -1.0
+        if depth > 1.0:
+            lying = np.maximum(lying, alike)
+        else:
+            is_best = alike > standing
+            standing[is_best], parts[is_best] = alike[is_best], depth
+    still = _shifted(np.eye(3), np.array([0.0, both.grid.top]))
+    fixed = sweep.compare(still)
+    fixed[np.abs(sweep.place(still) - flat).max(axis=-1) < MIN_APART_PX] = -1.0
+    kinds = np.zeros(sweep.shape, np.uint8)
+    for kind, own, other in ((FLAT, lying, np.maximum(standing, fixed)), (STANDING, standing, np.maximum(lying, fixed)),
+                             (FIXED, fixed, np.maximum(lying, standing))):
+        kinds[sweep.tells & (own >= MIN_ALIKE) & (own - other >= MIN_LEAD)] = kind
+    kinds[(kinds == STANDING) & (sweep.measure_texture_along(away) < MIN_ALONG)] = UNTOLD
+    parts[kinds != STANDING] = 1.0
+    return Relief(kinds, parts, gains)
+
+
+def _align(both: TwoPictures, is_floor: NDArray[np.bool_], sigmas: Floats) -> TwoPictures | None:
+    """The same with the motion between the pictures by which most of the floor agrees, near the one that is believed.
+
+    None where that leaves the motion too unsure. Gauss-Newton on the contrast of both pictures at half their size, with
+    the weights of Geman and McClure.
+
+    Args:
+        sigmas: (3,) of the motion [m, m, rad].
+    """
+    now, earlier = (np.asarray(cv2.pyrDown(grey), np.float32) for grey in (both.picture[both.grid.top:], both.earlier))
+    sweep = _Sweep(now, earlier)
+    asked = sweep.tells & is_floor[::2, ::2]
+    contrast = _measure_contrast(now)[asked]
+
+    def see(change: Floats) -> Floats:
+        """The contrast of the earlier picture where it is asked, if the motion was otherwise; NaN beside it."""
+        floor = both._replace(earlier_from_now=_changed(both.earlier_from_now, change)).find_map(1.0)
+        if floor is None:
+            return np.full(len(contrast), np.nan)
+        seen = sweep.warp(np.diag([0.5, 0.5, 1.0]) @ floor @ np.diag([2.0, 2.0, 1.0]))
+        return np.where(_blur(seen)[asked] < 0.0, np.nan, _measure_contrast(seen)[asked])
+
+    change, prior = np.zeros(3), np.diag(1.0 / np.square(np.maximum(sigmas, LEAST_SIGMAS)))
+    information = prior
+    for _ in range(ALIGN_ROUNDS if asked.any() else 0):
+        base, *others = (see(change + step) for step in (np.zeros(3), *np.diag(ALIGN_STEPS)))
+        slopes = np.stack([(other - base) / step for other, step in zip(others, ALIGN_STEPS, strict=True)], axis=1)
+        seen = np.isfinite(slopes).all(axis=1)
+        slopes, off = slopes[seen], contrast[seen] - base[seen]
+        weights = (1.0 + (off / CONTRAST_SIGMA) ** 2) ** -2 / CONTRAST_SIGMA**2 / PATCH
+        information = slopes.T @ (weights[:, None] * slopes) + prior
+        change = change + np.linalg.solve(information, slopes.T @ (weights * off) - prior @ change)
+    left = np.sqrt(np.diag(np.linalg.inv(information)))
+    if both.camera.fx / STEP_PX * (left[2] + left[1] / TYPICAL_M) > MAX_UNSURE_PX:
+        return None
+    return both._replace(earlier_from_now=_changed(both.earlier_from_now, change))
+
+
+def _measure_contrast(grey: Grey) -> Grey:
+    """Grey levels less their mean round each, in standard deviations round it."""
+    mean = _blur(grey)
+    deviation = np.sqrt(np.maximum(_blur(grey * grey) - mean * mean, 0.0))
+    return np.asarray((grey - mean) / np.maximum(deviation, MIN_DEVIATION), np.float32)
+
+
+def _changed(motion: Pose2, by: Floats) -> Pose2:
+    return Pose2(motion.x_m + by[0], motion.y_m + by[1], motion.heading_rad + by[2])
+
+
+def _shifted(plane: Floats, by: Floats) -> Floats:
+    return np.asarray(np.array([[1.0, 0.0, by[0]], [0.0, 1.0, by[1]], [0.0, 0.0, 1.0]]) @ plane)
+
+
+class _Sweep:
+    """Compares the patches of a picture with those of an earlier one, seen through planes."""
+
+    def __init__(self, now: Grey, earlier: Grey) -> None:
+        self._now, self._earlier = now, earlier
+        self.shape = now.shape
+        self._mean = _blur(now)
+        self._deviation = np.sqrt(np.maximum(_blur(now * now) - self._mean**2, 0.0))
+        self.tells = self._deviation >= MIN_DEVIATION
+
+    def place(self, plane: Floats) -> NDArray[np.float32]:
+        """(rows, columns, 2) where the pixels were in the earlier picture."""
+        rows, columns = self.shape
+        at = np.stack(np.meshgrid(np.arange(columns, dtype=np.float32), np.arange(rows, dtype=np.float32)), axis=-1)
+        return np.asarray(cv2.perspectiveTransform(at, plane))
+
+    def is_in(self, places: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Which places are in the earlier picture, with their patches."""
+        rows, columns = self._earlier.shape
+        return np.asarray(((places >= HALF) & (places <= (columns - 1 - HALF, rows - 1 - HALF))).all(axis=-1))
+
+    def measure_texture_along(self, directions: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(rows, columns) share of the squared gradients of patches that is along directions (rows, columns, 2)."""
+        x, y = (cv2.Sobel(self._now, cv2.CV_32F, *order, ksize=3) for order in ((1, 0), (0, 1)))
+        xx, xy, yy = (_blur(product) for product in (x * x, x * y, y * y))
+        u, v = directions[..., 0], directions[..., 1]
+        along = xx * u * u + 2.0 * xy * u * v + yy * v * v
+        return np.asarray(along / np.maximum((xx + yy) * (u * u + v * v), 1e-9))
+
+    def warp(self, plane: Floats) -> Grey:
+        """(rows, columns) the earlier picture through a plane."""
+        rows, columns = self.shape
+        return np.asarray(cv2.warpPerspective(
+            self._earlier, plane, (columns, rows), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_CONSTANT, borderValue=OUTSIDE), np.float32)
+
+    def compare(self, plane: Floats) -> Grey:
+        """(rows, columns) normalized correlation of patches; -1 where they are not in the earlier picture."""
+        seen = self.warp(plane)
+        mean = _blur(seen)
+        deviation = np.sqrt(np.maximum(_blur(seen * seen) - mean * mean, 0.0))
+        alike = (_blur(self._now * seen) - self._mean * mean) / np.maximum(self._deviation * deviation, 1.0)
+        alike[mean < 0.0] = -1.0
+        return np.asarray(alike, np.float32)
+
+
+def _blur(values: NDArray[Any]) -> Grey:
+    return np.asarray(cv2.boxFilter(values, cv2.CV_32F, (2 * HALF + 1, 2 * HALF + 1), borderType=cv2.BORDER_REFLECT))
