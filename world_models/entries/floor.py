@@ -33,7 +33,7 @@ class FloorThing:
         box_px: (left, top, right, bottom) of it in the rectified picture; of ranges (0, 0, 0, 0).
         evidence: what tells that it is there, in words.
         is_cut: whether the picture's lower border cuts its feet off: it may reach from there to the robot's rim.
-        is_alike: whether it looks like the floor: only an earlier picture tells that it stands there.
+        is_alike: whether most of it looks like the floor: an earlier picture tells that it stands there, or an edge.
     """
 
     footprint: tuple[Point, ...]
@@ -64,7 +64,7 @@ class FreeFloor:
         things: what ends it and is not in the model.
         seen_s: when, by the body's clock.
         light: of the picture; None where the floor's looks are not known in it.
-        told_m: (n,) up to here an earlier picture would tell what stands there and looks like the floor; empty without.
+        told_m: (n,) up to here an earlier picture would tell what stands there, whatever it looks like; empty without.
     """
 
     sense: FloorSense

@@ -111,7 +111,7 @@ def find_relief(
     """The relief of a picture; None where the earlier one looked the other way, or the motion between is not known.
 
     Args:
-        is_floor: (rows, columns) where the model has floor.
+        is_floor: (rows, columns) where the floor is most likely: by it the two are aligned.
         sigma_m, sigma_rad: standard deviations of the motion between the two.
     """
     aligned = _align(both, is_floor, np.array([sigma_m, sigma_m, sigma_rad]))

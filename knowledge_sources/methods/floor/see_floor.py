@@ -32,6 +32,7 @@ from knowledge_sources.methods.floor.model_floor import (
 from knowledge_sources.methods.floor.relief import Relief, TwoPictures, find_relief
 from knowledge_sources.methods.floor.seen_floor import MAX_HIDDEN_M
 from knowledge_sources.methods.floor.standing_regions import (
+    MIN_THING_PIXELS,
     StandingRegion,
     compute_parallax_odds,
     find_footprint,
@@ -122,7 +123,8 @@ def see_free_floor(
         model = model.behind(robot.camera.obstruction.covers(grid.pixels, MODEL_MARGIN_PX))
     unlike, tells, light = find_unlike(picture[grid.top:], model, known, last_light)
     unlike &= s.use_appearance
-    relief = _find_relief(robot, grid, model, picture, pose, covariance, earlier) if s.use_parallax else None
+    relief = (_find_relief(robot, grid, model.is_plain & ~unlike, picture, pose, covariance, earlier)
+              if s.use_parallax else None)
     built = [(region, _build_thing(region, grid, robot, pose, covariance, relief, unlike, s))
              for region in find_regions(unlike, tells, grid, relief)]
     things = [(region, thing) for region, thing in built if thing is not None]
@@ -137,7 +139,7 @@ def see_free_floor(
 
 
 def _find_relief(
-    robot: RobotModel, grid: FloorGrid, model: ModelFloor, picture: NDArray[np.uint8], pose: Pose2,
+    robot: RobotModel, grid: FloorGrid, is_floor: NDArray[np.bool_], picture: NDArray[np.uint8], pose: Pose2,
     covariance: Floats, earlier: Sequence[Seen],
 ) -> Relief | None:
     """By the newest earlier picture."""
@@ -149,7 +151,7 @@ def _find_relief(
     sigma_m, sigma_rad = math.sqrt(float(np.trace(covariance[:2, :2])) / 2.0), math.sqrt(float(covariance[2, 2]))
     sigmas = math.hypot(then.sigma_m, sigma_m), math.hypot(then.sigma_rad, sigma_rad)
     both = TwoPictures(grid, now, earlier_grey, then.pose.inverse() @ pose, robot.camera, robot.mount)
-    return find_relief(both, model.is_plain, *sigmas)
+    return find_relief(both, is_floor, *sigmas)
 
 
 def find_unlike(
@@ -297,8 +299,9 @@ def _build_thing(
     height_m, sigma_height_m = measure_height(region, grid)
     if height_m < MAX_ROLLED_OVER_M and math.isfinite(sigma_height_m):
         return None
-    looks_like_floor = bool(
-        np.count_nonzero(unlike & region.mask) < MIN_UNLIKE_SHARE * np.count_nonzero(region.mask))
+    other = unlike & region.mask
+    looks_like_floor = bool(np.count_nonzero(other) < MIN_UNLIKE_SHARE * np.count_nonzero(region.mask))
+    core = cv2.erode(other.astype(np.uint8), np.ones((3, 3), np.uint8))
     p_before = P_LIKE_FLOOR if looks_like_floor else P_SEEN_ONCE
     odds = p_before / (1.0 - p_before)
     how = "it looks like the floor" if looks_like_floor else "it does not look like the floor"
@@ -327,7 +330,7 @@ def _build_thing(
         sigma_m=round(math.hypot(spread, own), 4),
         height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3), p_thing=round(odds / (1.0 + odds), 4),
         box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut,
-        is_alike=looks_like_floor)
+        is_alike=looks_like_floor or int(core.sum()) < MIN_THING_PIXELS)
 
 
 def _learn(

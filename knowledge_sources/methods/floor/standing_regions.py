@@ -91,8 +91,10 @@ def _describe_region(
     lowest = mask.shape[0] - 1 - np.argmax(mask[::-1, columns], axis=0)
     last = mask.shape[0] - 1
     # what is seen to stand stands at its own distance, though its foot looks like the floor or is not in the picture
-    ranges = np.where(mask, grid.ranges_m * parts, np.inf)[:, columns].min(axis=0)
-    is_told = ranges < grid.ranges_m[lowest, columns]
+    seeming = grid.ranges_m[lowest, columns]
+    ranges = np.minimum(seeming, _measure_standing_m(mask[:, columns], (grid.ranges_m * parts)[:, columns],
+                                                     parts[:, columns]))
+    is_told = ranges < seeming
     cut = (lowest >= last - 1) & ~is_told
     # below a foot there is floor; where the model's own parts begin there, it is no foot
     stands = is_told | cut | tells[np.minimum(lowest + 2, last), columns]
@@ -107,9 +109,25 @@ def _describe_region(
     above = max(0, int(highest[k]) - 2)
     is_clipped = bool(highest[k] <= 1 or not tells[above, columns[k]])
     feet = np.stack([lowest[is_foot], columns[is_foot]], axis=1)
-    parts_of = (ranges / grid.ranges_m[lowest, columns])[is_foot]
+    parts_of = (ranges / seeming)[is_foot]
     top = int(highest[k]), int(columns[k])
     return StandingRegion(mask, feet, parts_of, bool(cut[is_foot].any()), is_clipped, top)
+
+
+def _measure_standing_m(mask: NDArray[np.bool_], ranges_m: Floats, parts: NDArray[np.float32]) -> Floats:
+    """(k,) how far what stands in each of k columns is; infinite where nothing is seen to stand.
+
+    In a column the lower quarter of its pixels decides, and of five neighbouring columns the middle one: by chance some
+    patch is like another.
+    """
+    standing = mask & (parts < 1.0)
+    ordered = np.sort(np.where(standing, ranges_m, np.inf), axis=0)
+    counts = np.count_nonzero(standing, axis=0)
+    own = ordered[np.maximum(counts - 1, 0) // 4, np.arange(len(counts))]
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(own, 2, constant_values=np.inf), 5)
+    known = np.sort(around, axis=1)
+    middle = known[np.arange(len(own)), np.maximum(np.isfinite(around).sum(axis=1) - 1, 0) // 2]
+    return np.where(counts > 0, middle, np.inf)
 
 
 def _find_feet(
@@ -184,8 +202,8 @@ def measure_height(region: StandingRegion, grid: FloorGrid) -> tuple[float, floa
 
 P_TOLD = 0.98
 """Probability that what clearly stands, or clearly lies flat, by another picture, does so."""
-CLEAR = 12
-"""So many pixels that tell are clear; fewer tell less."""
+CLEAR, FEW = 12, 6
+"""So many pixels that tell are clear; fewer tell less, and few nothing."""
 MIN_STANDING_SHARE, MIN_FLAT_SHARE = 0.6, 0.8
 """Least shares of the pixels that tell, by which a region is said to stand or to lie flat."""
 MIN_FIXED = 6  # fewest pixels that stay in the picture, by which a region is on the lens
@@ -204,7 +222,7 @@ def compute_parallax_odds(region: StandingRegion, relief: Relief, grid: FloorGri
     stand = np.count_nonzero(near & (relief.kinds == STANDING))
     flat = np.count_nonzero(region.mask & asked & (relief.kinds == FLAT))
     told = max(stand, flat)
-    if told == 0 or told < (MIN_STANDING_SHARE if stand > flat else MIN_FLAT_SHARE) * (stand + flat):
+    if told < FEW or told < (MIN_STANDING_SHARE if stand > flat else MIN_FLAT_SHARE) * (stand + flat):
         return 1.0
     odds = (P_TOLD / (1.0 - P_TOLD)) ** min(1.0, told / CLEAR)
     return float(odds if stand > flat else 1.0 / odds)

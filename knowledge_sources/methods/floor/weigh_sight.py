@@ -41,8 +41,8 @@ from world_models.entries.obstacle import Obstacle, ObstacleStatus
 
 MIN_FREE_PART = 0.5  # part of an obstacle's footprint that must be seen free to tell that it is not there any more
 MAX_SHARED_PART = 0.25  # where a thing that is seen takes more of the footprint, the rest seen free tells nothing of it
-ALIKE_FREE_ODDS = 0.3  # the same of one that looks like the floor, where an earlier picture would tell that it stands
 FREE_FLOOR_ODDS = 0.03  # odds of an obstacle that is there while all of its footprint is seen free
+ALIKE_FREE_ODDS = 0.3  # the same of one that looks like the floor
 MIN_EVIDENCE_INTERVAL_S = 0.3  # pictures that follow each other faster are no further evidence of an obstacle
 MAX_OBSTACLE_SIGMA_M = 0.25
 """What is seen on the floor with a larger standard deviation is waited for until it is nearer."""
@@ -105,7 +105,7 @@ def weigh_sight(
     """
     f, s = sight.floor, settings.action
     free = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
-    told = shapely.Polygon()  # where what looks like the floor would be seen to stand
+    told = free if f.sense == "ranges" else shapely.Polygon()  # where what is not seen is not there
     if f.told_m:
         told = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m,
                                 np.minimum(f.told_m, np.subtract(f.far_m, f.sigma_m)).tolist())
@@ -140,7 +140,7 @@ def weigh_sight(
         if id in drafts or not may_be_there(obstacle):
             continue
         if measure_free_part(obstacle.footprint, seen) <= MAX_SHARED_PART:
-            gone = miss(sight.world, obstacle, told if obstacle.is_alike else free, f.seen_s, s)
+            gone = miss(sight.world, obstacle, told, f.seen_s, s)
             if gone is not None:
                 yield Sighted(id, gone)
 

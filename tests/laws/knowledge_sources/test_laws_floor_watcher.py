@@ -78,7 +78,7 @@ class Room:
         """A picture that is kept, from so far aside."""
         pose = to_world(Pose2(HERE.x_m, HERE.y_m + way_m, 0.0))
         frame = self.bench.put(CameraPicture(f"{way_m}".encode(), 0, 1.0, "track"))
-        return self.bench.put(FloorView(frame.id, belief or self.belief.id, pose.x_m, pose.y_m, 0.5, floor_m, 1.0))
+        return self.bench.put(FloorView(frame.id, belief or self.belief.id, pose.x_m, pose.y_m, 0.5, floor_m, 1.0, 0.01, 0.002))
 
     def look(self) -> tuple[Effect, ...] | None:
         self.frame = self.bench.put(CameraPicture(b"now", 1, NOW_S, "track"))
@@ -137,15 +137,16 @@ def test_it_compares_with_the_pictures_kept_from_far_enough_by_this_belief_on_th
     assert (locale, jpeg, known, seen_s, light) == (HALL, b"now", {}, NOW_S, None)
     assert math.dist(pose.position, to_world(HERE).position) < 1e-9 and robot.world.floor_m(HALL) == 0.0
     assert [seen.jpeg for seen in earlier] == [room.bench.view[e.value.frame].value.jpeg for e in far]
-    assert [seen.pose for seen in earlier] == [
-        Pose2(e.value.x_m, e.value.y_m, e.value.heading_rad) for e in far]
+    assert [(seen.pose, seen.sigma_m, seen.sigma_rad) for seen in earlier] == [
+        (Pose2(e.value.x_m, e.value.y_m, e.value.heading_rad), e.value.sigma_m, e.value.sigma_rad) for e in far]
     (seen,) = [e for e in effects if isinstance(e.value, FreeFloor)]
     assert isinstance(seen, Post) and seen.value == floor()
     assert reasons(seen) == {room.frame.id, room.belief.id, *(e.id for e in far)}
     is_kept = not kept or abs(float(room.bench.view[kept[-1].value.frame].value.jpeg)) > FLOOR_VIEW_DISTANCE_M
     here = to_world(HERE)
     assert made(effects, FloorView) == [FloorView(
-        room.frame.id, room.belief.id, here.x_m, here.y_m, here.heading_rad, 0.0, NOW_S)] * is_kept
+        room.frame.id, room.belief.id, here.x_m, here.y_m, here.heading_rad, 0.0, NOW_S, room.belief.value.sigma_m,
+        room.belief.value.sigma_rad)] * is_kept
     assert all(reasons(e) == {room.frame.id, room.belief.id} for e in effects if isinstance(e.value, FloorView))
 
 
