@@ -44,6 +44,7 @@ PUT_DOWN_FREE_M = 0.75  # round where it was put down the floor is free to this 
 NEAR_MODEL_M = 0.08  # nearer to a wall or a thing of the model the floor need not be seen
 MIN_INCREMENT_M = 0.2  # shortest move at full speed into floor that is seen to be free; less of it is crept
 MIN_CREEP_M = 0.05  # shortest move into floor that was not seen to be free
+TOUCHED_GAP_M = 0.02  # what was touched is not come so near to again
 MAX_DRIVEN_GAP_M = 0.8  # between two pictures that are no further apart the robot drove straight
 LOOK_AHEAD_M = 1.1  # so much of the way beyond a leg is looked at before it ends: what is too near to be seen then
 LOOK_FROM_M = 3.0  # distance from the end of a leg from which that begins
@@ -132,7 +133,8 @@ class FloorAhead:
         free_m = most_m
         for entry, polygon in self._suspected:
             gaps = shapely.distance(points, polygon)
-            met = np.flatnonzero((gaps[1:] < self._robot.radius_m) & (gaps[1:] < gaps[:-1] - 1e-9))
+            near_m = self._robot.radius_m + (0.0 if entry.value.touched_s is None else TOUCHED_GAP_M)
+            met = np.flatnonzero((gaps[1:] < near_m) & (gaps[1:] < gaps[:-1] - 1e-9))
             if len(met):
                 free_m = min(free_m, float(along[met[0]]))
                 self._told[entry.id] = entry

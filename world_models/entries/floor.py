@@ -64,7 +64,7 @@ class FreeFloor:
         things: what ends it and is not in the model.
         seen_s: when, by the body's clock.
         light: of the picture; None where the floor's looks are not known in it.
-        told_m: (n,) up to here an earlier picture would tell what stands there, whatever it looks like; empty without.
+        told_m: (n,) up to here an earlier picture would tell what stands there and looks like the floor; empty without.
     """
 
     sense: FloorSense

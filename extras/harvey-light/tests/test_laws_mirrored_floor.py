@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from experiments.generated.scenes import Patch, PatchFace, box_faces
 from harvey_light.baked import BAKED
 from knowledge_sources.methods.floor.model_floor import STEP_PX, ModelFloor, build_floor_grid
+from knowledge_sources.methods.floor.relief import TwoPictures, find_relief
 from knowledge_sources.methods.floor.see_floor import GREY, find_unlike
-from knowledge_sources.methods.floor.standing_regions import TwoPictures, compute_parallax_odds, find_regions
+from knowledge_sources.methods.floor.standing_regions import compute_parallax_odds, find_regions
 from sim.render.lighting import Lighting
 from sim.render.lights import Room, hang_lamps
 from world_models.camera import Camera, CameraMount
@@ -54,8 +55,9 @@ def test_mirrored_lamps_do_not_stand_on_the_floor_and_a_box_does(gloss: float, t
     assert grid is not None and now.shape == (512 // STEP_PX, 512 // STEP_PX)
     near = (grid.ranges_m < 7.0) & (np.abs(grid.points_robot[..., 1]) < 1.8)
     regions = find_regions(unlike & near, near, grid)
-    odds = [compute_parallax_odds(region, TwoPictures(grid, now, before, moved, CAMERA, MOUNT)) for region in regions]
-    assert regions
+    relief = find_relief(TwoPictures(grid, now, before, moved, CAMERA, MOUNT), near & ~unlike)
+    assert regions and relief is not None
+    odds = [compute_parallax_odds(region, relief, grid) for region in regions]
     if thing:
         assert max(odds) > 1.0
     else:

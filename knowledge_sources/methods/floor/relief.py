@@ -7,7 +7,7 @@ nothing to tell by, nothing is told: in plain surfaces, along lines that lead to
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import cv2
@@ -24,17 +24,19 @@ UNTOLD, FLAT, STANDING, FIXED = range(4)
 
 HALF = 3
 """Patches are squares of 2 HALF + 1 pixels of the reduced picture."""
+REACH = 2 * HALF + 3
+"""Side of the square round a pixel that its patch shows, and a little more."""
 MIN_DEVIATION = 3.0
 """A patch with less contrast than this [grey levels] tells nothing."""
 MIN_ALIKE = 0.6
 """Least correlation of two patches by which anything is told."""
-MIN_LEAD = 0.15
+MIN_LEAD = 0.25
 """Least lead over the correlations of all that it may be otherwise."""
-MIN_APART_PX = 2.0
+MIN_APART_PX = 2.5
 """What stands is told from what lies flat where it was at least so far from there, in the reduced earlier picture."""
 PARTS = (0.93, 0.86, 0.79, 0.72, 0.65, 0.57, 0.49, 0.41)
 """What stands is nearer than the floor that it hides: its distances that are tried, as parts of that of the floor."""
-DEPTHS = (1.25, 1.6, 2.1, 3.0)
+DEPTHS = (1.25, 1.5, 1.8, 2.15, 2.6, 3.1, 3.7)
 """And those of what a shiny floor mirrors: that of a thing of height h, with the camera at height c above the floor, is
 1 + h / c times as far."""
 LEAST_SIGMAS = (0.002, 0.002, 0.001)
@@ -100,6 +102,12 @@ class Relief:
     parts: NDArray[np.float32]
     gains_px: NDArray[np.float32]
 
+    def beside(self, model: NDArray[np.bool_]) -> Relief:
+        """The same without what stands where a patch shows a part of the model (rows, columns) that is no floor."""
+        near = cv2.dilate(model.astype(np.uint8), np.ones((REACH, REACH), np.uint8)) > 0
+        kinds = np.where((self.kinds == STANDING) & near, UNTOLD, self.kinds).astype(np.uint8)
+        return replace(self, kinds=kinds)
+
     def tells_of(self, parts: Floats) -> NDArray[np.bool_]:
         """Where what is at such parts (rows, columns) of the distance is told from the floor, if there is texture."""
         return np.asarray(self.gains_px * (1.0 / np.maximum(parts, 1e-3) - 1.0) >= MIN_APART_PX)
@@ -126,9 +134,6 @@ def find_relief(
     apart = np.abs(away).max(axis=-1)
     gains = np.where(sweep.is_in(flat), apart / (1.0 / PARTS[1] - 1.0), 0.0).astype(np.float32)
     lying = np.max([sweep.compare(_shifted(floor, near)) for near in np.array(NEAR_SHIFTS)], axis=0)
-    asked = sweep.tells & is_floor & (lying > -1.0)
-    if np.count_nonzero(lying[asked] >= MIN_ALIKE) < MIN_AGREEING * np.count_nonzero(asked):
-        return None
     standing, parts = np.full(sweep.shape, -1.0, np.float32), np.ones(sweep.shape, np.float32)
     for depth in (*PARTS, *DEPTHS):
         plane = both.find_map(depth)
@@ -141,6 +146,9 @@ def find_relief(
         else:
             is_best = alike > standing
             standing[is_best], parts[is_best] = alike[is_best], depth
+    asked = sweep.tells & is_floor & (lying > -1.0)
+    if np.count_nonzero(lying[asked] >= MIN_ALIKE) < MIN_AGREEING * np.count_nonzero(asked):
+        return None
     still = _shifted(np.eye(3), np.array([0.0, both.grid.top]))
     fixed = sweep.compare(still)
     fixed[np.abs(sweep.place(still) - flat).max(axis=-1) < MIN_APART_PX] = -1.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import cv2
@@ -56,7 +57,7 @@ MIN_TINTED_SHARE = 0.6  # share of what should be floor that must look alike, to
 MAX_TINT = 0.12  # largest difference from the floor's colour, in its parts of red and blue, in a tinted picture
 MODEL_MARGIN_PX = 3.0  # pixels so near to an edge of the model tell nothing; the belief's uncertainty comes on top
 P_SEEN_ONCE = 0.7  # probability that what does not look like the floor stands on it, before parallax tells
-P_LIKE_FLOOR = 0.05  # the same of what looks like the floor, and seems to stand up from it
+P_LIKE_FLOOR = 0.015  # the same of what looks like the floor, and seems to stand up from it
 MIN_UNLIKE_SHARE = 0.2  # of a region of which less than that does not look like the floor, all is said to look like it
 TOLD_HEIGHT_M = 0.3  # what looks like the floor is said to be told where something so high would be
 PART_SIGMA = 0.05  # of the part of the floor's distance at which the earlier picture shows a thing
@@ -123,10 +124,14 @@ def see_free_floor(
         model = model.behind(robot.camera.obstruction.covers(grid.pixels, MODEL_MARGIN_PX))
     unlike, tells, light = find_unlike(picture[grid.top:], model, known, last_light)
     unlike &= s.use_appearance
-    relief = (_find_relief(robot, grid, model.is_plain & ~unlike, picture, pose, covariance, earlier)
-              if s.use_parallax else None)
-    built = [(region, _build_thing(region, grid, robot, pose, covariance, relief, unlike, s))
-             for region in find_regions(unlike, tells, grid, relief)]
+    compare = partial(_find_relief, robot, grid, model.is_plain, unlike, picture, pose, covariance)
+    relief = compare(earlier[0]) if s.use_parallax and earlier else None
+    regions = find_regions(unlike, tells, grid, relief)
+    reliefs = [] if relief is None else [relief]
+    if reliefs and len(earlier) > 1 and any(not (region.mask & unlike).any() for region in regions):
+        again = compare(earlier[1])  # what looks like the floor is compared with one more picture
+        reliefs += [] if again is None else [again]
+    built = [(region, _build_thing(region, grid, robot, pose, covariance, reliefs, unlike, s)) for region in regions]
     things = [(region, thing) for region, thing in built if thing is not None]
     scan = _scan(grid, model, tells, things, robot.camera.fy, s)
     learnt = _learn(robot, locale, pose, earlier, known, floor_m)
@@ -139,19 +144,17 @@ def see_free_floor(
 
 
 def _find_relief(
-    robot: RobotModel, grid: FloorGrid, is_floor: NDArray[np.bool_], picture: NDArray[np.uint8], pose: Pose2,
-    covariance: Floats, earlier: Sequence[Seen],
+    robot: RobotModel, grid: FloorGrid, is_plain: NDArray[np.bool_], unlike: NDArray[np.bool_],
+    picture: NDArray[np.uint8], pose: Pose2, covariance: Floats, then: Seen,
 ) -> Relief | None:
-    """By the newest earlier picture."""
-    if not earlier:
-        return None
-    then = earlier[0]
+    """By an earlier picture."""
     before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)
     now, earlier_grey = (np.asarray(image.astype(np.float32) @ GREY, np.float32) for image in (picture, before))
     sigma_m, sigma_rad = math.sqrt(float(np.trace(covariance[:2, :2])) / 2.0), math.sqrt(float(covariance[2, 2]))
     sigmas = math.hypot(then.sigma_m, sigma_m), math.hypot(then.sigma_rad, sigma_rad)
     both = TwoPictures(grid, now, earlier_grey, then.pose.inverse() @ pose, robot.camera, robot.mount)
-    return find_relief(both, is_floor, *sigmas)
+    relief = find_relief(both, is_plain & ~unlike, *sigmas)
+    return None if relief is None else relief.beside(~is_plain)
 
 
 def find_unlike(
@@ -292,8 +295,8 @@ def _first(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def _build_thing(
-    region: StandingRegion, grid: FloorGrid, robot: RobotModel, pose: Pose2, covariance: Floats, relief: Relief | None,
-    unlike: NDArray[np.bool_], settings: FloorSettings,
+    region: StandingRegion, grid: FloorGrid, robot: RobotModel, pose: Pose2, covariance: Floats,
+    reliefs: Sequence[Relief], unlike: NDArray[np.bool_], settings: FloorSettings,
 ) -> FloorThing | None:
     """What stands where a region is; None where it is lower than what is rolled over, or no thing but on the lens."""
     height_m, sigma_height_m = measure_height(region, grid)
@@ -305,10 +308,11 @@ def _build_thing(
     p_before = P_LIKE_FLOOR if looks_like_floor else P_SEEN_ONCE
     odds = p_before / (1.0 - p_before)
     how = "it looks like the floor" if looks_like_floor else "it does not look like the floor"
-    if relief is not None:
-        if is_on_the_lens(region, relief):
+    if reliefs:
+        if is_on_the_lens(region, reliefs[0]):
             return None
-        told = compute_parallax_odds(region, relief, grid)
+        asked = reliefs if looks_like_floor else reliefs[:1]
+        told = math.prod(compute_parallax_odds(region, relief, grid) for relief in asked)
         odds *= told
         if told != 1.0:
             stands = "stands up from it" if told > 1.0 else "lies flat on it"

@@ -15,14 +15,12 @@ from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.methods.floor.model_floor import SIGHT_M, FloorGrid
-from knowledge_sources.methods.floor.relief import FIXED, FLAT, HALF, STANDING, Relief
+from knowledge_sources.methods.floor.relief import FIXED, FLAT, STANDING, Relief
 
 MIN_THING_PIXELS = 10  # smallest region, in pixels of half the picture's size
 ASSUMED_DEPTH_M = 0.3  # depth that a thing is taken to have behind what is seen of it
 MAX_THING_DEPTH_M = 0.8  # feet of one thing are at most so much further than its nearest
 
-REACH = 2 * HALF + 3
-"""Side of the square round a pixel in which nothing of the model may stand, for what stands to be something else."""
 MIN_ROWS = 3
 """A region of fewer rows is noise."""
 MAX_STEP = 0.06
@@ -65,8 +63,7 @@ def find_regions(
     seen = _drop_slivers(unlike & tells, tells)
     parts = np.ones(grid.shape, np.float32)
     if relief is not None:
-        alone = cv2.erode(tells.astype(np.uint8), np.ones((REACH, REACH), np.uint8), borderValue=1) > 0
-        parts = np.where(_drop_specks((relief.kinds == STANDING) & alone), relief.parts, parts)
+        parts = np.where(_drop_specks((relief.kinds == STANDING) & tells), relief.parts, parts)
         seen |= parts < 1.0
     near = cv2.dilate(seen.astype(np.uint8), np.ones((3, 3), np.uint8))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(near, connectivity=8)
@@ -202,8 +199,8 @@ def measure_height(region: StandingRegion, grid: FloorGrid) -> tuple[float, floa
 
 P_TOLD = 0.98
 """Probability that what clearly stands, or clearly lies flat, by another picture, does so."""
-CLEAR, FEW = 12, 6
-"""So many pixels that tell are clear; fewer tell less, and few nothing."""
+CLEAR, FEW, MOST_CLEAR = 20, 6, 1.5
+"""So many pixels that tell are clear; fewer tell less, few nothing, and many as much as half as many again."""
 MIN_STANDING_SHARE, MIN_FLAT_SHARE = 0.6, 0.8
 """Least shares of the pixels that tell, by which a region is said to stand or to lie flat."""
 MIN_FIXED = 6  # fewest pixels that stay in the picture, by which a region is on the lens
@@ -224,7 +221,7 @@ def compute_parallax_odds(region: StandingRegion, relief: Relief, grid: FloorGri
     told = max(stand, flat)
     if told < FEW or told < (MIN_STANDING_SHARE if stand > flat else MIN_FLAT_SHARE) * (stand + flat):
         return 1.0
-    odds = (P_TOLD / (1.0 - P_TOLD)) ** min(1.0, told / CLEAR)
+    odds = (P_TOLD / (1.0 - P_TOLD)) ** min(MOST_CLEAR, told / CLEAR)
     return float(odds if stand > flat else 1.0 / odds)
 
 

@@ -105,7 +105,7 @@ def weigh_sight(
     """
     f, s = sight.floor, settings.action
     free = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
-    told = free if f.sense == "ranges" else shapely.Polygon()  # where what is not seen is not there
+    told = free if f.sense == "ranges" else shapely.Polygon()  # where what looks like the floor would be seen to stand
     if f.told_m:
         told = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m,
                                 np.minimum(f.told_m, np.subtract(f.far_m, f.sigma_m)).tolist())
@@ -140,7 +140,7 @@ def weigh_sight(
         if id in drafts or not may_be_there(obstacle):
             continue
         if measure_free_part(obstacle.footprint, seen) <= MAX_SHARED_PART:
-            gone = miss(sight.world, obstacle, told, f.seen_s, s)
+            gone = miss(sight.world, obstacle, told if obstacle.is_alike else free, f.seen_s, s)
             if gone is not None:
                 yield Sighted(id, gone)
 

@@ -78,7 +78,8 @@ class Room:
         """A picture that is kept, from so far aside."""
         pose = to_world(Pose2(HERE.x_m, HERE.y_m + way_m, 0.0))
         frame = self.bench.put(CameraPicture(f"{way_m}".encode(), 0, 1.0, "track"))
-        return self.bench.put(FloorView(frame.id, belief or self.belief.id, pose.x_m, pose.y_m, 0.5, floor_m, 1.0, 0.01, 0.002))
+        return self.bench.put(FloorView(
+            frame.id, belief or self.belief.id, pose.x_m, pose.y_m, 0.5, floor_m, 1.0, 0.01, 0.002))
 
     def look(self) -> tuple[Effect, ...] | None:
         self.frame = self.bench.put(CameraPicture(b"now", 1, NOW_S, "track"))
