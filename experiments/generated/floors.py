@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -27,7 +28,7 @@ from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 
-FLOOR_TEXTURES = {"plain": 1.0, "speckle": 0.3, "carpet": 0.1, "tiles": 1.0, "wood": 0.3}
+FLOOR_TEXTURES: Mapping[str, float] = {"plain": 1.0, "speckle": 0.3, "carpet": 0.1, "tiles": 1.0, "wood": 0.3}
 """Textures of drawn floors, with the size of their cells [ft]."""
 DRAWN_FLOOR = "drawn-floor"
 

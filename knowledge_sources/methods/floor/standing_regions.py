@@ -15,12 +15,14 @@ from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.methods.floor.model_floor import SIGHT_M, FloorGrid
-from knowledge_sources.methods.floor.relief import FIXED, FLAT, STANDING, Relief
+from knowledge_sources.methods.floor.relief import FIXED, FLAT, STANDING, UNTOLD, Relief
 
 MIN_THING_PIXELS = 10  # smallest region, in pixels of half the picture's size
 ASSUMED_DEPTH_M = 0.3  # depth that a thing is taken to have behind what is seen of it
 MAX_THING_DEPTH_M = 0.8  # feet of one thing are at most so much further than its nearest
 
+MIN_BORDER_COLUMNS = 6
+"""Fewer columns of a lower border that is seen to stand do not tell that it hangs over the floor."""
 MIN_ROWS = 3
 """A region of fewer rows is noise."""
 MAX_STEP = 0.06
@@ -61,8 +63,9 @@ def find_regions(
         relief: by an earlier picture, if there is one.
     """
     seen = _drop_slivers(unlike & tells, tells)
-    parts = np.ones(grid.shape, np.float32)
+    parts, kinds = np.ones(grid.shape, np.float32), np.full(grid.shape, UNTOLD)
     if relief is not None:
+        kinds = relief.kinds
         parts = np.where(_drop_specks((relief.kinds == STANDING) & tells), relief.parts, parts)
         seen |= parts < 1.0
     near = cv2.dilate(seen.astype(np.uint8), np.ones((3, 3), np.uint8))
@@ -75,21 +78,23 @@ def find_regions(
         rows = np.flatnonzero(mask.any(axis=1))
         if len(rows) < MIN_ROWS:
             continue
-        region = _describe_region(mask, tells, grid, parts)
+        region = _describe_region(mask, tells, grid, parts, kinds)
         if region is not None:
             found.append(region)
     return tuple(found)
 
 
 def _describe_region(
-    mask: NDArray[np.bool_], tells: NDArray[np.bool_], grid: FloorGrid, parts: NDArray[np.float32]
+    mask: NDArray[np.bool_], tells: NDArray[np.bool_], grid: FloorGrid, parts: NDArray[np.float32],
+    kinds: NDArray[np.uint8],
 ) -> StandingRegion | None:
     columns = np.flatnonzero(mask.any(axis=0))
     lowest = mask.shape[0] - 1 - np.argmax(mask[::-1, columns], axis=0)
     last = mask.shape[0] - 1
     # what is seen to stand stands at its own distance, though its foot looks like the floor or is not in the picture
     seeming = grid.ranges_m[lowest, columns]
-    ranges = np.minimum(seeming, _measure_standing_m(mask[:, columns], (grid.ranges_m * parts)[:, columns],
+    part = _find_border_part(lowest, columns, parts, kinds)
+    ranges = np.minimum(part * seeming, _measure_standing_m(mask[:, columns], (grid.ranges_m * parts)[:, columns],
                                                      parts[:, columns]))
     is_told = ranges < seeming
     cut = (lowest >= last - 1) & ~is_told
@@ -109,6 +114,22 @@ def _describe_region(
     parts_of = (ranges / seeming)[is_foot]
     top = int(highest[k]), int(columns[k])
     return StandingRegion(mask, feet, parts_of, bool(cut[is_foot].any()), is_clipped, top)
+
+
+def _find_border_part(
+    lowest: NDArray[np.intp], columns: NDArray[np.intp], parts: NDArray[np.float32], kinds: NDArray[np.uint8]
+) -> float:
+    """How far the lower border of a region is, as a part of the distance of the floor that it hides; 1: it is on it.
+
+    The lower border of what hangs over the floor, as a shelf on legs, stands. All of it is taken to be at one height.
+    """
+    rows = np.clip(lowest[:, None] + np.arange(-2, 3), 0, kinds.shape[0] - 1)
+    seen, at = kinds[rows, columns[:, None]], parts[rows, columns[:, None]]
+    standing = (seen == STANDING) & (at < 1.0)
+    told = np.count_nonzero(standing.any(axis=1))
+    if told < MIN_BORDER_COLUMNS or told <= np.count_nonzero((seen == FLAT).any(axis=1)):
+        return 1.0
+    return float(np.median(at[standing]))
 
 
 def _measure_standing_m(mask: NDArray[np.bool_], ranges_m: Floats, parts: NDArray[np.float32]) -> Floats:

@@ -231,7 +231,7 @@ class PictureSearch:
 
     def _sieve(self, maps: Sequence[VisibilityMap], grids: Sequence[Floats]) -> list[Ints]:
         """Of the grid of each room the indices that are scored by more than a few points."""
-        count = sum(map(len, grids))
+        count = sum(len(grid) for grid in grids)
         if count < MIN_SIEVED:
             return [np.arange(len(grid)) for grid in grids]
         scores = [self.score(m, grid, np.tile(m.cell, 4), SIEVE_STRIDE) for m, grid in zip(maps, grids, strict=True)]

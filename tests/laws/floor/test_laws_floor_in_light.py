@@ -51,7 +51,7 @@ def test_a_tinted_picture_has_floor_and_a_thing_on_it(red: float, blue: float, g
 
 
 @settings(deadline=None, max_examples=20)
-@given(st.integers(95, 140), st.floats(0.35, 0.6), st.floats(0.35, 0.6))
+@given(st.integers(95, 140), st.floats(0.35, 0.55), st.floats(0.35, 0.55))
 def test_a_thing_that_fills_the_picture_at_once_is_not_the_floor_in_other_light(
     width: int, red: float, blue: float
 ) -> None:
