@@ -45,6 +45,7 @@ NEAR_MODEL_M = 0.08  # nearer to a wall or a thing of the model the floor need n
 MIN_INCREMENT_M = 0.2  # shortest move at full speed into floor that is seen to be free; less of it is crept
 MIN_CREEP_M = 0.05  # shortest move into floor that was not seen to be free
 TOUCHED_GAP_M = 0.02  # what was touched is not come so near to again
+TOUCHED_AWAY = 0.2  # nearer to it than that a move must lead away from it by this part of the way
 MAX_DRIVEN_GAP_M = 0.8  # between two pictures that are no further apart the robot drove straight
 LOOK_AHEAD_M = 1.1  # so much of the way beyond a leg is looked at before it ends: what is too near to be seen then
 LOOK_FROM_M = 3.0  # distance from the end of a leg from which that begins
@@ -97,8 +98,10 @@ class FloorAhead:
 
     def limit_move(self, move_m: float) -> Caution:
         """How far, of a move to the leg's end, the robot may go at once; a move of any other kind is no longer."""
-        unseen = self._find_unseen(self._sweep(self._way, move_m))
-        caution = limit_move(unseen, move_m, self._settings)
+        free_m = self._measure_to_things_m(move_m, touched=True)
+        if free_m < min(MIN_CREEP_M, move_m):
+            return Caution(0.0, True)
+        caution = limit_move(self._find_unseen(self._sweep(self._way, free_m)), free_m, self._settings)
         if not caution.creeps:
             return caution
         return caution._replace(move_m=min(caution.move_m, self._measure_to_things_m(move_m)))
@@ -125,16 +128,22 @@ class FloorAhead:
         slowly = self._settings.creep_speed_m_per_s if caution.creeps else None
         return leg, MotorCommand(command.turn_rad, move_m, slowly)
 
-    def _measure_to_things_m(self, most_m: float) -> float:
-        """How far the robot can go towards the leg's end before it comes nearer to what may stand there; 0..most."""
+    def _measure_to_things_m(self, most_m: float, *, touched: bool = False) -> float:
+        """How far the robot can go towards the leg's end before it comes nearer to what may stand there; 0..most.
+
+        Args:
+            touched: only what was touched is asked; the robot does not go along that, but away from it.
+        """
         way, step_m = shapely.LineString(self._way), MIN_CREEP_M
         along = np.arange(0.0, most_m + step_m, step_m)
         points = shapely.line_interpolate_point(way, along)
         free_m = most_m
         for entry, polygon in self._suspected:
             gaps = shapely.distance(points, polygon)
-            near_m = self._robot.radius_m + (0.0 if entry.value.touched_s is None else TOUCHED_GAP_M)
-            met = np.flatnonzero((gaps[1:] < near_m) & (gaps[1:] < gaps[:-1] - 1e-9))
+            if touched and entry.value.touched_s is None:
+                continue
+            near_m, away_m = (TOUCHED_GAP_M, TOUCHED_AWAY * step_m) if touched else (0.0, -1e-9)
+            met = np.flatnonzero((gaps[1:] < self._robot.radius_m + near_m) & (gaps[1:] < gaps[:-1] + away_m))
             if len(met):
                 free_m = min(free_m, float(along[met[0]]))
                 self._told[entry.id] = entry

@@ -33,7 +33,7 @@ class FloorThing:
         box_px: (left, top, right, bottom) of it in the rectified picture; of ranges (0, 0, 0, 0).
         evidence: what tells that it is there, in words.
         is_cut: whether the picture's lower border cuts its feet off: it may reach from there to the robot's rim.
-        is_alike: whether most of it looks like the floor: an earlier picture tells that it stands there, or an edge.
+        is_alike: whether it looks like the floor: an earlier picture alone tells that it stands there.
     """
 
     footprint: tuple[Point, ...]

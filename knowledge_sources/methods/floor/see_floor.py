@@ -33,7 +33,6 @@ from knowledge_sources.methods.floor.model_floor import (
 from knowledge_sources.methods.floor.relief import Relief, TwoPictures, find_relief
 from knowledge_sources.methods.floor.seen_floor import MAX_HIDDEN_M
 from knowledge_sources.methods.floor.standing_regions import (
-    MIN_THING_PIXELS,
     StandingRegion,
     compute_parallax_odds,
     find_footprint,
@@ -302,9 +301,8 @@ def _build_thing(
     height_m, sigma_height_m = measure_height(region, grid)
     if height_m < MAX_ROLLED_OVER_M and math.isfinite(sigma_height_m):
         return None
-    other = unlike & region.mask
-    looks_like_floor = bool(np.count_nonzero(other) < MIN_UNLIKE_SHARE * np.count_nonzero(region.mask))
-    core = cv2.erode(other.astype(np.uint8), np.ones((3, 3), np.uint8))
+    looks_like_floor = bool(
+        np.count_nonzero(unlike & region.mask) < MIN_UNLIKE_SHARE * np.count_nonzero(region.mask))
     p_before = P_LIKE_FLOOR if looks_like_floor else P_SEEN_ONCE
     odds = p_before / (1.0 - p_before)
     how = "it looks like the floor" if looks_like_floor else "it does not look like the floor"
@@ -334,7 +332,7 @@ def _build_thing(
         sigma_m=round(math.hypot(spread, own), 4),
         height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3), p_thing=round(odds / (1.0 + odds), 4),
         box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut,
-        is_alike=looks_like_floor or int(core.sum()) < MIN_THING_PIXELS)
+        is_alike=looks_like_floor)
 
 
 def _learn(
