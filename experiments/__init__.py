@@ -61,7 +61,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "agenda": "Activations per second with 10 to 100,000 pending",
         "explanations": "Missions of every scenario, explained and replayed",
         "frame-budget": "Time of perception per frame",
-        "large": "A mission's processor time where it is lost among 58 and 99 rooms",
+        "large": "Processor time, lost among 58 and 99 rooms",
         "questions": "Questions after runs: harvey why against deciding again",
         "render-speed": "Simulated camera: frame rate and edge accuracy",
         "watchers": "The live page: what 50 watchers cost, hostile requests",

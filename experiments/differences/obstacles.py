@@ -182,8 +182,8 @@ class ObstacleEnd(End):
     @property
     def is_flawed(self) -> bool:
         """Whether it is to be looked at."""
-        return not self.is_good or bool(self.contact_speeds or self.false_obstacles or self.false_accepts
-                                        or self.believed_shut)
+        flaws = self.contact_speeds, self.false_obstacles, self.forgotten, self.false_accepts, self.believed_shut
+        return not self.is_good or any(flaws)
 
 
 @dataclass

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
 from sim.ground_truth.table import Lasting
-from sim.ground_truth.things import SHAPES
+from sim.ground_truth.things import ROLLED_OVER, SHAPES
 from sim.ground_truth.true_changes import TrueChange, find_active
 from sim.scenario import load_scenario, parse_scenario
 from sim.stage import Stage, build_stage
@@ -69,7 +69,8 @@ def test_what_is_there_is_seen_where_it_stands_and_nowhere_else(
 
 
 @settings(deadline=None, max_examples=20)
-@given(kind=st.sampled_from(sorted(SHAPES)), aside=st.floats(-0.1, 0.1), heading_rad=st.floats(-3.0, 3.0))
+@given(kind=st.sampled_from(sorted(set(SHAPES) - set(ROLLED_OVER))), aside=st.floats(-0.1, 0.1),
+       heading_rad=st.floats(-3.0, 3.0))
 def test_what_is_there_is_hit(kind: str, aside: float, heading_rad: float) -> None:
     middle = 1.2192 + aside
     body = build_stage(parse_scenario(HALL + extra(kind, 4.2, middle, heading_rad))).body(1)

@@ -36,6 +36,7 @@ OWN: dict[ModuleType, tuple[type[End], dict[str, Any]]] = {
     miscalibrated: (miscalibrated.CameraEnd, {"found": [1e-4] * 7, "sigmas": [1e-4] * 7}),
     obstacles: (obstacles.ObstacleEnd, {
         "verdict": "reached", "shortest_m": 10.0, "contact_speeds": [], "answered": 0, "false_obstacles": [],
+        "forgotten": [],
         "stops": 1, "needless": 0}),
     twins: (twins.TwinEnd, {"rooms": 8, "doubts": 0, "by_odds": 0}),
     large: (large.LargeEnd, {"cpu_s": 8.0}),
@@ -92,6 +93,7 @@ def test_flawless_missions_hold_every_claim(
     (obstacles, (), {"false_accepts": 1}, "no milestone"),
     (obstacles, (), {"path_m": 13.0}, "the way is at most"),
     (obstacles, (), {"false_obstacles": ["something"]}, "false obstacle"),
+    (obstacles, (), {"forgotten": ["something"]}, "nothing certain is forgotten"),
     (obstacles, (), {"needless": 1}, "needless stop"),
     (twins, ("right",), {"outcome": "lost"}, "told right"),
     (twins, ("wrong",), {"doubts": 0}, "told wrong"),

@@ -96,17 +96,22 @@ def test_an_empty_floor_is_the_cluttered_one_without_its_things(tmp_path: Path) 
     assert (cluttered.goal, cluttered.start, cluttered.details) == (empty.goal, empty.start, empty.details)
 
 
-def test_in_each_tenth_mission_no_way_is_left(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_each_tenth_mission_has_no_way_and_each_second_is_camouflaged(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     asked: list[bool] = []
+    camouflaged: list[bool] = []
 
-    def write(folder: Path, seed: int, *, leaves_way: bool) -> Path:
+    def write(folder: Path, seed: int, *, leaves_way: bool, is_camouflaged: bool) -> Path:
         asked.append(leaves_way)
+        camouflaged.append(is_camouflaged)
         return folder
 
     monkeypatch.setattr(obstacles, "write_cluttered_mission", write)
     for trial in obstacles.make_trials(obstacles.ROWS[obstacles.CAMERA], 1_000_000, 20):
         obstacles.write_mission(trial, tmp_path)
     assert asked.count(False) == 2 and asked.count(True) == 18
+    assert camouflaged == [False, True] * 10
 
 
 @pytest.mark.parametrize(("day", "seed"), [(0, 1), (10, 2), (40, 3)])  # days of flat light, which needs no extra
