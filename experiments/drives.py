@@ -65,7 +65,7 @@ class Mission(NamedTuple):
 
 def drive_task(task: Task, *sinks: Sink) -> Mission:
     """Drive a mission in the simulator, which alone knows the truth."""
-    beliefs = DoorBeliefs(task.stage().scenario.truth.doors)
+    beliefs = DoorBeliefs(task.load().truth.doors)
     return Mission(run_task(task, sinks=[*sinks, beliefs]), beliefs.shut)
 
 
@@ -117,6 +117,25 @@ class End:
     def is_lost_in_place(self) -> bool:
         """Whether it ended lost, though it was where it believed."""
         return self.outcome == "lost" and self.belief_off_m is not None and self.belief_off_m <= IN_PLACE_M
+
+
+REACHED_M = 0.3
+"""A robot that says that it has reached the goal is wrong if it is farther away: another room is metres away."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoalEnd(End):
+    """The end of a mission that may be at another place than it says: one that looks alike."""
+
+    @property
+    def is_right(self) -> bool:
+        """Whether it reached the goal, and says so."""
+        return self.is_reached and self.error_m <= REACHED_M
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether it says that it reached the goal, and is elsewhere."""
+        return self.is_reached and self.error_m > REACHED_M
 
 
 def first_seed(seed: int, first: int = 1_000_000, apart: int = 10_000) -> int:

@@ -139,9 +139,9 @@ class FloorAhead:
         points = shapely.line_interpolate_point(way, along)
         free_m = most_m
         for entry, polygon in self._suspected:
-            gaps = shapely.distance(points, polygon)
             if touched and entry.value.touched_s is None:
                 continue
+            gaps = shapely.distance(points, polygon)
             near_m, away_m = (TOUCHED_GAP_M, TOUCHED_AWAY * step_m) if touched else (0.0, -1e-9)
             met = np.flatnonzero((gaps[1:] < self._robot.radius_m + near_m) & (gaps[1:] < gaps[:-1] + away_m))
             if len(met):

@@ -17,15 +17,13 @@ from blackboard.journal import Decision
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from experiments import drives
-from experiments.drives import Claim, Driven, End, Trial
+from experiments.drives import Claim, Driven, GoalEnd, Trial
 from experiments.generated.missions import write_twin_mission
 from experiments.report import Cell, Report
 from experiments.trials import at_most
 from harvey.campaign.campaign import Task
 from world_models.entries.location import PlaceOdds
 
-REACHED_M = 0.3
-"""A robot that says that it has reached the goal is wrong if it is farther away: another room is metres away."""
 RIGHT, WRONG = "right", "wrong"
 MISSIONS, QUICK_MISSIONS = 3_000, 4
 P_TOLD_RIGHT = 0.98
@@ -33,7 +31,7 @@ MIN_REACHED, MIN_NOTICED, MAX_WRONG = 0.99, 0.90, 0.001
 
 
 @dataclass(frozen=True, slots=True)
-class TwinEnd(End):
+class TwinEnd(GoalEnd):
     """How a mission ended, in whose row the robot was told the room right or wrong.
 
     Attributes:
@@ -45,16 +43,6 @@ class TwinEnd(End):
     rooms: int
     doubts: int
     by_odds: int
-
-    @property
-    def is_right(self) -> bool:
-        """Whether it reached the goal, and says so."""
-        return self.is_reached and self.error_m <= REACHED_M
-
-    @property
-    def is_wrong(self) -> bool:
-        """Whether it says that it reached the goal, and is elsewhere."""
-        return self.is_reached and self.error_m > REACHED_M
 
     @property
     def is_noticed(self) -> bool:

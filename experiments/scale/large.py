@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from experiments import drives
-from experiments.drives import Claim, Driven, End, Trial
+from experiments.drives import Claim, Driven, GoalEnd, Trial
 from experiments.generated.missions import write_large_mission
 from experiments.report import Report
 from harvey.campaign.campaign import Task
@@ -21,28 +21,17 @@ from logs.run_head import load_known_world
 MAX_CPU_S: Mapping[str, float] = {"58 rooms": 15.0, "99 rooms": 20.0}
 """Processor time that a mission may cost on the mean."""
 MISSIONS, QUICK_MISSIONS = 20, 1
-REACHED_M = 0.3
 MIN_REACHED = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class LargeEnd(End):
+class LargeEnd(GoalEnd):
     """How a mission ended, and its processor time [s], without reading the building.
 
     The first mission of a process compiles what is not compiled yet.
     """
 
     cpu_s: float
-
-    @property
-    def is_right(self) -> bool:
-        """Whether it reached the goal, and says so."""
-        return self.is_reached and self.error_m <= REACHED_M
-
-    @property
-    def is_wrong(self) -> bool:
-        """Whether it says that it reached the goal, and is elsewhere."""
-        return self.is_reached and self.error_m > REACHED_M
 
 
 def drive(trial: Trial) -> LargeEnd:

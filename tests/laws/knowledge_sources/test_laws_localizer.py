@@ -115,7 +115,7 @@ ACTION = SensingAction(1.0, 0.3, 2.0)
 
 
 def candidate(pose: Pose2, log_likelihood: float, weight: float = 0.5) -> PlaceCandidate:
-    """A place that the looks bear out; its pose in the room."""
+    """A place that the looks confirm, and the robot's pose in its room."""
     fits = PoseLikelihood(20, 18, log_likelihood, 0.9, 0.9)
     return PlaceCandidate(ROOM, in_world(pose), np.diag([1e-3, 2e-3, 1e-4]), fits, True, weight)
 
