@@ -52,7 +52,7 @@ POSES: Mapping[str, type] = {
 """Pose and covariance are in the locale's frame; h is the heading."""
 MILESTONES: Mapping[str, type] = {
     "cycle": int, "time_s": float, "name": str, "verdict": str, "expected": int, "matched": int,
-    "deviation_m": float, "deviation_rad": float, "p_false": float, "entries": str}
+    "deviation_m": float, "deviation_rad": float, "p_wrong": float, "most_p_wrong": float, "entries": str}
 TURNS: Mapping[str, type] = {"cycle": int, "time_s": float, "kind": str, "text": str}
 TRUTH: Mapping[str, type] = {"cycle": int, "world_x_m": float, "world_y_m": float, "world_heading_rad": float}
 

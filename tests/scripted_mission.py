@@ -170,7 +170,7 @@ def _judge(view: View) -> Iterable[Effect]:
     milestone, sketch = _last(view, Milestone), _last(view, PlanSketch)
     yield Revise(milestone, replace(milestone.value, status="verified"))
     yield Post(Certificate(milestone.id, "PoseFix-1", "verified", "2 of 2 lines", 2, 2, 1, 0.9, 0.5, 0.02, 0.01, 1.5,
-                           30.0, 1e-6), (milestone,))
+                           30.0, 1e-6, 1e-6, 0.006), (milestone,))
     yield Revise(sketch, replace(sketch.value, verified=True))
 
 

@@ -14,7 +14,8 @@ from world_models.entries.location import Hypothesis, diagonal
 from world_models.entries.task import Certificate, Milestone, Outcome
 from world_models.frames import Pose2
 
-CERTIFICATE = Certificate("Milestone-1", "", "refuted", "1 of 9 lines", 9, 3, 1, 0.1, 1.0, 0.1, 0.0, 9.0, 30.0, 1.0)
+CERTIFICATE = Certificate("Milestone-1", "", "refuted", "1 of 9 lines", 9, 3, 1, 0.1, 1.0, 0.1, 0.0, 9.0, 30.0, 1.0,
+                          1.0, 0.006)
 HELD = Hypothesis("kitchen", Pose2(1.0, 2.0, 0.0), diagonal(0.01, 0.01), "odometry")
 
 

@@ -92,7 +92,7 @@ class Hall:
     def verify(self, verdict: MilestoneVerdict = "verified") -> None:
         """A milestone is judged."""
         self.apply(Post(Certificate("Milestone-1", "", verdict, "so it was", 9, 9, 9, 1.0, 0.2, 0.0, 0.0, 0.0, 4.0,
-                                     1e-3)))
+                                     1e-3, 1e-3, 0.006)))
 
     def find(self, basis: str, correction: Pose2 | None = None) -> None:
         """The belief is corrected by a milestone, or by being found after it was lost, so far from where it was."""

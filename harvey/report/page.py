@@ -128,7 +128,7 @@ def _milestones(story: RunStory) -> Iterator[str]:
         numbers: Sequence[str] = (
             "" if row.time_s is None else f"{row.time_s:.1f}", f"{row.matched} of {row.expected}",
             "" if row.deviation_m is None else f"{1e3 * row.deviation_m:.1f}",
-            "" if row.p_false is None else f"{row.p_false:.1g}")
+            *("" if p is None else f"{p:.2g}" for p in (row.p_wrong, row.most_p_wrong)))
         when, *others = (f"<td>{escape(cell)}</td>" for cell in numbers)
         name = f"<td>{escape(row.name)} {' '.join(_reference(ref) for ref in row.refs[:1])}</td>"
         verdict = f'<td class="{escape(row.verdict.replace(" ", "-"))}">{escape(row.verdict)}</td>'

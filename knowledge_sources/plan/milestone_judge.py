@@ -27,6 +27,7 @@ from knowledge_sources.methods.verification.weigh import (
     compute_coverage_elsewhere,
     is_last_look,
     judge_place,
+    tell_odds,
     weigh_picture,
 )
 from knowledge_sources.place_believed import find_p_not_alias
@@ -124,8 +125,9 @@ class MilestoneJudge(RobotKnowledgeSource):
         rival = self._find_rival(view, case, weighed) if verdict.kind == "verified" else None
         if rival is None or rival.p <= self._settings.plan.max_p_rival:
             return verdict
-        return Verdict("not testable", f"{verdict.reason}; but {rival.said} ({rival.p:.0%})",
-                       max(weighed.p_false, rival.p))
+        odds = rival.p, self._settings.plan.max_p_rival
+        reason = f"{verdict.reason}; but {rival.said}: {tell_odds(*odds)}"
+        return Verdict("not testable", reason, *odds, p_rival=rival.p)
 
     def _find_rival(self, view: View, case: Case, weighed: Weighed) -> Rival | None:
         """Where else the picture is most likely taken, by the belief and by the picture; None where nowhere."""

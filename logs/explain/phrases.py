@@ -12,8 +12,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from textwrap import fill
 from typing import Any
 
-import numpy as np
-
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from logs.records import WHAT_IF, Candidate, EntryRecord
@@ -198,8 +196,7 @@ def describe_line_match(history: Timeline, record: EntryRecord[Any]) -> str:
     rest = [f"{landmark(name)} ({len(pairs)})" for name, pairs in others]
     more = f"; the other {agreeing - len(numbers)} with {listed(rest)}" if rest else ""
     of_all = f" of {count(len(seen.segments_px), 'line segment')}" if seen is not None else ""
-    lines = len(np.unique(match.value.pairs[fix.inliers][:, 0]))
-    return (f"{agreeing}{of_all}{where} were matched with {count(lines, 'model line')}: {_segments(numbers)} with"
+    return (f"{agreeing}{of_all}{where} were paired with lines of the model: {_segments(numbers)} with"
             f" {landmark(best)}{more}.")
 
 
@@ -221,13 +218,11 @@ def _segments(numbers: list[int]) -> str:
 def verdict(certificate: Certificate, milestone: Milestone | None) -> str:
     """What was concluded, with the numbers that decided."""
     what = milestone_name(milestone) if milestone is not None else certificate.milestone
-    chance = f"the probability that so much agrees at a wrong place is {certificate.p_false:.2g}"
     if certificate.verdict != "verified":
-        judged = f"(at the pose that was found; from the belief it expected {count(certificate.expected, 'line')})"
-        return f"{what} was judged {certificate.verdict}: {certificate.reason} {judged}; {chance}."
+        return f"{what} was judged {certificate.verdict}: {certificate.reason}."
     off = f"{metres(certificate.deviation_m)} and {degrees(abs(certificate.deviation_rad))} from what was believed"
-    return (f"{what} was verified: {certificate.reason} (up to {certificate.tolerance_px:.0f} px may be corrected);"
-            f" the pose is {off}; {chance}.")
+    return (f"{what} was verified: {certificate.reason}; the pose is {off}, and up to"
+            f" {certificate.tolerance_px:.0f} px may be corrected.")
 
 
 def milestone_name(milestone: Milestone) -> str:

@@ -39,7 +39,7 @@ WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, UserReport,
 PLANS: tuple[type[Any], ...] = (Goal, PlanSketch)
 MOST_PLACES = 4
 """So many places that came into question are told, the newest."""
-COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p chance")
+COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong", "at most")
 MOST_ROWS = 60
 """Of more rows only those are printed that were not verified, and the last ones."""
 MILESTONES = "Milestones"
@@ -85,7 +85,8 @@ class MilestoneRow:
         verdict: verified, refuted, not testable; or withdrawn, expected, turning.
         expected, matched: numbers of model lines.
         deviation_m, deviation_rad: from the belief that predicted it; None where it was not judged.
-        p_false: probability that so much agrees at a wrong place.
+        p_wrong, most_p_wrong: probability of a wrong place by which it was decided, and the bound on it that decided;
+            None where it was not judged.
         refs: certificate and milestone.
     """
 
@@ -97,7 +98,8 @@ class MilestoneRow:
     matched: int
     deviation_m: float | None
     deviation_rad: float | None
-    p_false: float | None
+    p_wrong: float | None
+    most_p_wrong: float | None
     refs: tuple[str, ...]
 
 
@@ -381,10 +383,10 @@ def read_milestones(history: Timeline) -> tuple[MilestoneRow, ...]:
             name, ref = (c.milestone, f"{c.milestone}.0") if below is None else (_name(below), below.ref)
             rows.append(MilestoneRow(
                 record.cycle, history.time_at(record.cycle), name, c.verdict, c.expected, c.matched, c.deviation_m,
-                c.deviation_rad, c.p_false, (record.ref, ref)))
+                c.deviation_rad, c.p_wrong, c.most_p_wrong, (record.ref, ref)))
     judged = {ref.rpartition(".")[0] for row in rows for ref in row.refs}
     rows += [MilestoneRow(one.cycle, history.time_at(one.cycle), _name(one), str(one.fields["status"]),
-                          len(one.fields["expected"]), 0, None, None, None, (one.ref,))
+                          len(one.fields["expected"]), 0, None, None, None, None, (one.ref,))
              for one in history.last_of_kind(Milestone) if one.id not in judged]
     return tuple(sorted(rows, key=lambda row: row.cycle))
 
@@ -409,11 +411,12 @@ def milestone_lines(rows: Sequence[MilestoneRow]) -> Iterator[str]:
 
 
 def _cells(row: MilestoneRow) -> tuple[str, ...]:
-    off_m, off_rad, p = row.deviation_m, row.deviation_rad, row.p_false
+    off_m, off_rad = row.deviation_m, row.deviation_rad
     return (
         str(row.cycle), "-" if row.time_s is None else f"{row.time_s:.1f}", row.name, row.verdict,
         f"{row.matched} of {row.expected}", "-" if off_m is None else f"{1e3 * off_m:.1f}",
-        "-" if off_rad is None else f"{math.degrees(abs(off_rad)):.1f}", "-" if p is None else f"{p:.1g}")
+        "-" if off_rad is None else f"{math.degrees(abs(off_rad)):.1f}",
+        *("-" if p is None else f"{p:.2g}" for p in (row.p_wrong, row.most_p_wrong)))
 
 
 def story_lines(story: RunStory) -> Iterator[str]:

@@ -181,9 +181,9 @@ class LineMatch:
     is_camera_open: bool = False
 
     def sentence(self) -> str:
-        lines, segments = (len(set(column.tolist())) for column in self.pairs.reshape(-1, 2).T)
-        return (f"{words.count(segments, 'segment')} matched to {lines} of {len(self.coverage)} expected model lines;"
-                f" {self.segments} against {self.milestone}, match error {self.error:.3g}")
+        segments = len(set(self.pairs.reshape(-1, 2)[:, 1].tolist()))
+        return (f"{words.count(segments, 'segment')} paired with model lines; {self.segments} against {self.milestone},"
+                f" match error {self.error:.3g}")
 
 
 @inference(keep=2, needs=match_solved)

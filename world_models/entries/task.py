@@ -304,7 +304,11 @@ class Certificate:
         residual_px: RMS distance of the inliers.
         deviation_m, deviation_rad, deviation_px: from the belief that predicted it.
         tolerance_px: up to where the wheels may have put it (§3.2) and the plan may adjust it (§6.1.4's window).
-        p_false: probability that the pose is wrong, as counted on rendered floors where half of the places are.
+        p_false: probability that the pose is wrong by this picture alone, as counted on rendered floors where half of
+            the places are, or that of a place that looks the same if it is larger.
+        p_wrong: the probability of a wrong place by which the verdict was decided, with what was believed before.
+        most_p_wrong: the bound on it that decided: up to it a place is verified; of what agrees too little for any
+            place, from it on it is refuted.
         faces, faces_alike: how many faces' colours were compared, and the part of them that is as the model says.
     """
 
@@ -322,17 +326,16 @@ class Certificate:
     deviation_px: float
     tolerance_px: float
     p_false: float
+    p_wrong: float
+    most_p_wrong: float
     faces: int = 0
     faces_alike: float = 0.0
 
     def sentence(self) -> str:
-        agree = (f"{words.count(self.inliers, 'segment')} agree to {words.quantity(self.residual_px, 'px')} with"
-                 f" {self.matched} of the {words.count(self.expected, 'line')} that should be in view")
         shift = (f"{words.quantity(self.deviation_px, 'px')} of the {words.quantity(self.tolerance_px, 'px')} that may"
                  " be corrected")
-        return (f"{self.verdict}: {self.reason}; {self.milestone}; {agree}; {words.metres(self.deviation_m)} and"
-                f" {words.degrees(self.deviation_rad)} from the belief, {shift}; the probability that so much"
-                f" agrees at a wrong place is {self.p_false:.2g}")
+        return (f"{self.verdict}: {self.reason}; {self.milestone}; {words.metres(self.deviation_m)} and"
+                f" {words.degrees(self.deviation_rad)} from the belief, {shift}")
 
 
 @inference()

@@ -178,7 +178,7 @@ def is_explained(shut: Explanation, opened: Explanation | None, *, is_sure: bool
     if not shut.is_solved:
         are_there = shut.matched >= MIN_FEW_SHARE * shut.expected
         return is_sure and (are_there or shut.expected < MIN_FEW_LINES)
-    if not POSE_CONFIDENCE.accepts(shut.p_false):
+    if shut.p_false > POSE_CONFIDENCE.accept:
         return False
     return opened is None or not opened.is_solved or opened.p_false > MIN_EXPLAINED_BETTER * shut.p_false
 

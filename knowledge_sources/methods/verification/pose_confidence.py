@@ -214,11 +214,6 @@ class PoseConfidence:
         weights = self.lines_and_colors if evidence.color_count > 0.0 else self.lines_only
         return float(weights.p_false(evidence.values[None])[0])
 
-    def accepts(self, p_false: float, prior_wrong: float = 0.5) -> bool:
-        """Whether a pose is accepted that was wrong with probability ``prior_wrong`` before (Bayes' rule)."""
-        wrong, right = p_false * prior_wrong, (1.0 - p_false) * (1.0 - prior_wrong)
-        return wrong <= self.accept * (wrong + right)
-
     @staticmethod
     def from_table(table: dict[str, Any]) -> PoseConfidence:
         """Read the weights and limits from ``verification_weights.toml``."""

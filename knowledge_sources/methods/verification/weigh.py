@@ -68,7 +68,6 @@ class Weighed:
         p_false: probability that the pose is wrong, by lines and colours.
         p_wrong: the same with what was believed before, and with the looks in other directions.
         most_p_wrong: how much of that is accepted; where no other look is left, as much as is believed.
-        is_enough: whether it is.
         shift_px: median distance of the lines from where they were expected.
         tolerance_px: the largest that may be.
         is_inexact: whether the model's lines may be displaced.
@@ -89,7 +88,6 @@ class Weighed:
     p_false: float
     p_wrong: float
     most_p_wrong: float
-    is_enough: bool
     shift_px: float
     tolerance_px: float
     is_weak: bool
@@ -99,11 +97,26 @@ class Weighed:
 
 
 class Verdict(NamedTuple):
-    """What is decided: ``verified``, ``refuted`` or ``not testable``, in words why, and how likely it is wrong."""
+    """What is decided.
+
+    Attributes:
+        kind: ``verified``, ``refuted`` or ``not testable``.
+        reason: in words, with the one count of lines and the bound that decided.
+        p_wrong: the probability of a wrong place by which it was decided.
+        most_p_wrong: what of it is accepted; of what agrees too little for any place, where refuting begins.
+        p_rival: of another place at which the picture may have been taken.
+    """
 
     kind: MilestoneVerdict
     reason: str
-    p_false: float
+    p_wrong: float
+    most_p_wrong: float
+    p_rival: float = 0.0
+
+
+def tell_odds(p_wrong: float, most_p_wrong: float) -> str:
+    """A probability of a wrong place beside its bound, in words."""
+    return f"wrong with a probability of {100.0 * p_wrong:.2g}%, and at most {100.0 * most_p_wrong:.2g}% may be"
 
 
 def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, settings: Settings) -> Weighed:
@@ -141,9 +154,8 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         p_false=p_false,
         p_wrong=p_after,
         most_p_wrong=most,
-        is_enough=p_after <= most or POSE_CONFIDENCE.accepts(p_false, p_wrong),
         shift_px=_median_shift(expected_px, plain_px),
-        tolerance_px=_find_tolerance_px(before, motion_px, POSE_CONFIDENCE.accepts(p_false), s),
+        tolerance_px=_find_tolerance_px(before, motion_px, p_false <= POSE_CONFIDENCE.accept, s),
         is_weak=before.in_doubt or not followed,
         is_inexact=bool(milestone.displacement_modes),
         camera_chi2=fix.camera_chi2,
@@ -168,30 +180,31 @@ def _find_tolerance_px(before: Before, motion_px: float, is_sure: bool, settings
 
 def judge_place(w: Weighed, settings: Settings) -> Verdict:
     """The verdict by this place alone, and why."""
-    a, faces = w.lines.agreement, w.faces
+    a, faces, odds = w.lines.agreement, w.faces, (w.p_wrong, w.most_p_wrong)
+    least = settings.verification.min_matched_lines
     if w.segments.contrast < settings.plan.min_contrast:
-        return Verdict("not testable", f"the frame is dark (contrast {w.segments.contrast:.1f} of 255)", w.p_false)
-    if w.expected < settings.verification.min_matched_lines:
-        return Verdict("not testable", f"only {w.expected} lines are expected in this view", w.p_false)
+        return Verdict("not testable", f"the frame is dark (contrast {w.segments.contrast:.1f} of 255)", *odds)
+    if w.expected < least:
+        return Verdict("not testable", f"{a.visible} lines are in this view, and fewer than {least} do not tell", *odds)
     colours = f" and {round(faces.agreeing * faces.count)} of {faces.count} faces' colours" * faces.is_testable
     found = f"{a.matched} of {a.visible} lines, {w.lines.coverage:.0%} of their length,{colours} accounted for"
     if w.p_false >= POSE_CONFIDENCE.refute:
+        odds = w.p_false, POSE_CONFIDENCE.refute
         if not w.is_camera_known:  # a place where the camera's own error hides what agrees
-            return Verdict("not testable", f"{found}: the camera is not known well enough to tell", w.p_false)
+            return Verdict("not testable", f"{found}: the camera is not known well enough to tell", *odds)
         kind: MilestoneVerdict = "not testable" if w.is_inexact else "refuted"
-        return Verdict(kind, f"{found}; at a wrong place {a.chance:.0%} are by chance", w.p_false)
+        return Verdict(kind, f"{found}: by this picture {tell_odds(*odds)}", *odds)
     where = f"{found}, {w.shift_px:.1f} px from where expected"
     if w.camera_chi2 > settings.camera_state.max_chi2:
-        return Verdict("refuted", f"{where}: only with a camera that is mounted otherwise than it can be", w.p_false)
-    if not w.is_enough or a.matched < settings.verification.min_matched_lines:
-        asked = f"wrong with {w.p_wrong:.1%}, and at most {w.most_p_wrong:.1%} may be" * (not w.is_enough)
-        few = f"fewer than {settings.verification.min_matched_lines} lines" * w.is_enough
-        return Verdict("not testable", f"{where}: not enough to tell the place by ({asked}{few})", w.p_false)
+        return Verdict("refuted", f"{where}: only with a camera that is mounted otherwise than it can be", *odds)
+    if w.p_wrong > w.most_p_wrong:
+        return Verdict("not testable", f"{where}: not enough to tell the place by: {tell_odds(*odds)}", *odds)
+    if a.matched < least:
+        return Verdict("not testable", f"{where}: not enough to tell the place by: fewer than {least} lines", *odds)
     if w.shift_px > w.tolerance_px:
         most = f"more than the {w.tolerance_px:.0f} px that the plan may be adjusted by"
-        return Verdict("refuted", f"{where}: {most}", w.p_false)
-    together = f"; with the looks in other directions wrong with {w.p_wrong:.1%}" * (w.p_wrong > POSE_CONFIDENCE.accept)
-    return Verdict("verified", where + together, w.p_false)
+        return Verdict("refuted", f"{where}: {most}", *odds)
+    return Verdict("verified", f"{where}: {tell_odds(*odds)}", *odds)
 
 
 def is_last_look(milestone: Milestone, plan: PlanSettings) -> bool:
@@ -225,7 +238,9 @@ def certify(names: tuple[str, str], w: Weighed, verdict: Verdict, fix: PoseFix) 
         deviation_rad=wrap_angle(w.pose.heading_rad - w.before.heading_rad),
         deviation_px=w.shift_px,
         tolerance_px=w.tolerance_px,
-        p_false=verdict.p_false,
+        p_false=max(w.p_false, verdict.p_rival),
+        p_wrong=verdict.p_wrong,
+        most_p_wrong=verdict.most_p_wrong,
         faces=w.faces.count,
         faces_alike=w.faces.agreeing,
     )

@@ -103,7 +103,8 @@ class ScriptedJudge(RobotKnowledgeSource):
         here, nothing = belief.value.world_from_robot(find_building(view)), np.zeros((0, 2))
         fix = Post(PoseFix("", here, np.array(SURE), nothing[:, 0] > 0, nothing, ()), (trigger.entry,))
         yield fix
-        told = Certificate(milestone.id, _next_fix(view), verdict, "", 9, 9, 9, 1.0, 0.5, 0.0, 0.0, px, PLAN_PX, 0.0)
+        told = Certificate(milestone.id, _next_fix(view), verdict, "", 9, 9, 9, 1.0, 0.5, 0.0, 0.0, px, PLAN_PX,
+                           0.0, 0.0, 0.006)
         yield Post(told, (fix, milestone))
         yield Revise(milestone, replace(milestone.value, status=verdict), (fix,))
         if px == UNTOLD and len(milestone.value.tried) + 1 < DEFAULT.plan.max_looks:

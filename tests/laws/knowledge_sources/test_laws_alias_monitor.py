@@ -58,7 +58,8 @@ def verify(
         LineMatch("Milestone-1", looked.id, np.zeros((0, 2), np.int64), np.zeros((0, 2, 3)), BARE, 0.0, np.zeros(0))
     )
     fix = bench.put(PoseFix(match.id, pose, np.diag([1e-4, 1e-4, 1e-5]), np.ones(0, bool), np.zeros(0), ()))
-    return bench.put(Certificate("Milestone-1", fix.id, verdict, "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0, 0.001))
+    return bench.put(Certificate("Milestone-1", fix.id, verdict, "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0,
+                                 0.001, 0.001, 0.006))
 
 
 def say(seen: np.ndarray, here: Pose2, there: Pose2) -> float:

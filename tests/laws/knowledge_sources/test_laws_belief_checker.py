@@ -31,7 +31,8 @@ def doubtful(pose: Pose2 | None = None) -> tuple[Bench, Entry[Discrepancy]]:
 
 def certify(bench: Bench, milestone: str, p_false: float, matched: int) -> None:
     """What a look for a milestone said."""
-    said = Certificate(milestone, "", "not testable", "", 9, matched, matched, 0.5, 1.0, 0.0, 0.0, 0.0, 10.0, p_false)
+    said = Certificate(milestone, "", "not testable", "", 9, matched, matched, 0.5, 1.0, 0.0, 0.0, 0.0, 10.0, p_false,
+                       p_false, 0.006)
     bench.put(said)
 
 

@@ -36,7 +36,8 @@ def verify(bench: Bench, step: tuple[float, ...], sigmas: tuple[float, ...], pos
     fix = bench.put(PoseFix("LineMatch-1", pose, np.diag([1e-4, 1e-4, 1e-5]), np.ones(0, bool), np.zeros(0), (),
                             step, covariance))
     return fix, bench.put(
-        Certificate("Milestone-1", fix.id, verdict, "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0, 0.001))
+        Certificate("Milestone-1", fix.id, verdict, "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0, 0.001, 0.001,
+                    0.006))
 
 
 @settings(max_examples=40)

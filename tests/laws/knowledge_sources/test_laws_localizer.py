@@ -236,7 +236,8 @@ def test_the_odds_by_which_a_place_is_found_are_told_with_it(refuted: int, verif
         bench.put(PlaceOdds(ROOM, 2, "told", 0.9, 0.99, 0))
         bench.put(Discrepancy(Level.GOAL, "it is elsewhere", None, (0.0, 0.0), "px"))
     if verified:
-        bench.put(Certificate("Milestone-1", "", "verified", "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0, 0.001))
+        bench.put(Certificate("Milestone-1", "", "verified", "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0, 0.001, 0.001,
+                              0.006))
     here, there = candidate(TRUTH, 30.0), candidate(Pose2(1.0, 4.0, -2.0), 26.0)
     result = LocalizationResult(AMBIGUOUS, (there, here), None)
     effects, _ = search_says(bench, look_round(bench, (math.pi / 2, 0.0)), result)

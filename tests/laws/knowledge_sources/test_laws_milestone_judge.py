@@ -7,6 +7,7 @@ the robot is in doubt, has followed landmarks, or has not: each state has its ow
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
@@ -74,7 +75,7 @@ def weigh(**changed: Any) -> Any:
         "segments": Segments("CameraPicture-1", "Milestone-1", NO_LINES, np.zeros(0), contrast), "expected": 20,
         "lines": SimpleNamespace(agreement=agreement, coverage=0.9), "faces": changed.pop("faces", NO_FACES),
         "p_false": 0.5 * POSE_CONFIDENCE.accept, "p_wrong": 0.1 * POSE_CONFIDENCE.accept,
-        "most_p_wrong": POSE_CONFIDENCE.accept, "is_enough": True, "shift_px": 3.0, "tolerance_px": 10.0,
+        "most_p_wrong": POSE_CONFIDENCE.accept, "shift_px": 3.0, "tolerance_px": 10.0,
         "is_weak": False, "is_inexact": False, "camera_chi2": 0.0, "is_camera_known": True,
     }
     return SimpleNamespace(**(plain | changed))
@@ -82,6 +83,7 @@ def weigh(**changed: Any) -> Any:
 
 NO_FACES: Any = SimpleNamespace(is_testable=False, agreeing=0.0, count=0)
 FEW, REFUTE, CHI2 = VERIFICATION.min_matched_lines, POSE_CONFIDENCE.refute, DEFAULT.camera_state.max_chi2
+UNSURE = {"p_wrong": POSE_CONFIDENCE.accept + SMALL}
 
 
 @pytest.mark.parametrize(("changed", "verdict"), [
@@ -92,20 +94,40 @@ FEW, REFUTE, CHI2 = VERIFICATION.min_matched_lines, POSE_CONFIDENCE.refute, DEFA
     ({"expected": FEW - 1}, "not testable"),
     ({"matched": FEW}, "verified"),
     ({"matched": FEW - 1}, "not testable"),
-    ({"is_enough": False}, "not testable"),
-    ({"p_false": REFUTE - SMALL, "is_enough": False}, "not testable"),
-    ({"p_false": REFUTE + SMALL, "is_enough": False}, "refuted"),
-    ({"p_false": REFUTE + SMALL, "is_enough": False, "is_inexact": True}, "not testable"),
-    ({"p_false": REFUTE + SMALL, "is_enough": False, "is_camera_known": False}, "not testable"),
+    (UNSURE, "not testable"),
+    ({"p_false": REFUTE - SMALL, **UNSURE}, "not testable"),
+    ({"p_false": REFUTE + SMALL, **UNSURE}, "refuted"),
+    ({"p_false": REFUTE + SMALL, **UNSURE, "is_inexact": True}, "not testable"),
+    ({"p_false": REFUTE + SMALL, **UNSURE, "is_camera_known": False}, "not testable"),
     ({"camera_chi2": CHI2 - SMALL}, "verified"),
     ({"camera_chi2": CHI2 + SMALL}, "refuted"),
     ({"shift_px": 10.0 - SMALL}, "verified"),
     ({"shift_px": 10.0 + SMALL}, "refuted"),
     ({"shift_px": math.inf}, "refuted"),
-    ({"shift_px": 10.0 + SMALL, "is_enough": False}, "not testable"),
+    ({"shift_px": 10.0 + SMALL, **UNSURE}, "not testable"),
 ])
 def test_the_verdict_just_below_and_just_above_each_bound(changed: dict[str, Any], verdict: str) -> None:
     assert judge_place(weigh(**changed), DEFAULT).kind == verdict
+
+
+@given(st.integers(0, 60), st.floats(1e-9, 1.0), st.floats(1e-9, 1.0), st.sampled_from([POSE_CONFIDENCE.accept, 0.03]),
+       st.floats(0.0, 60.0), st.booleans())
+@settings(max_examples=200, deadline=None)
+def test_a_verdict_says_one_count_of_lines_and_the_bound_that_decided(
+    matched: int, p_false: float, p_wrong: float, most: float, shift_px: float, is_inexact: bool
+) -> None:
+    """Whatever it is, its reason has the figures of its fields, and no others of their kind."""
+    said = judge_place(weigh(matched=matched, p_false=p_false, p_wrong=p_wrong, most_p_wrong=most, shift_px=shift_px,
+                             is_inexact=is_inexact), DEFAULT)
+    assert re.findall(r"(\d+) of (\d+) lines", said.reason) == [(str(matched), "20")]
+    told = re.findall(r"wrong with a probability of ([^ ]+)%, and at most ([^ ]+)% may be", said.reason)
+    assert told in ([], [(f"{100.0 * said.p_wrong:.2g}", f"{100.0 * said.most_p_wrong:.2g}")])
+    is_by_odds = said.kind == "verified" or p_false >= REFUTE or p_wrong > most
+    assert bool(told) is is_by_odds
+    if said.kind == "verified" or not is_by_odds:
+        assert said.p_wrong <= said.most_p_wrong
+    else:
+        assert said.p_wrong >= said.most_p_wrong
 
 
 @pytest.mark.parametrize(("modes", "most"), [((), PLAN.max_looks), (("wall",), PLAN.max_inexact_looks)])
@@ -120,15 +142,6 @@ def test_it_looks_again_as_often_as_it_may(modes: tuple[str, ...], most: int) ->
 def test_what_was_told_changes_the_odds_by_bayes_rule(p: float, log_odds: float) -> None:
     updated = update(p, log_odds)
     assert updated / (1.0 - updated) == pytest.approx(p / (1.0 - p) * math.exp(log_odds))
-
-
-@pytest.mark.parametrize("p_wrong", [0.001, 0.05, 0.5, 0.9])
-def test_a_pose_is_accepted_up_to_the_stated_probability_of_being_wrong(p_wrong: float) -> None:
-    """After Bayes' rule with what was believed before: both sides of the bound."""
-    odds = POSE_CONFIDENCE.accept / (1.0 - POSE_CONFIDENCE.accept) * (1.0 - p_wrong) / p_wrong
-    bound = odds / (1.0 + odds)
-    assert POSE_CONFIDENCE.accepts(bound * (1.0 - 1e-9), p_wrong)
-    assert not POSE_CONFIDENCE.accepts(bound * (1.0 + 1e-6), p_wrong)
 
 
 class StateView(TracedView):
@@ -228,8 +241,8 @@ def test_each_state_of_the_robot_asks_for_its_own_evidence(judged: list[Judged])
                 for value, enough in ((bound * 0.99, True), (bound + 0.01 * (1.0 - bound), False)):
                     others = {name: (0.999 if enough else 1e-9) for name in states if name != own}
                     judge = MilestoneJudge(tune(**others, **{own: value}))
-                    is_enough = judge.weigh(view, case_on(view, trigger)).is_enough
-                    assert is_enough is enough, (own, in_doubt, followed, value)
+                    weighed = judge.weigh(view, case_on(view, trigger))
+                    assert (weighed.p_wrong <= weighed.most_p_wrong) is enough, (own, in_doubt, followed, value)
                 checked.append(own)
 
     for board, trigger in judged:
@@ -254,8 +267,8 @@ def test_where_no_other_view_is_left_all_looks_together_need_only_be_believed(ju
                 weighed = MilestoneJudge().weigh(view, case._replace(milestone=looked))
                 assert weighed.p_wrong == pytest.approx(wanted, rel=1e-6)
                 may_be = believed if tried + 1 == most else POSE_CONFIDENCE.accept
-                assert weighed.is_enough is (wanted <= may_be)
-                checked.add((tried, weighed.is_enough))
+                assert weighed.most_p_wrong == may_be
+                checked.add((tried, wanted <= may_be))
 
     for board, trigger in judged:
         check(board, trigger)
@@ -279,7 +292,7 @@ def test_landmarks_that_were_followed_speak_for_no_place_where_the_belief_leaves
         by_pixel = 1.0 / (VERIFICATION.motion_tolerance_sigmas * weigh_at(1e-3).robot.camera.fx)
         sure, unsure = weigh_at(0.5 * PLAN.max_followed_px * by_pixel), weigh_at(12.0 * PLAN.max_followed_px * by_pixel)
         wide = weigh_at(16.0 * PLAN.max_deviation_px * by_pixel)
-        checked.append((sure.is_weak, unsure.is_weak, POSE_CONFIDENCE.accepts(wide.p_false), wide.tolerance_px))
+        checked.append((sure.is_weak, unsure.is_weak, wide.p_false <= POSE_CONFIDENCE.accept, wide.tolerance_px))
 
     for board, trigger in judged:
         check(board, trigger)
@@ -351,7 +364,7 @@ def test_the_deviation_is_measured_where_the_place_is_known_or_is_beyond_the_win
     milestone: Any = case.milestone._replace(value=replace(case.milestone.value, tried=tried, told=(0.0,) * len(tried)))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(judge, "weigh", lambda *_: weighed)
-        patch.setattr(judge, "_hold_against_others", lambda *_: Verdict(verdict, "so", 1e-3))
+        patch.setattr(judge, "_hold_against_others", lambda *_: Verdict(verdict, "so", 1e-3, 0.006))
         effects = tuple(judge.act(view, case._replace(milestone=milestone)))
     found = made(effects, Discrepancy)
     assert bool(found) == (verdict != "not testable" or is_last)
@@ -389,7 +402,7 @@ def test_what_the_wheels_can_do_and_what_the_picture_leaves_open_count_together(
             fix = replace(case.fix.value, covariance=case.fix.value.covariance + np.diag([more, more, 1e-2 * more]))
             entry: Any = SimpleNamespace(value=fix, id=case.fix.id)
             weighed = judge.weigh(view, case._replace(fix=entry))
-            if POSE_CONFIDENCE.accepts(weighed.p_false):
+            if weighed.p_false <= POSE_CONFIDENCE.accept:
                 open_px = compute_motion_tolerance_px(
                     weighed.robot, np.array(case.milestone.value.expected), weighed.before,
                     weighed.covariance + fix.covariance, VERIFICATION)
@@ -453,7 +466,7 @@ def test_a_place_that_repeats_itself_is_held_against_it_by_bayes_rule(
     near = Pose2(weighed.pose.x_m + 0.05, weighed.pose.y_m, weighed.pose.heading_rad)
     other = near if is_near else Pose2(weighed.pose.x_m + 3.0, weighed.pose.y_m, weighed.pose.heading_rad)
     monkeypatch.setattr(milestone_judge, "list_aliases", lambda *_, **__: [Alias(other, margin)])
-    verdict = judge._hold_against_others(view, case, weighed, Verdict("verified", "so", 1e-3))
+    verdict = judge._hold_against_others(view, case, weighed, Verdict("verified", "so", 1e-3, PLAN.max_p_rival))
     spread = weighed.covariance + case.fix.value.covariance + 1e-9 * np.eye(3)
     (own, away) = (float(d @ np.linalg.solve(spread, d)) for d in (
         pose.minus(weighed.before) for pose in (weighed.pose, other)))
@@ -462,7 +475,8 @@ def test_a_place_that_repeats_itself_is_held_against_it_by_bayes_rule(
     against = (p_there * math.exp(-0.5 * max(away - own, 0.0)) + share) * math.exp(min(max(-margin, -most), most))
     p = against / (p_there + share + against)
     assert verdict.kind == ("verified" if p <= PLAN.max_p_rival else "not testable")
-    assert verdict.p_false == pytest.approx(1e-3 if p <= PLAN.max_p_rival else max(1e-3, p), rel=1e-3)
+    assert verdict.p_wrong == pytest.approx(1e-3 if p <= PLAN.max_p_rival else p, rel=1e-3)
+    assert verdict.p_rival == pytest.approx(0.0 if p <= PLAN.max_p_rival else p, rel=1e-3)
 
 
 @pytest.mark.parametrize(("p_false", "is_weak", "asked"), [
@@ -478,7 +492,7 @@ def test_how_far_it_is_held_against_the_rest_of_the_room(
     case = case_on(view, one.trigger)
     weighed = replace(judge.weigh(view, case), p_false=p_false, is_weak=is_weak)
     monkeypatch.setattr(milestone_judge, "list_aliases", lambda *_, search, **__: searched.append(search) or [])
-    assert judge._hold_against_others(view, case, weighed, Verdict("verified", "so", p_false)).kind == "verified"
+    assert judge._hold_against_others(view, case, weighed, Verdict("verified", "so", p_false, 1.0)).kind == "verified"
     assert searched == ([] if asked is None else [asked])
 
 

@@ -44,7 +44,8 @@ def fix_at(bench: Bench, pose: Pose2, covariance: Covariance) -> Entry[PoseFix]:
 
 
 def certify(bench: Bench, fix: str, verdict: MilestoneVerdict = "verified") -> Entry[Certificate]:
-    return bench.put(Certificate("Milestone-1", fix, verdict, "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0, 0.001))
+    return bench.put(Certificate("Milestone-1", fix, verdict, "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0, 0.001, 0.001,
+                                 0.006))
 
 
 @settings(max_examples=40)

@@ -66,7 +66,7 @@ def test_it_moves_what_was_seen_since_it_was_sure_and_was_not_touched(drawn: lis
     for cycle, one in enumerate(drawn, 1):
         is_thing = isinstance(one, tuple)
         value: Any = thing(one[0], is_touched=one[1], number=cycle) if is_thing else Certificate(
-            "Milestone-1", "", one, "so it was", 9, 9, 9, 1.0, 0.2, 0.0, 0.0, 0.0, 4.0, 1e-3)
+            "Milestone-1", "", one, "so it was", 9, 9, 9, 1.0, 0.2, 0.0, 0.0, 0.0, 4.0, 1e-3, 1e-3, 0.006)
         (change,) = board.apply([Post(value)], author="test", cycle=cycle)
         if is_thing and one[0] != "gone" and not one[1]:
             expected.append(change.entry)

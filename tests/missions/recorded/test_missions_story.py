@@ -123,8 +123,10 @@ def test_the_turning_points_are_those_that_the_run_found(told: tuple[str, Path],
 
 def test_every_verdict_of_the_journal_is_a_row(story: RunStory, history: Timeline) -> None:
     certificates = [record for record in history.of_kind(Certificate) if record.change == "Posted"]
-    judged = [row for row in story.milestones if row.p_false is not None]
-    assert [(row.cycle, row.verdict) for row in judged] == [(r.cycle, r.fields["verdict"]) for r in certificates]
+    judged = [row for row in story.milestones if row.p_wrong is not None]
+    told = [(row.cycle, row.verdict, row.matched, row.expected, row.p_wrong, row.most_p_wrong) for row in judged]
+    figures = "verdict", "matched", "expected", "p_wrong", "most_p_wrong"
+    assert told == [(r.cycle, *(r.fields[name] for name in figures)) for r in certificates]
     ids = {ref.rpartition(".")[0] for row in story.milestones for ref in row.refs if ref.startswith("Milestone-")}
     assert ids == {id for id in history.newest if id.startswith("Milestone-")}
 

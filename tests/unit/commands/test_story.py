@@ -101,8 +101,8 @@ def test_lost_and_found_are_told_with_place_and_reason(tmp_path: Path) -> None:
 
 
 def test_of_a_long_table_all_that_was_not_verified_is_shown() -> None:
-    rows = tuple(MilestoneRow(n, None, f"M{n}", "refuted" if n in (3, 40) else "verified", 9, 8, 0.1, 0.0, 0.5, ())
-                 for n in range(1, 4 * MOST_ROWS))
+    judged = ((n, "refuted" if n in (3, 40) else "verified") for n in range(1, 4 * MOST_ROWS))
+    rows = tuple(MilestoneRow(n, None, f"M{n}", verdict, 9, 8, 0.1, 0.0, 0.5, 0.01, ()) for n, verdict in judged)
     lines = list(milestone_lines(rows))
     assert lines[0] == f"Of {len(rows)} these {MOST_ROWS // 2 + 2}; --json has them all."
     assert sum("refuted" in line for line in lines) == 2

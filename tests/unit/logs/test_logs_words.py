@@ -121,7 +121,7 @@ def test_the_story_says_what_it_wants_expects_sees_doubts_and_does() -> None:
     assert ("**It believes** that it stands at (1.00, 1.00) m of kitchen, heading 0.0 degrees "
             "(sure to 20 mm and 0.6 degrees), by command.") in told
     assert "**Milestone** the door is expected; " in told and "should show 2 model lines of kitchen-door." in told
-    assert "**It sees** 3 line segments found; 2 segments matched to 2 of 2 expected model lines; 1 of 2" in told
+    assert "**It sees** 3 line segments found; 2 segments paired with model lines; 1 of 2" in told
     assert "**It doubts:** nothing now." in told
 
 
