@@ -20,7 +20,6 @@ from knowledge_sources.action.dependency_withdrawer import DependencyWithdrawer
 from knowledge_sources.action.door_toucher import DoorToucher
 from knowledge_sources.action.door_watcher import DoorWatcher
 from knowledge_sources.action.elevator_rider import ElevatorRider
-from knowledge_sources.action.fault_closer import FaultCloser
 from knowledge_sources.action.fault_handler import FaultHandler
 from knowledge_sources.action.floor_changer import FloorChanger
 from knowledge_sources.action.floor_watcher import FloorWatcher
@@ -108,7 +107,6 @@ KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
     GoalRenewer,
     AliasMonitor,
     FaultHandler,
-    FaultCloser,
     ModelReviser,
     GoalChanger,
     FloorWatcher,

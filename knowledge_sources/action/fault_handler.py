@@ -1,4 +1,4 @@
-"""Fault handler (§2, §4): a fault of the body is waited for, ever longer, but not for ever."""
+"""Fault handler (§2, §4): a fault of the body is waited for, ever longer, but not for ever; and then closed."""
 
 from __future__ import annotations
 
@@ -11,37 +11,39 @@ from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
+from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import NOT_GIVEN_UP
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import OPEN_FAULT
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import STOP_KEY, BodyFault, Recovery, Ride
+from world_models.entries.body import STOP_KEY, BodyFault, Course, MotorCommand, Recovery, Ride
 from world_models.entries.task import Impasse
 
 
 class Case(NamedTuple):
-    """A fault that is open, and the recovery that was in vain so far; None where none was asked for yet."""
+    """A fault, and the recovery that was in vain so far or has ended it; None where none was asked for yet."""
 
     fault: Entry[BodyFault]
     recovery: Entry[Recovery] | None
 
 
 class FaultHandler(RobotKnowledgeSource):
-    """Asks for recovery from a fault of the body that is open, each time after twice the pause.
+    """Asks for recovery from a fault of the body, each time after twice the pause; closes one that is over.
 
     After the stop key, and after ``max_fault_s``, there is no way on. An elevator that does not come is no fault of the
-    robot: then it is blocked.
+    robot: then it is blocked. A motion that was broken off puts the belief in doubt: a milestone must be verified
+    before the robot moves on. After ``max_broken_motions`` motions in a row that were broken off there is no way on.
     """
 
     level, priority = Level.ACTION, Priority.ENTER
-    on = (Watch(BodyFault, (Posted,)), Watch(Recovery, (Revised,), lambda r: r.status not in ("asked", "over")))
+    on = (Watch(BodyFault, (Posted,)), Watch(Recovery, (Revised,), lambda r: r.status != "asked"))
     needs = (NOT_GIVEN_UP,)
-    writes = (Recovery, Impasse)
+    writes = (BodyFault, Recovery, Discrepancy, Impasse)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         """An open fault for which nobody waits, the oldest of them."""
         asked = {entry.value.fault: entry for entry in view.all(Recovery)}
-        waiting = {id for id, entry in asked.items() if entry.value.status in ("asked", "over")}
+        waiting = {id for id, entry in asked.items() if entry.value.status == "asked"}
         fault = next((entry for entry in view.having(OPEN_FAULT, True) if entry.id not in waiting), None)
         return None if fault is None else Case(fault, asked.get(fault.id))
 
@@ -49,7 +51,9 @@ class FaultHandler(RobotKnowledgeSource):
         (fault, recovery), s = case, self._settings.action
         f, asked = fault.value, None if recovery is None else recovery.value
         because = (fault,) if recovery is None else (fault, recovery)
-        if STOP_KEY in (f.what, "" if asked is None else asked.what):
+        if recovery is not None and asked is not None and asked.status == "over":
+            yield from self._close(view, fault, recovery)
+        elif STOP_KEY in (f.what, "" if asked is None else asked.what):
             yield Post(Impasse("stopped", f.detail if asked is None else asked.detail), because)
         elif recovery is None or asked is None:
             yield Post(Recovery(fault.id, f.request, f.when_s, s.min_retry_wait_s), because)
@@ -59,6 +63,21 @@ class FaultHandler(RobotKnowledgeSource):
             again = replace(asked, status="asked", wait_s=min(2.0 * asked.wait_s, s.max_retry_wait_s))
             yield Revise(recovery, again, because)
 
+    def _close(self, view: View, fault: Entry[BodyFault], recovery: Entry[Recovery]) -> Iterable[Effect]:
+        closed = Revise(fault, replace(fault.value, status="over"), (recovery,))
+        yield closed
+        motion = view.get(recovery.value.request)
+        if motion is None or not isinstance(motion.value, MotorCommand | Course):
+            return
+        times = self._settings.action.max_broken_motions
+        if _were_all_broken_off(view, times):
+            reason = f"{times} motions in a row were broken off, the last one by: {fault.value.what}"
+            yield Post(Impasse("failed", reason), (closed,))
+            return
+        bound_px = self._settings.plan.max_deviation_px
+        what = f"{motion.id} was broken off: {fault.value.what}"
+        yield Post(Discrepancy(Level.PLAN, what, None, (bound_px, bound_px), "px"), (closed, recovery))
+
     def _give_up(self, request: Entry[Any] | None, fault: BodyFault, tried: Recovery) -> Impasse:
         """How the mission ends: without an elevator there is no way; else the body has failed."""
         if request is not None and isinstance(request.value, Ride):
@@ -67,3 +86,11 @@ class FaultHandler(RobotKnowledgeSource):
                            f" come: {why}; it was called for {tried.waited_s:.0f} s")
         return Impasse("failed", f"{fault.what}, and it was not over after {tried.waited_s:.0f} s; nothing more is"
                        " commanded")
+
+
+def _were_all_broken_off(view: View, times: int) -> bool:
+    """Whether each of the last ``times`` motions was broken off."""
+    broken = {entry.value.request for entry in view.all(BodyFault)}
+    asked = sorted((*view.all(MotorCommand), *view.all(Course)), key=lambda entry: -entry.cycle)
+    last = asked[:times]
+    return len(last) == times and all(command.id in broken for command in last)

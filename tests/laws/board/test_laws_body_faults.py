@@ -16,7 +16,6 @@ from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from blackboard.servoing import Discrepancy
 from harvey.runner.ports import BodyPort
-from knowledge_sources.action.fault_closer import FaultCloser
 from knowledge_sources.action.fault_handler import FaultHandler
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.settings import DEFAULT
@@ -85,7 +84,7 @@ def drive(requests: list[str], body: ScriptedBody) -> tuple[Scheduler, list[Any]
         told.extend(change.entry for change in (*decision.observed, *decision.made))
 
     scheduler = Scheduler(
-        [FaultHandler(), FaultCloser(), MissionMonitor(),
+        [FaultHandler(), MissionMonitor(),
          Scripted("asker", Note, asking, writes=(MotorCommand, PictureRequest))],
         ports=(BodyPort(body),), sinks=(listen,),
     )

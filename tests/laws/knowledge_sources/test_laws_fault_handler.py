@@ -1,4 +1,7 @@
-"""Law of faults: each open fault is waited for, ever longer, until the patience is at its end or somebody stops it."""
+"""Laws of faults: each open one is waited for, ever longer, until the patience is at its end or somebody stops it.
+
+One that is over is closed; a motion that it broke off is a doubt, too many in a row are the end.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +16,27 @@ from blackboard.board import Blackboard
 from blackboard.change import Posted, Revised
 from blackboard.effect import Post, Revise
 from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
 from knowledge_sources.action.fault_handler import FaultHandler
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.body import STOP_KEY, BodyFault, Recovery, RecoveryStatus, Ride
+from world_models.entries.body import (
+    STOP_KEY,
+    BodyFault,
+    Course,
+    MotorCommand,
+    PictureRequest,
+    Recovery,
+    RecoveryStatus,
+    Ride,
+)
 from world_models.entries.task import Impasse, Outcome
 
 SOURCE, S = FaultHandler(), DEFAULT.action
+MOST = S.max_broken_motions
+REQUESTS = (MotorCommand(0.1, 0.5), Course("Leg-1", 0.4, 0.0), PictureRequest("track"))
+steps = st.lists(st.tuples(st.sampled_from(REQUESTS), st.booleans()), min_size=1, max_size=2 * MOST)
+"""What was asked for, in order, and whether it was broken off."""
 PATIENCE_S = S.max_fault_s
 waits_s = st.sampled_from((0.05, 0.3, 1.0, S.max_retry_wait_s))
 whats = st.sampled_from(("link lost", STOP_KEY))
@@ -37,7 +55,7 @@ def test_it_wakes_by_a_new_fault_and_by_a_try_in_vain() -> None:
     for status in get_args(RecoveryStatus):
         value = Recovery("BodyFault-1", "MotorCommand-1", 1.0, 0.1, status=status)
         (change,) = board.apply([Post(value)], author="test", cycle=1)
-        assert any(w.sees(Revised(change.entry)) for w in SOURCE.on) == (status not in ("asked", "over"))
+        assert any(w.sees(Revised(change.entry)) for w in SOURCE.on) == (status != "asked")
         assert not any(w.sees(Posted(change.entry)) for w in SOURCE.on)
     (change,) = board.apply([Post(BodyFault("base", "link lost", "", "", 1.0))], author="test", cycle=1)
     assert any(w.sees(Posted(change.entry)) for w in SOURCE.on)
@@ -57,7 +75,7 @@ def test_the_oldest_open_fault_for_which_nobody_waits_is_answered(drawn: list[An
         if recovery is not None:
             (tried_change,) = board.apply([Post(replace(recovery, fault=change.entry.id))], author="test", cycle=1)
             tried = tried_change.entry
-        if not is_over and (tried is None or tried.value.status not in ("asked", "over")):
+        if not is_over and (tried is None or tried.value.status != "asked"):
             unanswered.append((change.entry, tried))
     if end is not None:
         board.apply([Post(end)], author="test", cycle=1)
@@ -66,7 +84,11 @@ def test_the_oldest_open_fault_for_which_nobody_waits_is_answered(drawn: list[An
     assert (effects is not None) == (bool(unanswered) and not is_given_up)
     if effects is None:
         return
-    (effect,), (fault, tried) = effects, unanswered[0]
+    (effect, *more), (fault, tried) = effects, unanswered[0]
+    if tried is not None and tried.value.status == "over":
+        assert isinstance(effect, Revise) and effect.entry is fault and effect.value.status == "over"
+        return
+    assert more == []
     assert list(effect.because) == [entry for entry in (fault, tried) if entry is not None]
     if fault.value.what == STOP_KEY or (tried is not None and tried.value.what == STOP_KEY):
         detail = fault.value.detail if tried is None else tried.value.detail
@@ -98,3 +120,46 @@ def test_an_elevator_that_does_not_come_is_named(part: float, detail: str) -> No
         return
     assert isinstance(effect, Post) and effect.value.kind == "blocked" and effect.value.is_open
     assert all(word in effect.value.reason for word in ("lift-a", "car-1", "car-2", detail or "first"))
+
+
+@given(steps, st.booleans())
+@settings(max_examples=200)
+def test_what_was_broken_off_is_a_doubt_and_so_many_in_a_row_are_the_end(
+    drawn: list[tuple[Any, bool]], has_ended: bool
+) -> None:
+    board, in_a_row = Blackboard(), 0
+    for cycle, (request, is_broken) in enumerate([*drawn[:-1], (drawn[-1][0], True)], 1):
+        (asked,) = board.apply([Post(request)], author="test", cycle=cycle)
+        if is_broken:
+            status: Any = "open" if cycle == len(drawn) else "over"
+            fault = BodyFault("base", "stalled", "so it was", asked.entry.id, 1.0, status=status)
+            (noticed,) = board.apply([Post(fault)], author="test", cycle=cycle)
+        if not isinstance(request, PictureRequest):
+            in_a_row = in_a_row + 1 if is_broken else 0
+    recovery = Recovery(noticed.entry.id, asked.entry.id, 1.0, 0.1, status="over")
+    (tried,) = board.apply([Post(recovery)], author="test", cycle=98)
+    if has_ended:
+        board.apply([Post(Outcome("failed", ""))], author="test", cycle=99)
+    effects = answer(SOURCE, board.view, Revised(tried.entry))
+    assert (effects is None) == has_ended
+    if effects is None:
+        return
+    closed, *more = effects
+    assert isinstance(closed, Revise) and closed.entry is noticed.entry and closed.value.status == "over"
+    assert tuple(closed.because) == (tried.entry,)
+    if isinstance(drawn[-1][0], PictureRequest):
+        assert more == []
+        return
+    (told,) = more
+    if in_a_row >= MOST:
+        assert isinstance(told.value, Impasse) and told.value.kind == "failed" and tuple(told.because) == (closed,)
+    else:
+        bound_px = DEFAULT.plan.max_deviation_px
+        assert isinstance(told.value, Discrepancy) and tuple(told.because) == (closed, tried.entry)
+        assert (told.value.level, told.value.magnitude) == (Level.PLAN, None)
+        assert told.value.bounds == (bound_px, bound_px) and asked.entry.id in told.value.what
+
+
+def test_a_fault_that_is_forgotten_is_not_closed() -> None:
+    (tried,) = Blackboard().apply([Post(Recovery("BodyFault-9", "x", 1.0, 0.1, status="over"))], author="t", cycle=1)
+    assert answer(SOURCE, Blackboard().view, Revised(tried.entry)) is None

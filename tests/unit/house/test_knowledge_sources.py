@@ -119,7 +119,7 @@ SHARED: dict[str, tuple[int, str]] = {
     "FreeFloor": (2, "two senses"),
     "Goal": (4, "set, reached, replaced because lost, replaced because asked"),
     "Hypothesis": (9, "each correction of the belief is one rule"),
-    "Impasse": (9, "who sees no way on says so; the mission monitor decides"),
+    "Impasse": (8, "who sees no way on says so; the mission monitor decides"),
     "Leg": (2, "two ways to drive: in increments, and on the move"),
     "Milestone": (7, "a chain: chosen, predicted, updated, judged, withdrawn"),
     "MotorCommand": (2, "on the way, and to look round when lost"),
