@@ -44,6 +44,7 @@ MAX_COMPARED_SEGMENTS = 300  # most segments of a view, the longest, that may be
 MAX_SIDES = 12  # most sides of an outline that are tried, those that are seen at the greatest length
 INSIDE_MARGIN_PX = 8.0  # distance within the outline from which a segment lies inside
 MAX_INSIDE_FRACTION = 0.1  # largest length of segments inside an opaque outline, as a part of the outline's own
+MIN_GROWTH = 1.05  # least part of an outline that is found by which one with what was known is larger, to be kept
 MAX_TRIED_FRACTION = 5.0  # where more lies inside, as of a texture, no single side is left out as chance
 
 
@@ -156,14 +157,20 @@ def _limit_turn_variance(covariance: Floats, variance: float) -> Floats:
 def update_obstruction(
     views: Sequence[CameraView], camera: Camera, known: Obstruction | None, min_area: float | None = None,
 ) -> Obstruction | None:
-    """Find what is before the camera in these views; else return what was known, unless something is seen inside it.
+    """Find what is before the camera in these views, with what was known of it, unless something is seen inside that.
 
+    A side is not found where what is behind it is as bright: so views that show some of the sides take back no other;
+    nor do views in which something is seen inside what was found itself: they are from before it was there.
     ``min_area`` is the smallest part of the picture, by default ``MIN_OBSTRUCTION_AREA``.
     """
     found = find_obstruction(views, camera, min_area)
-    if found is None and known is not None and is_opaque(known, [v.segments_px for v in views]):
-        return known
-    return found
+    if known is None:
+        return found
+    seen = [v.segments_px for v in views]
+    if found is None:
+        return known if is_opaque(known, seen) else None
+    both, since = _join(known, found, camera), [s for s in seen if is_opaque(found, [s])]
+    return both if since and is_opaque(both, since) else found
 
 
 def find_obstruction(views: Sequence[CameraView], camera: Camera, min_area: float | None = None) -> Obstruction | None:
@@ -274,6 +281,19 @@ def _enclose(sides: Sequence[_Side], camera: Camera, min_area: float) -> Obstruc
     if not min_area <= area <= MAX_OBSTRUCTION_AREA:
         return None
     return Obstruction(tuple((float(x), float(y)) for x, y in corners))
+
+
+def _join(known: Obstruction, found: Obstruction, camera: Camera) -> Obstruction:
+    """The hull of two outlines; what was found where that is hardly less, or the hull too large."""
+    sides = [_Side(np.array([corner, corner]), np.zeros((0, 2, 2))) for o in (known, found) for corner in o.outline_px]
+    both = _enclose(sides, camera, 0.0)
+    if both is None or _measure_area(both) < MIN_GROWTH * _measure_area(found):
+        return found
+    return both
+
+
+def _measure_area(obstruction: Obstruction) -> float:
+    return abs(float(cv2.contourArea(np.array(obstruction.outline_px, np.float32))))
 
 
 def _drop_worst_side(sides: list[_Side], others: list[Floats], camera: Camera) -> tuple[list[_Side], list[Floats]]:

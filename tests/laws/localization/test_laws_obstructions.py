@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.localization.views import (
     MAX_OBSTRUCTION_AREA,
+    MIN_GROWTH,
     CameraView,
     find_obstruction,
     has_counterpart,
@@ -228,6 +229,27 @@ def test_a_known_obstruction_is_kept_until_something_is_seen_inside_it(seed: int
     (left, top), _, (right, bottom), _ = obstruction.outline_px
     across = np.array([[[left + 10, top + 10], [right - 10, bottom - 10]]])
     assert update_obstruction([CameraView(across, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)))], CAMERA, obstruction) is None
+
+
+@few
+@given(seed=seeds, is_seen_before=st.booleans())
+def test_views_that_show_some_sides_take_back_no_other(seed: int, is_seen_before: bool) -> None:
+    rng = np.random.default_rng(seed)
+    obstruction, pose = outline(rng), somewhere(rng)
+    views = take_views(pose, obstruction, rng)
+    if is_seen_before:  # a look from before something stood there
+        views = [CameraView(seen(ROBOT, pose, None, rng), Pose2(0.0, 0.0, 0.3), np.zeros((3, 3))), *views]
+    found = find_obstruction(views, CAMERA)
+    assume(found is not None)
+    corner = rng.integers(4)
+    known = Obstruction(tuple(np.roll(np.array(obstruction.outline_px), corner, axis=0)[:3].tolist()))
+    now = update_obstruction(views, CAMERA, known)
+    assert found is not None and now is not None
+    assert np.all(now.covers(found.outline_px, round_px=4.0))
+    if is_opaque(found, [v.segments_px for v in views[-LOOKS:]]):
+        whole = cv2.convexHull(np.array([*known.outline_px, *now.outline_px], np.float32))
+        kept = cv2.contourArea(np.array(now.outline_px, np.float32))
+        assert cv2.contourArea(whole) <= 1.03 * MIN_GROWTH * kept  # a part is lost as corners are rounded
 
 
 @few
