@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.belief.odds import to_log_odds, update
+from knowledge_sources.methods.floor.door_beside import find_jamb_beside
 from knowledge_sources.methods.floor.found_things import (
     find_before,
     find_open_floor,
@@ -115,11 +116,17 @@ def weigh_sight(
         if not is_telling(thing, s):
             continue
         core = deepen(thing.footprint, sight.eye, OBSTACLE_DEPTH_M)
-        shape = _reach_to_rim(sight, core) if thing.is_cut else core
         rest, whole = {id: o for id, o in known.items() if id not in drafts}, MAX_HULL_PART
         if f.sense == "ranges":  # an echo tells how far a thing is, not where in its cone: any in it may be heard
             rest, whole = {id: o for id, o in rest.items() if may_be_there(o)}, math.inf
         id = find_before(rest, core, sight.eye, settings.plan.overhang_m) if thing.is_cut else None
+        jamb = find_jamb_beside(sight.world, f.locale, core, sight.eye) if thing.is_cut and id is None else None
+        shape = core
+        if jamb is not None:  # a door that is a little beside, before anything wider is believed
+            shape = core = jamb.shape
+            thing = replace(thing, evidence=f"{thing.evidence}, as a jamb of {jamb.door} that stands beside would")
+        elif thing.is_cut:
+            shape = _reach_to_rim(sight, core)
         id = id or find_same(rest, shape, thing.sigma_m, whole)
         if id is not None:
             new = see_again(sight, known[id], ways_m[id], thing, shape, free, s)
@@ -129,6 +136,8 @@ def weigh_sight(
         again = [build_polygon(draft.obstacle.footprint) for draft in drafts.values()]
         if any(shapely.intersection(polygon, shape).area > 0.5 * shape.area for polygon in again):
             continue  # another part of what was joined already
+        if jamb is None and _is_explained(sight, thing, shape):
+            continue
         found = see_first(sight, thing, shape, 1 + len(known) + fresh, s)
         if found is not None:
             fresh += 1
@@ -162,15 +171,19 @@ def _reach_to_rim(sight: Sight, shape: shapely.Polygon) -> shapely.Polygon:
     return build_polygon(shapely.get_coordinates(shapely.union(shape, largest)))
 
 
+def _is_explained(sight: Sight, thing: FloorThing, shape: shapely.Polygon) -> bool:
+    """Whether walls and things of the model may be all that is seen."""
+    locale = find_room(sight.world, shape, sight.floor.locale)
+    unexplained = shapely.intersection(shape, find_open_floor(sight.world, locale, TOUCH_MARGIN_M + thing.sigma_m))
+    return bool(unexplained.area < MIN_PART_UNEXPLAINED * shape.area)
+
+
 def see_first(
     sight: Sight, thing: FloorThing, shape: shapely.Polygon, number: int, settings: ActionSettings
 ) -> Obstacle | None:
-    """A thing that was not known; None where walls and things of the model may be all that is seen."""
+    """A thing that was not known; None where it stands on no floor."""
     f, world = sight.floor, sight.world
     locale = find_room(world, shape, f.locale)
-    unexplained = shapely.intersection(shape, find_open_floor(world, locale, TOUCH_MARGIN_M + thing.sigma_m))
-    if unexplained.area < MIN_PART_UNEXPLAINED * shape.area:
-        return None
     own = shapely.intersection(shape, find_open_floor(world, locale, 0.0))
     footprint = list_corners(own)
     if not footprint:

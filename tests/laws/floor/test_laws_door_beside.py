@@ -1,0 +1,77 @@
+"""Laws of a jamb that stands beside its place in the model: it explains what is seen of it, and nothing wider."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from knowledge_sources.methods.floor.door_beside import MAX_BESIDE_M, find_jamb_beside
+from knowledge_sources.methods.motion.footprints import build_polygon
+from world_models.building.locales import Doorway
+from world_models.files.world_files import WORLDS, load_world
+
+WORLD = load_world(WORLDS / "research_center.toml", details=[])
+CASES = [(room, door) for room in WORLD.rooms for door in WORLD.doorways_of(room) if door.width_m > 6.0 * MAX_BESIDE_M]
+cases = st.sampled_from(CASES)
+aways, asides = st.floats(0.8, 1.4), st.floats(-0.3, 0.3)
+sides, parts = st.sampled_from((0, 1)), st.floats(0.3, 1.0)
+few = settings(max_examples=150, deadline=None)
+
+
+def stand(door: Doorway, room: str, away_m: float, aside_m: float) -> tuple[float, float]:
+    """A place in a room before a door."""
+    jambs = door.threshold_of(room)
+    along = (jambs[1] - jambs[0]) / door.width_m
+    x, y = jambs.mean(axis=0) - away_m * door.outward_from(room) + aside_m * along
+    return float(x), float(y)
+
+
+def look(door: Doorway, room: str, eye: tuple[float, float], side: int, low_m: float, high_m: float) -> shapely.Polygon:
+    """What is seen of a thing without feet, further off than a door, past places so far into its opening from a jamb.
+    """
+    jambs = door.threshold_of(room)
+    inward = (jambs[1 - side] - jambs[side]) / door.width_m
+    ends = np.array([jambs[side] + at * inward for at in (low_m, high_m)])
+    return build_polygon(np.concatenate([eye + part * (ends - eye) for part in (1.15, 1.4)]))
+
+
+@few
+@given(cases, aways, asides, sides, parts)
+def test_what_is_seen_of_a_jamb_is_that_end_of_the_wall(
+    case: tuple[str, Doorway], away_m: float, aside_m: float, side: int, part: float
+) -> None:
+    room, door = case
+    eye = stand(door, room, away_m, aside_m)
+    seen = look(door, room, eye, side, 0.01, part * MAX_BESIDE_M)
+    found = find_jamb_beside(WORLD, room, seen, eye)
+    assert found is not None and found.door == door.name
+    jamb = door.threshold_of(room)[side]
+    opening = shapely.MultiPoint(np.concatenate(door.thresholds_world)).convex_hull.buffer(0.02)
+    assert opening.contains(found.shape)
+    inward = (door.threshold_of(room)[1 - side] - jamb) / door.width_m
+    into_m = (shapely.get_coordinates(found.shape) - jamb) @ inward
+    assert into_m.min() >= -0.02 and into_m.max() <= MAX_BESIDE_M + 0.02
+
+
+@few
+@given(cases, aways, asides, sides, st.floats(3.5, 6.0))
+def test_what_reaches_further_into_the_opening_is_no_jamb(
+    case: tuple[str, Doorway], away_m: float, aside_m: float, side: int, wide: float
+) -> None:
+    room, door = case
+    eye = stand(door, room, away_m, aside_m)
+    assert find_jamb_beside(WORLD, room, look(door, room, eye, side, 0.0, wide * MAX_BESIDE_M), eye) is None
+
+
+@few
+@given(cases, aways, asides, sides)
+def test_what_stands_nearer_than_the_door_is_no_jamb(
+    case: tuple[str, Doorway], away_m: float, aside_m: float, side: int
+) -> None:
+    room, door = case
+    eye = np.array(stand(door, room, away_m, aside_m))
+    seen = shapely.get_coordinates(look(door, room, (float(eye[0]), float(eye[1])), side, 0.01, 0.1))
+    near = build_polygon(eye + 0.3 * (seen - eye))
+    assert find_jamb_beside(WORLD, room, near, (float(eye[0]), float(eye[1]))) is None
