@@ -16,6 +16,17 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats
 from world_models.frames import Pose2
 
+CHI2_95 = 7.815
+"""Of three unknowns: 95 % lie within. Up to it a pose is where it was believed."""
+SURVEY_M, SURVEY_RAD = 0.015, math.radians(0.5)
+"""Standard deviations of a place by other walls than those it was believed by, though the model is called exact."""
+
+
+def compute_chi2(one: Pose2, other: Pose2, covariance: Floats) -> float:
+    """The squared distance of two poses in standard deviations of a covariance (3, 3)."""
+    off = one.minus(other)
+    return float(off @ np.linalg.solve(covariance + 1e-12 * np.eye(3), off))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BelievedPlace:
@@ -30,10 +41,15 @@ class BelievedPlace:
     covariance: Floats
     p_there: float
 
-    def compute_chi2(self, pose: Pose2) -> float:
-        """The squared distance of a pose from the believed one, in standard deviations."""
-        off = pose.minus(self.pose)
-        return float(off @ np.linalg.solve(self.covariance + 1e-9 * np.eye(3), off))
+    def compute_p_wrong(self, pose: Pose2) -> float:
+        """The probability that a pose that was solved for is wrong, before its picture is weighed.
+
+        What is believed speaks for a pose within its covariance, and as much against one outside: there either the
+        belief is wrong or the pose is, as where a wall is not where the model has it.
+        """
+        chi2 = compute_chi2(pose, self.pose, self.covariance + np.diag(np.square([SURVEY_M, SURVEY_M, SURVEY_RAD])))
+        within = math.exp(-0.5 * min(max(chi2 - CHI2_95, 0.0), 1400.0))
+        return (1.0 - self.p_there) * within + self.p_there * (1.0 - within)
 
 
 def compute_p_rivals(believed: BelievedPlace, here: Pose2, rivals: Sequence[tuple[Pose2, float]]) -> float:
@@ -50,9 +66,9 @@ def compute_p_rivals(believed: BelievedPlace, here: Pose2, rivals: Sequence[tupl
     if not rivals:
         return 0.0
     share = (1.0 - believed.p_there) / (1 + len(rivals))
-    own_chi2, odds = believed.compute_chi2(here), list[float]()
+    own_chi2, odds = compute_chi2(here, believed.pose, believed.covariance), list[float]()
     for pose, ratio in rivals:
-        farther = max(believed.compute_chi2(pose) - own_chi2, 0.0)
+        farther = max(compute_chi2(pose, believed.pose, believed.covariance) - own_chi2, 0.0)
         odds.append((believed.p_there * math.exp(-0.5 * min(farther, 1400.0)) + share) * math.exp(ratio))
     against = math.fsum(odds)
     return against / (believed.p_there + share + against)

@@ -15,6 +15,7 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief.odds import update
+from knowledge_sources.methods.belief.places import compute_chi2
 from knowledge_sources.methods.localization.global_localization import (
     LocalizationResult,
     LocalizationStatus,
@@ -135,6 +136,5 @@ def is_within_reach(
     settings: LocalizationSettings = DEFAULT.localization,
 ) -> bool:
     """Whether a pose may be where the robot was told to be, or was tracked to, by both covariances (3, 3)."""
-    off = pose.minus(told)
     beyond = np.diag(np.square([settings.told_sigma_m, settings.told_sigma_m, settings.told_sigma_rad]))
-    return float(off @ np.linalg.solve(covariance + told_covariance + beyond, off)) <= settings.max_told_chi2
+    return compute_chi2(pose, told, covariance + told_covariance + beyond) <= settings.max_told_chi2

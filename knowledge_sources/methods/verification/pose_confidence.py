@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Mask
+from knowledge_sources.methods.belief.places import compute_chi2
 from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from knowledge_sources.methods.verification.color_check import ColorCheck
 from knowledge_sources.methods.verification.line_check import (
@@ -97,7 +98,7 @@ def compute_evidence(
         projected, segments_px, SHARP_TOLERANCE_PX, LINE_TOLERANCE_RAD))
     directions = _error_directions(PROBE_TURN_RAD)
     motion = length[:, None] * _compute_motion(robot, lines_world, pose, directions, MAX_LINE_MOTION_PX)
-    sigmas = min(_mahalanobis(pose, belief, covariance + belief_covariance), MAX_BELIEF_SIGMAS)
+    sigmas = min(math.sqrt(compute_chi2(pose, belief, covariance + belief_covariance)), MAX_BELIEF_SIGMAS)
     return PoseEvidence(
         coverage=_ratio(length * covered, length),
         weakest_coverage=min(_ratio(motion[:, k] * covered, motion[:, k]) for k in range(len(directions))),
@@ -157,12 +158,6 @@ def _compute_slopes(robot: RobotModel, lines_world: Floats, pose: Pose2) -> tupl
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
     across = np.einsum("nj,nejk->nek", normal, slopes.reshape(-1, 2, 2, 3))
     return np.all(points[:, 2].reshape(-1, 2) > NEAR_M, axis=1), np.asarray(across)
-
-
-def _mahalanobis(pose: Pose2, belief: Pose2, covariance: Floats) -> float:
-    """The distance of two poses in standard deviations of a covariance (3, 3)."""
-    off = pose.minus(belief)
-    return math.sqrt(max(0.0, float(off @ np.linalg.solve(covariance + 1e-12 * np.eye(3), off))))
 
 
 PRODUCTS = (("coverage", "sharpness"), ("coverage", "color_agreement"), ("sharpness", "color_agreement"))

@@ -10,6 +10,7 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief.odds import Alike, Look, add_looks, to_log_odds, update
+from knowledge_sources.methods.belief.places import BelievedPlace
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors
 from knowledge_sources.methods.verification.line_check import LineCheck, check_lines, find_errors, predict_lines
@@ -139,8 +140,9 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     if fix.camera_step:  # how far the robot is from where it was believed, not the camera
         expected_px = robot.camera.project_segments(lines, robot.camera_from_world(before.pose))[0]
     p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed
-    p_wrong = update(s.plan.p_wrong_in_doubt if before.in_doubt else p_wrong, _sum_told(milestone))
-    p_after = update(p_wrong, to_log_odds(p_false))
+    believed = BelievedPlace(before.pose, before.covariance + fix.covariance,
+                             1.0 - (s.plan.p_wrong_in_doubt if before.in_doubt else p_wrong))
+    p_after = update(believed.compute_p_wrong(pose), _sum_told(milestone) + to_log_odds(p_false))
     most = 1.0 - s.localization.min_p_believed if is_last_look(milestone, s.plan) else POSE_CONFIDENCE.accept
     return Weighed(
         robot=robot,

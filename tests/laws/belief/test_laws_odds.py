@@ -129,3 +129,29 @@ def test_headings_that_are_whole_turns_apart_are_the_same(heading: float, off: f
     near, far = Pose2(1.0, 2.0, heading + off), Pose2(1.0, 2.0, heading + off + turns * math.tau)
     assert measure_common(one, far, alike) == pytest.approx(measure_common(one, near, alike), abs=1e-9)
     assert measure_common(one, near, alike) == pytest.approx(max(0.0, 1.0 - abs(off) / 0.6))
+
+
+@given(probabilities, st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(-3.0, 3.0))
+def test_what_is_believed_speaks_for_a_pose_within_it_and_as_much_against_one_far_outside(
+    p_there: float, near: float, far: float, along: float
+) -> None:
+    """It is never likelier the farther off it is, where the belief speaks for anything; one in doubt says nothing."""
+    believed = BelievedPlace(Pose2(1.0, 2.0, 0.5), np.diag([0.02**2, 0.02**2, 0.01**2]), p_there)
+    at = [Pose2(1.0 + off * math.cos(along), 2.0 + off * math.sin(along), 0.5) for off in sorted((near, far))]
+    nearer, farther = (believed.compute_p_wrong(pose) for pose in at)
+    assert believed.compute_p_wrong(believed.pose) == pytest.approx(1.0 - p_there)
+    assert believed.compute_p_wrong(Pose2(9.0, 2.0, 0.5)) == pytest.approx(p_there)
+    assert nearer <= farther + 1e-12 if p_there >= 0.5 else farther <= nearer + 1e-12
+    assert BelievedPlace(believed.pose, believed.covariance, 0.5).compute_p_wrong(at[1]) == pytest.approx(0.5)
+
+
+@given(st.floats(0.5, 0.999), st.floats(0.5, 0.999), st.floats(0.01, 1.0))
+def test_neither_a_surer_belief_nor_a_wider_one_makes_the_pose_that_it_allows_less_likely(
+    one: float, other: float, wider: float
+) -> None:
+    """Surer, where the pose is as it was believed; wider, wherever the pose is."""
+    here, exact, wide = Pose2(1.0, 2.0, 0.5), 4e-4 * np.eye(3), (4e-4 + wider) * np.eye(3)
+    beside, off, (less, more) = Pose2(1.02, 2.0, 0.5), Pose2(1.0 + wider, 2.0, 0.5), sorted((one, other))
+    at_beside = [BelievedPlace(here, exact, p).compute_p_wrong(beside) for p in (more, less)]
+    at_off = [BelievedPlace(here, covariance, more).compute_p_wrong(off) for covariance in (wide, exact)]
+    assert at_beside == sorted(at_beside) and at_off == sorted(at_off)
