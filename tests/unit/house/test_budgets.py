@@ -20,7 +20,7 @@ LINES = {
     "logs": 7_450,
     "harvey": 10_524,
     "experiments": 10_230,
-    "tests": 43_240,
+    "tests": 43_260,
     "extras": 14_910,
 }
 """Of Python files, at most."""
