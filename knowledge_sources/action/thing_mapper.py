@@ -5,7 +5,6 @@ It is told of by pictures of the floor or by range sensors; and it is forgotten 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -58,9 +57,8 @@ class ThingMapper(RobotKnowledgeSource):
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         scan, belief = case
         known, driving = {entry.id: entry for entry in view.all(Obstacle)}, current_leg(view)
-        ways_m = {id: _measure_way_m(view, entry, scan.value) for id, entry in known.items()}
         obstacles = {id: entry.value for id, entry in known.items()}
-        for found in weigh_sight(self._tell_of(view, scan, belief), obstacles, ways_m, self._settings):
+        for found in weigh_sight(self._tell_of(view, scan, belief), obstacles, self._settings):
             entry = None if found.known is None else known[found.known]
             on_way = (driving[0],) if found.is_next and driving is not None else ()
             if entry is None:
@@ -77,12 +75,3 @@ class ThingMapper(RobotKnowledgeSource):
                     if (found := view.get(ref.id)) is not None and isinstance(found.value, CameraPicture))
         told_by = next(pictures, scan.id) if scan.value.sense == "camera" else scan.id
         return Sight(scan.value, told_by, belief.world, belief.robot.radius_m + SEEN_MARGIN_M, known_free, ahead)
-
-
-def _measure_way_m(view: View, obstacle: Entry[Obstacle], scan: FreeFloor) -> float:
-    """How far the eye is from where the sight was taken on which an obstacle rests; infinite where that is gone."""
-    for ref in obstacle.because:
-        before = view.get(ref.id)
-        if before is not None and isinstance(before.value, FreeFloor):
-            return math.hypot(scan.x_m - before.value.x_m, scan.y_m - before.value.y_m)
-    return math.inf

@@ -115,8 +115,7 @@ class Obstacle:
         name: under which the frame of its locale has it, as ``hallway/obstacle-1``.
         locale: where it stands.
         footprint: (k, 2) corners, counter-clockwise, of what it is taken to cover of the floor [m, world].
-        core: (k, 2) corners of the part of that which was seen, where its feet were not: the rest may be free floor.
-            () where the footprint is what was seen.
+        core: (k, 2) corners of the part of that which was seen: the rest may be free floor. () where all of it was.
         sigma_m: standard deviation of the place of its near side.
         x_m, y_m: where it is, in the locale's frame: where it was touched, or the middle of its footprint.
         width_m: how wide it is taken to be.
@@ -129,6 +128,8 @@ class Obstacle:
         evidence: what tells of it, in words: which pixels of which picture.
         status: suspected (not certain enough to act on), there, or gone.
         is_alike: whether it looks like the floor: that it is not seen tells little.
+        seen_from_m: from how near its shape was seen; infinite where its feet were not.
+        told_from: (2,) where the eye was when something was told last of it [m, world]; None where no picture told.
     """
 
     name: str
@@ -149,6 +150,8 @@ class Obstacle:
     status: ObstacleStatus = "there"
     core: Corners = ()
     is_alike: bool = False
+    seen_from_m: float = math.inf
+    told_from: tuple[float, float] | None = None
 
     @property
     def is_there(self) -> bool:

@@ -9,16 +9,13 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor.thing_shapes import MIN_COMMON_DIRECTIONS
 from knowledge_sources.methods.motion.footprints import (
     Corners,
     build_polygon,
-    join_footprints,
-    list_corners,
     measure_common_directions,
     measure_hull_part,
     measure_width_m,
-    take_free,
 )
 from knowledge_sources.settings import ActionSettings
 from world_models.building.building import Building
@@ -27,9 +24,7 @@ from world_models.entries.location import Place
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
 from world_models.frames import Pose2
 
-VAGUE_SIGMA_M = 0.05  # sights of an obstacle whose standard deviations differ by this and twofold are not joined
-MIN_COMMON_DIRECTIONS = 0.6
-"""A sight without feet tells nothing new where this part of its directions is that of what is known."""
+VAGUE_SIGMA_M = 0.05  # an obstacle of which the place is less sure is not known well
 MAX_BEHIND_DOOR_M = 4.0  # a thing that is seen through a doorway stands at most so far behind it
 
 
@@ -79,39 +74,6 @@ def find_before(
         if part >= MIN_COMMON_DIRECTIONS and (best is None or part > best[0]):
             best = part, name
     return None if best is None else best[1]
-
-
-def weigh_footprints(
-    known: shapely.Geometry, seen: shapely.Geometry, free: shapely.Geometry, known_sigma_m: float, sigma_m: float,
-    eye: Floats,
-) -> shapely.Geometry:
-    """The footprint by two sights: the sharper one decides.
-
-    A sight of which the feet are not seen tells in which directions the thing is, and that it is nearer than the
-    picture's lower border: it adds to what is known only in directions in which nothing was known.
-    """
-    if known_sigma_m >= 2.0 * sigma_m + VAGUE_SIGMA_M:
-        return seen
-    vague_m = VAGUE_SIGMA_M
-    is_vague = sigma_m >= 2.0 * known_sigma_m + vague_m or min(sigma_m, known_sigma_m) >= 2.0 * vague_m
-    if is_vague and measure_common_directions(known, seen, eye) >= MIN_COMMON_DIRECTIONS:
-        return take_free(known, free)
-    return join_footprints(known, seen, free)
-
-
-def with_core(obstacle: Obstacle, seen: shapely.Geometry) -> Obstacle:
-    """An obstacle with what was seen of its footprint last, where that is clearly less than the footprint."""
-    footprint = build_polygon(obstacle.footprint)
-    core = shapely.intersection(footprint, seen)
-    is_less = 0.0 < core.area < 0.9 * footprint.area
-    return replace(obstacle, core=list_corners(core) if is_less else ())
-
-
-def keep_touched(known: Obstacle, seen: shapely.Geometry) -> shapely.Geometry:
-    """What was seen of a known obstacle, with what it took when it was touched: no picture takes that back."""
-    if known.touched_s is None:
-        return seen
-    return shapely.union(seen, build_polygon(known.core or known.footprint))
 
 
 def place(world: Building, obstacle: Obstacle, shape: shapely.Geometry) -> Obstacle:

@@ -18,8 +18,10 @@ from knowledge_sources.methods.floor.model_floor import SIGHT_M, FloorGrid
 from knowledge_sources.methods.floor.relief import FIXED, FLAT, STANDING, UNTOLD, Relief
 
 MIN_THING_PIXELS = 10  # smallest region, in pixels of half the picture's size
-ASSUMED_DEPTH_M = 0.3  # depth that a thing is taken to have behind what is seen of it
+SEEN_DEPTH_M = 0.05  # depth of a foot
 MAX_THING_DEPTH_M = 0.8  # feet of one thing are at most so much further than its nearest
+
+CUT_DEPTH_M = 0.15  # the same where the lower border of the picture cuts it off
 
 MIN_BORDER_COLUMNS = 6
 """Fewer columns of a lower border that is seen to stand do not tell that it hangs over the floor."""
@@ -157,7 +159,7 @@ def _find_feet(
     from the nearest, or its column is next to such a one and stands about as far off. Where the picture's border cuts
     the feet off, only what is as near as that border tells where they are.
     """
-    deep_m = 0.5 * ASSUMED_DEPTH_M if cut.any() else MAX_THING_DEPTH_M
+    deep_m = CUT_DEPTH_M if cut.any() else MAX_THING_DEPTH_M
     is_foot = stands & (ranges <= nearest + deep_m)
     for order in (range(1, len(columns)), range(len(columns) - 2, -1, -1)):
         for i in order:
@@ -188,7 +190,7 @@ def _drop_slivers(seen: NDArray[np.bool_], tells: NDArray[np.bool_]) -> NDArray[
 def find_footprint(region: StandingRegion, grid: FloorGrid) -> Floats:
     """(k, 2) corners, counter-clockwise, robot's frame, of what a region takes of the floor [m].
 
-    It is the hull of its feet, and of the same points further off by the depth that is assumed.
+    It is the hull of its feet, and of the same points a little further off.
     """
     eye = grid.eye_robot
     away = region.parts[:, None] * (grid.points_robot[region.feet[:, 0], region.feet[:, 1]] - eye)
@@ -196,9 +198,8 @@ def find_footprint(region: StandingRegion, grid: FloorGrid) -> Floats:
     lengths = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
     cut = (region.feet[:, 0] >= grid.shape[0] - 2) & (region.parts == 1.0)
     near = np.where(cut[:, None], eye + away * CUT_PART, points)
-    nearest = float(np.linalg.norm(near - eye, axis=1).min())
-    deep = np.clip(nearest + ASSUMED_DEPTH_M - lengths, 0.1, ASSUMED_DEPTH_M)
-    far = points + away / lengths * np.where(cut[:, None], 0.0, deep)  # one that is cut off is nearer than its border
+    deep_m = np.where(cut[:, None], 0.0, SEEN_DEPTH_M)  # what is cut off is nearer than the border of the picture
+    far = points + away / lengths * deep_m
     hull = shapely.convex_hull(shapely.multipoints(np.concatenate([near, far])))
     if not isinstance(hull, shapely.Polygon):
         hull = hull.buffer(0.02, quad_segs=1)

@@ -17,23 +17,19 @@ from knowledge_sources.methods.floor.found_things import (
     find_open_floor,
     find_room,
     find_same,
-    keep_touched,
     may_be_there,
     place,
     tell_status,
-    weigh_footprints,
-    with_core,
 )
 from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M
+from knowledge_sources.methods.floor.thing_shapes import ThingShape, join_shapes, leave_free
 from knowledge_sources.methods.floor.weigh_touch import TOUCH_MARGIN_M
 from knowledge_sources.methods.motion.footprints import (
     build_free_floor,
     build_polygon,
     deepen,
-    list_corners,
     measure_change_m,
     measure_free_part,
-    take_free,
 )
 from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.building import Building
@@ -43,8 +39,9 @@ from world_models.entries.obstacle import Obstacle, ObstacleStatus
 MIN_FREE_PART = 0.5  # part of an obstacle's footprint that must be seen free to tell that it is not there any more
 MAX_SHARED_PART = 0.25  # where a thing that is seen takes more of the footprint, the rest seen free tells nothing of it
 FREE_FLOOR_ODDS = 0.03  # odds of an obstacle that is there while all of its footprint is seen free
+LOOKS_FREE_ODDS = 0.2  # the same where the floor there looks free, and nothing else tells
 ALIKE_FREE_ODDS = 0.3  # the same of one that looks like the floor
-MIN_EVIDENCE_INTERVAL_S = 0.3  # pictures that follow each other faster are no further evidence of an obstacle
+MIN_WAY_M = FLOOR_VIEW_DISTANCE_M / 2.0  # what is seen, or missed, from nearer by is no further evidence
 MAX_OBSTACLE_SIGMA_M = 0.25
 """What is seen on the floor with a larger standard deviation is waited for until it is nearer."""
 MAX_HULL_PART = 1.5  # two sights are of one thing where the hull round both is at most so much larger than both
@@ -76,6 +73,10 @@ class Sight(NamedTuple):
     def eye(self) -> tuple[float, float]:
         return self.floor.x_m, self.floor.y_m
 
+    def is_from_elsewhere(self, known: Obstacle) -> bool:
+        """Whether the eye is not where it was when something was told last of an obstacle: this is further evidence."""
+        return known.told_from is None or math.dist(self.eye, known.told_from) >= MIN_WAY_M
+
 
 class Sighted(NamedTuple):
     """What is known of one obstacle after a sight.
@@ -96,13 +97,12 @@ def is_telling(thing: FloorThing, settings: ActionSettings) -> bool:
 
 
 def weigh_sight(
-    sight: Sight, known: Mapping[str, Obstacle], ways_m: Mapping[str, float], settings: Settings
+    sight: Sight, known: Mapping[str, Obstacle], settings: Settings
 ) -> Iterator[Sighted]:
     """What a sight tells of each thing in it, and of each obstacle whose floor it shows.
 
     Args:
         known: what is known on the floor, by id.
-        ways_m: how far the eye is from where each was seen last; infinite where that is forgotten.
     """
     f, s = sight.floor, settings.action
     free = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
@@ -115,41 +115,39 @@ def weigh_sight(
     for thing in f.things:
         if not is_telling(thing, s):
             continue
-        core = deepen(thing.footprint, sight.eye, OBSTACLE_DEPTH_M)
+        new = _shape_of(sight, thing)
         rest, whole = {id: o for id, o in known.items() if id not in drafts}, MAX_HULL_PART
         if f.sense == "ranges":  # an echo tells how far a thing is, not where in its cone: any in it may be heard
             rest, whole = {id: o for id, o in rest.items() if may_be_there(o)}, math.inf
-        id = find_before(rest, core, sight.eye, settings.plan.overhang_m) if thing.is_cut else None
-        jamb = find_jamb_beside(sight.world, f.locale, core, sight.eye) if thing.is_cut and id is None else None
-        shape = core
+        id = find_before(rest, new.seen, sight.eye, settings.plan.overhang_m) if thing.is_cut else None
+        jamb = find_jamb_beside(sight.world, f.locale, new.seen, sight.eye) if thing.is_cut and id is None else None
         if jamb is not None:  # a door that is a little beside, before anything wider is believed
-            shape = core = jamb.shape
+            new = ThingShape(jamb.shape, jamb.shape, float(jamb.shape.distance(shapely.Point(sight.eye))))
             thing = replace(thing, evidence=f"{thing.evidence}, as a jamb of {jamb.door} that stands beside would")
-        elif thing.is_cut:
-            shape = _reach_to_rim(sight, core)
+        shape = new.whole
         id = id or find_same(rest, shape, thing.sigma_m, whole)
         if id is not None:
-            new = see_again(sight, known[id], ways_m[id], thing, shape, free, s)
-            if new is not None:
-                drafts[id] = Sighted(id, with_core(new, keep_touched(known[id], core)))
+            again = see_again(sight, known[id], thing, new, free, s)
+            if again is not None:
+                drafts[id] = Sighted(id, again)
             continue
-        again = [build_polygon(draft.obstacle.footprint) for draft in drafts.values()]
-        if any(shapely.intersection(polygon, shape).area > 0.5 * shape.area for polygon in again):
+        joined = [build_polygon(draft.obstacle.footprint) for draft in drafts.values()]
+        if any(shapely.intersection(polygon, shape).area > 0.5 * shape.area for polygon in joined):
             continue  # another part of what was joined already
         if jamb is None and _is_explained(sight, thing, shape):
             continue
-        found = see_first(sight, thing, shape, 1 + len(known) + fresh, s)
+        found = see_first(sight, thing, new, 1 + len(known) + fresh, s)
         if found is not None:
             fresh += 1
-            drafts[f"new {fresh}"] = Sighted(None, with_core(found, core))
+            drafts[f"new {fresh}"] = Sighted(None, found)
     for draft in drafts.values():
         yield _hold_next(draft, sight.ahead)
     seen = shapely.union_all([build_polygon(thing.footprint).buffer(2.0 * thing.sigma_m) for thing in f.things])
     for id, obstacle in known.items():
         if id in drafts or not may_be_there(obstacle):
             continue
-        if measure_free_part(obstacle.footprint, seen) <= MAX_SHARED_PART:
-            gone = miss(sight.world, obstacle, told if obstacle.is_alike else free, f.seen_s, s)
+        if sight.is_from_elsewhere(obstacle) and measure_free_part(obstacle.footprint, seen) <= MAX_SHARED_PART:
+            gone = miss(sight, obstacle, told if obstacle.is_alike else free, told, s)
             if gone is not None:
                 yield Sighted(id, gone)
 
@@ -161,14 +159,19 @@ def _hold_next(draft: Sighted, ahead: shapely.Geometry) -> Sighted:
     return draft
 
 
-def _reach_to_rim(sight: Sight, shape: shapely.Polygon) -> shapely.Polygon:
-    """What a thing whose feet are not seen may take: from the robot's rim on, but for floor that is known free."""
-    away = shapely.get_coordinates(shape)[:-1] - sight.eye
+def _shape_of(sight: Sight, thing: FloorThing) -> ThingShape:
+    """What a sight shows of a thing, and what that may take: as deep as is assumed, and where its feet are not seen
+    from the robot's rim on, but for floor that is known free.
+    """
+    seen, whole = build_polygon(thing.footprint), deepen(thing.footprint, sight.eye, OBSTACLE_DEPTH_M)
+    if not thing.is_cut:
+        return ThingShape(seen, whole, float(seen.distance(shapely.Point(sight.eye))))
+    away = shapely.get_coordinates(whole)[:-1] - sight.eye
     rim = sight.eye + sight.rim_m * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
-    whole = build_polygon(np.concatenate([shapely.get_coordinates(shape), rim]))
-    unseen = shapely.get_parts(shapely.difference(whole, sight.known_free))
+    reaching = build_polygon(np.concatenate([shapely.get_coordinates(whole), rim]))
+    unseen = shapely.get_parts(shapely.difference(reaching, sight.known_free))
     largest = max(unseen, key=lambda part: part.area, default=shapely.Polygon())
-    return build_polygon(shapely.get_coordinates(shapely.union(shape, largest)))
+    return ThingShape(seen, build_polygon(shapely.get_coordinates(shapely.union(whole, largest))), math.inf)
 
 
 def _is_explained(sight: Sight, thing: FloorThing, shape: shapely.Polygon) -> bool:
@@ -179,24 +182,25 @@ def _is_explained(sight: Sight, thing: FloorThing, shape: shapely.Polygon) -> bo
 
 
 def see_first(
-    sight: Sight, thing: FloorThing, shape: shapely.Polygon, number: int, settings: ActionSettings
+    sight: Sight, thing: FloorThing, shape: ThingShape, number: int, settings: ActionSettings
 ) -> Obstacle | None:
     """A thing that was not known; None where it stands on no floor."""
     f, world = sight.floor, sight.world
-    locale = find_room(world, shape, f.locale)
-    own = shapely.intersection(shape, find_open_floor(world, locale, 0.0))
-    footprint = list_corners(own)
+    locale = find_room(world, shape.whole, f.locale)
+    own = shapely.intersection(shape.whole, find_open_floor(world, locale, 0.0))
+    footprint, core = shape._replace(whole=own).list_corners()
     if not footprint:
         return None
     found = Obstacle(
         f"{locale}/obstacle-{number}", locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m,
         thing.sigma_height_m, min(thing.p_thing, settings.max_obstacle_certainty), f.seen_s, f.seen_s, None, f.sense,
-        _tell(thing, sight), tell_status(thing.p_thing, settings), is_alike=thing.is_alike)
+        _tell(thing, sight), tell_status(thing.p_thing, settings), core, thing.is_alike, shape.from_m,
+        sight.eye)
     return place(world, found, own)
 
 
 def see_again(
-    sight: Sight, known: Obstacle, way_m: float, thing: FloorThing, shape: shapely.Polygon, free: shapely.Geometry,
+    sight: Sight, known: Obstacle, thing: FloorThing, shape: ThingShape, free: shapely.Geometry,
     settings: ActionSettings,
 ) -> Obstacle | None:
     """A known obstacle after it was seen once more; None where that tells nothing that matters.
@@ -207,18 +211,14 @@ def see_again(
     certainty = max(known.certainty, thing.p_thing)
     if known.status == "gone":
         certainty = thing.p_thing
-    elif way_m >= FLOOR_VIEW_DISTANCE_M / 2.0:
+    elif sight.is_from_elsewhere(known):
         certainty = update(known.certainty, to_log_odds(min(thing.p_thing, s.max_obstacle_certainty)))
     certainty = min(certainty, s.max_obstacle_certainty)
-    own = shapely.intersection(shape, find_open_floor(world, known.locale, 0.0))
-    polygon = build_polygon(known.footprint)
-    if f.sense == "ranges" and known.status != "gone":  # nor how wide it is
-        joined = take_free(polygon, free)
-    else:
-        joined = weigh_footprints(
-            polygon, shape if own.is_empty else own, free, known.sigma_m, thing.sigma_m, np.array(sight.eye))
-    footprint = list_corners(joined)
-    moved = measure_change_m(known.footprint, footprint) >= s.min_footprint_change_m
+    joined = _join_sight(sight, known, shape, free)
+    footprint, core = joined.list_corners()
+    seen_before = known.core or known.footprint
+    moved = max(measure_change_m(known.footprint, footprint),
+                measure_change_m(seen_before, core or footprint)) >= s.min_footprint_change_m
     surer = certainty > known.certainty + 0.005 or tell_status(certainty, s) != known.status
     higher = thing.sigma_height_m < 0.7 * known.sigma_height_m
     if not (moved or surer or higher or f.seen_s - known.seen_s >= SEEN_AGAIN_S):
@@ -227,27 +227,50 @@ def see_again(
     status: ObstacleStatus = "there" if known.is_there else tell_status(certainty, s)
     new = replace(known, certainty=certainty, seen_s=f.seen_s, looked_s=f.seen_s, status=status, height_m=height,
                   sigma_height_m=sigma, sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight),
-                  is_alike=known.is_alike and thing.is_alike)
-    return place(world, replace(new, footprint=footprint), joined) if moved and footprint else new
+                  is_alike=known.is_alike and thing.is_alike, told_from=sight.eye)
+    if not moved or not footprint:
+        return new
+    return place(world, replace(new, footprint=footprint, core=core, seen_from_m=joined.from_m), joined.whole)
+
+
+def _join_sight(sight: Sight, known: Obstacle, new: ThingShape, free: shapely.Geometry) -> ThingShape:
+    """The shape of a known obstacle after it was seen once more; what was touched no picture takes back."""
+    f, old = sight.floor, ThingShape.of(known)
+    if known.status == "gone":
+        joined = new
+    elif f.sense == "ranges":  # nor how wide it is
+        joined = leave_free(old, free)
+    else:
+        joined = join_shapes(old, new, free, np.array(sight.eye))
+    if known.touched_s is not None:
+        joined = ThingShape(shapely.union(joined.seen, old.seen), shapely.union(joined.whole, old.seen), joined.from_m)
+    own = shapely.intersection(joined.whole, find_open_floor(sight.world, known.locale, 0.0))
+    return joined if own.is_empty else joined._replace(whole=own)
 
 
 def miss(
-    world: Building, known: Obstacle, free: shapely.Geometry, seen_s: float, settings: ActionSettings
+    sight: Sight, known: Obstacle, free: shapely.Geometry, told: shapely.Geometry, settings: ActionSettings
 ) -> Obstacle | None:
-    """A known obstacle after its floor, or some of it, was seen free; None where that tells nothing."""
-    if seen_s - known.looked_s < MIN_EVIDENCE_INTERVAL_S:
-        return None
+    """A known obstacle after its floor, or some of it, was seen free; None where that tells nothing.
+
+    Args:
+        told: where it would be seen to stand, whatever it looks like.
+    """
     free_part = measure_free_part(known.footprint, free)
     if free_part >= MIN_FREE_PART:
-        odds = ALIKE_FREE_ODDS if known.is_alike else FREE_FLOOR_ODDS
+        told_part = measure_free_part(known.footprint, told)
+        odds = ALIKE_FREE_ODDS if known.is_alike else LOOKS_FREE_ODDS
+        if not known.is_alike and told_part >= MIN_FREE_PART:
+            odds = FREE_FLOOR_ODDS
         certainty = update(known.certainty, free_part * math.log(odds))
         status: ObstacleStatus = "gone" if certainty < settings.min_gone_certainty else known.status
-        return replace(known, certainty=certainty, looked_s=seen_s, status=status)
-    left = take_free(build_polygon(known.footprint), free)
-    footprint = list_corners(left)
+        return replace(known, certainty=certainty, looked_s=sight.floor.seen_s, status=status, told_from=sight.eye)
+    left = leave_free(ThingShape.of(known), free)
+    footprint, core = left.list_corners()
     if not footprint or measure_change_m(known.footprint, footprint) < settings.min_footprint_change_m:
         return None
-    return place(world, replace(known, footprint=footprint, looked_s=seen_s), left)
+    new = replace(known, footprint=footprint, core=core, looked_s=sight.floor.seen_s, told_from=sight.eye)
+    return place(sight.world, new, left.whole)
 
 
 def _tell(thing: FloorThing, sight: Sight) -> str:

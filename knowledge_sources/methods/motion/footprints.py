@@ -83,8 +83,11 @@ def join_footprints(known: shapely.Geometry, seen: shapely.Geometry, free: shape
 
 
 def take_free(known: shapely.Geometry, free: shapely.Geometry) -> shapely.Geometry:
-    """What is left of a footprint without the floor that is seen to be free: the hull of its largest piece."""
-    pieces = shapely.get_parts(shapely.difference(known, free))
+    """What is left of a footprint without the floor that is seen to be free: the hull of its largest piece.
+
+    A sliver, which rounding leaves, is nothing.
+    """
+    pieces = [piece for piece in shapely.get_parts(shapely.difference(known, free)) if piece.area > MIN_SIDE_M**2]
     return shapely.convex_hull(max(pieces, key=lambda piece: piece.area, default=shapely.Polygon()))
 
 

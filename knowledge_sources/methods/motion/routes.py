@@ -95,8 +95,8 @@ def find_shortest_route(
     """Find the shortest route through the free space, by Dijkstra's search of its visibility graph.
 
     An end in the margin round the free space is first joined to the nearest free point to which a straight line leads
-    over the open ``floor`` (the free space of a robot without a width), which is computed only then; rather to one on
-    the way to which the robot, with its ``radius_m``, comes no nearer to what bounds that floor than it is.
+    over the open ``floor`` (the free space of a robot without a width), which is computed only then. On the way to it a
+    robot with ``radius_m`` touches nothing, and comes no nearer to what it touches already.
 
     Returns:
         Way points [(2,), ...] with both ends; None where there is no route.
@@ -156,7 +156,7 @@ def _find_nearest_free(
     free: shapely.Geometry, point: Floats, floor: Callable[[], shapely.Geometry], radius_m: float
 ) -> Floats | None:
     """Of the nearest point of each free part, and all corners: the nearest that is not behind a barrier, and on the way
-    to which nothing is touched that is not touched already, if there is one.
+    to which nothing is touched that is not touched already.
     """
     parts = [part for part in shapely.get_parts(free) if not part.is_empty]
     nearest = [shapely.get_coordinates(shapely.shortest_line(shapely.Point(point), part))[-1] for part in parts]
@@ -165,10 +165,9 @@ def _find_nearest_free(
     corners = _drop_duplicates(shapely.get_coordinates(free))
     candidates = sorted((*nearest, *corners), key=lambda p: float(np.linalg.norm(p - point)))
     open_floor = floor()
-    clear = [np.asarray(p) for p in candidates if is_clear(open_floor, point, p)]
-    width_m = min(radius_m, open_floor.boundary.distance(shapely.Point(point))) - TOUCHED_M
-    return next((p for p in clear if open_floor.boundary.distance(shapely.LineString([point, p])) >= width_m),
-                clear[0] if clear else None)
+    width_m = min(radius_m + TOUCHED_M, open_floor.boundary.distance(shapely.Point(point))) - TOUCHED_M
+    return next((np.asarray(p) for p in candidates if is_clear(open_floor, point, p) and (
+        not radius_m or open_floor.boundary.distance(shapely.LineString([point, p])) >= width_m)), None)
 
 
 def find_bends(free: shapely.Geometry) -> Floats:

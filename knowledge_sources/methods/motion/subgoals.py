@@ -49,6 +49,8 @@ DOOR_LOOK_APART_M = 0.7  # so far from where it was seen before: then it is anot
 MIN_DOOR_LOOK_SINE = 0.7  # least sine of the angle at which it is seen there, 1 from the front
 MIN_LOOKOUT_CHANGE_M = 0.4  # a place nearer than this to where the robot stands shows nothing new
 WAY_TOLERANCE_M = 0.15  # tolerance at the end of a leg on the way
+LEFT_ROOM_M = 0.01  # of the room that a leg leaves to things, so much is kept
+MIN_TOLERANCE_M = 0.02  # least tolerance at the end of a leg on the way
 MIN_DOORWAY_CLEARANCE_M = 0.10  # a doorway with less room on each side of the robot is approached more exactly
 
 MAX_ROUTES = 24
@@ -241,9 +243,20 @@ class SubgoalPlanner:
         places[-1] = subgoal.destination
         last = len(places) - 2
         return tuple(
-            Subgoal(a, b, True, tolerance_m=subgoal.tolerance_m if i == last else WAY_TOLERANCE_M)
+            Subgoal(a, b, True, tolerance_m=self._limit_tolerance_m(
+                a, b, subgoal.tolerance_m if i == last else WAY_TOLERANCE_M))
             for i, (a, b) in enumerate(pairwise(places))
         )
+
+    def _limit_tolerance_m(self, a: Place, b: Place, most_m: float) -> float:
+        """The tolerance of a straight leg: no more than the room that it leaves to what the model lacks.
+
+        A short leg away from what the robot stands at is driven, too, and not taken to be done.
+        """
+        leg = LineString([place.in_world(self._building).position for place in (a, b)])
+        room_m = min((leg.distance(build_polygon(obstacle.footprint)) - self._robot.radius_m
+                      for obstacle in self._obstacles if obstacle.locale == b.locale), default=math.inf)
+        return min(most_m, max(room_m - LEFT_ROOM_M, MIN_TOLERANCE_M))
 
     def plan_look(self, belief: Hypothesis, obstacle: Obstacle) -> Subgoal | None:
         """A place in the robot's room to look at an obstacle again, from elsewhere; None where none is left.
@@ -303,10 +316,11 @@ class SubgoalPlanner:
             return shapely.buffer(shapely.union_all(shapely.buffer(parts, JOINT_M, join_style="mitre")), -JOINT_M,
                                   join_style="mitre")
 
-        for free in self._list_free_spaces(locale):
-            route = find_shortest_route(free, start, end, floor, self._robot.radius_m)
-            if route is not None:
-                return route
+        for radius_m in (self._robot.radius_m, 0.0):  # it leaves where it stands without touching, if it can
+            for free in self._list_free_spaces(locale):
+                route = find_shortest_route(free, start, end, floor, radius_m)
+                if route is not None:
+                    return route
         return None
 
     def _list_free_spaces(self, locale: str) -> Iterator[Geometry]:

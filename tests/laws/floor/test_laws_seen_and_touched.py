@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generated_boards import HALL, house, plain_robot, to_world
-from knowledge_sources.methods.floor.found_things import find_same, keep_touched, with_core
+from knowledge_sources.methods.floor.found_things import find_same
 from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M, see_ranges
+from knowledge_sources.methods.floor.thing_shapes import ThingShape
 from knowledge_sources.methods.floor.weigh_sight import Sight, see_again
 from knowledge_sources.methods.floor.weigh_touch import TOUCHED_SIDE_M, Touched, touch_again
 from knowledge_sources.methods.motion.footprints import build_polygon
@@ -32,7 +33,7 @@ def box(x: float, y: float, half_x: float, half_y: float) -> Corners:
         to_world(Pose2(x + i * half_x, y + k * half_y, 0.0)).position for i, k in ((-1, -1), (1, -1), (1, 1), (-1, 1))))
 
 
-WHOLE, PART = box(4.0, 2.0, 0.5, 0.4), box(3.7, 2.0, 0.2, 0.4)
+WHOLE, PART, FAR_END = box(4.0, 2.0, 0.5, 0.4), box(3.7, 2.0, 0.2, 0.4), box(4.6, 2.0, 0.1, 0.1)
 THING = Obstacle("hall/obstacle-1", HALL, WHOLE, 0.05, 4.0, 2.0, 1.0, 0.8, 0.3, certainty=0.9, core=PART, by="sight")
 
 
@@ -67,20 +68,15 @@ def test_touched_it_reaches_to_where_it_was_touched_and_what_was_seen_of_it_too(
 @pytest.mark.parametrize("core", [(), PART])
 @pytest.mark.parametrize("touched_s", [None, 3.0])
 def test_no_picture_takes_back_what_was_touched(core: Corners, touched_s: float | None) -> None:
-    """What was seen of it then; not the rest of what it was taken to cover."""
-    seen = build_polygon(box(4.6, 2.0, 0.1, 0.1))
-    kept = keep_touched(replace(THING, core=core, touched_s=touched_s), seen)
-    wanted = seen if touched_s is None else shapely.union(seen, build_polygon(core or WHOLE))
-    assert kept.symmetric_difference(wanted).area < 1e-9
-
-
-@pytest.mark.parametrize("part", [0.0, 0.2, 0.7, 0.89, 0.91, 1.0])
-def test_what_was_seen_is_told_apart_where_it_is_clearly_less_than_the_whole(part: float) -> None:
-    seen = build_polygon(box(4.0 - 0.5 + 0.5 * part, 2.0, 0.5 * part, 0.5)) if part else NONE
-    core = with_core(THING, seen).core
-    assert bool(core) == (0.0 < part < 0.9)
-    if core:
-        assert build_polygon(core).symmetric_difference(build_polygon(WHOLE).intersection(seen)).area < 5e-3
+    """What was seen of it then; not the rest of what it was taken to cover. A nearer sight sees only its far end."""
+    known = replace(THING, core=core, touched_s=touched_s, seen_from_m=4.0)
+    end = build_polygon(FAR_END)
+    new = look(known=known, shape=ThingShape(end, end, 1.0), free=build_polygon(WHOLE))
+    assert new is not None
+    wanted = end
+    if touched_s is not None:
+        wanted = shapely.convex_hull(shapely.union(wanted, build_polygon(core or WHOLE)))
+    assert build_polygon(new.footprint).symmetric_difference(wanted).area < 5e-3
 
 
 @pytest.mark.parametrize("sigmas", [(0.03, 0.04), (0.04, 0.03), (0.0, 0.05), (0.12, 0.05)])
@@ -100,13 +96,15 @@ def test_another_sight_is_of_a_thing_within_twice_what_both_leave_open(
 
 
 def look(*, p: float = 0.6, sigma_m: float = 0.05, sigma_height_m: float = 0.3, seen_s: float = 9.0,
-         way_m: float = 0.0, known: Obstacle = THING, height_m: float = 0.7) -> Obstacle | None:
-    """A thing after another sight of all of it from a way away."""
+         way_m: float = 0.0, known: Obstacle = THING, height_m: float = 0.7, shape: ThingShape | None = None,
+         free: shapely.Geometry = NONE) -> Obstacle | None:
+    """A thing after another sight from a way away, of all of it unless a shape is told."""
     eye = to_world(Pose2(1.5, 2.0, 0.0))
     floor = FreeFloor("camera", HALL, eye.x_m, eye.y_m, (0.0,), (1.0,), (1.0,), ("thing",), (0.02,), (), seen_s)
     thing = FloorThing(known.footprint, sigma_m, height_m, sigma_height_m, p, (0.0, 0.0, 9.0, 9.0), "unlike the floor")
     sight = Sight(floor, "CameraPicture-1", house(), 0.4, NONE, NONE)
-    return see_again(sight, known, way_m, thing, build_polygon(known.footprint), NONE, DEFAULT.action)
+    known = replace(known, told_from=(eye.x_m + way_m, eye.y_m))
+    return see_again(sight, known, thing, shape or ThingShape.of(known), free, DEFAULT.action)
 
 
 @pytest.mark.parametrize("sigma_m", [0.02, 0.05, 0.2])

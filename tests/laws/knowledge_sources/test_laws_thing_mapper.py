@@ -18,7 +18,13 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.action.thing_mapper import ThingMapper
 from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M
-from knowledge_sources.methods.floor.weigh_sight import FREE_FLOOR_ODDS, MAX_OBSTACLE_SIGMA_M, MIN_EVIDENCE_INTERVAL_S
+from knowledge_sources.methods.floor.weigh_sight import (
+    ALIKE_FREE_ODDS,
+    FREE_FLOOR_ODDS,
+    LOOKS_FREE_ODDS,
+    MAX_OBSTACLE_SIGMA_M,
+    MIN_WAY_M,
+)
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall, carton
 from world_models.building.world import World
@@ -113,7 +119,8 @@ def test_odds_multiply_only_where_it_is_seen_from_elsewhere(
 ) -> None:
     hall = Hall(world, ())
     first = hall.put(hall.look(seen_s=1.0))
-    old = hall.put(known("there" if before >= S.min_obstacle_certainty else "suspected", before), first)
+    status: ObstacleStatus = "there" if before >= S.min_obstacle_certainty else "suspected"
+    old = hall.put(replace(known(status, before), told_from=(first.value.x_m, first.value.y_m)), first)
     scan, effects = ask(hall, hall.look(carton(p_thing), seen_s=9.0, ahead_m=ahead_m))
     (effect,) = effects or ()
     is_elsewhere = ahead_m >= FLOOR_VIEW_DISTANCE_M / 2.0
@@ -124,24 +131,30 @@ def test_odds_multiply_only_where_it_is_seen_from_elsewhere(
         "there" if old.value.is_there or effect.value.certainty >= S.min_obstacle_certainty else "suspected")
 
 
-@given(st.floats(0.3, 0.999), st.sampled_from((0.0, 0.5 * MIN_EVIDENCE_INTERVAL_S, 2.0 * MIN_EVIDENCE_INTERVAL_S)))
-@settings(max_examples=20, deadline=None)
-def test_floor_that_is_seen_free_lowers_the_odds_by_a_stated_factor(
-    world: World, before: float, later_s: float
+@given(st.floats(0.3, 0.999), st.sampled_from((0.0, 0.5 * MIN_WAY_M, 1.1 * MIN_WAY_M, 0.3)), st.booleans(),
+       st.booleans())
+@settings(max_examples=40, deadline=None)
+def test_floor_that_is_seen_free_from_elsewhere_lowers_the_odds_by_a_stated_factor(
+    world: World, before: float, ahead_m: float, is_told: bool, is_alike: bool
 ) -> None:
+    """By less where it only looks free; and what looks like the floor is gone only where it would be told."""
     hall = Hall(world, ())
-    old = hall.put(replace(known("suspected", before), looked_s=5.0, seen_s=2.0))
-    scan, effects = ask(hall, hall.look(seen_s=5.0 + later_s))
+    first = hall.put(hall.look(seen_s=1.0))
+    old = hall.put(replace(known("suspected", before), looked_s=5.0, seen_s=2.0, is_alike=is_alike,
+                           told_from=(first.value.x_m, first.value.y_m)), first)
+    look = hall.look(seen_s=6.0, ahead_m=ahead_m)
+    scan, effects = ask(hall, look if is_told else replace(look, told_m=()))
     assert effects is not None
-    if later_s < MIN_EVIDENCE_INTERVAL_S:
+    if ahead_m < MIN_WAY_M or (is_alike and not is_told):
         assert effects == ()
         return
     (effect,) = effects
     assert isinstance(effect, Revise) and set(effect.because) == {scan, old}
-    certainty = probability(odds_of(before), FREE_FLOOR_ODDS)
+    odds = ALIKE_FREE_ODDS if is_alike else FREE_FLOOR_ODDS if is_told else LOOKS_FREE_ODDS
+    certainty = probability(odds_of(before), odds)
     assert effect.value.certainty == pytest.approx(certainty, rel=1e-6)
     assert effect.value.status == ("gone" if certainty < S.min_gone_certainty else "suspected")
-    assert effect.value.looked_s == 5.0 + later_s and effect.value.seen_s == 2.0
+    assert effect.value.looked_s == 6.0 and effect.value.seen_s == 2.0
 
 
 @given(st.floats(2.3, 2.6))
