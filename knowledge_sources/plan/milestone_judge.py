@@ -15,9 +15,10 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.methods.belief.places import BelievedPlace, compute_p_rivals
+from knowledge_sources.methods.belief.places import BelievedPlace, bound_p_rivals, compute_p_rivals
 from knowledge_sources.methods.calibration.camera_state import add_yaw, compute_camera_covariance, is_camera_known
 from knowledge_sources.methods.localization.aliasing import list_aliases
+from knowledge_sources.methods.localization.pose_candidates import DISTINCT
 from knowledge_sources.methods.verification.weigh import (
     Before,
     PictureEvidence,
@@ -138,10 +139,12 @@ class MilestoneJudge(RobotKnowledgeSource):
                 return Rival(f"as much agrees at {other.id}", 0.5)
         if weighed.p_false <= MAX_P_FALSE_UNMISTAKABLE or not weighed.is_weak:
             return None
-        rivals = list_aliases(weighed.robot, weighed.segments.segments_px, room, weighed.pose,
-                              search=weighed.p_false > MAX_P_FALSE_CLEAR, settings=s)
         p_there, most = find_p_not_alias(view, s.localization), s.localization.max_alike_log_ratio
         believed = BelievedPlace(weighed.before, weighed.covariance + case.fix.value.covariance, p_there)
+        if bound_p_rivals(believed, weighed.pose, DISTINCT, most) <= s.plan.max_p_rival:
+            return None
+        rivals = list_aliases(weighed.robot, weighed.segments.segments_px, room, weighed.pose,
+                              search=weighed.p_false > MAX_P_FALSE_CLEAR, settings=s)
         p = compute_p_rivals(believed, weighed.pose, [
             (alias.world_from_robot, min(max(-alias.margin, -most), most)) for alias in rivals])
         return Rival(f"it may be another door of {room}, or its other side", p)

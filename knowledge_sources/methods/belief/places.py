@@ -20,6 +20,8 @@ CHI2_95 = 7.815
 """Of three unknowns: 95 % lie within. Up to it a pose is where it was believed."""
 SURVEY_M, SURVEY_RAD = 0.015, math.radians(0.5)
 """Standard deviations of a place by other walls than those it was believed by, though the model is called exact."""
+MOST_RIVALS = 100
+"""No room has so many places at which it repeats itself or a picture fits."""
 
 
 def compute_chi2(one: Pose2, other: Pose2, covariance: Floats) -> float:
@@ -72,3 +74,17 @@ def compute_p_rivals(believed: BelievedPlace, here: Pose2, rivals: Sequence[tupl
         odds.append((believed.p_there * math.exp(-0.5 * min(farther, 1400.0)) + share) * math.exp(ratio))
     against = math.fsum(odds)
     return against / (believed.p_there + share + against)
+
+
+def bound_p_rivals(believed: BelievedPlace, here: Pose2, apart: tuple[float, float], most_log_ratio: float) -> float:
+    """The most that :func:`compute_p_rivals` can be, whatever the rivals: so those that do not matter are not sought.
+
+    ``apart``: each is farther from here than by so much of the way [m], or of a turn [rad].
+    """
+    off, covariance = here.minus(believed.pose), believed.covariance + 1e-12 * np.eye(3)
+    way_m, turn_rad = max(apart[0] - math.hypot(off[0], off[1]), 0.0), max(apart[1] - abs(off[2]), 0.0)
+    chi2 = min(way_m**2 / float(np.linalg.eigvalsh(covariance[:2, :2])[-1]), turn_rad**2 / float(covariance[2, 2]))
+    farther = max(chi2 - compute_chi2(here, believed.pose, believed.covariance), 0.0)
+    near = MOST_RIVALS * believed.p_there * math.exp(-0.5 * min(farther, 1400.0))
+    against = (near + 1.0 - believed.p_there) * math.exp(most_log_ratio)
+    return against / (believed.p_there + against)

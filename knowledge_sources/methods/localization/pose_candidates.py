@@ -53,6 +53,7 @@ SIEVED_PART = 0.05  # part of the grid that goes through the sieve, the best of 
 MIN_SIEVED = 3_000  # a smaller grid is not sieved
 MIN_CANDIDATE_DISTANCE_M = 0.45  # distance from which two candidates are distinct
 MIN_CANDIDATE_ANGLE_RAD = math.radians(10.0)  # angle from which two candidates are distinct
+DISTINCT = MIN_CANDIDATE_DISTANCE_M, MIN_CANDIDATE_ANGLE_RAD
 MAX_CLIMBED = 60  # best poses of the grid that are improved by hill climbing
 COARSE_CLIMB_M = 0.1  # step of the first round of hill climbing
 COARSE_CLIMB_RAD = math.radians(0.8)  # step of the first round of hill climbing

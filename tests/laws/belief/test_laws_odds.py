@@ -18,8 +18,8 @@ from knowledge_sources.methods.belief.odds import (
     to_probability,
     update,
 )
-from knowledge_sources.methods.belief.places import BelievedPlace, compute_p_rivals
-from world_models.frames import Pose2
+from knowledge_sources.methods.belief.places import BelievedPlace, bound_p_rivals, compute_p_rivals
+from world_models.frames import Pose2, wrap_angle
 
 ALIKE = Alike(step_m=0.6, turn_rad=1.0)
 poses = st.builds(Pose2, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
@@ -155,3 +155,18 @@ def test_neither_a_surer_belief_nor_a_wider_one_makes_the_pose_that_it_allows_le
     at_beside = [BelievedPlace(here, exact, p).compute_p_wrong(beside) for p in (more, less)]
     at_off = [BelievedPlace(here, covariance, more).compute_p_wrong(off) for covariance in (wide, exact)]
     assert at_beside == sorted(at_beside) and at_off == sorted(at_off)
+
+
+@given(st.floats(0.5, 0.9999), st.floats(0.005, 0.3), st.floats(0.002, 0.2), poses, st.floats(0.0, 4.0),
+       st.lists(st.tuples(poses, st.floats(-4.0, 4.0)), min_size=1, max_size=9))
+def test_no_rivals_are_likelier_than_the_bound_by_which_none_is_sought(
+    p_there: float, sigma_m: float, sigma_rad: float, off: Pose2, most: float, drawn: list[tuple[Pose2, float]]
+) -> None:
+    """Wherever they lie beyond what counts as here, and whatever the picture says up to the most that it may."""
+    believed = BelievedPlace(HERE, np.diag([sigma_m**2, (0.5 * sigma_m) ** 2, sigma_rad**2]), p_there)
+    here = Pose2(HERE.x_m + 0.05 * off.x_m, HERE.y_m + 0.05 * off.y_m, HERE.heading_rad + 0.02 * off.heading_rad)
+    apart = 0.4, 0.3
+    rivals = [(pose, max(min(ratio, most), -most)) for pose, ratio in drawn
+              if pose.distance_to(here) > apart[0] or abs(wrap_angle(pose.heading_rad - here.heading_rad)) > apart[1]]
+    p = compute_p_rivals(believed, here, rivals)
+    assert p <= bound_p_rivals(believed, here, apart, most) + 1e-12
