@@ -225,6 +225,7 @@ CLEAR, FEW, MOST_CLEAR = 20, 6, 1.5
 """So many pixels that tell are clear; fewer tell less, few nothing, and many as much as half as many again."""
 MIN_STANDING_SHARE, MIN_FLAT_SHARE = 0.6, 0.8
 """Least shares of the pixels that tell, by which a region is said to stand or to lie flat."""
+LOW_TOP_M = 0.08  # the top of what is low, but not rolled over
 MIN_FIXED = 6  # fewest pixels that stay in the picture, by which a region is on the lens
 
 
@@ -232,12 +233,14 @@ def compute_parallax_odds(region: StandingRegion, relief: Relief, grid: FloorGri
     """The odds that a region is solid against flat or reflected, by an earlier picture; 1 where nothing tells.
 
     Asked are its pixels that, if it were solid, would be so much nearer than the floor behind them that they are told
-    from it. Of those round it, which show the floor behind it too, only what stands tells.
+    from it: as near as its foot, or as the top of something low, as a plank. Of those round it, which show the floor
+    behind it too, only what stands tells.
     """
     near, foot_m = _widen(region.mask), np.full(grid.shape[1], np.inf)
     foot_m[region.feet[:, 1]] = grid.ranges_m[region.feet[:, 0], region.feet[:, 1]] * region.parts
     foot_m[np.isinf(foot_m)] = foot_m.min()
-    asked = near & relief.tells_of(np.minimum(foot_m / grid.ranges_m, 1.0))
+    low = 1.0 - LOW_TOP_M / grid.camera_height_m
+    asked = near & relief.tells_of(np.clip(foot_m / grid.ranges_m, low, 1.0))
     stand = np.count_nonzero(near & (relief.kinds == STANDING))
     flat = np.count_nonzero(region.mask & asked & (relief.kinds == FLAT))
     told = max(stand, flat)
