@@ -88,16 +88,17 @@ def find_frames(view: View, locales: Iterable[str]) -> tuple[Entry[LocaleFrame],
     return tuple(entry for name in names if (entry := view.newest(FRAME_OF, name)) is not None)
 
 
-def has_followed(view: View, settings: ActionSettings) -> bool:
-    """Whether enough landmarks were in sight in the last tracked frame.
+def find_followed(view: View, settings: ActionSettings) -> tuple[Entry[Tracks], ...]:
+    """The landmarks that are followed, if enough of them were in sight in the last tracked frame; else ().
 
     With so many landmarks in sight the robot is at no other door: the tracker drops all of them when they are not where
     they should be.
     """
     tracks = view.latest(Tracks)
     if tracks is None:
-        return False
-    return sum(track.found_px is not None for track in tracks.value.items) >= settings.min_followed_landmarks
+        return ()
+    in_sight = sum(track.found_px is not None for track in tracks.value.items)
+    return (tracks,) if in_sight >= settings.min_followed_landmarks else ()
 
 
 def active_goal(view: View) -> Entry[Goal] | None:

@@ -23,8 +23,8 @@ from knowledge_sources.methods.localization.aliasing import precompute_views
 from knowledge_sources.methods.verification.view_quality import list_seen_locales, predict_milestone
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import (
+    find_followed,
     find_frames,
-    has_followed,
     open_discrepancy,
     unmeasured_doubt,
 )
@@ -74,7 +74,7 @@ class ViewPredictor(RobotKnowledgeSource):
         robot, pose = find_robot_and_pose(view, belief.value)
         here = replace(milestone.value, look_heading_rad=pose.heading_rad)
         expected = predict_milestone(robot, pose, here, find_car_of(view, here), self._settings)
-        if not has_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
+        if not find_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
             precompute_views(robot, belief.value.locale, pose, self._settings)  # the judge asks: another door?
         frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale, self._settings))
         wish = Revise(milestone, expected, (milestone, belief, *hidden, *frames))

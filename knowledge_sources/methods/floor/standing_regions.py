@@ -157,7 +157,8 @@ def _find_feet(
 
     What hangs over the floor seems to stand much further off than the feet do: a foot is within the depth of a thing
     from the nearest, or its column is next to such a one and stands about as far off. Where the picture's border cuts
-    the feet off, only what is as near as that border tells where they are.
+    the feet off, only what is as near as that border tells where they are, and nothing further off than a thing is
+    deep: its slanting side leads away from there.
     """
     deep_m = CUT_DEPTH_M if cut.any() else MAX_THING_DEPTH_M
     is_foot = stands & (ranges <= nearest + deep_m)
@@ -167,7 +168,7 @@ def _find_feet(
             is_next = columns[i] - columns[j] == order.step
             if is_foot[j] and stands[i] and is_next and abs(ranges[i] - ranges[j]) <= MAX_STEP * ranges[j]:
                 is_foot[i] = True
-    return is_foot
+    return is_foot & (ranges <= nearest + MAX_THING_DEPTH_M) if cut.any() else is_foot
 
 
 def _drop_specks(standing: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -26,6 +26,9 @@ SLACK_M = 1e-6
 TOUCHED_M = 0.002
 """What comes nearer by less than this is no nearer."""
 
+AWAY_GAP_M, AWAY_STEP_M, AWAY_PART = 0.02, 0.05, 0.3
+"""What is nearer than this is left: so much of the first step leads away from it."""
+
 CORNER_STEPS = 4
 """Corners of a quarter circle round what is no rectangle: the way round it is at most 4.4 % too near (where the
 corner's angle is no multiple of a step, a step may be half as long again: 1 - cos(16.9 degrees))."""
@@ -165,9 +168,18 @@ def _find_nearest_free(
     corners = _drop_duplicates(shapely.get_coordinates(free))
     candidates = sorted((*nearest, *corners), key=lambda p: float(np.linalg.norm(p - point)))
     open_floor = floor()
-    width_m = min(radius_m + TOUCHED_M, open_floor.boundary.distance(shapely.Point(point))) - TOUCHED_M
     return next((np.asarray(p) for p in candidates if is_clear(open_floor, point, p) and (
-        not radius_m or open_floor.boundary.distance(shapely.LineString([point, p])) >= width_m)), None)
+        not radius_m or _leads_away(open_floor.boundary, point, p, radius_m))), None)
+
+
+def _leads_away(boundary: shapely.Geometry, point: Floats, end: Floats, radius_m: float) -> bool:
+    """Whether a line touches nothing, and leads away from what is touched, or nearly so, at its beginning."""
+    line = shapely.LineString([point, end])
+    begin_m = boundary.distance(shapely.Point(point))
+    if boundary.distance(line) < min(radius_m + TOUCHED_M, begin_m) - TOUCHED_M:
+        return False
+    first = shapely.line_interpolate_point(line, min(AWAY_STEP_M, line.length))
+    return begin_m >= radius_m + AWAY_GAP_M or boundary.distance(first) >= begin_m + AWAY_PART * AWAY_STEP_M
 
 
 def find_bends(free: shapely.Geometry) -> Floats:

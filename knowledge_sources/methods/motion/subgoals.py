@@ -49,6 +49,7 @@ DOOR_LOOK_APART_M = 0.7  # so far from where it was seen before: then it is anot
 MIN_DOOR_LOOK_SINE = 0.7  # least sine of the angle at which it is seen there, 1 from the front
 MIN_LOOKOUT_CHANGE_M = 0.4  # a place nearer than this to where the robot stands shows nothing new
 WAY_TOLERANCE_M = 0.15  # tolerance at the end of a leg on the way
+MAX_OVERLAP_M = 0.05  # so much nearer than touching a way may begin, where no other does: its place is not known better
 LEFT_ROOM_M = 0.01  # of the room that a leg leaves to things, so much is kept
 MIN_TOLERANCE_M = 0.02  # least tolerance at the end of a leg on the way
 MIN_DOORWAY_CLEARANCE_M = 0.10  # a doorway with less room on each side of the robot is approached more exactly
@@ -316,7 +317,7 @@ class SubgoalPlanner:
             return shapely.buffer(shapely.union_all(shapely.buffer(parts, JOINT_M, join_style="mitre")), -JOINT_M,
                                   join_style="mitre")
 
-        for radius_m in (self._robot.radius_m, 0.0):  # it leaves where it stands without touching, if it can
+        for radius_m in (self._robot.radius_m, self._robot.radius_m - MAX_OVERLAP_M):
             for free in self._list_free_spaces(locale):
                 route = find_shortest_route(free, start, end, floor, radius_m)
                 if route is not None:
