@@ -66,7 +66,7 @@ class TouchFinder(RobotKnowledgeSource):
         if id is not None:
             known = obstacles[id]
             return Case(known, touch_again(belief.world, touched, known.value, s), (*because, known))
-        if find_nearest(belief.world, b.locale, belief.pose.position)[0] <= radius_m + reach_m:
+        if find_nearest(belief.world, b.locale, belief.pose.position, of_model=True)[0] <= radius_m + reach_m:
             return None
         return Case(None, touch_first(belief.world, touched, b.locale, sigma_m, 1 + len(obstacles), s), because)
 

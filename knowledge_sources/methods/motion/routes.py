@@ -17,6 +17,7 @@ from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats
 from world_models.building.building import Building
+from world_models.building.locales import EXTRA_KIND
 
 Footprint = tuple[tuple[float, float], ...]
 
@@ -57,10 +58,13 @@ def list_obstacles(
     return [corners for _, corners in _list_footprints(building, locale, instead)]
 
 
-def _list_footprints(building: Building, locale: str, instead: Mapping[str, Footprint]) -> list[tuple[str, Floats]]:
+def _list_footprints(
+    building: Building, locale: str, instead: Mapping[str, Footprint], *, of_model: bool = False
+) -> list[tuple[str, Floats]]:
     """The names and the corners (k, 2) of what the robot could hit in a locale."""
     return [(thing.name, np.asarray(instead[thing.name], float) if thing.name in instead else thing.footprint_world)
-            for thing in building.things_of(locale) if thing.is_obstacle]
+            for thing in building.things_of(locale)
+            if thing.is_obstacle and not (of_model and thing.kind == EXTRA_KIND)]
 
 
 def compute_free_space(
@@ -142,16 +146,19 @@ def measure_thing_distance_m(footprint: Any, point: Any) -> float:
 
 
 def find_nearest(
-    building: Building, locale: str, point: Any, instead: Mapping[str, Footprint] = MappingProxyType({})
+    building: Building, locale: str, point: Any, instead: Mapping[str, Footprint] = MappingProxyType({}), *,
+    of_model: bool = False,
 ) -> tuple[float, str]:
     """Distance [m] of a point (2,) [world] from the nearest wall or obstacle of a locale, and which of them it is.
 
-    ``instead``: footprints by the names of things that are taken to stand otherwise.
+    Args:
+        instead: footprints by the names of things that are taken to stand otherwise.
+        of_model: without what the model lacks.
     """
     openings = [np.concatenate(doorway.thresholds_world) for doorway in building.doorways_of(locale)]
     near = [(measure_wall_distance_m(building.outline(locale), openings, point), "a wall")]
     near += [(measure_thing_distance_m(corners, point), name)
-             for name, corners in _list_footprints(building, locale, instead)]
+             for name, corners in _list_footprints(building, locale, instead, of_model=of_model)]
     return min(near)
 
 
@@ -179,7 +186,7 @@ def _leads_away(boundary: shapely.Geometry, point: Floats, end: Floats, radius_m
     if boundary.distance(line) < min(radius_m + TOUCHED_M, begin_m) - TOUCHED_M:
         return False
     first = shapely.line_interpolate_point(line, min(AWAY_STEP_M, line.length))
-    return begin_m >= radius_m + AWAY_GAP_M or boundary.distance(first) >= begin_m + AWAY_PART * AWAY_STEP_M
+    return bool(begin_m >= radius_m + AWAY_GAP_M or boundary.distance(first) >= begin_m + AWAY_PART * AWAY_STEP_M)
 
 
 def find_bends(free: shapely.Geometry) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import replace
 
@@ -116,7 +117,7 @@ def test_what_is_seen_free_is_forgotten_within_two_pictures_and_found_again(hall
     hall.see(carton(), seen_s=1.0)
     hall.see(carton(), seen_s=2.0)
     for seen_s in (3.0, 4.0):
-        hall.see(seen_s=seen_s)
+        hall.see(seen_s=seen_s, ahead_m=0.2 * (seen_s - 2.0))
     assert [o.status for o in hall.obstacles] == ["gone"]
     assert hall.frame.changes == () and "is gone" in hall.obstacles[0].sentence()
     hall.see(carton(), seen_s=5.0)
@@ -134,8 +135,22 @@ def test_what_was_touched_is_forgotten_when_its_floor_is_clearly_free(hall: Hall
     touched = Obstacle(f"{HALL}/obstacle-1", HALL, CARTON, 0.05, 4.0, 1.2, 0.45, certainty=0.99, touched_s=0.5)
     hall.apply(Post(touched))
     hall.see(seen_s=3.0)
-    hall.see(seen_s=4.0)
+    hall.see(seen_s=4.0, ahead_m=0.2)
     assert [o.status for o in hall.obstacles] == ["gone"]
+
+
+@given(st.floats(2.0, 4.2), st.booleans())
+@settings(max_examples=10, deadline=None)
+def test_a_touch_is_not_explained_by_what_is_known_on_another_side(world: World, away_rad: float, left: bool) -> None:
+    """What the model lacks explains no touch elsewhere: something else stands there."""
+    hall = Hall(world)
+    direction = 0.3 if left else -0.3
+    out = cmath.exp(1j * (direction + away_rad)) * (hall.robot.radius_m + 0.05)
+    x, y = HERE.x_m + out.real, HERE.y_m + out.imag
+    beside = tuple((x + a * abs(out.real), y + b * abs(out.imag)) for a, b in ((0.0, 0.0), (0.1, 0.0), (0.0, 0.1)))
+    hall.apply(Post(Obstacle(f"{HALL}/obstacle-1", HALL, beside, 0.02, 4.0, 1.2, 0.1, certainty=0.99)))
+    hall.touch(direction, turns=(), basis="milestone")
+    assert len(hall.obstacles) == 2 and hall.obstacles[1].touched_s == 3.0
 
 
 def test_what_the_model_has_there_is_no_obstacle(hall: Hall) -> None:
@@ -223,7 +238,7 @@ def test_nothing_is_expected_to_be_seen_behind_it_and_all_of_it_when_it_is_gone(
     during = lines()
     assert total_length(during) < 0.9 * total_length(before)
     for seen_s in (3.0, 4.0):
-        hall.see(seen_s=seen_s)
+        hall.see(seen_s=seen_s, ahead_m=0.2 * (seen_s - 2.0))
     assert np.array_equal(lines(), before)
 
 

@@ -49,7 +49,7 @@ from knowledge_sources.plan.milestone_judge import (
     Case,
     MilestoneJudge,
 )
-from knowledge_sources.questions import HELD, find_belief, find_camera
+from knowledge_sources.questions import HELD, find_belief, find_camera, find_followed
 from knowledge_sources.settings import DEFAULT, Settings
 from rebuilt_board import copy_of
 from sim.scenario import parse_scenario
@@ -320,7 +320,8 @@ def test_what_it_writes_follows_from_the_verdict(judged: list[Judged], in_doubt:
             board.apply([Post(Discrepancy(Level.PLAN, "by a law", 9.0, (0.0, 30.0), "px"))], author="test", cycle=10**6)
         case, weighed, effects = judge_on(Judged(board, one.trigger))
         said = effect_on(effects, Certificate)
-        assert reasons(said) == {case.fix.id, case.milestone.id}
+        followed = {entry.id for entry in find_followed(board.view, DEFAULT.action)}
+        assert reasons(said) == {case.fix.id, case.milestone.id, *followed}
         assert (said.value.milestone, said.value.fix) == (case.milestone.id, case.fix.id)
         off = case.fix.value.world_from_robot.minus(case.belief.value.world_from_robot(weighed.robot.world))
         assert said.value.deviation_m == pytest.approx(math.hypot(*off[:2]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +12,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.motion.routes import SLACK_M, compute_free_space, find_shortest_route, is_clear
+from knowledge_sources.methods.motion.routes import (
+    AWAY_PART,
+    AWAY_STEP_M,
+    SLACK_M,
+    TOUCHED_M,
+    compute_free_space,
+    find_shortest_route,
+    is_clear,
+)
 
 ROOM = [(0.0, 0.0), (8.0, 0.0), (8.0, 6.0), (0.0, 6.0)]
 coordinate = st.floats(0.6, 5.4)
@@ -152,3 +161,21 @@ def test_a_goal_shut_in_behind_an_obstacle_is_not_reached_through_it() -> None:
     desk = [[(0.0, 0.5), (1.8, 0.5), (1.8, 0.7), (0.0, 0.7)], [(1.6, 0.0), (1.8, 0.0), (1.8, 0.6), (1.6, 0.6)]]
     floor = compute_free_space(ROOM, desk, 0.0)
     assert find_shortest_route(compute_free_space(ROOM, desk, 0.4), (1.0, 3.0), (0.9, 0.3), lambda: floor) is None
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(-0.015, 0.015))
+@settings(max_examples=30, deadline=None)
+def test_a_way_begins_by_leading_away_from_what_the_robot_stands_at(side: float, gap_m: float) -> None:
+    """It does not slide along it, nor come nearer; where the goal lies behind, it goes round."""
+    radius_m, middle = 0.35, np.array([4.0, 3.0])
+    thing = shapely.Point(middle).buffer(0.2)
+    out = np.array([math.cos(side), math.sin(side)])
+    start, goal = middle + (0.2 + radius_m + gap_m) * out, middle - 1.2 * out
+    room = shapely.box(0.0, 0.0, 8.0, 6.0)
+    free = room.buffer(-radius_m - 0.12).difference(thing.buffer(radius_m + 0.12))
+    route = find_shortest_route(free, start, goal, lambda: room.difference(thing), radius_m)
+    assert route is not None
+    first = shapely.line_interpolate_point(shapely.LineString(route), AWAY_STEP_M)
+    begin_m = thing.distance(shapely.Point(start))
+    assert thing.distance(first) >= begin_m + 0.9 * AWAY_PART * AWAY_STEP_M
+    assert thing.distance(shapely.LineString(route)) >= min(radius_m, begin_m) - 2.0 * TOUCHED_M
