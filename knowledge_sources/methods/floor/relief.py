@@ -93,7 +93,8 @@ class Relief:
 
     Attributes:
         kinds: (rows, columns) UNTOLD, FLAT (on the floor, or mirrored in it), STANDING, or FIXED (on the lens).
-        parts: (rows, columns) how far what stands is, as a part of the distance of the floor that it hides; else 1.
+        parts: (rows, columns) how far what stands is, as a part of the distance of the floor that it hides; above 1
+            what is mirrored in the floor; else 1.
         gains_px: (rows, columns) what is at a part p of that distance was ``gain * (1 / p - 1)`` from where the floor
             was in the earlier picture, reduced; 0 where that is not in it.
     """
@@ -109,8 +110,11 @@ class Relief:
         return replace(self, kinds=kinds)
 
     def tells_of(self, parts: Floats) -> NDArray[np.bool_]:
-        """Where what is at such parts (rows, columns) of the distance is told from the floor, if there is texture."""
-        return np.asarray(self.gains_px * (1.0 / np.maximum(parts, 1e-3) - 1.0) >= MIN_APART_PX)
+        """Where what is at such parts (rows, columns) of the distance is told from the floor, if there is texture; and
+        from what is mirrored in it, where that is seen.
+        """
+        lying = np.maximum(self.parts, 1.0)
+        return np.asarray(self.gains_px * (1.0 / np.maximum(parts, 1e-3) - 1.0 / lying) >= MIN_APART_PX)
 
 
 def find_relief(
@@ -135,6 +139,7 @@ def find_relief(
     gains = np.where(sweep.is_in(flat), apart / (1.0 / PARTS[1] - 1.0), 0.0).astype(np.float32)
     lying = np.max([sweep.compare(_shifted(floor, near)) for near in np.array(NEAR_SHIFTS)], axis=0)
     standing, parts = np.full(sweep.shape, -1.0, np.float32), np.ones(sweep.shape, np.float32)
+    on_floor, depths = lying, np.ones(sweep.shape, np.float32)
     for depth in (*PARTS, *DEPTHS):
         plane = both.find_map(depth)
         if plane is None:
@@ -142,6 +147,7 @@ def find_relief(
         alike = sweep.compare(plane)
         alike[gains * abs(1.0 / depth - 1.0) < MIN_APART_PX] = -1.0
         if depth > 1.0:
+            depths[alike > lying] = depth
             lying = np.maximum(lying, alike)
         else:
             is_best = alike > standing
@@ -157,7 +163,8 @@ def find_relief(
                              (FIXED, fixed, np.maximum(lying, standing))):
         kinds[sweep.tells & (own >= MIN_ALIKE) & (own - other >= MIN_LEAD)] = kind
     kinds[(kinds == STANDING) & (sweep.measure_texture_along(away) < MIN_ALONG)] = UNTOLD
-    parts[kinds != STANDING] = 1.0
+    is_mirrored = (kinds == FLAT) & (lying - on_floor >= MIN_LEAD)
+    parts = np.where(kinds == STANDING, parts, np.where(is_mirrored, depths, np.float32(1.0)))
     return Relief(kinds, parts, gains)
 
 
