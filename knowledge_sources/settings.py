@@ -412,6 +412,8 @@ class PlanSettings:
     max_lookouts: int = setting(
         6, "count", "So often the robot looks again, from elsewhere, at what leaves no way; then it is blocked.")
     max_leg_m: float = setting(3.6, "m", "Longest leg without a milestone in between.")
+    approaches_seeing: bool = setting(
+        True, "yes/no", "Whether a doorway is approached, and left behind, from where the floor in it is seen.", "§4")
     max_adjustments: int = setting(8, "count", "So often a sketch is adjusted at one milestone; then that was in vain.")
 
     # Discrepancy raiser

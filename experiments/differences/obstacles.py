@@ -122,8 +122,9 @@ RING: Pairs = (("ranges.sensors", "24"),)
 NO_APPEARANCE: Pairs = (("floor.use_appearance", "false"),)
 NO_PARALLAX: Pairs = (("floor.use_parallax", "false"),)
 NO_RANGES: Pairs = (("floor.use_ranges", "false"),)
-UNSEEN: Pairs = (*NO_APPEARANCE, *NO_PARALLAX, *NO_RANGES, ("action.keeps_to_seen_floor", "false"))
-"""The floor is not looked at, and the robot drives without having seen it."""
+UNSEEN: Pairs = (*NO_APPEARANCE, *NO_PARALLAX, *NO_RANGES, ("action.keeps_to_seen_floor", "false"),
+                 ("plan.approaches_seeing", "false"))
+"""The floor is not looked at, and the robot drives without having seen it, the shortest way."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.arrays import Floats, Mask
+from knowledge_sources.methods.floor.model_floor import SIGHT_M
 from world_models.building.building import Building
 from world_models.entries.floor import FreeFloor
 from world_models.frames import Pose2, wrap_angle
@@ -212,6 +213,13 @@ def _is_in_picture(robot: RobotModel, pose: Pose2, points: Floats) -> Mask:
     inside = there[:, 2] > MIN_DEPTH_M
     inside[inside] = robot.camera.inside(robot.camera.project(there[inside]), BORDER_PX)
     return np.asarray(inside)
+
+
+def measure_first_seen_m(robot: RobotModel) -> float:
+    """How far before its axis the robot first sees the floor straight ahead; 0 where it sees none within its sight."""
+    ahead_m = np.arange(0.0, SIGHT_M, SPACING_M)
+    seen = _is_in_picture(robot, Pose2(0.0, 0.0, 0.0), np.column_stack([ahead_m, np.zeros_like(ahead_m)]))
+    return float(ahead_m[seen.argmax()])
 
 
 def _is_in_sight(robot: RobotModel, floor: shapely.Geometry, pose: Pose2, points: Floats) -> Mask:

@@ -13,7 +13,7 @@ import shapely
 from shapely import Geometry, LineString, Point
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor.seen_floor import find_floor
+from knowledge_sources.methods.floor.seen_floor import find_floor, measure_first_seen_m
 from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.methods.motion.routes import (
     JOINT_M,
@@ -38,6 +38,8 @@ from world_models.robot import RobotModel
 
 DOORWAY_DISTANCES_M = (0.65, 0.55, 0.47, 0.40)
 """Distances from a doorway at which it is approached straight, tried in this order."""
+SEEING_PARTS = (1.0, 0.75, 0.6)
+"""From so much of the distance at which the robot first sees the floor it approaches a doorway, where there is room."""
 DOORWAY_OFFSETS_M = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 """Distances from its middle, to either side, at which it is approached aslant, past what stands before it."""
 LOOKOUT_DISTANCES_M = (1.8, 2.4, 3.0)  # distances from which it does so: the floor before it is in the picture
@@ -87,6 +89,9 @@ class SubgoalPlanner:
         self._cores = {o.name: o.core for o in there if o.core} if by_cores else {}
         self._obstacles = tuple(replace(o, footprint=o.core) if o.name in self._cores else o for o in there)
         self._cluttered = frozenset(obstacle.locale for obstacle in self._obstacles)
+        first_m = measure_first_seen_m(robot) if settings.approaches_seeing else 0.0
+        self._distances_m = (*(part * first_m for part in SEEING_PARTS if part * first_m > DOORWAY_DISTANCES_M[0]),
+                             *DOORWAY_DISTANCES_M)
 
     def explain_unfit(self, there: Place) -> str:
         """Why the robot cannot stand at a place, as far as it knows; "" where it can."""
@@ -211,11 +216,11 @@ class SubgoalPlanner:
             return Place.of_world(self._building, locale, float(x), float(y), float(heading))
         middle, outward = passage.threshold_of(locale).mean(axis=0), passage.outward_from(locale)
         free = self._free_space(locale, self._settings.clearances_m[-1])
-        distances = DOORWAY_DISTANCES_M
+        distances = self._distances_m
         fit = (m for m in distances if free.covers(Point(middle - m * outward)))
         if locale in self._cluttered:
             fit = (m for m in fit if self._is_passed(middle, middle - m * outward, locale))
-        away = next(fit, None if locale in self._cluttered else distances[0])
+        away = next(fit, None if locale in self._cluttered else DOORWAY_DISTANCES_M[0])
         if away is None:
             return None
         x, y = middle - away * outward

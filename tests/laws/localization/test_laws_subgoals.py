@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generated_boards import HALL, HOUSE, LENGTH_M, STUDY, WIDTH_M, Bench, plain_robot, to_world
+from knowledge_sources.methods.floor.seen_floor import find_floor, measure_first_seen_m, sees
 from knowledge_sources.methods.motion.subgoals import (
     LOOKOUT_DIRECTIONS,
     LOOKOUT_DISTANCES_M,
@@ -22,10 +24,12 @@ from knowledge_sources.methods.motion.subgoals import (
 )
 from knowledge_sources.questions import find_robot
 from knowledge_sources.settings import DEFAULT
+from world_models.camera import Camera, CameraMount
 from world_models.entries.location import Place
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2
+from world_models.robot import RobotModel
 
 S = DEFAULT.plan
 WEST = HOUSE.replace('along = 2.0', 'along = 3.2').replace("[doors]", """[locales.west]
@@ -86,6 +90,33 @@ def test_a_way_is_one_step_after_the_other_through_the_door_and_past_what_stands
             through.origin, through.destination)])
         least_m = line.distance(shapely.Polygon(bench.view["Obstacle-1"].value.footprint))
         assert least_m >= plain_robot().radius_m + S.clearances_m[-1] - 1e-3
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.4, 1.6), st.floats(0.3, 1.2), st.floats(0.0, 0.4))
+def test_a_doorway_is_approached_from_where_the_floor_in_it_is_seen(
+    height_m: float, angle_rad: float, tilt_rad: float
+) -> None:
+    """Whatever the camera: at the place before it, facing it, all floor from its threshold on is in the picture."""
+    plain = plain_robot()
+    robot = RobotModel(plain.world, Camera.from_field_of_view(2.0 * angle_rad), CameraMount(height_m, 0.1, tilt_rad),
+                       plain.actuator)
+    here, there = Place(HALL, 5.0, 2.8), Place(STUDY, 3.0, 2.0)
+    way = SubgoalPlanner(robot, S).plan_between_locales(here, there, 0.01)
+    shortest = SubgoalPlanner(robot, replace(S, approaches_seeing=False)).plan_between_locales(here, there, 0.01)
+    assert way is not None and shortest is not None
+    door = next(d for d in robot.world.doorways_of(HALL) if d.name == "study-door")
+    middle, outward = door.threshold_of(HALL).mean(axis=0), door.outward_from(HALL)
+    before = way[0].destination.in_world(robot.world).position
+    away_m, nearest_m = (float(outward @ (middle - p.destination.in_world(robot.world).position))
+                         for p in (way[0], shortest[0]))
+    first_m = measure_first_seen_m(robot)
+    assert away_m == pytest.approx(max(first_m, nearest_m)) or first_m > 2.0  # the hall has no room for more
+    if nearest_m <= first_m <= 2.0:
+        facing = Pose2(float(before[0]), float(before[1]), math.atan2(outward[1], outward[0]))
+        ahead = middle + np.linspace(0.01, 0.5, 10)[:, None] * outward
+        assert sees(robot, find_floor(robot.world, (HALL, STUDY)), facing, ahead).all()
+        assert not sees(robot, find_floor(robot.world, (HALL, STUDY)), facing, [middle - 0.06 * outward]).any()
 
 
 @pytest.mark.parametrize("beside_m", [0.02, 0.05, 0.099, 0.101, 0.3])
