@@ -14,9 +14,13 @@ from blackboard.level import Level
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_camera, open_discrepancy, open_impasse, open_milestone
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.location import Hypothesis, Place
+from world_models.entries.location import Hypothesis, Place, TwinOdds
 from world_models.entries.obstacle import Obstruction
 from world_models.entries.task import Goal, Impasse, Outcome
+
+
+SURE_PLACE = 0.999
+"""Where the place is less probable than this against those that look like it, the end says so."""
 
 
 class Case(NamedTuple):
@@ -29,7 +33,8 @@ class Case(NamedTuple):
 class MissionMonitor(RobotKnowledgeSource):
     """Declares how the mission ends: the goal is reached, somebody sees no way on, or nothing is left to do.
 
-    Where it is not reached, what hides a part of each picture is said too.
+    Where it is not reached, what hides a part of each picture is said too; where it is, how likely the robot is at
+    another place that looks the same.
     """
 
     level, priority = Level.GOAL, Priority.ENTER
@@ -46,7 +51,10 @@ class MissionMonitor(RobotKnowledgeSource):
         reached, impasse = view.latest(Goal, lambda goal: goal.status == "reached"), open_impasse(view)
         if reached is not None:
             why = f"every milestone on the way to {reached.value.destination} was verified"
-            return Case(Outcome("reached", why), (reached,))
+            twins = view.latest(TwinOdds, lambda odds: bool(odds.twins) and odds.probability < SURE_PLACE)
+            if twins is None:
+                return Case(Outcome("reached", why), (reached,))
+            return Case(Outcome("reached", f"{why}, but {twins.value.sentence()}"), (reached, twins))
         if impasse is not None:
             return Case(Outcome(impasse.value.kind, impasse.value.reason), (impasse,))
         return _find_what_is_left(view, trigger.entry)

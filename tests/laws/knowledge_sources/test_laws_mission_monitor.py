@@ -9,7 +9,7 @@ from blackboard.entry import Entry
 from blackboard.level import Level
 from generated_boards import HALL, Bench, all_reasons, made, plain_robot, wakes
 from knowledge_sources.goal.mission_monitor import MissionMonitor
-from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.location import Hypothesis, Twin, TwinOdds, diagonal
 from world_models.entries.obstacle import Obstruction
 from world_models.entries.task import Impasse, Outcome
 from world_models.frames import Pose2
@@ -54,6 +54,21 @@ def test_what_weighs_most_tells_how_it_ends(is_reached: bool, has_impasse: bool,
         assert (kind, named) == ("failed", {still.id, goal.id})
     bench.put(Outcome(kind, reason))
     assert end(bench, still) is None
+
+
+@pytest.mark.parametrize("probability", [0.95, 0.985, 0.9989, 0.9991, 1.0])
+@pytest.mark.parametrize("twins", [0, 1, 5])
+def test_where_it_may_be_elsewhere_reached_says_so(probability: float, twins: int) -> None:
+    """The probability and the likeliest of the other places; where none looks the same, or none is likely, nothing."""
+    bench = Bench(plain_robot())
+    goal = bench.revise(bench.pursue(), status="reached")
+    others = tuple(Twin(f"room-{k}", Pose2(3.0 * k, 0.0, 0.0), -float(k)) for k in range(1, twins + 1))
+    odds = bench.put(TwinOdds(0.98, probability, others, ("Certificate-1",), Pose2(0.0, 0.0, 0.0)))
+    found = end(bench, goal)
+    assert found is not None and found[0] == "reached"
+    says = twins > 0 and probability < 0.999
+    assert found[2] == {goal.id, *([odds.id] if says else [])}
+    assert (f"{probability:.1%}" in found[1] and "room-1" in found[1]) == says
 
 
 @pytest.mark.parametrize("kind", ["blocked", "lost", "failed", "stopped"])
