@@ -117,7 +117,12 @@ class Verdict(NamedTuple):
 
 def tell_odds(p_wrong: float, most_p_wrong: float) -> str:
     """A probability of a wrong place beside its bound, in words."""
-    return f"wrong with a probability of {100.0 * p_wrong:.2g}%, and at most {100.0 * most_p_wrong:.2g}% may be"
+    return f"wrong with a probability of {say_percent(p_wrong)}, and at most {say_percent(most_p_wrong)} may be"
+
+
+def say_percent(p: float) -> str:
+    """A probability to two figures, or four where it is near to one."""
+    return f"{100.0 * p:.{2 if p < 0.99 else 4}g}%"
 
 
 def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, settings: Settings) -> Weighed:
