@@ -44,6 +44,7 @@ PUT_DOWN_FREE_M = 0.75  # round where it was put down the floor is free to this 
 NEAR_MODEL_M = 0.08  # nearer to a wall or a thing of the model the floor need not be seen
 MIN_INCREMENT_M = 0.2  # shortest move at full speed into floor that is seen to be free; less of it is crept
 MIN_CREEP_M = 0.05  # shortest move into floor that was not seen to be free
+UNSURE_GAP_M = 0.3  # nearer to what is only suspected it creeps: what was seen of it may be a part of it
 TOUCHED_GAP_M = 0.02  # what was touched is not come so near to again
 TOUCHED_AWAY = 0.2  # nearer to it than that a move must lead away from it by this part of the way
 MAX_DRIVEN_GAP_M = 0.8  # between two pictures that are no further apart the robot drove straight
@@ -103,7 +104,10 @@ class FloorAhead:
             return Caution(0.0, True)
         caution = limit_move(self._find_unseen(self._sweep(self._way, free_m)), free_m, self._settings)
         if not caution.creeps:
-            return caution
+            sure_m = self._measure_to_things_m(caution.move_m, UNSURE_GAP_M)
+            if sure_m >= min(caution.move_m, MIN_INCREMENT_M):
+                return caution._replace(move_m=sure_m)
+            caution = Caution(min(caution.move_m, self._settings.max_creep_m), True)
         return caution._replace(move_m=min(caution.move_m, self._measure_to_things_m(move_m)))
 
     def keep_to_seen(self, command: MotorCommand) -> tuple[Leg, MotorCommand | None]:
@@ -128,10 +132,11 @@ class FloorAhead:
         slowly = self._settings.creep_speed_m_per_s if caution.creeps else None
         return leg, MotorCommand(command.turn_rad, move_m, slowly)
 
-    def _measure_to_things_m(self, most_m: float, *, touched: bool = False) -> float:
+    def _measure_to_things_m(self, most_m: float, gap_m: float = 0.0, *, touched: bool = False) -> float:
         """How far the robot can go towards the leg's end before it comes nearer to what may stand there; 0..most.
 
         Args:
+            gap_m: of its rim; of what is only suspected, where it is not 0.
             touched: only what was touched is asked; the robot does not go along that, but away from it.
         """
         way, step_m = shapely.LineString(self._way), MIN_CREEP_M
@@ -139,10 +144,10 @@ class FloorAhead:
         points = shapely.line_interpolate_point(way, along)
         free_m = most_m
         for entry, polygon in self._suspected:
-            if touched and entry.value.touched_s is None:
+            if (touched and entry.value.touched_s is None) or (gap_m and entry.value.is_there):
                 continue
             gaps = shapely.distance(points, polygon)
-            near_m, away_m = (TOUCHED_GAP_M, TOUCHED_AWAY * step_m) if touched else (0.0, -1e-9)
+            near_m, away_m = (TOUCHED_GAP_M, TOUCHED_AWAY * step_m) if touched else (gap_m, -1e-9)
             met = np.flatnonzero((gaps[1:] < self._robot.radius_m + near_m) & (gaps[1:] < gaps[:-1] + away_m))
             if len(met):
                 free_m = min(free_m, float(along[met[0]]))

@@ -126,7 +126,10 @@ def test_what_was_pending_is_known_where_acts_wait(history: Timeline) -> None:
 def test_a_sketch_drawn_anew_goes_back_to_what_was_told(run: RunDirectory, history: Timeline) -> None:
     superseded = next(ref for ref in history.refs if ref.startswith("PlanSketch-")
                       and value_in(history, ref)["status"] == "superseded")
-    for ref in (superseded, "PlanSketch-3.0"):
+    route = value_in(history, superseded)["path"]
+    drawn = [ref for ref in history.refs if re.fullmatch(r"PlanSketch-\d+\.0", ref)
+             and value_in(history, ref)["path"] == route]
+    for ref in (superseded, drawn[-1]):
         found = told(history, ref, run)
         assert f"{DOOR} is shut (user)" in step(found, "changed").text
         assert step(found, "told").refs == ("UserReport-1.0",)
