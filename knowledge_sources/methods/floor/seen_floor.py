@@ -27,6 +27,9 @@ HIDDEN_M = 0.3
 """So far behind the near side of a thing the floor counts as taken by it."""
 SPACING_M = 0.05
 """Of the points by which a region is told."""
+MIN_POINTS = 3
+WINDOW_M = 0.15
+"""Fewer unseen points than that within so much of the way hide nothing: 75 square centimetres."""
 
 
 class _Scan(NamedTuple):
@@ -104,12 +107,11 @@ def _ask_scan(scan: _Scan, points: Floats) -> tuple[Mask, Mask]:
 
 
 class Sweep(NamedTuple):
-    """What a disc sweeps on a way, and a rim round it.
+    """What a disc sweeps on a way.
 
     Attributes:
-        points: (n, 2) of a grid, on the floor [m, world].
-        at_m: (n,) how far the disc has come when it first covers each; 0 for what it covers at the start, infinite for
-            the rim.
+        points: (n, 2) on the floor [m, world].
+        at_m: (n,) how far the disc has come when it first covers each; 0 for what it covers at the start.
     """
 
     points: Floats
@@ -120,32 +122,27 @@ class Sweep(NamedTuple):
 
 
 def sample_sweep(way: Sequence[tuple[float, float]], radius_m: float, most_m: float) -> Sweep:
-    """What a disc sweeps on the first ``most_m`` of a way (k, 2), by points of a grid; with a rim of one point."""
+    """What a disc sweeps on the first ``most_m`` of a way (k, 2), by points of a grid."""
     line = shapely.LineString(way) if len(way) > 1 else shapely.LineString([way[0], way[0]])
     length = min(line.length, most_m)
     at = np.append(np.arange(0.0, length, SPACING_M / 2.0), length)
     places = shapely.get_coordinates(shapely.line_interpolate_point(line, at))
-    rim_m = radius_m + math.sqrt(2.0) * SPACING_M
-    low, high = places.min(axis=0) - rim_m, places.max(axis=0) + rim_m
+    low, high = places.min(axis=0) - radius_m, places.max(axis=0) + radius_m
     xs, ys = (SPACING_M * np.arange(np.floor(a / SPACING_M), np.ceil(b / SPACING_M) + 1.0)
               for a, b in zip(low, high, strict=True))
     grid = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=-1).reshape(-1, 2)
-    away2 = ((grid[:, None] - places[None]) ** 2).sum(axis=2)
-    near, beside = away2 <= radius_m**2, (away2 <= rim_m**2).any(axis=1)
-    at_m = np.where(near.any(axis=1), at[near.argmax(axis=1)], np.inf)
-    return Sweep(grid[beside], at_m[beside])
+    near = ((grid[:, None] - places[None]) ** 2).sum(axis=2) <= radius_m**2
+    swept = near.any(axis=1)
+    return Sweep(grid[swept], at[near[swept].argmax(axis=1)])
 
 
 def find_blind(unseen: Sweep) -> Floats:
-    """How far the disc has come (n,), rising, where it begins to cover unseen floor that may hide something.
-
-    That is each square of four unseen points of the grid: what stands in floor that is seen all round would be seen.
-    """
-    cells = {(round(x / SPACING_M), round(y / SPACING_M)): at
-             for (x, y), at in zip(unseen.points.tolist(), unseen.at_m.tolist(), strict=True)}
-    squares = ([cells.get((i + di, j + dj), -1.0) for di, dj in ((0, 0), (0, 1), (1, 0), (1, 1))] for i, j in cells)
-    met = [min(square) for square in squares]
-    return np.sort([at for at in met if 0.0 <= at < math.inf])
+    """How far the disc has come (n,), rising, where it begins to cover unseen points that may hide something."""
+    at = np.sort(unseen.at_m)
+    if len(at) < MIN_POINTS:
+        return np.zeros(0)
+    few = MIN_POINTS - 1
+    return np.asarray(at[:-few][at[few:] - at[:-few] <= WINDOW_M])
 
 
 def measure_blind_m(unseen: Sweep) -> float:
@@ -164,8 +161,9 @@ def measure_blind_end_m(unseen: Sweep, gap_m: float) -> float:
     blind = find_blind(unseen)
     if not len(blind):
         return 0.0
+    at = np.sort(unseen.at_m)
     last = blind[0]
-    for there in blind:
+    for there in at[at >= last]:
         if there - last > gap_m:
             break
         last = there
