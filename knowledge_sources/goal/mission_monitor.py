@@ -18,7 +18,6 @@ from world_models.entries.location import Hypothesis, Place, TwinOdds
 from world_models.entries.obstacle import Obstruction
 from world_models.entries.task import Goal, Impasse, Outcome
 
-
 SURE_PLACE = 0.999
 """Where the place is less probable than this against those that look like it, the end says so."""
 

@@ -122,7 +122,6 @@ class Obstacle:
         height_m: of its top above the floor; sigma_height_m: standard deviation; infinite where nothing tells it.
         certainty: probability that it is there.
         seen_s: when it was last seen, ranged or touched, by the body's clock.
-        looked_s: when its place was last seen or ranged, whether or not it was there still.
         touched_s: when it was last touched; None where it never was.
         by: what told of it first.
         evidence: what tells of it, in words: which pixels of which picture.
@@ -143,7 +142,6 @@ class Obstacle:
     sigma_height_m: float = math.inf
     certainty: float = 1.0
     seen_s: float = 0.0
-    looked_s: float = 0.0
     touched_s: float | None = None
     by: ObstacleSense = "touch"
     evidence: str = ""

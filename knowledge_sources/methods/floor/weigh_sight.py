@@ -193,7 +193,7 @@ def see_first(
         return None
     found = Obstacle(
         f"{locale}/obstacle-{number}", locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m,
-        thing.sigma_height_m, min(thing.p_thing, settings.max_obstacle_certainty), f.seen_s, f.seen_s, None, f.sense,
+        thing.sigma_height_m, min(thing.p_thing, settings.max_obstacle_certainty), f.seen_s, None, f.sense,
         _tell(thing, sight), tell_status(thing.p_thing, settings), core, thing.is_alike, shape.from_m,
         sight.eye)
     return place(world, found, own)
@@ -225,7 +225,7 @@ def see_again(
         return None
     height, sigma = (thing.height_m, thing.sigma_height_m) if higher else (known.height_m, known.sigma_height_m)
     status: ObstacleStatus = "there" if known.is_there else tell_status(certainty, s)
-    new = replace(known, certainty=certainty, seen_s=f.seen_s, looked_s=f.seen_s, status=status, height_m=height,
+    new = replace(known, certainty=certainty, seen_s=f.seen_s, status=status, height_m=height,
                   sigma_height_m=sigma, sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight),
                   is_alike=known.is_alike and thing.is_alike, told_from=sight.eye)
     if not moved or not footprint:
@@ -264,12 +264,12 @@ def miss(
             odds = FREE_FLOOR_ODDS
         certainty = update(known.certainty, free_part * math.log(odds))
         status: ObstacleStatus = "gone" if certainty < settings.min_gone_certainty else known.status
-        return replace(known, certainty=certainty, looked_s=sight.floor.seen_s, status=status, told_from=sight.eye)
+        return replace(known, certainty=certainty, status=status, told_from=sight.eye)
     left = leave_free(ThingShape.of(known), free)
     footprint, core = left.list_corners()
     if not footprint or measure_change_m(known.footprint, footprint) < settings.min_footprint_change_m:
         return None
-    new = replace(known, footprint=footprint, core=core, looked_s=sight.floor.seen_s, told_from=sight.eye)
+    new = replace(known, footprint=footprint, core=core, told_from=sight.eye)
     return place(sight.world, new, left.whole)
 
 

@@ -71,7 +71,7 @@ def touch_first(
     at = Place.of_world(world, locale, float(touched.at[0]), float(touched.at[1]))
     return Obstacle(
         f"{locale}/obstacle-{number}", locale, touched.build_square(width_m), sigma_m, at.x_m, at.y_m, width_m,
-        certainty=s.max_obstacle_certainty, seen_s=contact.when_s, looked_s=contact.when_s, touched_s=contact.when_s,
+        certainty=s.max_obstacle_certainty, seen_s=contact.when_s, touched_s=contact.when_s,
         by="touch", evidence=contact.sentence())
 
 
@@ -81,5 +81,5 @@ def touch_again(world: Building, touched: Touched, known: Obstacle, settings: Ac
     joined = shapely.convex_hull(shapely.union_all([build_polygon(known.footprint), corner]))
     core = list_corners(shapely.union(build_polygon(known.core), corner)) if known.core else ()
     new = replace(known, footprint=list_corners(joined), core=core, certainty=settings.max_obstacle_certainty,
-                  seen_s=when_s, looked_s=when_s, touched_s=when_s, status="there")
+                  seen_s=when_s, touched_s=when_s, status="there")
     return place(world, new, joined)

@@ -61,7 +61,7 @@ def test_touched_it_reaches_to_where_it_was_touched_and_what_was_seen_of_it_too(
             hull = shapely.convex_hull(shapely.union(build_polygon(before), build_polygon(square)))
             assert build_polygon(after).hausdorff_distance(hull) < 8e-3
     assert not has_core or is_part(new.core, new.footprint)
-    assert (new.status, new.seen_s, new.looked_s, new.touched_s) == ("there", 7.0, 7.0, 7.0)
+    assert (new.status, new.seen_s, new.touched_s) == ("there", 7.0, 7.0)
     assert new.certainty == DEFAULT.action.max_obstacle_certainty
 
 

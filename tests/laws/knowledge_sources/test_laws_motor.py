@@ -33,6 +33,7 @@ from generated_boards import (
 )
 from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.motor import Motor
+from knowledge_sources.floor_ahead import MIN_INCREMENT_M, UNSURE_GAP_M
 from knowledge_sources.methods.floor.seen_floor import find_floor
 from knowledge_sources.methods.motion.increments import MAX_HEADING_ERROR_RAD
 from knowledge_sources.methods.motion.pure_pursuit import MAX_START_OFFSET_M
@@ -294,6 +295,16 @@ def test_it_does_not_creep_to_where_something_may_stand_but_halts_the_leg() -> N
     effect = effect_on(halted, Leg)
     assert (effect.value.status, effect.value.increments) == ("halted", 0)
     assert {"Leg-1", "Hypothesis-1", "Obstacle-1"} <= reasons(effect)
+
+
+@pytest.mark.parametrize("suspected", [0.7, 0.8, 0.9, 1.1, 1.2, 1.5])
+def test_it_creeps_past_what_is_only_suspected_though_the_floor_is_seen_free(suspected: float) -> None:
+    """At full speed up to 0.3 m before it; from there slowly, and not to where it may stand."""
+    command = command_of(drive_to_thing(3.0, suspected=suspected)[1])
+    assert command is not None
+    move_m, before_m = ACTUATOR.reach * command.move_m, suspected - 0.1 - plain_robot().radius_m
+    assert (command.speed_m_per_s is None) == (before_m - UNSURE_GAP_M >= MIN_INCREMENT_M)
+    assert move_m <= max(before_m - UNSURE_GAP_M, 0.0 if command.speed_m_per_s is None else before_m) + 0.05 + SMALL
 
 
 def test_what_it_watches() -> None:

@@ -97,7 +97,7 @@ def test_what_was_not_known_is_as_certain_as_its_sight(world: World, p_thing: fl
     found: Obstacle = effect.value
     assert found.certainty == min(p_thing, S.max_obstacle_certainty)
     assert found.status == ("there" if p_thing >= S.min_obstacle_certainty else "suspected")
-    assert (found.name, found.seen_s, found.looked_s, found.touched_s) == (f"{HALL}/obstacle-1", 7.0, 7.0, None)
+    assert (found.name, found.seen_s, found.touched_s) == (f"{HALL}/obstacle-1", 7.0, None)
     assert shapely.hausdorff_distance(shapely.Polygon(found.footprint), shapely.Polygon(CARTON)) < 2e-3
 
 
@@ -140,7 +140,7 @@ def test_floor_that_is_seen_free_from_elsewhere_lowers_the_odds_by_a_stated_fact
     """By less where it only looks free; and what looks like the floor is gone only where it would be told."""
     hall = Hall(world, ())
     first = hall.put(hall.look(seen_s=1.0))
-    old = hall.put(replace(known("suspected", before), looked_s=5.0, seen_s=2.0, is_alike=is_alike,
+    old = hall.put(replace(known("suspected", before), seen_s=2.0, is_alike=is_alike,
                            told_from=(first.value.x_m, first.value.y_m)), first)
     look = hall.look(seen_s=6.0, ahead_m=ahead_m)
     scan, effects = ask(hall, look if is_told else replace(look, told_m=()))
@@ -154,14 +154,14 @@ def test_floor_that_is_seen_free_from_elsewhere_lowers_the_odds_by_a_stated_fact
     certainty = probability(odds_of(before), odds)
     assert effect.value.certainty == pytest.approx(certainty, rel=1e-6)
     assert effect.value.status == ("gone" if certainty < S.min_gone_certainty else "suspected")
-    assert effect.value.looked_s == 6.0 and effect.value.seen_s == 2.0
+    assert effect.value.seen_s == 2.0
 
 
 @given(st.floats(2.3, 2.6))
 @settings(max_examples=15, deadline=None)
 def test_where_a_part_is_seen_free_so_much_of_the_factor_counts(world: World, far_m: float) -> None:
     hall = Hall(world, ())
-    old = hall.put(replace(known("suspected", 0.7), looked_s=5.0))
+    old = hall.put(known("suspected", 0.7))
     scan = hall.look(seen_s=9.0, far_m=far_m)
     _, effects = ask(hall, scan)
     seen = shapely.Point(scan.x_m, scan.y_m).buffer(far_m - scan.sigma_m[0], quad_segs=200)

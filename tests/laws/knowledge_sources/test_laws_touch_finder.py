@@ -84,7 +84,7 @@ def test_a_sure_touch_is_a_square_behind_the_point_however_the_robot_has_turned_
     assert shapely.hausdorff_distance(shapely.Polygon(found.footprint), square) < ROUNDED_M
     assert shapely.Polygon(found.footprint).exterior.is_ccw
     assert (found.name, found.locale, found.status, found.by) == (f"{HALL}/obstacle-1", HALL, "there", "touch")
-    assert (found.seen_s, found.looked_s, found.touched_s) == (3.0, 3.0, 3.0)
+    assert (found.seen_s, found.touched_s) == (3.0, 3.0)
     assert found.certainty == DEFAULT.action.max_obstacle_certainty and found.width_m == side_m
     b = trigger.entry.value
     aside_m = hall.robot.radius_m * math.hypot(b.sigma_rad, sigma_rad)
