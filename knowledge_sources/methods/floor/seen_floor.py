@@ -17,7 +17,6 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.arrays import Floats, Mask
-from knowledge_sources.methods.floor.model_floor import SIGHT_M
 from world_models.building.building import Building
 from world_models.entries.floor import FreeFloor
 from world_models.frames import Pose2, wrap_angle
@@ -176,6 +175,8 @@ MAX_FLOORS = 64
 BORDER_PX = 8.0
 """What is nearer to the border of the picture does not count as seen."""
 MIN_DEPTH_M = 0.1
+MAX_FIRST_SEEN_M = 4.5
+"""A camera that sees no floor nearer than this sees none that matters."""
 HEADINGS = 24
 """Directions, round the robot, that are tried for a look."""
 
@@ -214,8 +215,8 @@ def _is_in_picture(robot: RobotModel, pose: Pose2, points: Floats) -> Mask:
 
 
 def measure_first_seen_m(robot: RobotModel) -> float:
-    """How far before its axis the robot first sees the floor straight ahead; 0 where it sees none within its sight."""
-    ahead_m = np.arange(0.0, SIGHT_M, SPACING_M)
+    """How far before its axis the robot first sees the floor straight ahead; 0 where it sees none that matters."""
+    ahead_m = np.arange(0.0, MAX_FIRST_SEEN_M, SPACING_M)
     seen = _is_in_picture(robot, Pose2(0.0, 0.0, 0.0), np.column_stack([ahead_m, np.zeros_like(ahead_m)]))
     return float(ahead_m[seen.argmax()])
 
