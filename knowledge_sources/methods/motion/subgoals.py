@@ -140,8 +140,8 @@ class SubgoalPlanner:
     def _find_blocked(self, route: Route, here: Place, destination: Place, aslant: bool) -> list[Passage]:
         """The passages at the ends of the first part of a route on which obstacles leave no way, if any."""
         came: Passage | None = None
-        for step in route.steps:
-            ends = self._find_ends(step.passage, step.origin, step.destination, aslant)
+        for step, rooms_m in zip(route.steps, self._measure_rooms_m(route, here, destination), strict=True):
+            ends = self._find_ends(step.passage, step.origin, step.destination, rooms_m, aslant)
             if ends is None:
                 return [step.passage]
             if not self._has_way(here, ends.before):
@@ -160,8 +160,8 @@ class SubgoalPlanner:
         self, route: Route, here: Place, destination: Place, tolerance_m: float, aslant: bool
     ) -> tuple[Subgoal, ...] | None:
         subgoals: list[Subgoal] = []
-        for step in route.steps:
-            ends = self._find_ends(step.passage, step.origin, step.destination, aslant)
+        for step, rooms_m in zip(route.steps, self._measure_rooms_m(route, here, destination), strict=True):
+            ends = self._find_ends(step.passage, step.origin, step.destination, rooms_m, aslant)
             if ends is None:
                 return None
             subgoals.append(self._build_subgoal(here, ends.before, ends.tolerance_m))
@@ -172,9 +172,29 @@ class SubgoalPlanner:
         subgoals.append(self._build_subgoal(here, destination, tolerance_m))
         return tuple(subgoals)
 
-    def _find_ends(self, passage: Passage, origin: str, destination: str, aslant: bool) -> _Ends | None:
+    def _measure_rooms_m(self, route: Route, here: Place, destination: Place) -> list[tuple[float, float]]:
+        """How far from each passage of a route the robot may come to it, and leave it, without turning back: as far as
+        the way begins or ends from it, or half as far as the next passage is.
+        """
+        ends = [here.in_world(self._building).position, destination.in_world(self._building).position]
+        places = [[self._find_middle(step.passage, side) for side in (step.origin, step.destination)]
+                  for step in route.steps]
+        gaps = [0.5 * math.dist(a[1], b[0]) for a, b in pairwise(places)]
+        gaps = [math.dist(ends[0], places[0][0]), *gaps, math.dist(places[-1][1], ends[1])] if places else []
+        return list(pairwise(gaps))
+
+    def _find_middle(self, passage: Passage, locale: str) -> Floats:
+        """(2,) of a doorway's threshold in a locale; where the robot stops for a link [m, world]."""
+        if isinstance(passage, Link):
+            return passage.stop_of(locale)[:2]
+        return np.asarray(passage.threshold_of(locale).mean(axis=0))
+
+    def _find_ends(
+        self, passage: Passage, origin: str, destination: str, rooms_m: tuple[float, float], aslant: bool
+    ) -> _Ends | None:
         """The places before and behind a passage: straight before it, or past what stands there, aslant."""
-        before, behind = (self._find_place_before(passage, side) for side in (origin, destination))
+        before, behind = (self._find_place_before(passage, side, most_m)
+                          for side, most_m in zip((origin, destination), rooms_m, strict=True))
         if before is not None and behind is not None:
             return _Ends(before, behind, self._way_tolerance_m(passage))
         if not aslant or isinstance(passage, Link) or not self._cluttered & {origin, destination}:
@@ -209,14 +229,16 @@ class SubgoalPlanner:
             return WAY_TOLERANCE_M
         return max(beside, self._settings.clearances_m[-1])
 
-    def _find_place_before(self, passage: Passage, locale: str) -> Place | None:
-        """The place from which a passage is passed straight; None where something is in the way."""
+    def _find_place_before(self, passage: Passage, locale: str, most_m: float) -> Place | None:
+        """The place from which a passage is passed straight, rather no farther from it; None where something is in the
+        way.
+        """
         if isinstance(passage, Link):
             x, y, heading = passage.stop_of(locale)
             return Place.of_world(self._building, locale, float(x), float(y), float(heading))
         middle, outward = passage.threshold_of(locale).mean(axis=0), passage.outward_from(locale)
         free = self._free_space(locale, self._settings.clearances_m[-1])
-        distances = self._distances_m
+        distances = [m for m in self._distances_m if m <= max(most_m, DOORWAY_DISTANCES_M[0])]
         fit = (m for m in distances if free.covers(Point(middle - m * outward)))
         if locale in self._cluttered:
             fit = (m for m in fit if self._is_passed(middle, middle - m * outward, locale))

@@ -119,6 +119,23 @@ def test_a_doorway_is_approached_from_where_the_floor_in_it_is_seen(
         assert not sees(robot, find_floor(robot.world, (HALL, STUDY)), facing, [middle - 0.06 * outward]).any()
 
 
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.7, 3.0), st.floats(0.7, 3.0), st.sampled_from((0.8, 3.2)))
+def test_it_never_turns_back_on_its_way_through_doors(begin_m: float, end_m: float, along_m: float) -> None:
+    """Near before a door, near behind one, and between two that are opposite, it goes on ahead."""
+    robot = plain_robot(read_world(Source.parse(WEST.replace("along = 3.2", f"along = {along_m}", 1), "house.toml")))
+    bench = Bench(robot)
+    doors = {d.name: d for d in robot.world.doorways_of(HALL)}
+    first, last = doors["low-door" if along_m == 0.8 else "high-door"], doors["study-door"]
+    start = first.threshold_of("west").mean(axis=0) - begin_m * first.outward_from("west")
+    goal = last.threshold_of(STUDY).mean(axis=0) - end_m * last.outward_from(STUDY)
+    way = plan(bench).plan_between_locales(Place.of_world(robot.world, "west", *start.tolist()),
+                                           Place.of_world(robot.world, STUDY, *goal.tolist()), 0.01)
+    assert way is not None
+    ahead = [float(first.outward_from("west") @ p.destination.in_world(robot.world).position) for p in way]
+    assert (np.diff([float(first.outward_from("west") @ start), *ahead]) >= -1e-6).all()
+
+
 @pytest.mark.parametrize("beside_m", [0.02, 0.05, 0.099, 0.101, 0.3])
 def test_a_narrow_door_is_come_to_as_exactly_as_it_leaves_room_beside_the_robot(beside_m: float) -> None:
     """But not more exactly than the robot keeps clear of things anyway; a wide one as any place on the way."""

@@ -15,12 +15,12 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 9_980,
-    "knowledge_sources": 22_270,
+    "knowledge_sources": 22_295,
     "sim": 5_850,
     "logs": 7_450,
     "harvey": 10_524,
     "experiments": 10_230,
-    "tests": 43_530,
+    "tests": 43_550,
     "extras": 14_910,
 }
 """Of Python files, at most."""
