@@ -238,8 +238,10 @@ class SubgoalPlanner:
             return Place.of_world(self._building, locale, float(x), float(y), float(heading))
         middle, outward = passage.threshold_of(locale).mean(axis=0), passage.outward_from(locale)
         free = self._free_space(locale, self._settings.clearances_m[-1])
+        wide = self._free_space(locale, self._settings.clearances_m[0])  # from farther, only where there is room
         distances = [m for m in self._distances_m if m <= max(most_m, DOORWAY_DISTANCES_M[0])]
-        fit = (m for m in distances if free.covers(Point(middle - m * outward)))
+        fit = (m for m in distances
+               if (wide if m > DOORWAY_DISTANCES_M[0] else free).covers(Point(middle - m * outward)))
         if locale in self._cluttered:
             fit = (m for m in fit if self._is_passed(middle, middle - m * outward, locale))
         away = next(fit, None if locale in self._cluttered else DOORWAY_DISTANCES_M[0])

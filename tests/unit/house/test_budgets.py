@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 9_980,
-    "knowledge_sources": 22_295,
+    "knowledge_sources": 22_300,
     "sim": 5_850,
     "logs": 7_450,
     "harvey": 10_524,
