@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -90,8 +90,7 @@ class SubgoalPlanner:
         self._obstacles = tuple(replace(o, footprint=o.core) if o.name in self._cores else o for o in there)
         self._cluttered = frozenset(obstacle.locale for obstacle in self._obstacles)
         first_m = measure_first_seen_m(robot) if settings.approaches_seeing else 0.0
-        self._distances_m = (*(part * first_m for part in SEEING_PARTS if part * first_m > DOORWAY_DISTANCES_M[0]),
-                             *DOORWAY_DISTANCES_M)
+        self._seeing_m = [part * first_m for part in SEEING_PARTS if part * first_m > DOORWAY_DISTANCES_M[0]]
 
     def explain_unfit(self, there: Place) -> str:
         """Why the robot cannot stand at a place, as far as it knows; "" where it can."""
@@ -199,7 +198,7 @@ class SubgoalPlanner:
             return _Ends(before, behind, self._way_tolerance_m(passage))
         if not aslant or isinstance(passage, Link) or not self._cluttered & {origin, destination}:
             return None
-        middles = [passage.threshold_of(side).mean(axis=0) for side in (origin, destination)]
+        middles = [self._find_middle(passage, side) for side in (origin, destination)]
         for clearance_m in self._settings.clearances_m:
             free = self._find_free_passage(passage, (origin, destination), clearance_m)
             line = find_line_through(free, middles, passage.outward_from(origin), DOORWAY_DISTANCES_M,
@@ -236,12 +235,11 @@ class SubgoalPlanner:
         if isinstance(passage, Link):
             x, y, heading = passage.stop_of(locale)
             return Place.of_world(self._building, locale, float(x), float(y), float(heading))
-        middle, outward = passage.threshold_of(locale).mean(axis=0), passage.outward_from(locale)
-        free = self._free_space(locale, self._settings.clearances_m[-1])
-        wide = self._free_space(locale, self._settings.clearances_m[0])  # from farther, only where there is room
-        distances = [m for m in self._distances_m if m <= max(most_m, DOORWAY_DISTANCES_M[0])]
-        fit = (m for m in distances
-               if (wide if m > DOORWAY_DISTANCES_M[0] else free).covers(Point(middle - m * outward)))
+        middle, outward = self._find_middle(passage, locale), passage.outward_from(locale)
+        wide, free = (self._free_space(locale, self._settings.clearances_m[k]) for k in (0, -1))
+        seeing = (m for m in self._seeing_m if m <= most_m and wide.covers(Point(middle - m * outward)))
+        near = (m for m in DOORWAY_DISTANCES_M if free.covers(Point(middle - m * outward)))
+        fit: Iterator[float] = chain(seeing, near)
         if locale in self._cluttered:
             fit = (m for m in fit if self._is_passed(middle, middle - m * outward, locale))
         away = next(fit, None if locale in self._cluttered else DOORWAY_DISTANCES_M[0])
