@@ -59,6 +59,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
     },
     "scale": {
         "agenda": "Activations per second with 10 to 100,000 pending",
+        "cost": "Where the processor time of missions goes",
         "explanations": "Missions of every scenario, explained and replayed",
         "frame-budget": "Time of perception per frame",
         "large": "Processor time, lost among 58 and 99 rooms",
