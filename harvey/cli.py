@@ -6,6 +6,7 @@ output was closed, 143 terminated.
 
 from __future__ import annotations
 
+import atexit
 import errno
 import gc
 import os
@@ -33,6 +34,7 @@ INTERRUPTED, OUTPUT_CLOSED, TERMINATED = 130, 141, 143
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     gc.set_threshold(*GC_THRESHOLDS)
+    atexit.register(gc.freeze)  # what is left then goes with the process: a third of a second to look through it
     try:
         return _run(argv)
     except KeyboardInterrupt as stop:
