@@ -1,7 +1,7 @@
 """Kinds of entries: what each type of value is to the board, said once, where the type is defined.
 
 ``@request``, ``@observation`` and ``@inference`` mark a frozen dataclass as a kind of entry, and make one of a class
-that is none yet. Everything that differs by kind follows from the mark: what ports are asked for, what is on the disk
+that is none yet. Everything that differs by kind follows from the mark: what ports are asked for, what is written
 before they are asked, what is read back from a journal, how long an entry is kept, and what people are told of it.
 """
 
@@ -23,7 +23,7 @@ class Role(Enum):
     """Where entries of a kind come from, and who acts on them."""
 
     REQUEST = "request"
-    """A knowledge source writes it, and a port acts on it: it is on the disk before the port is asked."""
+    """A knowledge source writes it, and a port acts on it: it is in the journal before the port is asked."""
     OBSERVATION = "observation"
     """It comes from outside: from a port, from the user, or from the runner of the mission."""
     INFERENCE = "inference"

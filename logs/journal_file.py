@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from blackboard.journal import Decision, decision_line
@@ -23,26 +22,24 @@ class JournalFile:
 
     The scheduler calls its sinks before a port sees the decision. When this returns:
 
-    - a decision on which a port will act is forced onto the disk, with all before it: nothing reaches the motors that
-      is not written down, and a power cut changes nothing about that;
-    - a decision that took up an observation is with the operating system, with all before it: a killed process takes no
-      observation with it;
+    - a decision on which a port will act, or that took up an observation, is with the operating system, with all before
+      it: nothing reaches the motors that is not written down, and a killed process takes no observation with it;
+    - where ``sync`` is set, one on which a port will act is on the disk too: a power cut changes nothing about that;
     - any other decision follows from those before it and nothing has followed from it outside the board. It may be held
       back until the next of the other kinds, or until there are HELD_LINES; a killed process makes it again, the same.
 
-    Measured on an ext4 disk: forcing takes 6 ms, writing alone 0.01 ms; a drive forces about two decisions and one
-    picture an increment.
+    Measured on an ext4 disk: forcing takes 6 ms, writing alone 0.01 ms; two decisions and one picture an increment.
     """
 
-    def __init__(self, path: Path, *, keep: int = 0, forced: Callable[[Decision], bool] = is_acted_on) -> None:
+    def __init__(self, path: Path, *, keep: int = 0, sync: bool = True) -> None:
         """Begin a new journal at ``path``, or go on with one behind its first ``keep`` bytes.
 
         Args:
-            forced: which decisions are forced onto the disk before this sink returns.
+            sync: force what a port will act on onto the disk before this sink returns.
 
         Raises OSError where the file cannot be written, or another process is writing it.
         """
-        self._forced = forced
+        self._sync = sync
         self._held: list[str] = []
         self._last: tuple[Decision, str] | None = None
         self._file = Appended(path, "journal", keep=keep)
@@ -53,11 +50,11 @@ class JournalFile:
         Raises CannotWriteError where the file cannot be written any more, as when the disk is full; names the file.
         """
         self._held.append(self.line(decision))
-        if self._forced(decision):
+        is_awaited = is_acted_on(decision)
+        if is_awaited or decision.observed or len(self._held) >= HELD_LINES:
             self.flush()
+        if is_awaited and self._sync:
             self._file.sync()
-        elif decision.observed or len(self._held) >= HELD_LINES:
-            self.flush()
 
     def line(self, decision: Decision) -> str:
         """A decision's line, without its newline; the last one is remembered."""

@@ -1,8 +1,9 @@
 """The camera's pictures on disk: the JPEGs one behind the other, as the camera delivered them.
 
 The file is ``camera.mjpeg``; video tools play it (``ffplay camera.mjpeg``). It needs no index: the journal tells the
-length and the SHA-256 of every picture, in the order in which they stand in the file. A picture is on the disk before
-any knowledge source sees it, so that no decision rests on something that a crash, or a power cut, could take away.
+length and the SHA-256 of every picture, in the order in which they stand in the file. A picture is written before any
+knowledge source sees it, so that no decision rests on something that a crash, or with ``sync`` a power cut, could take
+away.
 """
 
 from __future__ import annotations
@@ -16,14 +17,19 @@ from logs.disk import Appended
 class MjpegFile:
     """Writes ``camera.mjpeg``."""
 
-    def __init__(self, path: Path, *, keep: int = 0) -> None:
-        """Begin a file, or go on with one behind its first ``keep`` bytes. Raises OSError."""
+    def __init__(self, path: Path, *, keep: int = 0, sync: bool = True) -> None:
+        """Begin a file, or go on with one behind its first ``keep`` bytes.
+
+        ``sync`` forces each picture onto the disk. Raises OSError.
+        """
+        self._sync = sync
         self._file = Appended(path, "camera's pictures", keep=keep)
 
     def add(self, jpeg: bytes) -> None:
-        """Put a picture on the disk. Raises CannotWriteError."""
+        """Write a picture. Raises CannotWriteError."""
         self._file.append(jpeg)
-        self._file.sync()
+        if self._sync:
+            self._file.sync()
 
     def close(self) -> None:
         """No more pictures."""

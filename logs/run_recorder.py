@@ -43,7 +43,7 @@ class RunRecorder:
 
     def __init__(
         self, run: RunDirectory | None, head: RunHead, world: World, robot: RobotModel, *,
-        live: bool = False, whole: Extent | None = None, drawing: Path | None = None,
+        live: bool = False, whole: Extent | None = None, drawing: Path | None = None, sync: bool = False,
     ) -> None:
         """Begin the files of a run.
 
@@ -52,6 +52,7 @@ class RunRecorder:
             live: let a viewer watch.
             whole: go on with the files of a run, of which so much is whole.
             drawing: of a run that is only replayed: where its recording is drawn.
+            sync: force what a port acts on, and each picture, onto the disk, so that it outlives a power cut too.
 
         Raises:
             OSError: a file cannot be written, or another process is writing it.
@@ -68,11 +69,12 @@ class RunRecorder:
                     run.path.mkdir(parents=True, exist_ok=True)
                     head.write(run.path)
                 keep = whole or Extent()
-                self._journal = JournalFile(run.journal, keep=keep.journal)
+                self._journal = JournalFile(run.journal, keep=keep.journal, sync=sync)
                 opened.callback(self._journal.close)
-                self._camera = MjpegFile(run.camera, keep=keep.camera)
+                self._camera = MjpegFile(run.camera, keep=keep.camera, sync=sync)
                 opened.callback(self._camera.close)
-                sync_folder(run.path)
+                if sync:
+                    sync_folder(run.path)
             if drawing is not None or live:
                 line_of = decision_line if self._journal is None else self._journal.line
                 self._drawing = RecordingWriter(
@@ -87,11 +89,11 @@ class RunRecorder:
         return (self._write, *([self._drawing] if self._drawing else []))
 
     def record_port(self, port: Port) -> RecordedPort:
-        """The port, whose pictures are on the disk before the board sees them."""
+        """The port, whose pictures are written before the board sees them."""
         return RecordedPort(self, port)
 
     def record_picture(self, effect: Effect) -> None:
-        """Put a picture on the disk, if that is what was observed. Raises CannotWriteError."""
+        """Write a picture, if that is what was observed. Raises CannotWriteError."""
         value = None if isinstance(effect, Retract) else effect.value
         if self._camera is not None and isinstance(value, CameraPicture):
             self._camera.add(value.jpeg)

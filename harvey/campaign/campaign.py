@@ -46,6 +46,7 @@ class Task:
         out: its run directory; None keeps nothing.
         body: how the simulated body is reached.
         go_on: keep what is in ``out`` of this mission already, and go on where it was cut off.
+        sync: force what is written onto the disk before it is acted on.
     """
 
     scenario: str
@@ -54,6 +55,7 @@ class Task:
     out: Path | None = None
     body: str = "simulated"
     go_on: bool = False
+    sync: bool = False
 
     @property
     def agent_settings(self) -> Pairs:
@@ -150,7 +152,7 @@ def run_task(
         return _keep_or_resume(RunDirectory(task.out), task, stage, (*shown, *sinks), live)
     out = None if task.out is None else make_room(task.out, stage.scenario.name, task.seed)
     head = build_head(stage, task.seed, task.body, task.agent_settings)
-    return run_mission(stage, task.seed, out=out, sinks=(*shown, *sinks), live=live, head=head)
+    return run_mission(stage, task.seed, out=out, sinks=(*shown, *sinks), live=live, head=head, sync=task.sync)
 
 
 def make_room(out: Path, name: str, seed: int) -> Path:
@@ -189,7 +191,7 @@ def _keep_or_resume(run: RunDirectory, task: Task, stage: Stage, sinks: Sequence
     from harvey.simulation.simulated_run import resume_mission
 
     found = find_finished(task, stage)
-    return found or resume_mission(run, find_remains(run), sinks=sinks, live=live, stage=stage)
+    return found or resume_mission(run, find_remains(run), sinks=sinks, live=live, stage=stage, sync=task.sync)
 
 
 Keep = Literal["all", "failures", "none"]

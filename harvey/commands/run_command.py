@@ -38,6 +38,9 @@ def _add_run_arguments(parser: ArgumentParser) -> None:
                         help="of several seeds: whose run directories stay, all, those that do not reach the goal, or"
                              " none; the results stay in any case (all)")
     parser.add_argument("--check", action="store_true", help="do not drive; list the milestones to come")
+    parser.add_argument("--sync", action="store_true",
+                        help="force the journal and each picture onto the disk before anything follows from them, as"
+                             " harvey drive and --body serial:BASE do; else a power cut may take the last seconds")
     parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
     parser.add_argument("--trace", action="store_true", help="print every cycle: changes, candidates, choice, effects")
 
@@ -48,7 +51,8 @@ def _run_run(args: Namespace) -> int:
     workers = parse_workers(args)
     seeds, settings, body = parse_seeds(args.seed), parse_pairs(args.settings), body_kind(args.body)
     tasks = tuple(
-        Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1), body, args.go_on) for seed in seeds)
+        Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1), body, args.go_on, args.sync)
+        for seed in seeds)
     if args.check:
         if also := [name for name in ("live", "trace", "go_on") if getattr(args, name)]:
             raise BadInput(f"--check: expected it without --{also[0].replace('_', '-')}, because nothing is driven")

@@ -96,7 +96,7 @@ def _hardware_run(
     try:
         agent = build_agent(head)
         with stop_key(body.stop_for_good), Heartbeat(base) as heartbeat:
-            recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, whole=whole)
+            recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, whole=whole, sync=True)
             yield Run(head, agent, around(body, heartbeat.tick), recorder, limits=mission.limits, clock=clock,
                       sinks=sinks, told=mission.told, tell=tell, before_cycle=heartbeat.tick)
     finally:

@@ -72,7 +72,7 @@ class BodyPort:
 
     name = "body"
     acts_on = (MotorCommand, Course, PictureRequest, Ride, Recovery)
-    """The requests that it answers; all of them are marked as such, so each is on the disk before it comes here."""
+    """The requests that it answers; all of them are marked as such, so each is in the journal before it comes here."""
 
     def __init__(self, body: Body) -> None:
         self._body = body

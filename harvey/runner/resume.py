@@ -70,7 +70,7 @@ def find_remains(run: RunDirectory) -> Remains:
 def _check_not_lost(run: RunDirectory, pictures: int) -> None:
     """Raises BadInput where a run of which no decision is there was more than begun: its journal was lost since.
 
-    A picture is asked for by a decision that is on the disk by then; so where nothing was lost, there is none.
+    A picture is asked for by a decision that is written by then; so where nothing was lost, there is none.
     """
     lost = [f"{run.camera.name} has {pictures} bytes of pictures"] * (pictures > 0)
     if told := run.read_result().get("decisions"):

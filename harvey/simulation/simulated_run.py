@@ -55,6 +55,7 @@ def run_mission(
     body: str = IN_PROCESS,
     around: Around = unchanged,
     tell: Tell = tell_nothing,
+    sync: bool = False,
 ) -> MissionResult:
     """Run a scenario's mission to its outcome.
 
@@ -67,25 +68,27 @@ def run_mission(
         body: how the body is reached (:func:`harvey.simulation.serial_body.open_body`), where ``head`` does not say it.
         around: puts something between the agent and the body.
         tell: called before each cycle, to put on the board what somebody says meanwhile.
+        sync: force what is written onto the disk before it is acted on, as over a serial line in any case. A mission in
+            the process that a power cut takes can be driven again.
     """
     head = head or build_head(stage, seed, body)
     files = None if out is None else RunDirectory(out)
     agent = build_agent(head, sources)
-    recorder = RunRecorder(files, head, agent.world, agent.robot, live=live)
+    recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, sync=sync or head.body != IN_PROCESS)
     with SimulatedRun(stage, head, agent, recorder, sinks, around, tell) as run:
         return run.drive(files)
 
 
 def resume_mission(
     files: RunDirectory, remains: Remains, *, sinks: Sequence[Sink] = (), live: bool = False,
-    around: Around = unchanged, stage: Stage | None = None,
+    around: Around = unchanged, stage: Stage | None = None, sync: bool = False,
 ) -> MissionResult:
     """Go on with a run to its outcome; its recording is drawn anew from the start.
 
     Args:
         remains: what is whole of it; the rest of its files is dropped.
         stage: the building of its scenario, where it is at hand.
-        sinks, live, around: as for :func:`run_mission`.
+        sinks, live, around, sync: as for :func:`run_mission`.
 
     Raises:
         BadInput: it is no run of the simulator, or cannot be replayed as it was.
@@ -93,7 +96,8 @@ def resume_mission(
     head = RunHead.read(files.path)
     stage = stage or rebuild_stage(head)
     agent = build_agent(head)
-    recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, whole=remains.extent)
+    recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, whole=remains.extent,
+                           sync=sync or head.body != IN_PROCESS)
     with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
         return run.drive(files, lambda: continue_run(files, run, run.body_replay))
 

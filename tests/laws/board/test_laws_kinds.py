@@ -1,4 +1,4 @@
-"""Kinds of entries: marked once, where they are defined; and no request reaches a port before it is on the disk."""
+"""Kinds of entries: marked once, where they are defined; and no request reaches a port before it is written."""
 
 from __future__ import annotations
 
@@ -63,22 +63,25 @@ class Gripper:
 
     name = "gripper"
 
-    def __init__(self, journal: Path, forced: list[int]) -> None:
-        self._journal, self._forced = journal, forced
+    def __init__(self, journal: Path, forced: list[int], sync: bool) -> None:
+        self._journal, self._forced, self._sync = journal, forced, sync
         self.asked: list[str] = []
 
     def answer(self, change: Change) -> Iterable[Effect]:
         written = [made["entry"] for record in read_journal(self._journal) for made in record["made"]]
-        assert str(change.entry.ref) in written and self._forced
+        assert str(change.entry.ref) in written and len(self._forced) == self._sync
         self.asked.append(change.entry.id)
         self._forced.clear()
         yield Post(GripperReport(0.1), (change.entry,))
 
 
 @settings(deadline=None, max_examples=40)
-@given(kinds=st.lists(st.sampled_from((*REQUESTS, Note)), min_size=1, max_size=6))
-def test_no_request_reaches_a_port_before_it_is_on_the_disk(kinds: list[type[Any]]) -> None:
-    """For every registered request, one that this test invents too; what is no request reaches no port at all."""
+@given(kinds=st.lists(st.sampled_from((*REQUESTS, Note)), min_size=1, max_size=6), sync=st.booleans())
+def test_no_request_reaches_a_port_before_it_is_written(kinds: list[type[Any]], sync: bool) -> None:
+    """And forced onto the disk, once, if and only if that is asked for.
+
+    For every registered request, one that this test invents too; what is no request reaches no port at all.
+    """
     values = [Note("a") if kind is Note else example(kind) for kind in kinds]
 
     def act(_view: Any, trigger: Change) -> Iterable[Effect]:
@@ -91,13 +94,14 @@ def test_no_request_reaches_a_port_before_it_is_on_the_disk(kinds: list[type[Any
     with TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         patch.setattr(disk.os, "fsync", forced.append)
         path = Path(folder) / "journal.jsonl"
-        journal, gripper = JournalFile(path), Gripper(path, forced)
+        journal, gripper = JournalFile(path, sync=sync), Gripper(path, forced, sync)
         source = Scripted("asker", Note, act, where=lambda note: note.text.isdigit(), writes=(*REQUESTS, Note))
         scheduler = Scheduler([source], ports=[gripper], sinks=[journal], kinds=(GripperReport,))
         scheduler.post([Post(Note("0"))], "user")
         while scheduler.step() is not None:
             pass
         journal.close()
+    assert not forced
     assert [id.rpartition("-")[0] for id in gripper.asked] == [kind.__name__ for kind in kinds if kind is not Note]
 
 

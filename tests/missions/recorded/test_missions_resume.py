@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -142,6 +143,21 @@ def test_a_simulator_that_answers_otherwise_is_found_out(
     head = json.loads((run.path / "run.json").read_text())
     (run.path / "run.json").write_text(json.dumps({**head, "seed": SEED + 1}))
     assert main(["resume", str(run.path)]) == 2
+
+
+@pytest.mark.parametrize(("body", "sync", "forces"),
+                         [("simulated", False, False), ("simulated", True, True), ("denning", False, True)])
+def test_the_disk_is_forced_where_a_port_is_real_or_it_is_asked_for(
+    short_stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, sync: bool, forces: bool
+) -> None:
+    """Before each motion and each picture; what is written is the same."""
+    forced: list[int] = []
+    monkeypatch.setattr(disk.os, "fsync", forced.append)
+    scenario = short_stage.scenario
+    stage = replace(short_stage, scenario=replace(scenario, limits=replace(scenario.limits, max_cycles=24)))
+    run_mission(stage, SEED, out=tmp_path / "run", body=body, sync=sync)
+    assert bool(forced) == forces
+    made_by(list(read_records(tmp_path / "run" / "journal.jsonl")), "MotorCommand", 0)
 
 
 def test_two_processes_do_not_write_one_run(

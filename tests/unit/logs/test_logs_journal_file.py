@@ -6,24 +6,22 @@ import pytest
 
 from blackboard.journal import Decision, decision_line, decision_record
 from journals import read_journal
-from logs import disk
 from logs.journal_file import HELD_LINES, JournalFile, is_acted_on
 from logs.run_errors import BadInput
 from scripted_mission import play
-from world_models.entries.body import MotorCommand, PictureRequest
 
 
-def play_to(path: Path, *, forced: bool = False) -> list[Decision]:
+def play_to(path: Path, *, sync: bool = False) -> list[Decision]:
     decisions: list[Decision] = []
-    journal = JournalFile(path, forced=lambda _decision: forced)
+    journal = JournalFile(path, sync=sync)
     play([journal, decisions.append])
     journal.close()
     return decisions
 
 
-@pytest.mark.parametrize("forced", [False, True])
-def test_every_decision_comes_back(tmp_path: Path, forced: bool) -> None:
-    decisions = play_to(tmp_path / "journal.jsonl", forced=forced)
+@pytest.mark.parametrize("sync", [False, True])
+def test_every_decision_comes_back(tmp_path: Path, sync: bool) -> None:
+    decisions = play_to(tmp_path / "journal.jsonl", sync=sync)
     assert decisions
     assert list(read_journal(tmp_path / "journal.jsonl")) == [decision_record(d) for d in decisions]
 
@@ -48,9 +46,9 @@ def test_what_is_not_in_the_file_follows_from_what_is(tmp_path: Path) -> None:
 
 def test_what_is_held_back_is_not_much(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
-    journal, decisions = JournalFile(path, forced=lambda _decision: False), []
+    journal, decisions = JournalFile(path, sync=False), []
     play([decisions.append])
-    silent = decisions[0]._replace(observed=())
+    silent = decisions[0]._replace(observed=(), made=())
     for number in range(1, 3 * HELD_LINES + 2):
         journal(silent._replace(cycle=number))
         assert len(path.read_bytes().splitlines()) == number // HELD_LINES * HELD_LINES
@@ -88,26 +86,6 @@ def test_it_goes_on_behind_what_is_whole(tmp_path: Path) -> None:
         journal(decision)
     journal.close()
     assert path.read_bytes() == b"".join(lines)
-
-
-def test_what_a_port_will_act_on_is_on_the_disk_before_it_does(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    forced: list[int] = []
-    monkeypatch.setattr(disk.os, "fsync", forced.append)
-    journal = JournalFile(tmp_path / "journal.jsonl")
-    decisions: list[Decision] = []
-
-    def sink(decision: Decision) -> None:
-        before = len(forced)
-        journal(decision)
-        acts = any(isinstance(c.entry.value, MotorCommand | PictureRequest) for c in decision.made)
-        assert (len(forced) > before) == acts
-        decisions.append(decision)
-
-    play([sink])
-    journal.close()
-    assert 0 < len(forced) < len(decisions)
 
 
 def test_a_truncated_last_line_is_left_out(tmp_path: Path) -> None:
