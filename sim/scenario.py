@@ -173,7 +173,7 @@ def parse_scenario(text: str, name: str = "scenario", folder: Path = SCENARIOS) 
 def scenario_from_tables(data: Mapping[str, Any], name: str, folder: Path) -> Scenario:
     """The scenario of tables as its source holds them. Raises ScenarioError."""
     try:
-        return _scenario(Source(name, data, {}), name, folder)
+        return _scenario(Source(name, data), name, folder)
     except WorldError as error:
         raise ScenarioError(str(error)) from None
 

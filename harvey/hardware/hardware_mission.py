@@ -99,7 +99,7 @@ def load_mission(path: Path | None, settings: Mapping[str, Any]) -> HardwareMiss
         BadInput: the file cannot be read, a key is unknown or lacking, or a value is of the wrong kind.
     """
     try:
-        source = Source("the options", {}, {}) if path is None else Source.read(path)
+        source = Source("the options", {}) if path is None else Source.read(path)
         name, folder = ("drive", Path()) if path is None else (path.stem, path.parent)
         return _mission(source, settings, name, folder)
     except WorldError as error:
@@ -109,7 +109,7 @@ def load_mission(path: Path | None, settings: Mapping[str, Any]) -> HardwareMiss
 def rebuild_mission(head: RunHead, settings: Mapping[str, Any]) -> HardwareMission:
     """The mission of a run that was begun on hardware, with some settings replaced; see :func:`load_mission`."""
     try:
-        return _mission(Source("run.json", head.scenario, {}), settings, head.name, Path(head.folder))
+        return _mission(Source("run.json", head.scenario), settings, head.name, Path(head.folder))
     except WorldError as error:
         raise BadInput(str(error)) from None
 

@@ -140,7 +140,7 @@ def plane_of(polygon_world: NDArray[np.float64], name: str = "polygon") -> NDArr
     p = np.asarray(polygon_world, float)
     if p.ndim != 2 or p.shape[1] != 3 or len(p) < 3 or not np.all(np.isfinite(p)):
         raise ValueError(f"region {name}: expected at least 3 finite vertices (k, 3), got shape {p.shape}")
-    ahead = np.roll(p, -1, axis=0)
+    ahead = _advance(p)
     normal = _cross(p - p[0], ahead - p[0]).sum(axis=0)
     length = float(np.linalg.norm(normal))
     if length < 1e-10:
@@ -150,7 +150,7 @@ def plane_of(polygon_world: NDArray[np.float64], name: str = "polygon") -> NDArr
     if np.abs(p @ normal - offset).max() > 1e-3:
         raise ValueError(f"region {name}: expected a flat polygon, got vertices up to "
                          f"{np.abs(p @ normal - offset).max():.4f} m off its plane")
-    corners = _cross(ahead - p, np.roll(ahead, -1, axis=0) - ahead) @ normal
+    corners = _cross(ahead - p, _advance(ahead) - ahead) @ normal
     if corners.min() < -1e-6:
         raise ValueError(f"region {name}: expected a convex polygon, got a reflex corner")
     return np.array([*normal, offset])
@@ -160,14 +160,20 @@ def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
     """Cross products of rows (n, 3); for few rows faster than ``np.cross``."""
     ax, ay, az = a.T
     bx, by, bz = b.T
-    return np.column_stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]).T
+
+
+def _advance(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The next vertex of each (n, 3); for few rows faster than ``np.roll``."""
+    return np.concatenate([p[1:], p[:1]])
 
 
 def _texture_axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
     """(2, 3) unit axes: s horizontal in the plane, t up the plane; on floors and ceilings s is world x."""
-    level = math.hypot(normal[0], normal[1])
-    s = np.array([-normal[1], normal[0], 0.0]) / level if level > 1e-6 else np.array([1.0, 0.0, 0.0])
-    return np.stack([s, np.cross(normal, s)])
+    x, y, z = normal.tolist()
+    level = math.hypot(x, y)
+    sx, sy = (-y / level, x / level) if level > 1e-6 else (1.0, 0.0)
+    return np.array([[sx, sy, 0.0], [y * 0.0 - z * sy, z * sx - x * 0.0, x * sy - y * sx]])
 
 
 def _origin(region: RegionLike, polygon: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:

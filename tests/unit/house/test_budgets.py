@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 9_980,
+    "world_models": 9_991,
     "knowledge_sources": 22_300,
     "sim": 5_850,
     "logs": 7_450,

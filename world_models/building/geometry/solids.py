@@ -38,7 +38,7 @@ BOX_EDGES: tuple[tuple[int, Side, Side], ...] = tuple(
 """Direction of each of the twelve edges of a box, and the two sides that meet in it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Box:
     """A block in the frame of a part: x to the right with the back to the wall, y off the wall, z up [m]."""
 
@@ -47,7 +47,7 @@ class Box:
     z: Range
     finish: Finish
 
-    @property
+    @cached_property
     def ranges(self) -> tuple[Range, Range, Range]:
         return self.x, self.y, self.z
 
@@ -57,8 +57,9 @@ class Box:
         b, c = (axis + 1) % 3, (axis + 2) % 3
         corners = np.empty((4, 3))
         corners[:, axis] = self.ranges[axis][end]
-        corners[:, b] = np.take(self.ranges[b], [0, 1, 1, 0])
-        corners[:, c] = np.take(self.ranges[c], [0, 0, 1, 1])
+        (b_low, b_high), (c_low, c_high) = self.ranges[b], self.ranges[c]
+        corners[:, b] = b_low, b_high, b_high, b_low
+        corners[:, c] = c_low, c_low, c_high, c_high
         return corners if end else corners[::-1]
 
 
@@ -76,10 +77,13 @@ class Surface:
     offset_m: float
     brightness: float
 
-    def touches(self, corners_world: NDArray[np.float64], normal_world: NDArray[np.float64]) -> bool:
-        """Whether a side with these corners and this outward normal lies against it."""
-        opposed = float(self.normal_world @ normal_world) < -0.999
-        return opposed and bool(np.abs(corners_world @ self.normal_world - self.offset_m).max() < CONTACT_M)
+    def opposes(self, normal_world: NDArray[np.float64]) -> bool:
+        """Whether a side with this outward normal may lie against it."""
+        return float(self.normal_world @ normal_world) < -0.999
+
+    def touches(self, corners_world: Any) -> bool:
+        """Whether a side that it opposes, with these corners, lies against it."""
+        return bool(np.abs(corners_world @ self.normal_world - self.offset_m).max() < CONTACT_M)
 
 
 def surface_from_polygon(polygon_world: NDArray[np.float64], finish: Finish) -> Surface:
@@ -140,10 +144,9 @@ class Solid:
 
     def _find_cover(self, index: int, side: Side) -> float | None:
         """Brightness of the surface or box that covers all of a side; None for an open side."""
-        corners = self.world_from_part.apply(self.boxes[index].side(side))
-        normal = self._normals[side]
-        for surface in self.surfaces:
-            if surface.touches(corners, normal):
+        corners = self.world_from_part.apply(self.boxes[index].side(side)) if self._facing[side] else None
+        for surface in self._facing[side]:
+            if surface.touches(corners):
                 return surface.brightness
         for other, box in enumerate(self.boxes):
             if other != index and _covers(box, self.boxes[index], side):
@@ -215,14 +218,20 @@ class Solid:
                 for axis, end in SIDES}
 
     @cached_property
-    def _known_brightness(self) -> dict[tuple[Finish, Side], float]:
+    def _facing(self) -> dict[Side, list[Surface]]:
+        """The surfaces that each side may lie against."""
+        return {side: [s for s in self.surfaces if s.opposes(normal)] for side, normal in self._normals.items()}
+
+    @cached_property
+    def _known_brightness(self) -> dict[tuple[int, Side], float]:
         return {}
 
     def _brightness(self, finish: Finish, side: Side) -> float:
-        """Expected brightness of a finish on a side; cached."""
-        if (finish, side) not in self._known_brightness:
-            self._known_brightness[finish, side] = expected_brightness(finish, self._normals[side])
-        return self._known_brightness[finish, side]
+        """Expected brightness on a side of the finish of one of the boxes; cached by its identity."""
+        key = id(finish), side
+        if key not in self._known_brightness:
+            self._known_brightness[key] = expected_brightness(finish, self._normals[side])
+        return self._known_brightness[key]
 
     def _background(self, index: int) -> float:
         """Brightness behind a thin box on a wall; NaN for others."""

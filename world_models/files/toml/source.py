@@ -7,6 +7,7 @@ import tomllib
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -136,16 +137,14 @@ class Source:
     Attributes:
         name: for messages: the path as it was given.
         data: its tables.
-        lines: the line, from 1, on which each value starts.
         folder: file names in it are relative to it.
-        text: as it was read.
+        text: as it was read; "" where the tables come from elsewhere.
         depth: length of the chain of files that name each other, up to this one.
         settings: keys whose values were replaced since it was read (``--set``).
     """
 
     name: str
     data: Mapping[str, Any]
-    lines: Mapping[Key, int]
     folder: Path = Path()
     text: str = ""
     depth: int = 0
@@ -174,7 +173,12 @@ class Source:
             match = re.search(r"at line (\d+)", str(error))
             line = match.group(1) if match else text.count("\n") + 1
             raise WorldError(f"{name}:{line}: expected TOML, got: {error}") from None
-        return Source(name, data, find_line_numbers(text), text=text)
+        return Source(name, data, text=text)
+
+    @cached_property
+    def lines(self) -> Mapping[Key, int]:
+        """The line, from 1, on which each value starts; found when an error needs it."""
+        return find_line_numbers(self.text)
 
     @property
     def file(self) -> Path:
