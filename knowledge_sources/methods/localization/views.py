@@ -14,7 +14,6 @@ from typing import Any
 import cv2
 import numpy as np
 from numba import njit
-from scipy.sparse.csgraph import connected_components
 
 from knowledge_sources.methods.arrays import Floats, Ints, Mask
 from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
@@ -250,6 +249,8 @@ def _build_sides(stationary: Sequence[Floats]) -> list[_Side]:
     segments = np.concatenate([np.zeros((0, 2, 2)), *stationary])
     if not len(segments):
         return []
+    from scipy.sparse.csgraph import connected_components  # loaded when first used: by missions whose view is hidden
+
     count, which = connected_components(_lie_on(segments, segments), directed=False)
     groups = [segments[which == k] for k in range(count)]
     groups.sort(key=lambda group: -float(np.sum(_measure(group))))

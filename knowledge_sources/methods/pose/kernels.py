@@ -779,6 +779,15 @@ def _add_prior(
 
 
 @compiled
+def find_rotation_vectors(rotations: Floats) -> Floats:
+    """(k, 3) axis times angle of rotations (k, 3, 3) by less than half a turn."""
+    out = np.empty((len(rotations), 3))
+    for k in range(len(rotations)):
+        out[k, 0], out[k, 1], out[k, 2] = _rotation_vector(rotations[k])
+    return out
+
+
+@compiled
 def _rotation_vector(rotation: Floats) -> tuple[float, float, float]:
     """Axis times angle of a rotation by less than half a turn."""
     x, y, z = rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]

@@ -8,7 +8,6 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.pose import kernels
@@ -162,7 +161,7 @@ def _keep_possible(
     slopes = slopes.reshape(-1, 6) * np.sqrt(SUBSET_SIZE / len(lines))
     spread = np.asarray(prior_covariance, float) + invert_information(slopes.T @ slopes)
     turns = rotations @ prior.rotation.T
-    moves = np.concatenate([Rotation.from_matrix(turns).as_rotvec(), translations - turns @ prior.translation], axis=1)
+    moves = np.concatenate([kernels.find_rotation_vectors(turns), translations - turns @ prior.translation], axis=1)
     squares = np.sum(moves * np.linalg.solve(spread, moves.T).T, axis=1)
     possible = squares <= MAX_CHI2_6
     return rotations[possible], translations[possible]

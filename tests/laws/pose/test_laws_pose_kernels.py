@@ -235,10 +235,12 @@ def test_gain_is_how_the_minimum_moves(seed: int) -> None:
 @few
 @given(seed=seeds)
 def test_inverse_and_orthonormal_rotation(seed: int) -> None:
-    """The compiled inverse is numpy's; a rotation that drifted becomes the nearest one."""
+    """The compiled inverse is numpy's, the rotation vector scipy's; a rotation that drifted becomes the nearest one."""
     rng = np.random.default_rng(seed)
     root = rng.normal(0.0, 1.0, (6, 6)) + 3.0 * np.eye(6)
     np.testing.assert_allclose(kernels._invert(root @ root.T), np.linalg.inv(root @ root.T), rtol=1e-7, atol=1e-10)
-    rotation = Pose.from_rotation_vector(rng.normal(0.0, 1.0, 3), [0.0, 0.0, 0.0]).rotation
+    pose = Pose.from_rotation_vector(rng.normal(0.0, 0.5, 3), [0.0, 0.0, 0.0])
+    rotation = pose.rotation
+    np.testing.assert_allclose(kernels.find_rotation_vectors(rotation[None])[0], pose.rotation_vector, atol=1e-9)
     found = kernels._orthonormalise(rotation + rng.normal(0.0, 1e-6, (3, 3)))
     np.testing.assert_allclose(found @ found.T, np.eye(3), atol=1e-10)

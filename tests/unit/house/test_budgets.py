@@ -14,13 +14,13 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 9_991,
-    "knowledge_sources": 22_300,
+    "world_models": 9_998,
+    "knowledge_sources": 22_321,
     "sim": 5_850,
     "logs": 7_450,
     "harvey": 10_524,
     "experiments": 10_405,
-    "tests": 43_645,
+    "tests": 43_654,
     "extras": 14_910,
 }
 """Of Python files, at most."""
