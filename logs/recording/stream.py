@@ -10,10 +10,13 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+import pyarrow as pa
 import rerun as rr
 from rerun.chunk import RrdReader
 
 from logs.run_errors import RecordingError
+
+pa.set_memory_pool(pa.system_memory_pool())  # arrow's own keeps 20 MB that a mission's recording gave back
 
 APPLICATION = "harvey"
 FLUSH_CYCLES, LIVE_FLUSH_CYCLES = 128, 4
