@@ -14,6 +14,9 @@ EXTRAS := $(patsubst %/pyproject.toml,%,$(wildcard extras/*/pyproject.toml))
 COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --generate-hashes --no-strip-extras --allow-unsafe \
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
 
+# Compiled once, as pip does with a package: a third of a second a command where Python is told to write no bytecode.
+ROOMS := blackboard world_models knowledge_sources sim logs harvey
+
 # One thread: faster for matrices as small as ours, and the order of additions never varies.
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
@@ -77,6 +80,7 @@ $(VENV)/.ready-to-run: requirements.lock pyproject.toml $(VENV)/.ready-to-instal
 	@$(PIP) install --require-hashes -r requirements.lock
 	@echo "== Installing harvey"
 	@$(PIP) install --no-deps --no-build-isolation -e .
+	@$(BIN)/python -m compileall -q $(ROOMS)
 	@touch $@
 
 $(VENV)/.ready-to-test: requirements-dev.lock $(VENV)/.ready-to-run
