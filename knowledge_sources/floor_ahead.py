@@ -16,6 +16,7 @@ from blackboard.entry import Entry
 from knowledge_sources.conditions import Belief
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.seen_floor import (
+    SPACING_M,
     Costs,
     Lookout,
     SeenFloor,
@@ -62,10 +63,12 @@ class Caution(NamedTuple):
     Attributes:
         move_m: at most so far [m, true]; 0 where something may stand in what is not seen.
         creeps: whether that leads into floor that was not seen to be free.
+        is_told: whether more than looks tells that it is free.
     """
 
     move_m: float
     creeps: bool
+    is_told: bool = False
 
 
 class FloorAhead:
@@ -106,7 +109,7 @@ class FloorAhead:
         if not caution.creeps:
             sure_m = self._measure_to_things_m(caution.move_m, UNSURE_GAP_M)
             if sure_m >= min(caution.move_m, MIN_INCREMENT_M):
-                return caution._replace(move_m=sure_m)
+                return caution._replace(move_m=sure_m, is_told=self.is_told(sure_m))
             caution = Caution(min(caution.move_m, self._settings.max_creep_m), True)
         return caution._replace(move_m=min(caution.move_m, self._measure_to_things_m(move_m)))
 
@@ -129,8 +132,20 @@ class FloorAhead:
         if caution.creeps and caution.move_m < min(MIN_CREEP_M, wanted_m):
             return leg, None
         move_m = min(command.move_m, actuator.compute_command_m(caution.move_m))
-        slowly = self._settings.creep_speed_m_per_s if caution.creeps else None
+        s = self._settings
+        slowly = s.creep_speed_m_per_s if caution.creeps else None if caution.is_told else self.wary_m_per_s
         return leg, MotorCommand(command.turn_rad, move_m, slowly)
+
+    @property
+    def wary_m_per_s(self) -> float:
+        """The highest speed into floor that only looks free."""
+        return min(self._settings.wary_speed_m_per_s, self._robot.actuator.speed_m_per_s)
+
+    def is_told(self, move_m: float) -> bool:
+        """Whether more than looks tells that the floor of a move is free; next to the model's walls nothing can."""
+        asked = self._ask(self._sweep(self._way, move_m))
+        untold = asked.only(~self._seen.ask_told(asked.points))
+        return measure_free_m(untold, move_m) >= move_m - SPACING_M  # the free floor itself ends between two points
 
     def _measure_to_things_m(self, most_m: float, gap_m: float = 0.0, *, touched: bool = False) -> float:
         """How far the robot can go towards the leg's end before it comes nearer to what may stand there; 0..most.
@@ -195,9 +210,13 @@ class FloorAhead:
         """What the robot sweeps on a way, but for where it begins."""
         return sample_sweep(way, self._robot.radius_m + SEEN_MARGIN_M, most_m)
 
+    def _ask(self, sweep: Sweep) -> Sweep:
+        """The part of a sweep that is not hard by something that the model has."""
+        return sweep.only(shapely.contains_xy(self._asked, sweep.points[:, 0], sweep.points[:, 1]))
+
     def _find_unseen(self, sweep: Sweep) -> Sweep:
         """The part of a sweep that is not seen free, and not hard by something that the model has."""
-        asked = sweep.only(shapely.contains_xy(self._asked, sweep.points[:, 0], sweep.points[:, 1]))
+        asked = self._ask(sweep)
         free, scans, discs = self._seen.ask(asked.points)
         reasons = [self._scans[k] for k in np.flatnonzero(scans)]
         reasons += [entry for k in np.flatnonzero(discs) for entry in self._discs[k].because]

@@ -101,7 +101,7 @@ class PathFollower(RobotKnowledgeSource):
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         course, leg, held, must_stop = case
         if course is not None and must_stop:
-            reasons = () if leg is None else self._look_ahead(view, leg.value, held)[1]
+            reasons = () if leg is None else self._look_ahead(view, leg.value, held)[2]
             yield Revise(course, replace(course.value, speed_m_per_s=0.0),
                          (course, held.entry, *open_discrepancies(view), *reasons))
         elif leg is not None:
@@ -120,19 +120,21 @@ class PathFollower(RobotKnowledgeSource):
         seen = update_leg(leg.value, here, point)
         step = Revise(leg, replace(seen, increments=seen.increments + (course is None)), (leg, belief, *corrected))
         yield step
-        curvature = steer_to(point, here, 0.0 if drift is None else drift.value.curvature_per_m)
-        free_m, reasons = self._look_ahead(view, leg.value, held)
-        new = Course(leg.id, choose_speed(free_m, robot.actuator, self._settings.action.creep_speed_m_per_s), curvature)
+        free_m, most_m_per_s, reasons = self._look_ahead(view, leg.value, held)
+        speed = choose_speed(free_m, most_m_per_s, robot.actuator, self._settings.action.creep_speed_m_per_s)
+        new = Course(leg.id, speed, steer_to(point, here, 0.0 if drift is None else drift.value.curvature_per_m))
         because = (step, belief, *(() if drift is None else (drift,)), *reasons)
         yield Post(new, because) if course is None else Revise(course, new, (course, *because))
 
-    def _look_ahead(self, view: View, leg: Leg, belief: Belief) -> tuple[float, tuple[Entry[Any], ...]]:
-        """How far ahead the floor is seen to be free, as far as that matters at full speed; and what tells that."""
-        most_m = belief.robot.actuator.stopping_distance_m() + MIN_ROLLING_LEG_M
+    def _look_ahead(self, view: View, leg: Leg, belief: Belief) -> tuple[float, float, tuple[Entry[Any], ...]]:
+        """How far ahead the floor is seen to be free, as far as that matters; the highest speed; what tells that."""
+        wheels = belief.robot.actuator
+        full, most_m = wheels.speed_m_per_s, wheels.stopping_distance_m() + MIN_ROLLING_LEG_M
         if not self._settings.action.keeps_to_seen_floor:
-            return most_m, ()
+            return most_m, full, ()
         floor = FloorAhead(view, leg, belief.entry, self._settings)
-        return floor.measure_free_m(most_m), floor.because
+        free_m = floor.measure_free_m(most_m)
+        return free_m, full if floor.is_told(free_m) else floor.wary_m_per_s, floor.because
 
     def _is_on_line(self, view: View, leg: Leg, belief: Belief, most_rad: float) -> bool:
         """Whether the robot can roll along a leg, and stop before its end: it faces its aim, and the floor is free."""

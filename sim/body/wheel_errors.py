@@ -52,7 +52,7 @@ class ActuatorParameters(Bounded):
     distance_sigma: float = bounded(0.003, 0.0, 1.0)
     encoder_step_m: float = bounded(0.001, 0.0, 1.0)
     encoder_step_rad: float = bounded(math.radians(0.05), 0.0, math.pi)
-    speed_m_per_s: float = bounded(0.4, 0.001, 10.0)
+    speed_m_per_s: float = bounded(0.6, 0.001, 10.0)
     turn_speed_rad_per_s: float = bounded(math.radians(45.0), 0.001, 100.0)
     acceleration_m_per_s2: float = bounded(0.8, 0.001, 100.0)
     increment_m: float = bounded(0.6096, 0.001, 100.0)

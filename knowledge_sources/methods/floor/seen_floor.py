@@ -39,15 +39,18 @@ class _Scan(NamedTuple):
     bearings_rad: Floats
     near_m: Floats
     far_m: Floats
+    told_m: Floats
     is_thing: Mask
 
 
 @lru_cache(maxsize=256)
 def _read_scan(scan: FreeFloor) -> _Scan:
+    told_m = scan.told_m if scan.sense == "camera" else scan.far_m  # what is ranged is no matter of looks
     bearings = np.unwrap(np.asarray(scan.bearings_rad, float)) if scan.bearings_rad else np.zeros(0)
     first = float(bearings[0]) if len(bearings) else 0.0
     return _Scan(np.array([scan.x_m, scan.y_m]), first, bearings - first, np.asarray(scan.near_m, float),
-                 np.asarray(scan.far_m, float), np.array([end == "thing" for end in scan.ends], bool))
+                 np.asarray(scan.far_m, float), np.asarray(told_m or np.zeros(len(bearings)), float),
+                 np.array([end == "thing" for end in scan.ends], bool))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +87,22 @@ class SeenFloor:
         for corners in self.taken:
             free &= ~shapely.intersects_xy(shapely.Polygon(corners), points[:, 0], points[:, 1])
         return free, scans, discs
+
+    def ask_told(self, points: Floats) -> Mask:
+        """Of which of the points (n, 2) more than looks tells that nothing stands there: an earlier picture, or that
+        the robot was there.
+        """
+        away = np.linalg.norm(points[:, None] - self.discs[None, :, :2], axis=2)
+        told = np.asarray((away <= self.discs[:, 2]).any(axis=1))
+        for scan in self.scans:
+            rest = np.flatnonzero(~told)
+            told[rest] = _is_told(_read_scan(scan), points[rest])
+        return told
+
+
+def _is_told(scan: _Scan, points: Floats) -> Mask:
+    """Which points (n, 2) a scan shows free by an earlier picture too."""
+    return _ask_scan(scan._replace(far_m=np.minimum(scan.far_m, scan.told_m)), points)[0]
 
 
 def _ask_scan(scan: _Scan, points: Floats) -> tuple[Mask, Mask]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -96,6 +97,23 @@ def test_more_scans_of_an_empty_floor_show_no_less(seen: list[FreeFloor], seed: 
     fewer = SeenFloor(tuple(empty[:-1]), np.zeros((0, 3))).ask(points)[0]
     more = SeenFloor(tuple(empty), np.zeros((0, 3))).ask(points)[0]
     assert not (fewer & ~more).any()
+
+
+@settings(max_examples=40)
+@given(scans(), st.floats(0.0, 1.0), st.integers(0, 2**32 - 1))
+def test_told_is_what_a_scan_shows_free_up_to_where_it_tells(seen: list[FreeFloor], part: float, seed: int) -> None:
+    points = np.random.default_rng(seed).uniform((-3.0, -2.0), (3.0, 2.0), (60, 2))
+    disc = np.array([[0.0, 0.0, 0.4]])
+    told = np.linalg.norm(points, axis=1) <= 0.4
+    by_discs = SeenFloor(tuple(replace(scan, told_m=()) for scan in seen), disc).ask_told(points)
+    assert (by_discs == told).all()
+    shorter = [replace(scan, told_m=tuple(part * far for far in scan.far_m)) for scan in seen]
+    for scan in shorter:
+        told |= SeenFloor((replace(scan, far_m=scan.told_m),), np.zeros((0, 3))).ask(points)[0]
+    assert (SeenFloor(tuple(shorter), disc).ask_told(points) == told).all()
+    ranged = replace(seen[-1], sense="range", told_m=())
+    free = SeenFloor((ranged,), np.zeros((0, 3)))
+    assert (free.ask_told(points) == free.ask(points)[0]).all()
 
 
 @settings(max_examples=40)

@@ -158,7 +158,7 @@ def test_on_the_move_a_fault_leaves_the_stopping_distance_open() -> None:
     pose, asked = Pose2(2.0, 2.0, 0.4), Course("Leg-1", 0.4, 0.0)
     whole, broken = (reckon(pose, 0.0, 0.3, asked=asked, fault=fault) for fault in (False, True))
     wider = np.subtract(broken.moved.covariance, whole.moved.covariance)
-    assert np.trace(wider) == pytest.approx((0.4**2 / (2 * 0.5)) ** 2 / 3)
+    assert np.trace(wider) == pytest.approx(ActuatorModel().stopping_distance_m() ** 2 / 3)
     assert made(broken.effects, PictureRequest) and not made(whole.effects, PictureRequest)
 
 

@@ -50,7 +50,7 @@ from world_models.entries.task import Leg, Outcome
 from world_models.frames import Pose2
 
 ACTUATOR = ActuatorModel()
-STOPPING_M = 0.4**2 / (2 * 0.5)
+STOPPING_M = ACTUATOR.stopping_distance_m()
 BLIND = PathFollower(replace(DEFAULT, action=replace(DEFAULT.action, keeps_to_seen_floor=False)))
 """One that does not ask what of the floor is seen."""
 SMALL = 1e-6
@@ -224,15 +224,22 @@ def test_a_difference_within_its_bound_is_corrected_by_the_next_course() -> None
     assert reasons(effect_on(effects, Leg)) == {board.leg.id, board.belief.id, "Discrepancy"}
 
 
-def see_up_to(gap_m: float) -> Rolling:
-    """The floor is seen free from wall to wall, up to so far before the robot's axis."""
+def see_up_to(gap_m: float, *, is_told: bool = True) -> Rolling:
+    """The floor is seen free from wall to wall, up to so far before the robot's axis; by an earlier picture too."""
     board = Rolling()
     wall = [to_world(Pose2(AHEAD.x_m + gap_m + dx, y, 0.0)).position
             for dx, y in ((0.0, 0.2), (0.4, 0.2), (0.4, 3.8), (0.0, 3.8))]
     scan = scan_floor(find_floor(house(), [HALL]), to_world(AHEAD), HALL, things=[shapely.Polygon(wall)],
                       near_m=0.05, forward_m=0.0, half_rad=1.4, count=200)
-    board.bench.put(scan, board.belief)
+    board.bench.put(scan if is_told else replace(scan, told_m=()), board.belief)
     return board
+
+
+@pytest.mark.parametrize("is_told", [False, True])
+def test_it_rolls_at_full_speed_only_where_more_than_looks_tells_that_the_floor_is_free(is_told: bool) -> None:
+    course = effect_on(see_up_to(3.0, is_told=is_told).ask(PathFollower()), Course)
+    fastest = ACTUATOR.speed_m_per_s if is_told else DEFAULT.action.wary_speed_m_per_s
+    assert course.value.speed_m_per_s == pytest.approx(fastest)
 
 
 @pytest.mark.parametrize("gap_m", [0.58, 0.6, 0.62, 0.7, 1.5])
@@ -255,7 +262,7 @@ def test_it_stops_where_too_little_floor_is_free_and_names_what_tells_that(gap_m
 def test_it_never_rolls_slower_than_it_creeps() -> None:
     for free_m in (0.0, 0.1, 0.101):
         creep = DEFAULT.action.creep_speed_m_per_s
-        assert choose_speed(free_m, ACTUATOR, creep) == creep
+        assert choose_speed(free_m, ACTUATOR.speed_m_per_s, ACTUATOR, creep) == creep
 
 
 def test_what_it_watches() -> None:

@@ -93,12 +93,12 @@ def test_a_device_fault_answers_in_place_of_the_device_for_its_duration(fault_cl
 def test_a_device_fault_in_mid_move_stops_the_wheels_as_its_class_says(fault_class: type[DeviceFault]) -> None:
     robot, whole = body(fault_class(after_m=0.2, duration_s=60.0)), body()
     reached = FaultyBody(robot)
-    answer = reached.execute(MotorCommand(0.0, 1.0))
+    speed_m_per_s = 0.4
+    answer = reached.execute(MotorCommand(0.0, 1.0, speed_m_per_s))
     whole.move(1.0)
     if fault_class.stops_motion_after_s is None:
         assert isinstance(answer, MotionReport) and robot.truth.path_m == whole.truth.path_m
         return
-    speed_m_per_s = 0.4
     assert isinstance(answer, BodyFault)
     assert robot.truth.path_m == pytest.approx(0.2 + speed_m_per_s * fault_class.stops_motion_after_s, abs=0.05)
     assert (answer.move_m is not None) == fault_class.odometry_arrives
