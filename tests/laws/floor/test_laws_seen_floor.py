@@ -111,7 +111,7 @@ def test_told_is_what_a_scan_shows_free_up_to_where_it_tells(seen: list[FreeFloo
     for scan in shorter:
         told |= SeenFloor((replace(scan, far_m=scan.told_m),), np.zeros((0, 3))).ask(points)[0]
     assert (SeenFloor(tuple(shorter), disc).ask_told(points) == told).all()
-    ranged = replace(seen[-1], sense="range", told_m=())
+    ranged = replace(seen[-1], sense="ranges", told_m=())
     free = SeenFloor((ranged,), np.zeros((0, 3)))
     assert (free.ask_told(points) == free.ask(points)[0]).all()
 
