@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -218,16 +219,22 @@ class CameraMount:
 
     @property
     def camera_from_robot(self) -> Pose:
-        c, s = math.cos(self.tilt_rad), math.sin(self.tilt_rad)
-        # Rows are the camera's axes (right, down, forward) in the robot's frame.
-        rotation = np.array([[0.0, -1.0, 0.0], [-s, 0.0, -c], [c, 0.0, -s]])
-        if self.yaw_rad:
-            c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-            rotation = rotation @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        if self.roll_rad:
-            c, s = math.cos(self.roll_rad), math.sin(self.roll_rad)
-            rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ rotation
-        return Pose(rotation, -rotation @ np.array([self.forward_m, 0.0, self.height_m]))
+        return _place_camera(self)
+
+
+@lru_cache(maxsize=64)
+def _place_camera(mount: CameraMount) -> Pose:
+    """Where the camera of a mount is: asked for at each line that is predicted, and seldom another mount's."""
+    c, s = math.cos(mount.tilt_rad), math.sin(mount.tilt_rad)
+    # Rows are the camera's axes (right, down, forward) in the robot's frame.
+    rotation = np.array([[0.0, -1.0, 0.0], [-s, 0.0, -c], [c, 0.0, -s]])
+    if mount.yaw_rad:
+        c, s = math.cos(mount.yaw_rad), math.sin(mount.yaw_rad)
+        rotation = rotation @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    if mount.roll_rad:
+        c, s = math.cos(mount.roll_rad), math.sin(mount.roll_rad)
+        rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ rotation
+    return Pose(rotation, -rotation @ np.array([mount.forward_m, 0.0, mount.height_m]))
 
 
 CAMERA_UNKNOWNS = ("tilt_rad", "roll_rad", "yaw_rad", "height_m", "focal", "cx_px", "cy_px")

@@ -61,7 +61,7 @@ class Obstacles:
         along = self.segments_world[:, 1] - start
         length2 = np.maximum(np.einsum("ij,ij->i", along, along), 1e-18)
         to_robot = pose.position - start
-        t = np.clip(np.einsum("ij,ij->i", to_robot, along) / length2, 0.0, 1.0)
+        t = np.minimum(np.maximum(np.einsum("ij,ij->i", to_robot, along) / length2, 0.0), 1.0)
         return np.asarray(to_robot - t[:, None] * along)
 
     def blocks(self, before: Pose2, after: Pose2) -> bool:

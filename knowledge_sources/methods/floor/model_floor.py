@@ -36,6 +36,7 @@ class FloorGrid:
         points_robot: (rows, columns, 2) where they meet the floor, in the robot's frame [m].
         ranges_m: (rows, columns) from the point below the camera.
         bearings_rad: (columns,) from the robot's heading, at the lower border.
+        floor_from_pixels: (3, 3) homography from column and row to the floor in the robot's frame [m].
     """
 
     top: int
@@ -45,6 +46,7 @@ class FloorGrid:
     points_robot: Floats
     ranges_m: Floats
     bearings_rad: Floats
+    floor_from_pixels: Floats
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -72,7 +74,10 @@ def build_floor_grid(
     eye = np.array([mount.forward_m, 0.0])
     points = around[top:] + eye
     bearings = np.arctan2(around[-1, :, 1], around[-1, :, 0])
-    return FloorGrid(top, camera_height_m, eye, pixels[top:], points, ranges[top:], bearings)
+    whole = np.array([[STEP_PX, 0.0, pixels[top, 0, 0]], [0.0, STEP_PX, pixels[top, 0, 1]], [0.0, 0.0, 1.0]])
+    x, y, z = mount.camera_from_robot.rotation.T @ np.linalg.inv(camera.matrix) @ whole
+    plane = np.stack([camera_height_m * x - eye[0] * z, camera_height_m * y, -z])
+    return FloorGrid(top, camera_height_m, eye, pixels[top:], points, ranges[top:], bearings, plane)
 
 
 MIN_UP = 0.99
@@ -134,8 +139,8 @@ def predict_model_floor(
     heights = np.full(len(rays), np.inf)
     heights[met] = world_from_camera.apply(rays[met] * depth[met, None])[:, 2] - floor_m
     is_floor = met & (normals[surface, 2] > MIN_UP) & (np.abs(heights) <= rolled_over_m)
-    keys, kind_of = np.unique(np.round(colours, 4), axis=0, return_inverse=True)
-    kinds = np.where(is_floor, kind_of.ravel()[surface], -1).reshape(-1, columns)
+    keys, kind_of = _find_kinds(colours)
+    kinds = np.where(is_floor, kind_of[surface], -1).reshape(-1, columns)
     kinds = np.repeat(np.repeat(kinds, STEP, axis=0), STEP, axis=1)[: shape[0], : shape[1]]
     depths = np.where(is_floor, np.inf, depth).reshape(-1, columns)
     depths = np.repeat(np.repeat(depths, STEP, axis=0), STEP, axis=1)[: shape[0], : shape[1]]
@@ -146,6 +151,18 @@ def predict_model_floor(
             half = int(np.ceil((margin_px + aside_px_m / max(least_m, MIN_DEPTH_M)) / STEP_PX))
             is_plain &= cv2.dilate(near, np.ones((1, 2 * half + 1), np.uint8)) == 0
     return ModelFloor(kinds[:, aside:-aside], keys, is_plain[:, aside:-aside])
+
+
+def _find_kinds(colours: Floats) -> tuple[Floats, Ints]:
+    """(k, 3) the different ones of colours (n, 3), in order, and (n,) which of them each is; the unknown ones are one.
+
+    As numpy's unique along an axis, but a tenth of its time for the few surfaces that are in sight.
+    """
+    rows = [tuple(row) for row in np.nan_to_num(np.round(colours, 4), nan=-1.0).tolist()]
+    keys = sorted(set(rows))
+    number = {key: k for k, key in enumerate(keys)}
+    different = np.array(keys)
+    return np.where(different < 0.0, np.nan, different), np.array([number[row] for row in rows], np.int64)
 
 
 def _widen(pixels: Floats, count: int) -> Floats:

@@ -7,7 +7,9 @@ nothing to tell by, nothing is told: in plain surfaces, along lines that lead to
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from functools import lru_cache, reduce
 from typing import Any, NamedTuple
 
 import cv2
@@ -43,7 +45,8 @@ LEAST_SIGMAS = (0.002, 0.002, 0.001)
 """Least standard deviations of the motion between two pictures [m, m, rad], before the floor is asked."""
 ALIGN_STEPS = (0.01, 0.01, 0.004)
 """By so much it is changed to see what that changes in the picture."""
-ALIGN_ROUNDS = 4
+ALIGN_ROUNDS, MAX_LEFT_SIGMAS = 4, 0.1
+"""At most so many rounds; none after one that changed the motion by less than so much of what is unsure of it."""
 CONTRAST_SIGMA = 0.5
 """Of the contrast of floor that agrees."""
 PATCH = 10.0
@@ -74,17 +77,22 @@ class TwoPictures(NamedTuple):
 
         None where the earlier picture looked the other way. All of one depth is in a plane level with the floor.
         """
-        rows, columns = self.grid.shape
-        r, c = np.array([0, 0, rows - 1, rows - 1]), np.array([0, columns - 1, columns - 1, 0])
-        eye, floor = self.grid.eye_robot, self.grid.points_robot[r, c]
+        then, camera = self.earlier_from_now, self.mount.camera_from_robot
+        c, s = math.cos(then.heading_rad), math.sin(then.heading_rad)
+        turn = np.array([[c, -s], [s, c]])
         height_m = self.mount.height_m - self.grid.camera_height_m * depth
-        flat = self.earlier_from_now.apply(eye + (floor - eye) * depth)
-        there = self.mount.camera_from_robot.apply(np.column_stack([flat, np.full(4, height_m)]))
-        if there[:, 2].min() <= NEAR_PLANE_M:
-            return None
-        pixels = (self.camera.project(there) + 0.5) / STEP_PX - 0.5
-        corners = np.stack([c, r], axis=1).astype(np.float32)
-        return np.asarray(cv2.getPerspectiveTransform(corners, pixels.astype(np.float32)))
+        moved = turn @ self.grid.eye_robot * (1.0 - depth) + then.position
+        there = np.column_stack([depth * camera.rotation[:, :2] @ turn,
+                                 camera.rotation @ np.append(moved, height_m) + camera.translation])
+        seen = there @ self.grid.floor_from_pixels
+        rows, columns = self.grid.shape
+        corners = np.array([[0, 0, 1], [columns - 1, 0, 1], [columns - 1, rows - 1, 1], [0, rows - 1, 1]])
+        if (corners @ seen[2] <= NEAR_PLANE_M * np.maximum(corners @ self.grid.floor_from_pixels[2], 0.0)).any():
+            return None  # beyond the horizon, where a rolled camera may see, the factor is not above 0
+        lens = self.camera.matrix
+        lens[:2] /= STEP_PX
+        lens[:2, 2] += 0.5 / STEP_PX - 0.5
+        return np.asarray(lens @ seen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,9 +143,9 @@ def find_relief(
     sweep = _Sweep(both.picture[both.grid.top:], both.earlier)
     flat = sweep.place(floor)
     away = sweep.place(nearer) - flat
-    apart = np.abs(away).max(axis=-1)
+    apart = _measure_apart(away)
     gains = np.where(sweep.is_in(flat), apart / (1.0 / PARTS[1] - 1.0), 0.0).astype(np.float32)
-    lying = np.max([sweep.compare(_shifted(floor, near)) for near in np.array(NEAR_SHIFTS)], axis=0)
+    lying = reduce(np.maximum, (sweep.compare(_shifted(floor, near)) for near in np.array(NEAR_SHIFTS)))
     standing, parts = np.full(sweep.shape, -1.0, np.float32), np.ones(sweep.shape, np.float32)
     on_floor, depths = lying, np.ones(sweep.shape, np.float32)
     for depth in (*PARTS, *DEPTHS):
@@ -157,7 +165,7 @@ def find_relief(
         return None
     still = _shifted(np.eye(3), np.array([0.0, both.grid.top]))
     fixed = sweep.compare(still)
-    fixed[np.abs(sweep.place(still) - flat).max(axis=-1) < MIN_APART_PX] = -1.0
+    fixed[_measure_apart(sweep.place(still) - flat) < MIN_APART_PX] = -1.0
     kinds = np.zeros(sweep.shape, np.uint8)
     for kind, own, other in ((FLAT, lying, np.maximum(standing, fixed)), (STANDING, standing, np.maximum(lying, fixed)),
                              (FIXED, fixed, np.maximum(lying, standing))):
@@ -166,6 +174,11 @@ def find_relief(
     is_mirrored = (kinds == FLAT) & (lying - on_floor >= MIN_LEAD)
     parts = np.where(kinds == STANDING, parts, np.where(is_mirrored, depths, np.float32(1.0)))
     return Relief(kinds, parts, gains)
+
+
+def _measure_apart(away: NDArray[np.float32]) -> Grey:
+    """(rows, columns) the larger part of vectors (rows, columns, 2); faster than along an axis."""
+    return np.maximum(np.abs(away[..., 0]), np.abs(away[..., 1]))
 
 
 def _align(both: TwoPictures, is_floor: NDArray[np.bool_], sigmas: Floats) -> TwoPictures | None:
@@ -199,7 +212,10 @@ def _align(both: TwoPictures, is_floor: NDArray[np.bool_], sigmas: Floats) -> Tw
         slopes, off = slopes[seen], contrast[seen] - base[seen]
         weights = (1.0 + (off / CONTRAST_SIGMA) ** 2) ** -2 / CONTRAST_SIGMA**2 / PATCH
         information = slopes.T @ (weights[:, None] * slopes) + prior
-        change = change + np.linalg.solve(information, slopes.T @ (weights * off) - prior @ change)
+        step = np.linalg.solve(information, slopes.T @ (weights * off) - prior @ change)
+        change = change + step
+        if step @ information @ step < MAX_LEFT_SIGMAS**2:
+            break
     left = np.sqrt(np.diag(np.linalg.inv(information)))
     if both.camera.fx / STEP_PX * (left[2] + left[1] / TYPICAL_M) > MAX_UNSURE_PX:
         return None
@@ -233,14 +249,13 @@ class _Sweep:
 
     def place(self, plane: Floats) -> NDArray[np.float32]:
         """(rows, columns, 2) where the pixels were in the earlier picture."""
-        rows, columns = self.shape
-        at = np.stack(np.meshgrid(np.arange(columns, dtype=np.float32), np.arange(rows, dtype=np.float32)), axis=-1)
-        return np.asarray(cv2.perspectiveTransform(at, plane))
+        return np.asarray(cv2.perspectiveTransform(_list_pixels(*self.shape), plane))
 
     def is_in(self, places: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Which places are in the earlier picture, with their patches."""
         rows, columns = self._earlier.shape
-        return np.asarray(((places >= HALF) & (places <= (columns - 1 - HALF, rows - 1 - HALF))).all(axis=-1))
+        x, y = places[..., 0], places[..., 1]
+        return np.asarray((x >= HALF) & (x <= columns - 1 - HALF) & (y >= HALF) & (y <= rows - 1 - HALF))
 
     def measure_texture_along(self, directions: NDArray[np.float32]) -> NDArray[np.float32]:
         """(rows, columns) share of the squared gradients of patches that is along directions (rows, columns, 2)."""
@@ -265,6 +280,12 @@ class _Sweep:
         alike = (_blur(self._now * seen) - self._mean * mean) / np.maximum(self._deviation * deviation, 1.0)
         alike[mean < 0.0] = -1.0
         return np.asarray(alike, np.float32)
+
+
+@lru_cache(maxsize=4)
+def _list_pixels(rows: int, columns: int) -> NDArray[np.float32]:
+    """(rows, columns, 2) column and row of each pixel."""
+    return np.stack(np.meshgrid(np.arange(columns, dtype=np.float32), np.arange(rows, dtype=np.float32)), axis=-1)
 
 
 def _blur(values: NDArray[Any]) -> Grey:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.floor.appearance import (
     MAX_CHROMA_ERROR,
@@ -227,6 +227,10 @@ def _fit_most(
     return first
 
 
+FLOOR_ENDS: tuple[FloorEnd, ...] = ("thing", "sight", "model")
+THING, SIGHT, MODEL = range(3)
+
+
 class _Scan(NamedTuple):
     bearings_rad: tuple[float, ...]
     near_m: tuple[float, ...]
@@ -249,33 +253,64 @@ def _scan(
             at = region.feet[:, 1]
             own_m[at] = np.minimum(own_m[at], grid.ranges_m[region.feet[:, 0], at] * region.parts)
             thing_m = np.minimum(thing_m, own_m)
-    is_floor = model.kinds >= 0
-    up = np.arange(rows)[::-1]
-    first_model = _first(~is_floor[up])
-    groups = np.array_split(np.arange(columns)[::-1], BEARINGS)  # bearings grow to the left
-    near, far, ends, sigmas, bearings = [], [], [], [], []
-    for group in groups:
-        bearings.append(float(grid.bearings_rad[group].mean()))
-        lowest_m = float(grid.ranges_m[-1, group].max())
-        near_m = lowest_m * max(0.0, 1.0 - MAX_HIDDEN_M / grid.camera_height_m)
-        stop = int(first_model[group].min())
-        told = np.flatnonzero(tells[up][:max(stop, 1), group].any(axis=1))
-        range_m = SIGHT_M if stop >= rows else float(grid.ranges_m[rows - 1 - stop, group].min())
-        if len(told):  # next to the model's own parts the looks tell nothing, and something may stand there
-            range_m = min(range_m, float(grid.ranges_m[rows - 1 - told[-1], group].min()) + settings.max_untold_m)
-        at_thing_m = float(thing_m[group].min())
-        end: FloorEnd = "thing" if at_thing_m <= min(range_m, SIGHT_M) else "sight" if range_m >= SIGHT_M else "model"
-        range_m = min(range_m, at_thing_m)
-        if stop == 0 or not len(told):  # nothing of the floor is seen, or its looks are not known
-            range_m = 0.0
-            end = end if stop == 0 else "sight"
-        elif at_thing_m <= float(grid.ranges_m[-1, group].min()):
-            range_m = 0.0
-        near.append(round(near_m, 3))
-        far.append(round(min(range_m, SIGHT_M), 3))
-        ends.append(end)
-        sigmas.append(round(0.01 + STEP_PX * range_m**2 / (grid.camera_height_m * fy), 3))
-    return _Scan(tuple(bearings), tuple(near), tuple(far), tuple(ends), tuple(sigmas))
+    stops = _first((model.kinds < 0)[::-1])
+    groups = _Groups(columns)
+    stop = groups.least(stops)
+    lowest_m = grid.ranges_m[-1]
+    near_m = groups.most(lowest_m) * max(0.0, 1.0 - MAX_HIDDEN_M / grid.camera_height_m)
+    column_of = np.arange(columns)
+
+    def find_range_m(rows_up: Ints) -> Floats:
+        """The least distance of the pixels of each group in its own row, counted from below."""
+        return groups.least(grid.ranges_m[rows - 1 - groups.spread(rows_up), column_of])
+
+    range_m = np.where(stop >= rows, SIGHT_M, find_range_m(np.minimum(stop, rows - 1)))
+    told = groups.any(tells[::-1]) & (np.arange(rows)[:, None] < np.maximum(stop, 1))
+    is_told, last_told = told.any(axis=0), rows - 1 - np.argmax(told[::-1], axis=0)
+    # Next to the model's own parts the looks tell nothing, and something may stand there.
+    range_m = np.where(is_told, np.minimum(range_m, find_range_m(last_told) + settings.max_untold_m), range_m)
+    at_thing_m = groups.least(thing_m)
+    is_thing, is_sight = at_thing_m <= np.minimum(range_m, SIGHT_M), range_m >= SIGHT_M
+    range_m = np.minimum(range_m, at_thing_m)
+    is_blind = (stop == 0) | ~is_told  # nothing of the floor is seen, or its looks are not known
+    range_m[is_blind | (at_thing_m <= groups.least(lowest_m))] = 0.0
+    sigma_m = 0.01 + STEP_PX * range_m**2 / (grid.camera_height_m * fy)
+    kinds = np.where(is_blind & (stop != 0), SIGHT, np.where(is_thing, THING, np.where(is_sight, SIGHT, MODEL)))
+    return _Scan(groups.mean(grid.bearings_rad), _round(near_m), _round(np.minimum(range_m, SIGHT_M)),
+                 tuple(FLOOR_ENDS[kind] for kind in kinds), _round(sigma_m))
+
+
+class _Groups:
+    """Neighbouring columns of a picture by which one direction is told; bearings grow to the left."""
+
+    def __init__(self, columns: int) -> None:
+        each, more = divmod(columns, BEARINGS)
+        self._sizes = np.repeat([each + 1, each], [more, BEARINGS - more])
+        self._starts = np.cumsum(self._sizes) - self._sizes
+
+    def least(self, values: NDArray[Any]) -> NDArray[Any]:
+        """(n,) of (columns,)."""
+        return np.minimum.reduceat(values[::-1], self._starts)
+
+    def most(self, values: NDArray[Any]) -> NDArray[Any]:
+        """(n,) of (columns,)."""
+        return np.maximum.reduceat(values[::-1], self._starts)
+
+    def any(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(rows, n) of (rows, columns)."""
+        return np.logical_or.reduceat(mask[:, ::-1], self._starts, axis=1)
+
+    def mean(self, values: Floats) -> tuple[float, ...]:
+        """(n,) of (columns,)."""
+        return tuple((np.add.reduceat(values[::-1], self._starts) / self._sizes).tolist())
+
+    def spread(self, values: NDArray[Any]) -> NDArray[Any]:
+        """(columns,) of (n,)."""
+        return np.repeat(values, self._sizes)[::-1]
+
+
+def _round(values: Floats) -> tuple[float, ...]:
+    return tuple(round(value, 3) for value in values.tolist())
 
 
 def _measure_told_m(grid: FloorGrid, relief: Relief | None) -> tuple[float, ...]:
@@ -284,8 +319,7 @@ def _measure_told_m(grid: FloorGrid, relief: Relief | None) -> tuple[float, ...]
         return ()
     part = max(0.0, 1.0 - TOLD_HEIGHT_M / grid.camera_height_m)
     tells_m = np.where(relief.tells_of(np.full(grid.shape, part)), part * grid.ranges_m, 0.0).max(axis=0)
-    groups = np.array_split(np.arange(grid.shape[1])[::-1], BEARINGS)
-    return tuple(round(min(SIGHT_M, float(tells_m[group].min())), 3) for group in groups)
+    return _round(np.minimum(SIGHT_M, _Groups(grid.shape[1]).least(tells_m)))
 
 
 def _first(mask: NDArray[np.bool_]) -> NDArray[np.intp]:

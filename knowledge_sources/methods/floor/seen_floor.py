@@ -149,7 +149,8 @@ def sample_sweep(way: Sequence[tuple[float, float]], radius_m: float, most_m: fl
     xs, ys = (SPACING_M * np.arange(np.floor(a / SPACING_M), np.ceil(b / SPACING_M) + 1.0)
               for a, b in zip(low, high, strict=True))
     grid = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=-1).reshape(-1, 2)
-    near = ((grid[:, None] - places[None]) ** 2).sum(axis=2) <= radius_m**2
+    dx, dy = (grid[:, None, k] - places[None, :, k] for k in (0, 1))
+    near = dx * dx + dy * dy <= radius_m**2
     swept = near.any(axis=1)
     return Sweep(grid[swept], at[near[swept].argmax(axis=1)])
 

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 9_998,
-    "knowledge_sources": 22_340,
+    "knowledge_sources": 22_410,
     "sim": 5_850,
     "logs": 7_450,
     "harvey": 10_524,
