@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,12 +58,17 @@ class Obstacles:
 
     def _gaps(self, pose: Pose2) -> NDArray[np.float64]:
         """(n, 2) from the nearest point of each segment to the robot."""
-        start = self.segments_world[:, 0]
-        along = self.segments_world[:, 1] - start
-        length2 = np.maximum(np.einsum("ij,ij->i", along, along), 1e-18)
+        start, along, length2 = self._lines
         to_robot = pose.position - start
         t = np.minimum(np.maximum(np.einsum("ij,ij->i", to_robot, along) / length2, 0.0), 1.0)
         return np.asarray(to_robot - t[:, None] * along)
+
+    @cached_property
+    def _lines(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Starts (n, 2), directions (n, 2) and squared lengths (n,) of the segments."""
+        start = np.ascontiguousarray(self.segments_world[:, 0])
+        along = self.segments_world[:, 1] - start
+        return start, along, np.maximum(np.einsum("ij,ij->i", along, along), 1e-18)
 
     def blocks(self, before: Pose2, after: Pose2) -> bool:
         """Whether a small step ends in a contact. A step away from what is touched already is free."""

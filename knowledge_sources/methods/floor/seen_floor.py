@@ -45,11 +45,11 @@ class _Scan(NamedTuple):
 
 @lru_cache(maxsize=256)
 def _read_scan(scan: FreeFloor) -> _Scan:
-    told_m = scan.told_m if scan.sense == "camera" else scan.far_m  # what is ranged is no matter of looks
+    told_m = scan.told_m or scan.far_m  # what is ranged is no matter of looks
     bearings = np.unwrap(np.asarray(scan.bearings_rad, float)) if scan.bearings_rad else np.zeros(0)
     first = float(bearings[0]) if len(bearings) else 0.0
     return _Scan(np.array([scan.x_m, scan.y_m]), first, bearings - first, np.asarray(scan.near_m, float),
-                 np.asarray(scan.far_m, float), np.asarray(told_m or np.zeros(len(bearings)), float),
+                 np.asarray(scan.far_m, float), np.asarray(told_m, float),
                  np.array([end == "thing" for end in scan.ends], bool))
 
 
@@ -94,9 +94,12 @@ class SeenFloor:
         """
         away = np.linalg.norm(points[:, None] - self.discs[None, :, :2], axis=2)
         told = np.asarray((away <= self.discs[:, 2]).any(axis=1))
-        for scan in self.scans:
+        for scan in reversed(self.scans):
             rest = np.flatnonzero(~told)
-            told[rest] = _is_told(_read_scan(scan), points[rest])
+            if not len(rest):
+                break
+            if scan.told_m or scan.sense != "camera":
+                told[rest] = _is_told(_read_scan(scan), points[rest])
         return told
 
 
