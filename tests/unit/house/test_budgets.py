@@ -14,13 +14,13 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 9_998,
+    "world_models": 10_000,
     "knowledge_sources": 22_410,
-    "sim": 5_850,
+    "sim": 5_860,
     "logs": 7_450,
     "harvey": 10_524,
     "experiments": 10_405,
-    "tests": 43_654,
+    "tests": 43_690,
     "extras": 14_910,
 }
 """Of Python files, at most."""
