@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import networkx as nx
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -109,8 +110,6 @@ def _draw(rng: np.random.Generator, sigma_m: float, size: int = 1) -> Floats:
 def _draw_walls(spec: WorldSpec, sigma_m: float, rng: np.random.Generator) -> dict[tuple[str, str], float]:
     """The displacement of each wall (locale, wall) into its room [m]."""
     names, starts, ends, inward = _list_walls(spec)
-    import networkx as nx  # loaded when first used: most scenarios have an exact model
-
     graph = nx.Graph()
     graph.add_nodes_from(range(len(names)))
     for i in range(len(names)):

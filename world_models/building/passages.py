@@ -16,14 +16,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from world_models.building.locales import Doorway, Link
 
 if TYPE_CHECKING:
     from world_models.building.locale_frame import LocaleFrame
 
-K = TypeVar("K", bound=Hashable)
 Numbered = tuple[str, int]
 """A locale and the number of one of its components, all passages open."""
 
@@ -129,26 +128,13 @@ class _Hierarchy:
 
 def _number_components(nodes: list[Numbered], edges: list[PassageEdge]) -> dict[Numbered, int]:
     """The connected component of each node, numbered in the order of the nodes."""
-    firsts = _find_firsts(nodes, (edge.between for edge in edges))
-    numbers = {first: number for number, first in enumerate(dict.fromkeys(firsts.values()))}
-    return {node: numbers[firsts[node]] for node in nodes}
+    import networkx as nx  # here, so that a frame can be read without it
 
-
-def _find_firsts(nodes: Iterable[K], edges: Iterable[tuple[K, K]]) -> dict[K, K]:
-    """For each node, and each end of an edge, the first that it is connected with; networkx would take long to load."""
-    near: dict[K, list[K]] = {node: [] for node in nodes}
-    for one, other in edges:
-        near.setdefault(one, []).append(other)
-        near.setdefault(other, []).append(one)
-    firsts: dict[K, K] = {}
-    for first in near:
-        todo = [] if first in firsts else [first]
-        while todo:
-            here = todo.pop()
-            if here not in firsts:
-                firsts[here] = first
-                todo += near[here]
-    return firsts
+    graph: nx.Graph = nx.Graph()
+    graph.add_nodes_from(nodes)
+    graph.add_edges_from(edge.between for edge in edges)
+    numbers = {node: number for number, members in enumerate(nx.connected_components(graph)) for node in members}
+    return {node: numbers[node] for node in nodes}
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +262,14 @@ class OpenPassages:
     def _first_of(self, container: str, component: Component) -> Component:
         """The component by which all are named that open passages of a container join with this one."""
         if container not in self._groups:
-            self._groups[container] = _find_firsts((), (edge.between for edge in self.edges(container)))
+            import networkx as nx
+
+            graph: nx.Graph = nx.Graph(edge.between for edge in self.edges(container))
+            groups: dict[Component, Component] = {}
+            for first in graph:
+                if first not in groups:
+                    groups |= dict.fromkeys(nx.node_connected_component(graph, first), first)
+            self._groups[container] = groups
         return self._groups[container].get(component, component)
 
     def _find_end(self, container: str, edge: PassageEdge, side: int) -> Component:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
 
+import networkx as nx
 import numpy as np
 import shapely
 from shapely import affinity
@@ -317,8 +318,6 @@ def _list_ways(free: shapely.Geometry, step_m: float) -> Iterator[_Way]:
     slack = free.buffer(SLACK_M)
     shapely.prepare(slack)
     pairs = pairs[shapely.covers(slack, shapely.linestrings(nodes[pairs]))]
-    import networkx as nx  # loaded when first used: most missions are never lost among alike places
-
     graph: nx.Graph = nx.Graph()
     lengths = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1)
     graph.add_weighted_edges_from(zip(*pairs.T.tolist(), lengths.tolist(), strict=True))

@@ -5,17 +5,17 @@ All coordinates are on the floor, in one frame, in metres.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 from types import MappingProxyType
 from typing import Any
 
+import networkx as nx
 import numpy as np
 import shapely
 from shapely.geometry.polygon import orient
 
-from knowledge_sources.methods.arrays import Floats, Indices
+from knowledge_sources.methods.arrays import Floats
 from world_models.building.building import Building
 from world_models.building.locales import EXTRA_KIND
 
@@ -115,37 +115,17 @@ def find_shortest_route(
     nodes = np.array([*(p for p in inner if p is not None), *find_bends(free)])
     slack = free.buffer(SLACK_M)
     shapely.prepare(slack)
+    graph: nx.Graph = nx.Graph()
+    graph.add_nodes_from(range(len(nodes)))
     pairs = np.array(list(combinations(range(len(nodes)), 2)))
     pairs = pairs[shapely.covers(slack, shapely.linestrings(nodes[pairs]))]
     lengths = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1)
-    route = _find_shortest(len(nodes), pairs, lengths)
-    return None if route is None else _drop_repeats([ends[0], *(nodes[i] for i in route), ends[1]])
-
-
-def _find_shortest(count: int, pairs: Indices, lengths: Floats) -> list[int] | None:
-    """The nodes of the shortest way from node 0 to node 1 of ``count``, by Dijkstra's search; None where there is none.
-
-    In numpy: networkx takes longer to load than all ways of a mission.
-
-    Args:
-        pairs: (m, 2) nodes that are joined. lengths: (m,), positive.
-    """
-    joined = np.full((count, count), np.inf)
-    joined[pairs[:, 0], pairs[:, 1]] = joined[pairs[:, 1], pairs[:, 0]] = lengths
-    away, before, is_open = np.full(count, np.inf), np.zeros(count, int), np.ones(count, bool)
-    away[0], here = 0.0, 0
-    while here != 1:
-        is_open[here] = False
-        through = away[here] + joined[here]
-        nearer = through < away
-        away[nearer], before[nearer] = through[nearer], here
-        here = int(np.argmin(np.where(is_open, away, np.inf)))
-        if not math.isfinite(away[here]) or not is_open[here]:
-            return None
-    route = [1]
-    while route[-1] != 0:
-        route.append(int(before[route[-1]]))
-    return route[::-1]
+    graph.add_weighted_edges_from(zip(*pairs.T.tolist(), lengths.tolist(), strict=True))
+    try:
+        route = nx.shortest_path(graph, 0, 1, weight="weight")
+    except nx.NetworkXNoPath:
+        return None
+    return _drop_repeats([ends[0], *(nodes[i] for i in route), ends[1]])
 
 
 def measure_wall_distance_m(outline: Any, openings: Sequence[Any], point: Any) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-import networkx as nx
 import numpy as np
 import pytest
 import shapely
@@ -13,7 +12,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.motion import routes
 from knowledge_sources.methods.motion.routes import (
     AWAY_PART,
     AWAY_STEP_M,
@@ -133,19 +131,6 @@ def test_free_is_what_is_far_enough_from_the_raw_obstacles(
     assert np.all(is_free[away_m > CLEARANCE_M + 1e-6])
     with_corners = shapely.contains_xy(compute_free_space(ROOM, obstacles, CLEARANCE_M), points)
     assert away_m[with_corners].min(initial=9.0) >= CLEARANCE_M - 1e-6
-
-
-@given(count=st.integers(2, 20), share=st.floats(0.0, 1.0), seed=st.integers(0, 9999))
-def test_the_shortest_way_is_that_of_networkx(count: int, share: float, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    nodes, pairs = rng.uniform(0.0, 5.0, (count, 2)), np.column_stack(np.triu_indices(count, 1))
-    pairs = pairs[rng.random(len(pairs)) < share]
-    lengths = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1)
-    graph = nx.Graph()
-    graph.add_nodes_from(range(count))
-    graph.add_weighted_edges_from(zip(*pairs.T.tolist(), lengths.tolist(), strict=True))
-    way = nx.shortest_path(graph, 0, 1, weight="weight") if nx.has_path(graph, 0, 1) else None
-    assert routes._find_shortest(count, pairs, lengths) == way
 
 
 def test_a_wall_across_the_room_leaves_no_way() -> None:

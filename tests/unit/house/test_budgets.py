@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 10_000,
-    "knowledge_sources": 22_410,
+    "knowledge_sources": 22_420,
     "sim": 5_860,
     "logs": 7_450,
     "harvey": 10_524,
