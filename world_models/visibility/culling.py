@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from world_models.building.building import Building
@@ -256,21 +257,47 @@ def overlap(one: Floats, other: Floats) -> NDArray[np.bool_]:
 
 def visible_spans(lines: Floats, shadows: Shadows) -> tuple[NDArray[np.int64], Floats]:
     """The k visible parts of segments (n, 2, 3): index of the segment (k,), and parameters (k, 2)."""
-    near_enough = shadows.nearest_m[None, :] < np.maximum(lines[:, 0, 2], lines[:, 1, 2])[:, None]
-    line, surface = np.nonzero(overlap(bounding_windows(lines)[:, None], shadows.windows[None]) & near_enough)
-    behind = shadows.bounds[:, -1]
-    beyond = np.maximum(*(_value(behind[:, surface], lines[line, end]) for end in (0, 1))) >= 0
-    line, surface = line[beyond], surface[beyond]
-    bounds = shadows.bounds[:, :, surface]
-    hidden = _interval(_value(bounds, lines[line, 0]), _value(bounds, lines[line, 1]))
-    some = hidden[:, 1] > hidden[:, 0]
     taken: list[list[tuple[float, float]]] = [[] for _ in lines]
-    for number, low, high in zip(line[some].tolist(), *hidden[some].T.tolist(), strict=True):
+    hidden = _find_hidden_spans(lines, bounding_windows(lines), shadows.bounds, shadows.windows, shadows.nearest_m)
+    for number, low, high in zip(*hidden, strict=True):
         taken[number].append((low, high))
     rows = [(number, *span) for number, parts in enumerate(taken)
             for span in subtract_intervals((0.0, 1.0), parts, MIN_PIECE)]
     table = np.array(rows, float).reshape(-1, 3)
     return table[:, 0].astype(np.int64), table[:, 1:]
+
+
+@njit(cache=True, error_model="numpy")
+def _find_hidden_spans(
+    lines: Floats, own: Floats, bounds: Floats, windows: Floats, nearest_m: Floats
+) -> tuple[list[int], list[float], list[float]]:  # pragma: no cover
+    """Each part of a segment (n, 2, 3) with its window (n, 4) that is in a shadow: its number and both parameters."""
+    numbers, lows, highs = [0 for _ in range(0)], [0.0 for _ in range(0)], [0.0 for _ in range(0)]
+    planes = bounds.shape[1]
+    for i in range(len(lines)):
+        (ax, ay, az), (bx, by, bz) = lines[i, 0], lines[i, 1]
+        for j in range(len(windows)):
+            if not nearest_m[j] < max(az, bz):
+                continue
+            if not (own[i, 0] <= windows[j, 2] and own[i, 1] <= windows[j, 3]
+                    and windows[j, 0] <= own[i, 2] and windows[j, 1] <= own[i, 3]):
+                continue
+            low, high = 0.0, 1.0
+            for k in range(planes - 1, -1, -1):  # the surface's own plane first: it excludes most
+                gx, gy, gz, h = bounds[0, k, j], bounds[1, k, j], bounds[2, k, j], bounds[3, k, j]
+                start, end = gx * ax + gy * ay + gz * az + h, gx * bx + gy * by + gz * bz + h
+                if start < 0.0 and end < 0.0:
+                    low = 2.0
+                    break
+                if start < 0.0:
+                    low = max(low, start / (start - end))
+                elif end < 0.0:
+                    high = min(high, start / (start - end))
+            if high > low:
+                numbers.append(i)
+                lows.append(low)
+                highs.append(high)
+    return numbers, lows, highs
 
 
 def _value(bounds: Floats, points: Floats) -> Floats:

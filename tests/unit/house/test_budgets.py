@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_000,
+    "world_models": 10_025,
     "knowledge_sources": 22_420,
     "sim": 5_860,
     "logs": 7_450,
