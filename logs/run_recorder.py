@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from blackboard.change import Change
 from blackboard.effect import Effect, Retract
@@ -14,7 +15,6 @@ from blackboard.scheduler import Port
 from logs.disk import sync_folder
 from logs.journal_file import JournalFile
 from logs.mjpeg_file import MjpegFile
-from logs.recording.writer import RecordingWriter
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
 from world_models.building.geometry.faces import Face
@@ -23,6 +23,9 @@ from world_models.entries.body import CameraPicture
 from world_models.entries.location import Place
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
+
+if TYPE_CHECKING:
+    from logs.recording.writer import RecordingWriter
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +79,8 @@ class RunRecorder:
                 if sync:
                     sync_folder(run.path)
             if drawing is not None or live:
+                from logs.recording.writer import RecordingWriter  # here, so that a mission without loads no rerun
+
                 line_of = decision_line if self._journal is None else self._journal.line
                 self._drawing = RecordingWriter(
                     drawing, world=world, camera=robot.lens, mount=robot.mount, live=live, line_of=line_of,
