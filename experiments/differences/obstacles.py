@@ -315,7 +315,8 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
         tuple(_table(driven)),
         notes=(
             f"{driven.seeds}, fewer in the columns to the right; no constant was chosen on them."
-            f" The robot moves at up to {ActuatorModel().speed_m_per_s} m/s. In each tenth cluttered mission no way is left; good: reached,"
+            f" The robot moves at up to {ActuatorModel().speed_m_per_s} m/s."
+            " In each tenth cluttered mission no way is left; good: reached,"
             " or blocked where a planner that knows the truth finds no way either. Bounds are one-sided, of 95 %, by"
             " Clopper and Pearson.",
             "Columns: the camera; and a ring of 24 range sensors; without what tells floor by its appearance, or by"
