@@ -11,7 +11,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.methods.floor.model_floor import STEP_PX, ModelFloor, build_floor_grid, predict_model_floor
+from knowledge_sources.methods.floor.model_floor import (
+    STEP_PX,
+    ModelFloor,
+    _find_kinds,
+    build_floor_grid,
+    predict_model_floor,
+)
 from sim.scenario import load_scenario
 from world_models.camera import Camera
 from world_models.frames import Pose2
@@ -50,3 +56,14 @@ def test_what_lies_just_beside_the_picture_keeps_floor_near_it_from_being_plain(
     rows = part.is_plain.shape[0]
     np.testing.assert_array_equal(part.is_plain, whole.is_plain[-rows:, CUT:-CUT])
     np.testing.assert_array_equal(part.kinds >= 0, whole.kinds[-rows:, CUT:-CUT] >= 0)
+
+
+@given(st.lists(st.sampled_from([(0.5, 0.4, 0.3), (0.5, 0.4, 0.30002), (0.2, 0.9, 0.1), (math.nan,) * 3]), min_size=1))
+def test_kinds_are_the_different_colours_in_order_and_all_that_are_unknown_are_one(
+    colours: list[tuple[float, float, float]]
+) -> None:
+    rows = np.array(colours)
+    keys, kind_of = _find_kinds(rows)
+    assert np.array_equal(keys[kind_of], np.round(rows, 4), equal_nan=True)
+    expected = np.unique(np.nan_to_num(np.round(rows, 4), nan=-1.0), axis=0)
+    assert np.array_equal(np.nan_to_num(keys, nan=-1.0), expected)

@@ -35,6 +35,7 @@ EVERYWHERE = np.ones(GRID.shape, bool)
 MOVES_M = st.floats(0.3, 0.6)
 SEEDS = st.integers(0, 2**32 - 1)
 HIGH_M = 0.35
+GREY = np.zeros((SIZE, SIZE), np.float32)
 FLOOR = cv2.GaussianBlur(np.random.default_rng(7).uniform(60.0, 180.0, (800, 800)), (0, 0), 2.0).astype(np.float32)
 """Grey levels of a floor, a pixel each centimetre and a half."""
 
@@ -260,3 +261,29 @@ def test_what_stands_on_the_floor_or_over_it_is_not(board: Board, low_m: float, 
     scene = see(board._replace(low_m=low_m), Pose2(moved_m, 0.0, 0.0))
     regions = find_regions(scene.board, EVERYWHERE, GRID, scene.relief)
     assert regions and not is_on_the_lens(regions[0], scene.relief)
+
+
+@settings(max_examples=60)
+@given(tilt=st.floats(0.0, 0.4), roll=st.floats(-0.1, 0.1), yaw=st.floats(-0.2, 0.2), high_m=st.floats(0.4, 1.4),
+       step_m=st.floats(-0.05, 0.05), moved=st.tuples(st.floats(-0.1, 0.8), st.floats(-0.3, 0.3), st.floats(-0.6, 0.6)),
+       depth=st.floats(0.4, 3.7), seed=SEEDS)
+def test_a_map_shows_what_the_camera_would_point_by_point(
+    tilt: float, roll: float, yaw: float, high_m: float, step_m: float, moved: tuple[float, float, float],
+    depth: float, seed: int,
+) -> None:
+    mount = CameraMount(high_m, 0.1, tilt, roll, yaw)
+    grid = build_floor_grid(CAMERA, mount, high_m - step_m, 9.0)
+    assume(grid is not None and np.isfinite(grid.points_robot).all())
+    assert grid is not None
+    both = TwoPictures(grid, GREY, GREY, Pose2(*moved), CAMERA, mount)
+    plane, rng = both.find_map(depth), np.random.default_rng(seed)
+    rows, columns = (rng.integers(0, size, 30) for size in grid.shape)
+    flat = both.earlier_from_now.apply(grid.eye_robot + depth * (grid.points_robot[rows, columns] - grid.eye_robot))
+    points = np.column_stack([flat, np.full(30, mount.height_m - grid.camera_height_m * depth)])
+    there = mount.camera_from_robot.apply(points)
+    if plane is None:
+        return
+    assert (there[:, 2] > 0.0).all()
+    expected = (CAMERA.project(there) + 0.5) / STEP_PX - 0.5
+    found = cv2.perspectiveTransform(np.stack([columns, rows], axis=1)[None].astype(float), plane)[0]
+    assert np.allclose(found, expected, rtol=1e-9, atol=1e-6)

@@ -20,7 +20,7 @@ LINES = {
     "logs": 7_450,
     "harvey": 10_524,
     "experiments": 10_410,
-    "tests": 43_690,
+    "tests": 43_745,
     "extras": 14_910,
 }
 """Of Python files, at most."""
