@@ -63,7 +63,7 @@ class Caution(NamedTuple):
     Attributes:
         move_m: at most so far [m, true]; 0 where something may stand in what is not seen.
         creeps: whether that leads into floor that was not seen to be free.
-        is_told: whether more than looks tells that it is free.
+        is_told: whether it is seen free by more than looks.
     """
 
     move_m: float
@@ -142,7 +142,7 @@ class FloorAhead:
         return min(self._settings.wary_speed_m_per_s, self._robot.actuator.speed_m_per_s)
 
     def is_told(self, move_m: float) -> bool:
-        """Whether more than looks tells that the floor of a move is free; next to the model's walls nothing can."""
+        """Whether the floor of a move is seen free by more than looks, but for what is next to the model's walls."""
         asked = self._ask(self._sweep(self._way, move_m))
         untold = asked.only(~self._seen.ask_told(asked.points))
         return measure_free_m(untold, move_m) >= move_m - SPACING_M  # the free floor itself ends between two points

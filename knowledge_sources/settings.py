@@ -356,7 +356,7 @@ class ActionSettings:
     max_seen_age_s: float = setting(60.0, "s", "What was seen to be free longer ago must be seen again.")
     creep_speed_m_per_s: float = setting(0.09, "m/s", "Speed into floor that was not seen to be free.")
     wary_speed_m_per_s: float = setting(
-        0.4, "m/s", "Speed into floor that looks free, where no earlier picture tells that nothing stands on it.")
+        0.4, "m/s", "Speed into floor that looks free, where no earlier picture would tell what stands on it.")
     max_creep_m: float = setting(0.6, "m", "Longest move at that speed before the next picture.")
     max_looks: int = setting(4, "count", "Most looks round on one leg.")
 

@@ -89,8 +89,8 @@ class SeenFloor:
         return free, scans, discs
 
     def ask_told(self, points: Floats) -> Mask:
-        """Of which of the points (n, 2) more than looks tells that nothing stands there: an earlier picture, or that
-        the robot was there.
+        """Which of the points (n, 2) are seen free by more than looks: an earlier picture would tell what stands there,
+        if it has an edge or a pattern; or the robot was there.
         """
         away = np.linalg.norm(points[:, None] - self.discs[None, :, :2], axis=2)
         told = np.asarray((away <= self.discs[:, 2]).any(axis=1))
