@@ -151,7 +151,7 @@ def run(quick: bool, seed: int) -> Report:
             f"Missions: {', '.join(Path(scenario).stem for scenario in scenarios.values())}, seed {drawn}, recorded as"
             " harvey run records them. Parts and knowledge sources add up to the total.",
             f"Sampled every {1000 * PERIOD_S:.0f} ms of processor time: less than a tenth of a second is known roughly."
-            " A collection of garbage takes as long, and counts for whoever calls for memory then."
+            " The time of Python's garbage collector counts for the code in which it runs."
             " Other load on the machine makes all of it longer: compare two versions in turn.",
             "A knowledge source's time is its acts, with the methods that they call, and what it finds when asked."
             " A method's is with all that it calls, so methods may be within each other, without loading.",
