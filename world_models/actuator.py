@@ -46,7 +46,7 @@ class ActuatorModel(Bounded):
     turn_sigma_rad: float = bounded(math.radians(0.2), 1e-6, math.pi / 2.0)
     skitter_m: float = bounded(0.004, 1e-6, 1.0)
     increment_m: float = bounded(0.6096, 0.01, 10.0)
-    turn_increment_rad: float = bounded(math.radians(20.0), 0.01, math.pi)
+    turn_increment_rad: float = bounded(math.radians(30.0), 0.01, math.pi)
     speed_m_per_s: float = bounded(0.6, 0.001, 10.0)
     brake_m_per_s2: float = bounded(0.5, 0.001, 100.0)
 

@@ -13,14 +13,15 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from knowledge_sources.conditions import GOING_ON, HELD, PICTURE, SURE, UP_TO_DATE, Belief
-from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M, Seen, see_free_floor
+from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD, Seen, see_free_floor
+from knowledge_sources.motion_between import find_motion_between
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import rolling_course
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import CameraPicture
 from world_models.entries.floor import LAST_VIEWS, FloorAppearance, FloorView, FreeFloor
 from world_models.entries.location import Hypothesis
-from world_models.frames import Pose2
+from world_models.frames import Pose2, wrap_angle
 
 FLOOR_STEP_M = 0.04  # on the move the floor is looked at again after so much of the way
 MAX_FLOOR_SIGMA_M = 0.1  # the floor is looked at while the robot's place is known to this
@@ -77,7 +78,7 @@ class FloorWatcher(RobotKnowledgeSource):
         lit = _find_lit(view, frame.value.sim_time_s)
         seen, learnt = see_free_floor(
             robot, locale, pose, case.belief.covariance, frame.value.jpeg,
-            [Seen(view[e.value.frame].value.jpeg, _pose_of(e.value), e.value.sigma_m, e.value.sigma_rad)
+            [Seen(view[e.value.frame].value.jpeg, _pose_of(e.value), find_motion_between(view, e.value, case.belief))
              for e in earlier],
             {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings,
             None if lit is None else lit.value.light)
@@ -86,9 +87,10 @@ class FloorWatcher(RobotKnowledgeSource):
         for appearance in learnt:
             old, because = known.get(appearance.locale), (frame, belief, *earlier)
             yield Post(appearance, because) if old is None else Revise(old, appearance, (*because, old))
-        if not kept or _measure_way_m(kept[0].value, pose) >= apart_m:
+        if not kept or not _is_like(kept[0].value, pose):
             yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,
-                                 frame.value.sim_time_s, belief.value.sigma_m, belief.value.sigma_rad), (frame, belief))
+                                 frame.value.sim_time_s, belief.value.sigma_m, belief.value.sigma_rad,
+                                 belief.value.motion), (frame, belief))
 
 
 def _find_lit(view: View, now_s: float) -> Entry[FreeFloor] | None:
@@ -112,6 +114,12 @@ def _is_near_last(view: View, belief: Belief) -> bool:
 def _is_seen(view: View, frame: Entry[CameraPicture]) -> bool:
     """Whether the floor was looked at in a picture already."""
     return any(frame.ref in seen.because for seen in view.newest_first(FreeFloor))
+
+
+def _is_like(kept: FloorView, pose: Pose2) -> bool:
+    """Whether a picture shows hardly more than one that is kept."""
+    turned_rad = abs(wrap_angle(pose.heading_rad - kept.heading_rad))
+    return _measure_way_m(kept, pose) < FLOOR_VIEW_DISTANCE_M and turned_rad < FLOOR_VIEW_TURN_RAD
 
 
 def _pose_of(kept: FloorView) -> Pose2:

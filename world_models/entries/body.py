@@ -16,6 +16,9 @@ RecoveryStatus = Literal["asked", "in vain", "over"]
 LAST_REQUESTS = 8
 """The newest requests and faults that stay on the board: the fault handler looks back over a few of them."""
 
+LAST_REPORTS = 32
+"""The newest reports of the wheels that stay: they tell the motion between two pictures that are compared."""
+
 
 def is_closed(fault: BodyFault) -> bool:
     return not fault.is_open
@@ -92,7 +95,7 @@ class Course:
         return f"roll on at {self.speed_m_per_s:.2f} m/s, bending by {words.bend(self.curvature_per_m)}"
 
 
-@observation(keep=2)
+@observation(keep=LAST_REPORTS)
 @dataclass(frozen=True, slots=True)
 class MotionReport:
     """What the wheel encoders claim was done, and how long it took."""

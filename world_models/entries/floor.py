@@ -128,6 +128,7 @@ class FloorView:
         x_m, y_m, heading_rad: where the robot was [world]; sigma_m, sigma_rad: standard deviations of that.
         floor_m: height of the floor there [m, world].
         seen_s: when, by the body's clock.
+        motion: id of the last report of the wheels until then, or "".
     """
 
     frame: str
@@ -139,6 +140,7 @@ class FloorView:
     seen_s: float
     sigma_m: float
     sigma_rad: float
+    motion: str = ""
 
     def sentence(self) -> str:
         return f"{self.frame} is kept: the floor was seen from {words.point(self.x_m, self.y_m)} of the world"

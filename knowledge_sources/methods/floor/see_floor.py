@@ -42,11 +42,15 @@ from knowledge_sources.methods.floor.standing_regions import (
 )
 from knowledge_sources.settings import DEFAULT, FloorSettings, Settings
 from world_models.entries.floor import FloorAppearance, FloorEnd, FloorThing, FreeFloor, Light
-from world_models.frames import Pose2
+from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 FLOOR_VIEW_DISTANCE_M = 0.25
 """A picture is kept to compare later ones with when the robot has gone so far since the last."""
+FLOOR_VIEW_TURN_RAD = math.radians(30.0)
+"""Or has turned so far."""
+MAX_TURNED_RAD = math.radians(45.0)
+"""Pictures are compared if the robot turned no further between them: further aside hardly any floor is in both."""
 
 BEARINGS = 64  # directions in which the free floor of a picture is written down
 MAX_ROLLED_OVER_M = 0.05  # what is not higher than this is rolled over
@@ -70,13 +74,20 @@ SIGHT_PART = 2.0
 """Pixels are looked at up to so many times the sight, for the tops of things."""
 
 
+class Motion(NamedTuple):
+    """Where the robot came to, in its frame before, with standard deviations."""
+
+    moved: Pose2
+    sigma_m: float
+    sigma_rad: float
+
+
 class Seen(NamedTuple):
-    """A picture and the robot's pose [world] when it was taken, with its standard deviations."""
+    """A picture, the robot's pose [world] when it was taken, and its motion since."""
 
     jpeg: bytes
     pose: Pose2
-    sigma_m: float
-    sigma_rad: float
+    since: Motion
 
 
 def see_free_floor(
@@ -123,12 +134,13 @@ def see_free_floor(
         model = model.behind(robot.camera.obstruction.covers(grid.pixels, MODEL_MARGIN_PX))
     unlike, tells, light = find_unlike(picture[grid.top:], model, known, last_light)
     unlike &= s.use_appearance
-    compare = partial(_find_relief, robot, grid, model.is_plain, unlike, picture, pose, covariance)
-    relief = compare(earlier[0]) if s.use_parallax and earlier else None
+    compare = partial(_find_relief, robot, grid, model.is_plain, unlike, picture)
+    alike = [seen for seen in earlier if abs(wrap_angle(seen.since.moved.heading_rad)) <= MAX_TURNED_RAD]
+    relief = compare(alike[0]) if s.use_parallax and alike else None
     regions = find_regions(unlike, tells, grid, relief)
     reliefs = [] if relief is None else [relief]
-    if reliefs and len(earlier) > 1 and any(not (region.mask & unlike).any() for region in regions):
-        again = compare(earlier[1])  # what looks like the floor is compared with one more picture
+    if reliefs and len(alike) > 1 and any(not (region.mask & unlike).any() for region in regions):
+        again = compare(alike[1])  # what looks like the floor is compared with one more picture
         reliefs += [] if again is None else [again]
     built = [(region, _build_thing(region, grid, robot, pose, covariance, reliefs, unlike, s)) for region in regions]
     things = [(region, thing) for region, thing in built if thing is not None]
@@ -144,15 +156,13 @@ def see_free_floor(
 
 def _find_relief(
     robot: RobotModel, grid: FloorGrid, is_plain: NDArray[np.bool_], unlike: NDArray[np.bool_],
-    picture: NDArray[np.uint8], pose: Pose2, covariance: Floats, then: Seen,
+    picture: NDArray[np.uint8], then: Seen,
 ) -> Relief | None:
     """By an earlier picture."""
     before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)
     now, earlier_grey = (np.asarray(image.astype(np.float32) @ GREY, np.float32) for image in (picture, before))
-    sigma_m, sigma_rad = math.sqrt(float(np.trace(covariance[:2, :2])) / 2.0), math.sqrt(float(covariance[2, 2]))
-    sigmas = math.hypot(then.sigma_m, sigma_m), math.hypot(then.sigma_rad, sigma_rad)
-    both = TwoPictures(grid, now, earlier_grey, then.pose.inverse() @ pose, robot.camera, robot.mount)
-    relief = find_relief(both, is_plain & ~unlike, *sigmas)
+    both = TwoPictures(grid, now, earlier_grey, then.since.moved, robot.camera, robot.mount)
+    relief = find_relief(both, is_plain & ~unlike, then.since.sigma_m, then.since.sigma_rad)
     return None if relief is None else relief.beside(~is_plain)
 
 
