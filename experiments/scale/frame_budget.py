@@ -99,7 +99,7 @@ def run(quick: bool, seed: int) -> Report:
 def _time_acts(scenario: str, seed: int) -> Times:
     """Drive a mission and time each act."""
     times: Times = {}
-    timed = frozenset((TRACK, FLOOR, *MILESTONE))
+    timed = frozenset((TRACK, NEW_LANDMARKS, FLOOR, *MILESTONE))
 
     def sources(settings: Settings) -> Sequence[KnowledgeSource]:
         return [_timed(ks, times) if ks.name in timed else ks for ks in knowledge_sources(settings)]

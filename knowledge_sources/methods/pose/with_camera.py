@@ -14,19 +14,19 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Mask
+from knowledge_sources.methods.pose.camera_kernel import measure_lines
 from knowledge_sources.methods.pose.line_set import check_matched_arrays
 from knowledge_sources.methods.pose.planar import to_pose2
 from knowledge_sources.settings import DEFAULT, CameraStateSettings
-from world_models.camera import CAMERA_UNKNOWNS, YAW, Camera, CameraMount, move_camera
+from world_models.camera import CAMERA_UNKNOWNS, YAW, Camera, CameraMount
 from world_models.frames import Pose2
 
 POSE = 3
 """Unknowns of the robot's pose; those of the camera come after them."""
 UNKNOWNS = POSE + len(CAMERA_UNKNOWNS)
-STEPS = np.array([1e-5, 1e-5, 1e-6, 1e-6, 1e-6, 1e-6, 1e-5, 1e-6, 1e-3, 1e-3])
-"""Of the numeric derivatives, in the unknowns' units."""
+STILL = np.array([1e-5, 1e-5, 1e-6, 1e-6, 1e-6, 1e-6, 1e-5, 1e-6, 1e-3, 1e-3])
+"""A state that changes by less than this stands still, in the unknowns' units."""
 FREE = np.array([i for i in range(UNKNOWNS) if i != POSE + YAW])
-TINY = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +93,7 @@ def estimate_camera_and_pose(
     for _ in range(settings.max_rounds):
         near = problem.find_near(state, bound)
         before, state = state, problem.minimise(state, near.astype(float))
-        if np.abs((state - before) / STEPS).max() < 1.0 and np.array_equal(near, problem.find_near(state, bound)):
+        if np.abs((state - before) / STILL).max() < 1.0 and np.array_equal(near, problem.find_near(state, bound)):
             break
     return _build_estimate(problem, state, covariance, bound, settings)
 
@@ -119,41 +119,23 @@ class _Problem:
         """(10,) the state less the prior's mean."""
         return state - self.start_at(self.prior)
 
-    def measure(self, state: Floats) -> Floats:
-        """(n, 2) distances of the segments' ends from the projected infinite model lines, in deviations."""
-        return np.asarray(self.measure_all(state[None])[0])
+    def measure(self, state: Floats) -> tuple[Floats, Floats]:
+        """(n, 2) distances of the segments' ends from the projected infinite model lines, in deviations; and (n, 2, 10)
+        their derivatives, 0 by the yaw.
+        """
+        c, m = self.camera, self.mount
+        distances, slopes = measure_lines(
+            self.model, self.segments, np.array([c.fx, c.fy, c.cx, c.cy]),
+            np.array([m.height_m, m.forward_m, m.tilt_rad, m.roll_rad, m.yaw_rad]), state)
+        return distances / self.sigma_px, slopes / self.sigma_px
 
-    def measure_all(self, states: Floats) -> Floats:
-        """(k, n, 2) the same of several states (k, 10), at once: one by one it takes three times as long."""
-        moved = [move_camera(self.camera, self.mount, state[POSE:]) for state in states]
-        placed = [mount.camera_from_robot for _, mount in moved]
-        lenses = np.array([[camera.fx, camera.fy, camera.cx, camera.cy] for camera, _ in moved])
-        x, y, heading = states[:, :POSE].T
-        c, s, none = np.cos(heading), np.sin(heading), np.zeros(len(states))
-        robot_from_world = np.stack([c, s, none, -s, c, none, none, none, none + 1.0], axis=1).reshape(-1, 3, 3)
-        origins = np.stack([-c * x - s * y, s * x - c * y, none], axis=1)
-        turns = np.stack([pose.rotation for pose in placed])
-        ends = self.model.reshape(-1, 3) @ (turns @ robot_from_world).transpose(0, 2, 1)
-        ends += ((turns @ origins[..., None])[..., 0] + np.stack([pose.translation for pose in placed]))[:, None]
-        (ax, ay, az), (bx, by, bz) = (np.moveaxis(ends[:, end::2], -1, 0) for end in (0, 1))
-        fx, fy, cx, cy = lenses.T[..., None]
-        a, b = (ay * bz - az * by) / fx, (az * bx - ax * bz) / fy  # the planes through the camera and the lines
-        c0 = ax * by - ay * bx - cx * a - cy * b
-        reach = np.hypot(a, b) + TINY
-        along = self.segments[..., 0] * a[..., None] + self.segments[..., 1] * b[..., None] + c0[..., None]
-        return np.asarray(along / reach[..., None] / self.sigma_px)
-
-    def slopes(self, state: Floats) -> Floats:
-        """(n, 2, 10) derivatives of the distances, by central differences; 0 by the yaw."""
-        found = np.zeros((len(self.model), 2, UNKNOWNS))
-        steps = np.diag(STEPS)[FREE]
-        ahead, back = np.split(self.measure_all(np.concatenate([state + steps, state - steps])), 2)
-        found[..., FREE] = np.moveaxis((ahead - back) / (2.0 * STEPS[FREE, None, None]), 0, -1)
-        return found
+    def measure_squares(self, state: Floats) -> Floats:
+        """(n,) the squared distances of the lines, in variances."""
+        return np.asarray(np.sum(self.measure(state)[0] ** 2, axis=1))
 
     def solve(self, state: Floats, weights: Floats) -> Floats:
         """The state after one Gauss-Newton step with these weights (n,) of the lines."""
-        distances, slopes = self.measure(state), self.slopes(state)
+        distances, slopes = self.measure(state)
         hessian = np.einsum("n,nea,neb->ab", weights, slopes, slopes) + self.information
         gradient = np.einsum("n,nea,ne->a", weights, slopes, distances) + self.information @ self.from_prior(state)
         moved = state.copy()
@@ -164,7 +146,7 @@ class _Problem:
         """The state of least squares with these weights."""
         for _ in range(iterations):
             before, state = state, self.solve(state, weights)
-            if np.abs((state - before) / STEPS).max() < 1.0:
+            if np.abs((state - before) / STILL).max() < 1.0:
                 break
         return state
 
@@ -172,18 +154,18 @@ class _Problem:
         """The state under a robust loss whose width narrows."""
         for width in settings.widths_px:
             for _ in range(settings.steps_a_width):
-                squares = np.mean(self.measure(state) ** 2, axis=1) * (self.sigma_px / width) ** 2
+                squares = 0.5 * self.measure_squares(state) * (self.sigma_px / width) ** 2
                 state = self.solve(state, 1.0 / (1.0 + squares) ** 2 * (self.sigma_px / width) ** 2 * 4.0)
         return state
 
     def find_near(self, state: Floats, bound: float) -> Mask:
         """(n,) the lines within the bound."""
-        return np.asarray(np.sum(self.measure(state) ** 2, axis=1) <= bound)
+        return np.asarray(self.measure_squares(state) <= bound)
 
     def compute_cost(self, state: Floats, bound: float) -> float:
         """The truncated squared errors of the lines, and the priors' shares."""
         off = self.from_prior(state)
-        return float(np.minimum(np.sum(self.measure(state) ** 2, axis=1), bound).sum() + off @ self.information @ off)
+        return float(np.minimum(self.measure_squares(state), bound).sum() + off @ self.information @ off)
 
 
 def _build_information(pose_covariance: Any, camera_covariance: Floats) -> Floats:
@@ -199,7 +181,7 @@ def _build_estimate(
     problem: _Problem, state: Floats, camera_covariance: Floats, bound: float, settings: CameraStateSettings
 ) -> CameraEstimate:
     near = problem.find_near(state, bound)
-    distances, slopes = problem.measure(state)[near], problem.slopes(state)[near]
+    distances, slopes = (measured[near] for measured in problem.measure(state))
     lines = np.einsum("nea,neb->ab", slopes, slopes)
     freedom = 2 * int(near.sum()) - len(FREE)
     scatter = max(1.0, float(np.sum(distances**2)) / freedom) if freedom >= settings.min_freedom else 1.0
