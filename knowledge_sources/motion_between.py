@@ -1,4 +1,4 @@
-"""The motion between two pictures: by what is believed of both places, or by the wheels, whichever tells it better (§3.2).
+"""The motion between two pictures: by what is believed of both places, or by the wheels if they tell it better (§3.2).
 
 Two beliefs of which each is off by half a degree tell the motion between them to 0.7 degrees only, as nobody knows how
 much of that they have in common. On a straight way the wheels tell it to 0.2.
@@ -16,7 +16,7 @@ from blackboard.entry import Entry
 from knowledge_sources.conditions import Belief
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.relief import TYPICAL_M
-from knowledge_sources.methods.floor.see_floor import Motion
+from knowledge_sources.methods.floor.see_floor import MotionBetween
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import BodyFault, MotionReport
 from world_models.entries.floor import FloorView
@@ -27,7 +27,7 @@ MAX_APART_SIGMAS = 3.0
 """Wheels that say otherwise than what is believed by more than this slipped, or the robot was pushed."""
 
 
-def find_motion_between(view: View, then: FloorView, now: Belief) -> Motion:
+def find_motion_between(view: View, then: FloorView, now: Belief) -> MotionBetween:
     """The motion from where a picture was kept to where the robot is believed to be now."""
     believed = _compare_beliefs(then, now)
     reports = _list_reports(view, then.motion, now.value.motion)
@@ -42,26 +42,26 @@ def find_motion_between(view: View, then: FloorView, now: Belief) -> Motion:
     return believed if is_apart else min(believed, rolled, key=_measure_unsure_m)
 
 
-def add_reports(actuator: ActuatorModel, drift: Drift, reports: list[MotionReport]) -> Motion:
+def add_reports(actuator: ActuatorModel, drift: Drift, reports: list[MotionReport]) -> MotionBetween:
     """The motion that wheels report, the oldest part first; their errors are taken as one and the same."""
     moved = Pose2(0.0, 0.0, 0.0)
     for report in reports:
         moved = moved @ actuator.predict_motion(report.turn_rad, report.move_m, drift.curvature_per_m)
     bent = math.hypot(drift.sigma_per_m, actuator.bend_sigma_per_m)
     known = replace(actuator, curvature_sigma_per_m=bent)
-    return Motion(moved, *_spread(known.motion_covariance(
-        sum(abs(report.turn_rad) for report in reports), sum(report.move_m for report in reports))))
+    return MotionBetween(moved, *_spread(known.motion_covariance(
+        math.fsum(abs(report.turn_rad) for report in reports), math.fsum(report.move_m for report in reports))))
 
 
-def _measure_unsure_m(motion: Motion) -> float:
+def _measure_unsure_m(motion: MotionBetween) -> float:
     """How unsure it leaves where floor is seen that is so far away."""
     return motion.sigma_m + TYPICAL_M * motion.sigma_rad
 
 
-def _compare_beliefs(then: FloorView, now: Belief) -> Motion:
+def _compare_beliefs(then: FloorView, now: Belief) -> MotionBetween:
     sigma_m, sigma_rad = _spread(now.covariance)
-    there = Pose2(then.x_m, then.y_m, then.heading_rad)
-    return Motion(there.inverse() @ now.pose, math.hypot(then.sigma_m, sigma_m), math.hypot(then.sigma_rad, sigma_rad))
+    moved = Pose2(then.x_m, then.y_m, then.heading_rad).inverse() @ now.pose
+    return MotionBetween(moved, math.hypot(then.sigma_m, sigma_m), math.hypot(then.sigma_rad, sigma_rad))
 
 
 def _spread(covariance: Floats) -> tuple[float, float]:

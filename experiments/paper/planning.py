@@ -1,13 +1,17 @@
 """Planning time of Figure 17's mission: its sketches with all milestones (§7: about 5 minutes, 21 milestones).
 
 The mission is a dry run, as in ``harvey run --check``: every milestone is verified at once, and the wheels do exactly
-what is asked. Timed are the decisions of interpreter, sketchers, view chooser and predictor.
+what is asked. Timed are the decisions of interpreter, sketchers, view chooser and predictor. What the view predictor
+prepares besides for the judge, the views from where a room repeats itself, plans nothing, and is told apart: a dry run
+asks for it at each milestone, a mission only where too few landmarks are followed.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from tqdm import tqdm
@@ -18,6 +22,8 @@ from blackboard.journal import Decision
 from experiments.report import Report
 from harvey.dry_run import build_dry_run
 from harvey.simulation.simulated_run import build_robot_model
+from knowledge_sources.methods.localization.aliasing import precompute_views
+from knowledge_sources.plan import view_predictor
 from sim.scenario import Scenario, load_scenario
 from world_models.building.world import World
 from world_models.entries.task import Milestone, Outcome, PlanSketch
@@ -35,8 +41,17 @@ class Clock:
 
     def __init__(self) -> None:
         self.ms = dict.fromkeys(PLANNERS, 0.0)
+        self.rivals_ms = 0.0
         self.sketches = self.milestones = 0
         self.begin()
+
+    def prepare(self, *given: Any) -> None:
+        """Have the judge's views prepared, and time it apart."""
+        began = time.thread_time()
+        precompute_views(*given)
+        took = time.thread_time() - began
+        self.rivals_ms += 1000.0 * took
+        self._began += took
 
     @property
     def total_ms(self) -> float:
@@ -70,6 +85,7 @@ def run(quick: bool, seed: int) -> Report:
             ("total planning, least [ms]", PAPER_MS, best.total_ms),
             ("total planning, median [ms]", None, float(np.median(totals)))]
     rows += [(f"of it: {name} [ms]", None, best.ms[name]) for name in PLANNERS]
+    rows.append(("beside it: views for the judge [ms]", None, best.rivals_ms))
     return Report(
         "Planning Figure 17's mission", ("what", "paper", "ours"), tuple(rows),
         notes=(
@@ -78,6 +94,8 @@ def run(quick: bool, seed: int) -> Report:
             "Each time with a new agent, routes and views unknown. Not counted: reading the file, and laying out each"
             " room's surfaces in arrays, once for each room and world. Times are of the processor, so that other load"
             " on the machine counts less; on a busy machine the claim may fail all the same.",
+            "Views for the judge: from where a room repeats itself. A dry run has them prepared at each milestone, a"
+            " mission only where too few landmarks are followed; they plan nothing.",
             "sketches: the route, then one for each of the three rooms; the paper's set has only the rooms'.",
             "paper: a VAX 11-750, planner in Common Lisp. No peer plans milestones.",
         ),
@@ -91,8 +109,9 @@ def _plan_afresh(known: World, scenario: Scenario) -> Clock:
     world, clock = World(known.frames), Clock()
     scheduler = build_dry_run(world, build_robot_model(scenario, world), sinks=(clock,))
     scheduler.post([Post(scenario.command)], "user")
-    while scheduler.view.latest(Outcome) is None:
-        clock.begin()
-        if scheduler.step() is None:
-            scheduler.post([Post(Quiescence(scheduler.cycle))], "scheduler")
+    with patch.object(view_predictor, precompute_views.__name__, clock.prepare):
+        while scheduler.view.latest(Outcome) is None:
+            clock.begin()
+            if scheduler.step() is None:
+                scheduler.post([Post(Quiescence(scheduler.cycle))], "scheduler")
     return clock

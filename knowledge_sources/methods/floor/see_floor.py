@@ -74,7 +74,7 @@ SIGHT_PART = 2.0
 """Pixels are looked at up to so many times the sight, for the tops of things."""
 
 
-class Motion(NamedTuple):
+class MotionBetween(NamedTuple):
     """Where the robot came to, in its frame before, with standard deviations."""
 
     moved: Pose2
@@ -87,7 +87,7 @@ class Seen(NamedTuple):
 
     jpeg: bytes
     pose: Pose2
-    since: Motion
+    since: MotionBetween
 
 
 def see_free_floor(

@@ -26,7 +26,9 @@ from knowledge_sources.action.floor_watcher import (
     MAX_LIGHT_AGE_S,
     FloorWatcher,
 )
-from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M
+from knowledge_sources.conditions import HELD
+from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD
+from knowledge_sources.motion_between import find_motion_between
 from world_models.entries.body import CameraPicture, Course, MotionReport
 from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor, Light
 from world_models.entries.location import Hypothesis, diagonal
@@ -74,12 +76,15 @@ class Room:
         self.belief: Entry[Hypothesis] = self.bench.believe(pose, diagonal(sigma_m, sigma_rad))
         self.frame: Entry[CameraPicture] | None = None
 
-    def view(self, way_m: float, floor_m: float = 0.0, belief: str | None = None) -> Entry[FloorView]:
-        """A picture that is kept, from so far aside."""
+    def view(
+        self, way_m: float, floor_m: float = 0.0, belief: str | None = None, aside_rad: float = 0.0
+    ) -> Entry[FloorView]:
+        """A picture that is kept, from so far aside, looking so far aside."""
         pose = to_world(Pose2(HERE.x_m, HERE.y_m + way_m, 0.0))
         frame = self.bench.put(CameraPicture(f"{way_m}".encode(), 0, 1.0, "track"))
         return self.bench.put(FloorView(
-            frame.id, belief or self.belief.id, pose.x_m, pose.y_m, 0.5, floor_m, 1.0, 0.01, 0.002))
+            frame.id, belief or self.belief.id, pose.x_m, pose.y_m, to_world(HERE).heading_rad + aside_rad, floor_m,
+            1.0, 0.01, 0.002))
 
     def look(self) -> tuple[Effect, ...] | None:
         self.frame = self.bench.put(CameraPicture(b"now", 1, NOW_S, "track"))
@@ -138,8 +143,10 @@ def test_it_compares_with_the_pictures_kept_from_far_enough_by_this_belief_on_th
     assert (locale, jpeg, known, seen_s, light) == (HALL, b"now", {}, NOW_S, None)
     assert math.dist(pose.position, to_world(HERE).position) < 1e-9 and robot.world.floor_m(HALL) == 0.0
     assert [seen.jpeg for seen in earlier] == [room.bench.view[e.value.frame].value.jpeg for e in far]
-    assert [(seen.pose, seen.sigma_m, seen.sigma_rad) for seen in earlier] == [
-        (Pose2(e.value.x_m, e.value.y_m, e.value.heading_rad), e.value.sigma_m, e.value.sigma_rad) for e in far]
+    held = HELD.of(room.bench.view)
+    assert [(seen.pose, seen.since) for seen in earlier] == [
+        (Pose2(e.value.x_m, e.value.y_m, e.value.heading_rad), find_motion_between(room.bench.view, e.value, held))
+        for e in far]
     (seen,) = [e for e in effects if isinstance(e.value, FreeFloor)]
     assert isinstance(seen, Post) and seen.value == floor()
     assert reasons(seen) == {room.frame.id, room.belief.id, *(e.id for e in far)}
@@ -147,8 +154,16 @@ def test_it_compares_with_the_pictures_kept_from_far_enough_by_this_belief_on_th
     here = to_world(HERE)
     assert made(effects, FloorView) == [FloorView(
         room.frame.id, room.belief.id, here.x_m, here.y_m, here.heading_rad, 0.0, NOW_S, room.belief.value.sigma_m,
-        room.belief.value.sigma_rad)] * is_kept
+        room.belief.value.sigma_rad, room.belief.value.motion)] * is_kept
     assert all(reasons(e) == {room.frame.id, room.belief.id} for e in effects if isinstance(e.value, FloorView))
+
+
+@pytest.mark.parametrize("aside_rad", [0.0, FLOOR_VIEW_TURN_RAD - SMALL, FLOOR_VIEW_TURN_RAD + SMALL])
+def test_it_keeps_a_picture_after_a_turn_on_the_spot(eye: Eye, aside_rad: float) -> None:
+    for side in (-1.0, 1.0):
+        room = Room()
+        room.view(0.0, aside_rad=side * aside_rad)
+        assert bool(made(room.look(), FloorView)) == (aside_rad > FLOOR_VIEW_TURN_RAD)
 
 
 def test_it_is_told_the_looks_of_floors_and_revises_what_it_learns(eye: Eye) -> None:

@@ -14,13 +14,13 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_025,
-    "knowledge_sources": 22_420,
+    "world_models": 10_030,
+    "knowledge_sources": 22_606,
     "sim": 5_860,
     "logs": 7_450,
     "harvey": 10_524,
     "experiments": 10_410,
-    "tests": 43_745,
+    "tests": 43_900,
     "extras": 14_910,
 }
 """Of Python files, at most."""
