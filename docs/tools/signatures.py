@@ -1,0 +1,24 @@
+"""Writes harvey/signatures.json: what Figure 17's mission has compiled. ``python -m docs.tools.signatures``."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+
+import harvey
+from harvey.compiling import FILE, list_compiled
+
+ROOMS = ("world_models.", "knowledge_sources.", "sim.")
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        harvey.run("lab-to-allens-office", seed=0, out=folder)
+    found = list_compiled(sorted(name for name in sys.modules if name.startswith(ROOMS)))
+    FILE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    print(f"{FILE.name}: {sum(map(len, found.values()))} functions of {len(found)} files")
+
+
+if __name__ == "__main__":
+    main()
