@@ -28,16 +28,16 @@ ENTRY = "harvey.simulation.simulated_run", "logs.recording.writer"
 Described = Mapping[str, Any] | str
 
 
-def describe_type(kind: Any) -> Described:
+def describe_type(given: Any) -> Described:
     """A type of numba for the file. Raises TypeError for one that no file can hold."""
-    if isinstance(kind, types.Array):
+    kind: Any = given  # numba states no types of its attributes
+    if isinstance(given, types.Array):
         return {"of": str(kind.dtype), "dims": kind.ndim, "layout": kind.layout, "fixed": not kind.mutable}
-    if isinstance(kind, types.BaseNamedTuple):
-        made = kind.instance_class
-        return {"named": [made.__module__, made.__qualname__], "parts": [describe_type(part) for part in kind.types]}
-    if isinstance(kind, types.BaseTuple):
-        return {"parts": [describe_type(part) for part in kind.types]}
-    if isinstance(kind, types.Number | types.Boolean):
+    if isinstance(given, types.BaseTuple):
+        parts: dict[str, Any] = {"parts": [describe_type(part) for part in kind.types]}
+        made = getattr(kind, "instance_class", None)
+        return parts if made is None else {"named": [made.__module__, made.__qualname__], **parts}
+    if isinstance(given, types.Number | types.Boolean):
         return str(kind)
     raise TypeError(f"expected numbers, arrays and tuples of them, got {kind}")
 

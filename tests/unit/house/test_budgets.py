@@ -18,9 +18,9 @@ LINES = {
     "knowledge_sources": 22_606,
     "sim": 5_860,
     "logs": 7_450,
-    "harvey": 10_524,
-    "experiments": 10_410,
-    "tests": 43_900,
+    "harvey": 10_620,
+    "experiments": 10_425,
+    "tests": 43_970,
     "extras": 14_910,
 }
 """Of Python files, at most."""
