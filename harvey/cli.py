@@ -122,7 +122,9 @@ def _answer(args: Namespace) -> int:
 
 def _print_error(text: str, error: BaseException) -> None:
     """One line on standard error; notes of the error say what was recorded, and how to go on."""
-    print("; ".join([f"harvey: {text}", *getattr(error, "__notes__", ())]), file=sys.stderr)
+    from harvey.errors import in_one_line
+
+    print("; ".join([in_one_line(f"harvey: {text}"), *getattr(error, "__notes__", ())]), file=sys.stderr)
 
 
 def _discard_output() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import threading
 from collections.abc import Iterator
@@ -10,11 +11,24 @@ from types import FrameType
 
 from logs.run_errors import BadInput
 
-__all__ = ["BadInput", "Terminated", "terminable"]
+__all__ = ["BadInput", "Terminated", "in_one_line", "terminable"]
+
+MOST_LETTERS, MOST_OF_A_WORD = 300, 80
 
 
 class Terminated(BaseException):
     """SIGTERM came; like KeyboardInterrupt it passes every ``except Exception``, so that files are closed."""
+
+
+def in_one_line(text: str, most: int = MOST_LETTERS) -> str:
+    """A text for a terminal: control characters are spelled out, and what is long is left out of its middle."""
+    plain = "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode()
+                    for letter in re.sub(r"\s*\n\s*", " ", text[:100 * most]))
+    return _without_middle(re.sub(r"\S+", lambda word: _without_middle(word[0], MOST_OF_A_WORD), plain), most)
+
+
+def _without_middle(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most // 2]}...{text[-(most - most // 2 - 3):]}"
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from harvey.commands import find_added_commands
 from harvey.commands.command import CliCommand, add_parser
-from harvey.errors import BadInput
+from harvey.errors import BadInput, in_one_line
 from world_models.words import count
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def load_file(file: str, details: list[str]) -> World:
 
     path = _path(file)
     if path.suffix == ".toml" and path.is_file() and path.stat().st_size > LARGE_BYTES:
-        print(f"{file}: reading", file=sys.stderr, flush=True)
+        print(f"{file}: reading {path.stat().st_size / 1e6:.1f} MB", file=sys.stderr, flush=True)
     return load_world(path, details=details)
 
 
@@ -148,9 +148,9 @@ def print_check(world: World, file: str) -> int:
     """Print the faults of a world; the exit code."""
     from world_models.building.checks import check_world
 
-    faults = check_world(world, _with_bar)
+    faults = check_world(world, with_bar)
     for fault in faults:
-        print(fault)
+        print(in_one_line(str(fault)))
     if faults:
         print(f"{file}: {count(len(faults), 'fault')}", file=sys.stderr)
         return 2
@@ -158,11 +158,11 @@ def print_check(world: World, file: str) -> int:
     return 0
 
 
-def _with_bar(items: Sequence[Any], what: str) -> Iterable[Any]:
+def with_bar(items: Sequence[Any], what: str) -> Iterable[Any]:
     """A bar on standard error, where it takes longer than some seconds."""
     from tqdm import tqdm
 
-    yield from tqdm(items, desc=f"checked: {what}", file=sys.stderr, leave=False, delay=SILENT_S, mininterval=1.0)
+    yield from tqdm(items, desc=what, file=sys.stderr, leave=False, delay=SILENT_S, mininterval=1.0)
 
 
 def _inventory(world: World) -> str:

@@ -25,6 +25,7 @@ import numpy as np
 from world_models.building.locale_frame import LocaleFrame
 from world_models.building.locales import Doorway, Finding, Link
 from world_models.building.world import World, words_about, words_of
+from world_models.files.regular_files import expect_regular
 from world_models.files.toml.source import WorldError
 from world_models.frames import frozen
 
@@ -187,7 +188,7 @@ class PackedFrames(Mapping[str, LocaleFrame]):
         self.touched: list[str] = []
         self._known: dict[str, LocaleFrame] = {}
         try:
-            path.stat()
+            expect_regular(path)
             self._file = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, check_same_thread=False)
             found = self._file.execute("select format, sha256, about from meta").fetchall()
         except OSError as error:

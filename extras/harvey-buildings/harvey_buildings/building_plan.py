@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from harvey.errors import in_one_line
 from world_models.files.toml.source import WorldError
 
 Floats = NDArray[np.float64]
@@ -116,7 +117,7 @@ class ImportReport:
 
     def __str__(self) -> str:
         parts = (("used", self.used), ("guessed", self.guessed), ("left out", self.left_out))
-        return "\n".join(f"{title}\n" + "\n".join(f"  {line}" for line in lines or ["nothing"])
+        return "\n".join(f"{title}\n" + "\n".join(f"  {in_one_line(line)}" for line in lines or ["nothing"])
                          for title, lines in parts)
 
 
@@ -196,6 +197,7 @@ class BuildingPlan:
     links: list[RoomLink] = field(default_factory=list)
     report: ImportReport = field(default_factory=ImportReport)
     network: NavigationGraph | None = None
+    _by_name: dict[str, Space] = field(default_factory=dict, repr=False)
 
     def on(self, storey: str) -> list[Space]:
         """The spaces of a storey."""
@@ -203,7 +205,9 @@ class BuildingPlan:
 
     def space(self, name: str) -> Space:
         """A space by name."""
-        return next(space for space in self.spaces if space.name == name)
+        if len(self._by_name) != len(self.spaces):
+            self._by_name = {space.name: space for space in self.spaces}
+        return self._by_name[name]
 
 
 class Names:
@@ -211,15 +215,17 @@ class Names:
 
     def __init__(self, *taken: str) -> None:
         self._taken = set(taken)
+        self._last: dict[str, int] = {}
 
     def new(self, text: str, otherwise: str) -> str:
         """A name made from a text, or from ``otherwise`` where the text has no words; numbered where taken."""
         base = slug(text) or otherwise
-        name, number = base, 1
+        name, number = base, self._last.get(base, 1)
         while name in self._taken:
             number += 1
             name = f"{base}-{number}"
         self._taken.add(name)
+        self._last[base] = number
         return name
 
 

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from harvey.commands.command import CliCommand, whole
-from harvey.commands.world_command import add_file_arguments, load_file, print_check
+from harvey.commands.world_command import add_file_arguments, load_file, print_check, with_bar
 from harvey.errors import BadInput
 
 MIN_WALL_M, MAX_WALL_M = 1.0, 20.0
@@ -32,7 +32,6 @@ def _export_arguments(parser: ArgumentParser) -> None:
 
 def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
     from harvey_buildings import import_building
-    from world_models.files.world_files import load_world
 
     path = Path(file)
     target = Path(out or path.with_suffix(".toml").name)
@@ -40,10 +39,10 @@ def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
         raise BadInput(f"--out: expected a name that ends in .toml, got {str(target)!r}")
     if wall_height_m is not None and not MIN_WALL_M <= wall_height_m <= MAX_WALL_M:
         raise BadInput(f"--wall-height: expected {MIN_WALL_M:g} to {MAX_WALL_M:g} metres, got {wall_height_m:g}")
-    made = import_building(path, wall_height_m)
+    made = import_building(path, wall_height_m, with_bar)
     target.write_text(made.text, encoding="utf-8")
     print(f"{made.report}\n")
-    return print_check(load_world(target), str(target))
+    return print_check(load_file(str(target), []), str(target))
 
 
 def _export(args: Namespace) -> int:

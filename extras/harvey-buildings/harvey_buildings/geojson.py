@@ -30,8 +30,10 @@ from harvey_buildings.building_plan import (
     WallOpening,
     slug,
 )
-from harvey_buildings.polygons import MAX_COORDINATE_M, extract_outline
+from harvey_buildings.polygons import MAX_COORDINATE_M, MOST_CROSSINGS, extract_outline, repair
+from world_models.building.checks import Watched, pass_on
 from world_models.building.world import World
+from world_models.files.regular_files import read_regular
 
 MAX_BYTES = 100_000_000
 EARTH_RADIUS_M = 6_371_008.8
@@ -93,9 +95,7 @@ def read_features(path: Path) -> tuple[list[Feature], str]:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise BuildingError(f"{path.name}: expected at most {MAX_BYTES} bytes, got {path.stat().st_size}")
-        text = json.loads(path.read_bytes())
+        text = json.loads(read_regular(path, MAX_BYTES))
     except OSError as error:
         raise BuildingError(f"{path.name}: expected a file to read, got: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
@@ -161,15 +161,16 @@ LEVEL_STEP_M = 0.5
 """Rooms whose floors differ by no more are on one storey."""
 
 
-def read_geojson(path: Path) -> BuildingPlan:
+def read_geojson(path: Path, *, watched: Watched = pass_on) -> BuildingPlan:
     """The plan of a GeoJSON file. Raises BuildingError where it cannot be read or has no room."""
     features, frame = read_features(path)
     plan = BuildingPlan(slug(path.stem) or "building", path.name)
     reader = _Reader(plan, features)
-    reader.add_rooms()
+    reader.add_rooms(watched)
     if not plan.spaces:
         raise BuildingError(f"{path.name}: expected features that are rooms (property feature: room, or feature_type: "
-                            f"unit) with polygons, got none among {len(features)} features")
+                            f"unit) with polygons, got none among {len(features)} features"
+                            f"{''.join(f' ({line})' for line in plan.report.left_out[:1])}")
     reader.add_doorways()
     reader.add_things()
     reader.add_links()
@@ -206,10 +207,10 @@ class _Reader:
         """The storey with the floor nearest to this height."""
         return min(self._plan.storeys, key=lambda storey: abs(storey.elevation_m - floor_m)).name
 
-    def add_rooms(self) -> None:
+    def add_rooms(self, watched: Watched) -> None:
         """Rooms and units with polygons, on storeys by the heights of their floors."""
         plan = self._plan
-        rooms = [(f, o) for f in self._of("room", "unit") if (o := self._outline(f)) is not None]
+        rooms = [(f, o) for f in watched(self._of("room", "unit"), "rooms read") if (o := self._outline(f)) is not None]
         for floor_m in sorted({self._floor_of(feature) for feature, _ in rooms}):
             if not plan.storeys or floor_m - plan.storeys[-1].elevation_m > LEVEL_STEP_M:
                 plan.storeys.append(Storey(self._names.new(f"storey-{len(plan.storeys) + 1}", "storey"), floor_m))
@@ -230,9 +231,10 @@ class _Reader:
             self._plan.report.left_out.append(f"{feature.label}: a unit of the category {category} is no room")
             return None
         shape = feature.geometry
-        outline = None if shape is None else extract_outline(shape if shape.is_valid else shapely.make_valid(shape))
+        outline = None if shape is None else extract_outline(repair(shape))
         if outline is None:
-            self._plan.report.left_out.append(f"{feature.label or 'a room'}: expected a polygon, got none")
+            self._plan.report.left_out.append(f"{feature.label or 'a room'}: expected a polygon whose sides cross at "
+                                              f"most {MOST_CROSSINGS} times, got none")
         return outline
 
     def add_doorways(self) -> None:

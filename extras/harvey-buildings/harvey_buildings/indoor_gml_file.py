@@ -18,7 +18,8 @@ import numpy as np
 import shapely
 
 from harvey_buildings.building_plan import BuildingError, slug
-from harvey_buildings.polygons import Floats, clean_outline, extract_outline
+from harvey_buildings.polygons import Floats, clean_outline, extract_outline, repair
+from world_models.files.regular_files import read_regular
 
 MAX_BYTES = 200_000_000
 MAX_DEPTH = 200
@@ -27,11 +28,9 @@ MAX_DEPTH = 200
 def read_xml(path: Path) -> ET.Element:
     """The root element. Raises BuildingError for no XML, a document type declaration, or too large or deep a file."""
     try:
-        data = path.read_bytes()
+        data = read_regular(path, MAX_BYTES)
     except OSError as error:
         raise BuildingError(f"{path}: expected a readable file, got: {error.strerror}") from None
-    if len(data) > MAX_BYTES:
-        raise BuildingError(f"{path.name}: expected at most {MAX_BYTES / 1e6:.0f} MB, got {len(data) / 1e6:.0f} MB")
     return _Builder(path.name).build(data)
 
 
@@ -210,7 +209,7 @@ def _read_cell(element: ET.Element, named: dict[str, ET.Element], origin: Floats
     lowest = min(height for height, _ in levels)
     parts = [shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]])
              for height, rings in levels if height < lowest + MAX_FLOOR_STEP]
-    floor = shapely.union_all([shapely.make_valid(part) for part in parts])
+    floor = shapely.union_all([repair(part) for part in parts])
     return _describe(element, floor, lowest, float(tall.max()))
 
 

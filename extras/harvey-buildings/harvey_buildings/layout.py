@@ -41,6 +41,7 @@ from harvey_buildings.polygons import (
     separate_outlines,
     straighten_wall,
 )
+from world_models.building.checks import Watched, pass_on
 
 STOREY_GAP_M = 10.0
 """Distance between storeys that are laid out side by side."""
@@ -56,6 +57,7 @@ MAX_MEETING_GAP_M = 2.5 * THIN_WALL_M
 MAX_OLD_WALL_M = 0.89
 """Thickness of the walls of old houses: tried for a door where no thinner wall fits."""
 DOORWAY_CLEARANCE_M = 0.05
+MIN_OPENING_M = 0.05
 MAX_STEP_M = 0.05
 
 
@@ -83,15 +85,15 @@ class Layout:
     full: set[str] = field(default_factory=set)
 
 
-def lay_out(plan: BuildingPlan) -> Layout:
+def lay_out(plan: BuildingPlan, watched: Watched = pass_on) -> Layout:
     """The layout of a building plan. Raises BuildingError where it has no room."""
     layout = Layout(plan)
     for storey in plan.storeys:
-        _separate_rooms(layout, storey.name)
+        _separate_rooms(layout, storey.name, watched)
         _straighten_walls(layout, storey.name)
     _place_furniture(layout)
     for storey in plan.storeys:
-        _place_openings(layout, storey.name)
+        _place_openings(layout, storey.name, watched)
         _place_windows(layout, storey.name)
     _clear_doorways(layout)
     _report_steps(layout)
@@ -104,10 +106,10 @@ def lay_out(plan: BuildingPlan) -> Layout:
     return layout
 
 
-def _separate_rooms(layout: Layout, storey: str) -> None:
+def _separate_rooms(layout: Layout, storey: str, watched: Watched) -> None:
     plan, report = layout.plan, layout.plan.report
     wanted = {space.name: space.outline for space in plan.on(storey)}
-    rooms, changed = separate_outlines(wanted)
+    rooms, changed = separate_outlines(wanted, watched)
     layout.rooms.update(rooms)
     for name in wanted:
         if name not in rooms:
@@ -132,7 +134,7 @@ def _straighten_walls(layout: Layout, storey: str) -> None:
     """Give curved walls a straight side at each of their doors."""
     outlines = _outlines(layout, storey)
     for opening in layout.plan.openings:
-        if opening.storey != storey or opening.along is None:
+        if opening.storey != storey or opening.along is None or opening.width_m < MIN_OPENING_M:
             continue
         near = _near(opening, outlines)
         if place_door(opening, near, all_pairs(near), MAX_OLD_WALL_M):
@@ -144,18 +146,21 @@ def _straighten_walls(layout: Layout, storey: str) -> None:
                 layout.plan.report.guessed.append(f"space {name}: its curved wall is straight at {opening.name}")
 
 
-def _place_openings(layout: Layout, storey: str) -> None:
+def _place_openings(layout: Layout, storey: str, watched: Watched) -> None:
     """Place doors, then wide openings where there is no wall."""
     plan, report = layout.plan, layout.plan.report
     outlines = _outlines(layout, storey)
-    for opening in (opening for opening in plan.openings if opening.storey == storey):
+    for opening in watched([opening for opening in plan.openings if opening.storey == storey], "openings placed"):
+        if opening.width_m < MIN_OPENING_M:
+            report.left_out.append(f"{opening.name}: narrower than {100 * MIN_OPENING_M:.0f} cm")
+            continue
         cut = _door(layout, opening, _near(opening, outlines))
         if cut is not None and overlap(cut, layout.cuts, layout.rooms):
             if opening.has_leaf:
                 report.left_out.append(f"door {opening.name}: another door is in its place")
         elif cut is not None:
             layout.cuts.append(cut)
-    for a, b in all_pairs(outlines):
+    for a, b in all_pairs(outlines) if plan.without_wall else ():
         if frozenset((a, b)) in plan.without_wall:
             _place_wide_opening(layout, a, b, outlines)
 

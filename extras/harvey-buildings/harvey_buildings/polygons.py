@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from world_models.building.checks import Watched, pass_on
 from world_models.building.geometry.outlines import is_simple
 
 Floats = NDArray[np.float64]
@@ -22,8 +23,12 @@ MAX_CORNERS, FINE_TOLERANCE_M, COARSE_TOLERANCE_M = 24, 0.002, 0.03
 """Outlines are simplified (Douglas-Peucker) to the fine tolerance; one that keeps more corners is curved, and is
 simplified to the coarse one."""
 MIN_HOLE_M2 = 0.05
+MOST_HOLES = 200
+"""A room with more pillars and rooms within it is none that a robot could be told of; to cut them open takes hours."""
 MIN_AREA_M2 = 0.05
 MAX_COORDINATE_M = 5000.0
+MOST_CROSSINGS = 200
+"""An outline whose sides cross one another more often is no room's, and would take hours to repair."""
 MAX_COVERED = 0.6
 """A space of which others, no larger, cover more than this part is no room: a zone, or described twice."""
 MAX_SKEW_RAD = math.radians(8.0)
@@ -48,8 +53,22 @@ def clean_outline(points: Floats) -> Floats | None:
     """A simple counter-clockwise outline (k, 2) from points (n, 2), simplified, rounded to 0.1 mm; None: no area."""
     if len(points) < 3 or not np.isfinite(points).all() or np.abs(points).max() > MAX_COORDINATE_M:
         return None
-    polygon = shapely.Polygon(points)
-    return extract_outline(polygon if polygon.is_valid else shapely.make_valid(polygon))
+    return extract_outline(repair(shapely.Polygon(points)))
+
+
+def repair(shape: shapely.Geometry) -> shapely.Geometry:
+    """A valid shape that covers the same; an empty one where its sides cross more than MOST_CROSSINGS times."""
+    if shape.is_valid:
+        return shape
+    rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(shape)]
+    sides = shapely.linestrings(np.concatenate([np.zeros((0, 2, 2)), *(
+        np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings)]))
+    tree, crossings = shapely.STRtree(sides), 0
+    for first in range(0, len(sides), 100):
+        crossings += tree.query(sides[first : first + 100], "crosses").shape[1]
+        if crossings > 2 * MOST_CROSSINGS:
+            return shapely.Polygon()
+    return shapely.make_valid(shape)
 
 
 def extract_outline(shape: shapely.Geometry, is_simplified: bool = False) -> Floats | None:
@@ -60,7 +79,10 @@ def extract_outline(shape: shapely.Geometry, is_simplified: bool = False) -> Flo
     polygons = [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > MIN_AREA_M2]
     if not polygons:
         return None
-    best = cut_holes_open(max(polygons, key=lambda p: p.area))
+    largest = max(polygons, key=lambda p: p.area)
+    if sum(shapely.Polygon(ring).area > MIN_HOLE_M2 for ring in largest.interiors) > MOST_HOLES:
+        return None
+    best = cut_holes_open(largest)
     for tolerance_m in (FINE_TOLERANCE_M,) if is_simplified else (FINE_TOLERANCE_M, COARSE_TOLERANCE_M):
         ring = shapely.Polygon(best.exterior).simplify(tolerance_m)
         outline = np.round(shapely.get_coordinates(shapely.orient_polygons(ring).exterior)[:-1], 4)
@@ -124,7 +146,9 @@ def _corner_heights(outline: Floats) -> Floats:
     return np.asarray(area / np.maximum(np.linalg.norm(base, axis=1), 1e-9))
 
 
-def separate_outlines(outlines: Mapping[str, Floats]) -> tuple[dict[str, Floats], list[str]]:
+def separate_outlines(
+    outlines: Mapping[str, Floats], watched: Watched = pass_on,
+) -> tuple[dict[str, Floats], list[str]]:
     """The outlines of a storey with a thin wall between those that touch or overlap, and the names of those changed.
 
     Outlines that others cover are left out.
@@ -132,8 +156,11 @@ def separate_outlines(outlines: Mapping[str, Floats]) -> tuple[dict[str, Floats]
     shapes = _drop_covered({name: shapely.Polygon(outline) for name, outline in outlines.items()})
     kept: dict[str, Floats] = {}
     changed = []
-    for name, shape in shapes.items():
-        near = [other for key, other in shapes.items() if key != name and shape.distance(other) < THIN_WALL_M - 2e-3]
+    drawn = list(shapes.values())
+    tree = shapely.STRtree(drawn)
+    for at, (name, shape) in enumerate(watched(list(shapes.items()), "rooms kept apart")):
+        near = [drawn[i] for i in sorted(tree.query(shape.buffer(THIN_WALL_M)).tolist())
+                if i != at and shape.distance(drawn[i]) < THIN_WALL_M - 2e-3]
         rest = shape
         for other in near:
             shared = shape.intersection(other).area
@@ -152,12 +179,16 @@ def separate_outlines(outlines: Mapping[str, Floats]) -> tuple[dict[str, Floats]
 
 def _drop_covered(shapes: Mapping[str, shapely.Polygon]) -> dict[str, shapely.Polygon]:
     """The shapes that smaller ones, and equal ones listed before, do not cover mostly."""
-    kept: dict[str, shapely.Polygon] = {}
-    for name, shape in sorted(shapes.items(), key=lambda pair: round(pair[1].area, 1)):
-        over = [other.intersection(shape) for other in kept.values() if other.intersects(shape)]
+    kept: set[int] = set()
+    by_size = sorted(shapes.items(), key=lambda pair: round(pair[1].area, 1))
+    tree = shapely.STRtree([shape for _, shape in by_size])
+    for at, (_, shape) in enumerate(by_size):
+        meets = sorted(tree.query(shape, "intersects").tolist())
+        over = [by_size[i][1].intersection(shape) for i in meets if i in kept]
         if not over or shapely.union_all(over).area < MAX_COVERED * shape.area:
-            kept[name] = shape
-    return {name: shape for name, shape in shapes.items() if name in kept}
+            kept.add(at)
+    names = {by_size[at][0] for at in kept}
+    return {name: shape for name, shape in shapes.items() if name in names}
 
 
 def square_outline(outline: Floats) -> Floats:

@@ -28,6 +28,7 @@ from harvey_buildings.building_plan import (
 from harvey_buildings.polygons import clean_outline, extract_outline, square_outline
 from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN, Cells, MapFile, read_cells, read_map_yaml
 from harvey_buildings.ros_map_rooms import Gap, Labels, Mask, clean_floor, part_rooms, rooms_beside
+from world_models.building.checks import Watched, pass_on
 
 MARGIN_CELLS = 3
 MIN_TURN_RAD = math.radians(0.3)
@@ -140,16 +141,19 @@ JAMB_M = 0.06
 """Wall at either side of a gap that is kept straight."""
 
 
-def room_shape(room: Mask, gaps: list[tuple[Gap, int]], cell_m: float) -> shapely.Polygon | None:
+def room_shape(
+    room: Mask, gaps: list[tuple[Gap, int]], cell_m: float, first: tuple[int, int],
+) -> shapely.Polygon | None:
     """The outline of a room's cells, as a polygon in columns and rows; None where nothing is left.
 
-    ``gaps``: those beside it, each with the side on which the room is: 1 or -1, as ``rooms_beside`` has them.
+    Args:
+        room: (rows, columns) its part of the grid.
+        gaps: those beside it, each with the side on which the room is: 1 or -1, as ``rooms_beside`` has them.
+        first: column and row of the part's first cell.
     """
-    bounds = ndimage.find_objects(room.astype(np.int8))[0]
     margin = round(SMOOTH_M / cell_m) + 2
-    part = np.pad(room[bounds], margin)
-    smooth = _smooth(part, SMOOTH_M / cell_m)
-    corner = np.array([bounds[1].start - margin, bounds[0].start - margin])
+    smooth = _smooth(np.pad(room, margin), SMOOTH_M / cell_m)
+    corner = np.array(first) - margin
     shape = _largest(shapely.transform(_trace(smooth), lambda points: points + corner))
     if shape is None:
         return None
@@ -223,9 +227,10 @@ WALL_HEIGHT_M, DOOR_HEIGHT_M = 2.5, 2.05
 MIN_DOOR_M = 0.6
 HEADER_M = 0.3
 STOREY = "ground"
+MOST_PIECES = 20_000
 
 
-def read_ros_map(path: Path, wall_height_m: float = WALL_HEIGHT_M) -> BuildingPlan:
+def read_ros_map(path: Path, wall_height_m: float = WALL_HEIGHT_M, *, watched: Watched = pass_on) -> BuildingPlan:
     """The plan of a ROS map, in the map's frame. Raises BuildingError where it cannot be read or has no room."""
     file = read_map_yaml(path)
     cells = read_cells(file)
@@ -233,12 +238,16 @@ def read_ros_map(path: Path, wall_height_m: float = WALL_HEIGHT_M) -> BuildingPl
         if not (cells == value).any():
             raise BuildingError(f"{file.image.name}: expected free and occupied cells, got no {what} one "
                                 f"(see {key} and negate in {path.name})")
+    pieces = sum(ndimage.label(cells == value)[1] for value in (FREE, OCCUPIED))
+    if pieces > MOST_PIECES:
+        raise BuildingError(f"{file.image.name}: expected floor and walls in at most {MOST_PIECES} pieces, got "
+                            f"{pieces}: this is no plan of rooms")
     grid = make_grid(cells, file)
     floor, things = clean_floor(grid.cells == FREE, grid.cell_m)
     labels, gaps = part_rooms(floor, grid.cell_m)
     labels = fill_to_walls(labels, grid.cells == FREE, max(1, round(0.15 / grid.cell_m)))
     plan = BuildingPlan(slug(path.stem) or "map", path.name, [Storey(STOREY, 0.0)])
-    names = _add_rooms(plan, labels, gaps, grid, wall_height_m)
+    names = _add_rooms(plan, labels, gaps, grid, wall_height_m, watched)
     if not names:
         raise BuildingError(f"{file.image.name}: expected a room of {1.5:g} m2 or more with walls, got none in "
                             f"{cells.shape[1]} x {cells.shape[0]} cells of {file.resolution_m:g} m")
@@ -247,16 +256,22 @@ def read_ros_map(path: Path, wall_height_m: float = WALL_HEIGHT_M) -> BuildingPl
     return plan
 
 
-def _add_rooms(plan: BuildingPlan, labels: Labels, gaps: list[Gap], grid: Grid, wall_height_m: float) -> dict[int, str]:
+def _add_rooms(plan: BuildingPlan, labels: Labels, gaps: list[Gap], grid: Grid, wall_height_m: float,
+               watched: Watched) -> dict[int, str]:
     """Add a space for each room of the grid; its name by its number. From the top left to the bottom right."""
     names: dict[int, str] = {}
-    for number in (int(k) for k in np.unique(labels) if k > 0):
-        beside = [(gap, 1 if rooms[0] == number else -1) for gap in gaps
-                  if number in (rooms := rooms_beside(gap, labels, grid.cell_m))]
-        shape = room_shape(labels == number, beside, grid.cell_m)
+    beside: dict[int, list[tuple[Gap, int]]] = {}
+    for gap in gaps:
+        for room, side in zip(rooms_beside(gap, labels, grid.cell_m), (1, -1), strict=False):
+            beside.setdefault(room, []).append((gap, side))
+    bounds = ndimage.find_objects(labels)
+    for number in watched([k for k, there in enumerate(bounds, 1) if there is not None], "rooms traced"):
+        rows, columns = bounds[number - 1]
+        shape = room_shape(labels[rows, columns] == number, beside.get(number, []), grid.cell_m,
+                           (columns.start, rows.start))
         outline = _trace_outline(grid.to_map_polygon(shape)) if shape is not None else None
         if outline is None:
-            area_m2 = float((labels == number).sum()) * grid.cell_m**2
+            area_m2 = float((labels[rows, columns] == number).sum()) * grid.cell_m**2
             plan.report.left_out.append(f"a part of {area_m2:.1f} m2: no outline could be traced")
             continue
         names[number] = f"room-{len(names) + 1}"

@@ -20,6 +20,7 @@ from scipy import ndimage
 
 from harvey_buildings.building_plan import BuildingError, Floats
 from world_models.building.world import World
+from world_models.files.regular_files import read_regular
 
 MODES = ("trinary", "scale", "raw")
 MAX_YAML_BYTES = 100_000
@@ -82,9 +83,7 @@ def read_map_yaml(path: Path) -> MapFile:
 def _read_lines(path: Path) -> dict[str, tuple[str, int]]:
     """The value and line of each key."""
     try:
-        if path.stat().st_size > MAX_YAML_BYTES:
-            raise BuildingError(f"{path.name}: expected a map.yaml of a few lines, got {path.stat().st_size} bytes")
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_regular(path, MAX_YAML_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise BuildingError(f"{path.name}: expected a text file of lines 'key: value', got bytes that are no UTF-8"
                             ) from None
@@ -206,14 +205,11 @@ def read_cells(file: MapFile) -> Cells:
 def _read_picture(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
     """(rows, columns) mean of the colour channels, 0 to 255, and the alpha channel where there is one, 0 to 1."""
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise BuildingError(f"{path.name}: expected a picture of at most {MAX_BYTES} bytes, got "
-                                f"{path.stat().st_size}")
-        data = path.read_bytes()
+        data = read_regular(path, MAX_BYTES)
     except FileNotFoundError:
         raise BuildingError(f"{path.name}: expected the picture that the map.yaml names, got none at {path}") from None
-    except (OSError, ValueError) as error:
-        raise BuildingError(f"{path.name}: expected a picture to read, got: {error}") from None
+    except OSError as error:
+        raise BuildingError(f"{path.name}: expected a picture to read, got: {error.strerror}") from None
     if data[:2] in (b"P2", b"P5"):
         return _read_pgm(path.name, data), None
     return _read_png(path.name, data)
@@ -237,8 +233,7 @@ def _read_png(name: str, data: bytes) -> tuple[NDArray[np.float32], NDArray[np.f
 def _check_png_size(name: str, data: bytes) -> None:
     """Refuse a PNG that says it is huge or has no end before it is unpacked."""
     if data[:8] != b"\x89PNG\r\n\x1a\n" or len(data) < 24:
-        raise BuildingError(f"{name}: expected a picture as PGM (P2, P5) or PNG, got bytes that start with "
-                            f"{data[:8]!r}")
+        raise BuildingError(f"{name}: expected a picture as PGM (P2, P5) or PNG, got another kind of file")
     width, height = int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
     if width * height > MAX_CELLS:
         raise BuildingError(f"{name}: expected at most {MAX_CELLS} cells, got {width} x {height}")

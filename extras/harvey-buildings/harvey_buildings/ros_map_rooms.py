@@ -12,6 +12,7 @@ from heapq import heapify, heappop, heappush
 from itertools import pairwise
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy import ndimage
 
@@ -253,8 +254,14 @@ def _is_slanting(gap: Gap) -> bool:
 def _flood(distance: NDArray[np.float64], seeds: NDArray[np.int32]) -> NDArray[np.int32]:
     """(rows, columns) the basin of each free cell: seeds grow into what is widest first (F. Meyer's watershed)."""
     wide = distance.shape[1] + 2
-    heights, basins = np.pad(distance, 1).ravel().tolist(), np.pad(seeds, 1).ravel().tolist()
-    ahead = [(-heights[at], at) for at, basin in enumerate(basins) if basin]
+    basins = _grow(np.pad(distance, 1).ravel(), np.pad(seeds, 1).ravel(), wide)
+    return basins.reshape(-1, wide)[1:-1, 1:-1]
+
+
+@njit(cache=True)
+def _grow(heights: NDArray[np.float64], basins: NDArray[np.int32], wide: int) -> NDArray[np.int32]:
+    """The basins of a flat grid with a border, grown where it is; ``wide`` columns."""
+    ahead = [(-heights[at], at) for at in range(len(basins)) if basins[at]]
     heapify(ahead)
     while ahead:
         _, at = heappop(ahead)
@@ -262,7 +269,7 @@ def _flood(distance: NDArray[np.float64], seeds: NDArray[np.int32]) -> NDArray[n
             if heights[beside] > 0.0 and not basins[beside]:
                 basins[beside] = basins[at]
                 heappush(ahead, (-heights[beside], beside))
-    return np.array(basins, np.int32).reshape(-1, wide)[1:-1, 1:-1]
+    return basins
 
 
 def _find_saddles(basins: NDArray[np.int32], distance: NDArray[np.float64],

@@ -37,6 +37,8 @@ HEADERS: Mapping[str, str] = {
 """Of every answer: nothing is fetched from elsewhere, and no other page can frame this one."""
 
 
+MOST_WATCHERS = 192
+"""Who comes to watch when there are so many is told to come later (503); orders are heard all the same."""
 NO_TOKEN = "expected the token that was printed at the start\n"
 MOST_WORDS = 200
 """A goal has at most so many bytes."""
@@ -81,10 +83,10 @@ class Board:
 
 
 class Guard:
-    """Refuses requests that another site's page makes, and marks every answer."""
+    """Refuses requests that another site's page makes, and watchers beyond MOST_WATCHERS; marks every answer."""
 
     def __init__(self, app: ASGIApp) -> None:
-        self._app = app
+        self._app, self._watchers = app, 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         async def marked(message: Message) -> None:
@@ -99,7 +101,21 @@ class Guard:
                 await PlainTextResponse("expected a request of this page, got one of another origin\n", 403)(
                     scope, receive, marked)
                 return
+            if scope["method"] in ("GET", "HEAD"):
+                await self._show(scope, receive, marked)
+                return
         await self._app(scope, receive, marked)
+
+    async def _show(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if self._watchers >= MOST_WATCHERS:
+            await PlainTextResponse(f"expected at most {MOST_WATCHERS} who watch, come later\n", 503)(
+                scope, receive, send)
+            return
+        self._watchers += 1
+        try:
+            await self._app(scope, receive, send)
+        finally:
+            self._watchers -= 1
 
 
 def build_app(

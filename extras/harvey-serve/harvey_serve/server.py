@@ -12,9 +12,8 @@ import uvicorn
 from starlette.applications import Starlette
 
 from harvey.errors import BadInput
+from harvey_serve.connections import ImpatientConnection
 
-MOST_CONNECTIONS = 256
-"""Who comes when there are so many is told to come later (503)."""
 LAST_WORDS_S = 1
 """A watcher that has not read the last message after this time does not get it [s]."""
 MAX_PORT = 65535
@@ -46,7 +45,7 @@ def bind(host: str, port: int) -> socket.socket:
 def serving(app: Starlette, listening: socket.socket) -> Iterator[None]:
     """Serve for a while; at the end watchers get the last message, and nothing listens any more."""
     server = uvicorn.Server(uvicorn.Config(
-        app, log_config=None, log_level="critical", access_log=False, limit_concurrency=MOST_CONNECTIONS,
+        app, log_config=None, log_level="critical", access_log=False, http=ImpatientConnection,
         timeout_graceful_shutdown=LAST_WORDS_S, server_header=False, ws="none"))
     thread = threading.Thread(target=server.run, args=([listening],), name="live page", daemon=True)
     with closing(listening):

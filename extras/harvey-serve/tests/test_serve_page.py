@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import socket
 import threading
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,11 +20,12 @@ from starlette.testclient import TestClient
 from harvey.cli import main
 from harvey.errors import BadInput
 from harvey.runner.teller import LiveTeller
-from harvey_serve.app import MOST_WORDS, build_app
+from harvey_serve.app import MOST_WATCHERS, MOST_WORDS, build_app
+from harvey_serve.connections import MOST_CONNECTIONS
 from harvey_serve.live_page import LivePage
 from harvey_serve.live_state import LiveState
 from harvey_serve.run_gate import WHY, Gate, GatedBody
-from harvey_serve.server import bind
+from harvey_serve.server import bind, serving
 from scripted_turns import decisions
 from world_models.camera import Camera
 from world_models.entries.body import STOP_KEY, BodyFault, MotionReport
@@ -46,6 +49,11 @@ class Page:
         self.live.end("reached: it is there")
         self.asked: list[str] = []
         self.app = build_app(self.live, self.gate, world, title="<b>a run</b>", token=TOKEN, ask=self.asked.append)
+
+
+    @staticmethod
+    def unended() -> LiveState:
+        return LiveState(load_world(FLAT), Camera(512.0, 512.0, 256.0, 256.0, 512, 512))
 
 
 @pytest.fixture(scope="module")
@@ -256,3 +264,54 @@ def test_bad_words_are_refused_in_a_sentence(
 ) -> None:
     assert main(["serve", "forty-foot-hallway", "--out", str(tmp_path / "run"), *words]) == 2
     assert wanted in capsys.readouterr().err and not (tmp_path / "run").exists()
+
+
+@pytest.fixture
+def served(page: Page) -> Iterator[tuple[str, int]]:
+    with serving(build_app(Page.unended(), page.gate, load_world(FLAT), title="a run", token=TOKEN),
+                 listening := bind("127.0.0.1", 0)):
+        yield listening.getsockname()
+
+
+def order_over(address: tuple[str, int], order: str) -> str:
+    asked = urllib.request.Request(f"http://{address[0]}:{address[1]}/orders/{order}", b"", BEARER, method="POST")
+    with urllib.request.urlopen(asked, timeout=10.0) as answer:
+        return str(answer.read().decode())
+
+
+WATCH = b"GET /events HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+
+
+@pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\nHost: 127", WATCH])
+def test_held_connections_keep_no_order_from_being_heard(served: tuple[str, int], page: Page, sent: bytes) -> None:
+    held = []
+    try:
+        for _ in range(2 * MOST_CONNECTIONS):
+            held.append(socket.create_connection(served, timeout=10.0))
+            held[-1].sendall(sent)
+        assert order_over(served, "pause") == "paused\n" and page.gate.state == "paused"
+        assert order_over(served, "resume") == "running\n"
+    finally:
+        for one in held:
+            one.close()
+
+
+def test_a_request_that_does_not_come_is_not_awaited(served: tuple[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("harvey_serve.connections.REQUEST_S", 0.3)
+    with socket.create_connection(served, timeout=10.0) as slow:
+        for letter in b"GET /":
+            slow.sendall(bytes([letter]))
+        assert slow.recv(1) == b""
+
+
+def test_those_who_watch_are_only_so_many(served: tuple[str, int]) -> None:
+    watching, answers = [], []
+    try:
+        for _ in range(MOST_WATCHERS + 1):
+            watching.append(socket.create_connection(served, timeout=10.0))
+            watching[-1].sendall(WATCH)
+            answers.append(watching[-1].recv(12))
+        assert answers == [b"HTTP/1.1 200"] * MOST_WATCHERS + [b"HTTP/1.1 503"]
+    finally:
+        for one in watching:
+            one.close()

@@ -14,14 +14,14 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_030,
+    "world_models": 10_068,
     "knowledge_sources": 22_606,
     "sim": 5_860,
     "logs": 7_450,
     "harvey": 10_620,
     "experiments": 10_425,
     "tests": 43_970,
-    "extras": 14_910,
+    "extras": 15_170,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -236,12 +236,17 @@ def _build_thing(spec: ThingSpec, name: str, world_from_part: Pose) -> Thing:
 def _build_locales(spec: WorldSpec, poses: Mapping[str, Pose]) -> dict[str, Locale]:
     """All locales, root first, then in the order of the file; those without walls enclose the locales in them."""
     specs = spec.locales
-    root = _build_container(spec.name, "building", None, Pose.identity(), spec, poses, {}, spec.source)
+    inside: dict[str, list[str]] = {}
+    for name, s in specs.items():
+        inside.setdefault(s.parent, []).append(name)
+    corners = {name: _corners_within(name, inside, specs, poses)
+               for name in (spec.name, *specs) if name == spec.name or specs[name].outline is None}
+    root = _build_container(spec.name, "building", None, Pose.identity(), corners[spec.name], poses, {}, spec.source)
     out = {spec.name: root}
     for name, s in specs.items():
         if s.outline is None:
             out[name] = replace(
-                _build_container(name, s.kind, s.parent, s.frame, spec, poses, s.properties, s.source),
+                _build_container(name, s.kind, s.parent, s.frame, corners[name], poses, s.properties, s.source),
                 survey_m=s.survey_m, survey_rad=s.survey_rad)
         else:
             out[name] = Locale(name, s.kind, s.parent, s.frame, s.outline, s.height_m, s.properties, s.source,
@@ -250,23 +255,25 @@ def _build_locales(spec: WorldSpec, poses: Mapping[str, Pose]) -> dict[str, Loca
 
 
 def _build_container(
-    name: str, kind: str, parent: str | None, frame: Pose, spec: WorldSpec, poses: Mapping[str, Pose],
-    properties: Mapping[str, Any], source: str,
+    name: str, kind: str, parent: str | None, frame: Pose, corners_world: NDArray[np.float64],
+    poses: Mapping[str, Pose], properties: Mapping[str, Any], source: str,
 ) -> Locale:
-    corners = poses[name].inverse().apply(_corners_within(name, spec.locales, poses))
+    corners = poses[name].inverse().apply(corners_world)
     (x0, y0, z0), (x1, y1, z1) = corners.min(axis=0), corners.max(axis=0)
     x0, y0, x1, y1 = x0 - CONTAINER_MARGIN_M, y0 - CONTAINER_MARGIN_M, x1 + CONTAINER_MARGIN_M, y1 + CONTAINER_MARGIN_M
     outline = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     return Locale(name, kind, parent, frame, outline, float(z1) + CONTAINER_MARGIN_M, properties, source, float(z0))
 
 
-def _corners_within(name: str, specs: Mapping[str, LocaleSpec], poses: Mapping[str, Pose]) -> NDArray[np.float64]:
+def _corners_within(
+    name: str, inside: Mapping[str, Sequence[str]], specs: Mapping[str, LocaleSpec], poses: Mapping[str, Pose],
+) -> NDArray[np.float64]:
     """(n, 3) floor and ceiling corners of all rooms that a locale contains [m, world]."""
     parts = [np.zeros((0, 3))]
-    for child, spec in specs.items():
-        if spec.parent == name:
-            parts.append(_corners_within(child, specs, poses))
-            if spec.outline is not None:
-                parts += [poses[child].apply(np.column_stack([spec.outline, np.full(len(spec.outline), z)]))
-                          for z in (0.0, spec.height_m)]
+    for child in inside.get(name, ()):
+        spec = specs[child]
+        parts.append(_corners_within(child, inside, specs, poses))
+        if spec.outline is not None:
+            parts += [poses[child].apply(np.column_stack([spec.outline, np.full(len(spec.outline), z)]))
+                      for z in (0.0, spec.height_m)]
     return np.concatenate(parts)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from world_models.building.geometry.faces import Finish
 from world_models.files.construction.specs import LocaleSpec, RoomFinishes, ThingSpec, WorldSpec
+from world_models.files.regular_files import read_regular
 from world_models.files.toml.source import WORLDS, Node, Source, WorldError
 from world_models.frames import Pose
 
@@ -65,7 +66,7 @@ def find_all_files(source: Source) -> Iterator[Source]:
 
 def compute_digest(path: Path) -> str:
     """SHA-256 of a world file with all that it includes or copies from. Raises OSError or WorldError."""
-    own = path.read_bytes()
+    own = read_regular(path)
     try:
         others = list(find_all_files(Source.read(path)))[1:]
     except WorldError:

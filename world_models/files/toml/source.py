@@ -11,6 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from world_models.files.regular_files import read_regular
+
 Key = tuple[str | int, ...]
 """The path to a value: table names, keys and positions in arrays, from the top of the file."""
 
@@ -154,7 +156,7 @@ class Source:
     def read(path: Path, depth: int = 0) -> Source:
         """Read a file. Raises WorldError where it is missing, not text or not TOML."""
         try:
-            text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")  # some editors write a byte order mark
+            text = read_regular(path).decode("utf-8-sig").replace("\r\n", "\n")  # some editors write a byte order mark
             return replace(Source.parse(text, str(path)), folder=path.parent, depth=depth)
         except OSError as error:
             raise WorldError(f"{path}: expected a readable file, got: {error.strerror}") from None

@@ -140,12 +140,13 @@ class WorldReader:
 
     def _check_hierarchy(self, nodes: Node) -> None:
         """Every locale lies in a known one, and those without walls contain some that have them."""
+        containers = {spec.parent for spec in self.locales.values()}
         for name, spec in self.locales.items():
             node = nodes.get(name)
             if node is None:
                 continue
             self._check_containers(name, node, nodes)
-            contains = any(other.parent == name for other in self.locales.values())
+            contains = name in containers
             if (spec.outline is None) != contains:
                 raise node.fail("either a size or outline, or other locales in it", "both" if contains else "neither")
         if not self.locales:
