@@ -103,10 +103,11 @@ class RunRecorder:
         if self._camera is not None and isinstance(value, CameraPicture):
             self._camera.add(value.jpeg)
 
-    def draw_truth(self, pose: Pose2, sim_time_s: float, contacts: Sequence[Place] = ()) -> None:
-        """Where the robot truly is, and where it touched something since the last cycle, for the drawing."""
+    def draw_truth(self, pose: Pose2, sim_time_s: float, contacts: Sequence[Place] = (),
+                   happened: Sequence[str] = ()) -> None:
+        """Where the robot truly is, where it touched something since the last cycle, and what was done to it."""
         if self._drawing is not None:
-            self._drawing.truth(pose, sim_time_s, contacts)
+            self._drawing.truth(pose, sim_time_s, contacts, happened)
 
     def draw_true_building(self, added: tuple[Face, ...], gone: tuple[Face, ...]) -> None:
         """How the building truly differs from its model from now on: faces that are there besides, and that are not."""

@@ -9,14 +9,14 @@ from typing import Any
 
 from blackboard.change import Posted
 from blackboard.journal import Decision
-from logs.explain.turning_points import Collision, TurningPoint, TurningPointFinder
+from logs.explain.turning_points import Collision, Happening, TurningPoint, TurningPointFinder
 from world_models.building.locale_frame import FrameRequest
 from world_models.entries.body import CameraPicture, MotionReport, PictureRequest
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot_state import CameraLesson, CameraState, find_camera_lessons
 from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch
 
-PARTS = ("contacts", "turning_points", "camera")
+PARTS = ("contacts", "happened", "turning_points", "camera")
 """What of a result is a list of parts with names."""
 PROBE = "probe"
 """The purpose of a picture that is to tell where the robot is."""
@@ -42,6 +42,8 @@ class MissionResult:
         camera: what has turned out to be otherwise about the camera than the robot was told.
         amiss: which of the scenario's faults did not happen, or not as they were asked for, in words.
         probes: pictures that it asked for to find out where it is; None in the results of older versions.
+        happened: what the simulator did to the robot and its building; None on hardware, and in the results of older
+            versions.
         belief_off_m: true distance of where it believed to be at the end; None where nobody knows it.
     """
 
@@ -70,6 +72,7 @@ class MissionResult:
     camera: Sequence[CameraLesson] = ()
     probes: int | None = None
     belief_off_m: float | None = None
+    happened: Sequence[Happening] | None = None
 
     @property
     def cycles(self) -> int:
@@ -89,7 +92,7 @@ class MissionResult:
     def record(self) -> dict[str, Any]:
         """As JSON types."""
         record = {name: getattr(self, name) for name in self.__slots__}
-        return record | {name: [asdict(one) for one in record[name]] for name in PARTS}
+        return record | {name: [asdict(one) for one in record[name]] for name in PARTS if record[name] is not None}
 
     @staticmethod
     def of_record(record: Mapping[str, Any]) -> MissionResult:
@@ -97,8 +100,10 @@ class MissionResult:
         contacts = tuple(Collision(**one) for one in record.get("contacts", ()))
         turning_points = tuple(TurningPoint(**one) for one in record.get("turning_points", ()))
         camera = tuple(CameraLesson(**one) for one in record.get("camera", ()))
-        return MissionResult(
-            **{**record, "contacts": contacts, "turning_points": turning_points, "camera": camera})
+        told = record.get("happened")
+        happened = None if told is None else tuple(Happening(**one) for one in told)
+        return MissionResult(**{**record, "contacts": contacts, "turning_points": turning_points, "camera": camera,
+                                "happened": happened})
 
 
 class RunCounts:

@@ -7,7 +7,8 @@ from dataclasses import replace
 from blackboard.journal import Decision
 from harvey.runner.result import MissionResult
 from harvey.simulation.contacts import ContactWatch
-from logs.explain.turning_points import Collision
+from harvey.simulation.happenings import HappeningWatch
+from logs.explain.turning_points import Collision, Happening
 from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage
 from sim.truth import cross_track_m
@@ -36,10 +37,12 @@ class Referee:
         self._followed = 0
         self._contact_watch = ContactWatch(world, body)
         self._contacts: list[Collision] = []
+        self._happening_watch = HappeningWatch(body, stage.scenario.moved)
+        self._happened: list[Happening] = []
 
     def __call__(self, decision: Decision) -> None:
         self._follow()
-        self._note_contacts(decision.cycle)
+        self._note_events(decision.cycle)
         is_redirected = any(isinstance(change.entry.value, Redirection) for change in decision.made)
         for change in decision.made:
             value = change.entry.value
@@ -61,7 +64,7 @@ class Referee:
 
     def complete(self, result: MissionResult, belief: Hypothesis | None) -> MissionResult:
         """The result with the true errors; ``belief`` is the last one held."""
-        self._note_contacts(result.decisions)
+        self._note_events(result.decisions)
         score = self._stage.score(self._body.track)
         return replace(
             result,
@@ -73,13 +76,15 @@ class Referee:
             milestones={**result.milestones, "false_accepts": self._false_accepts},
             collisions=score.collisions,
             contacts=tuple(self._contacts),
+            happened=tuple(self._happened),
             max_cross_track_m=self._max_cross_track_m,
             belief_off_m=None if belief is None else belief.world_from_robot(self._world).distance_to(
                 self._body.truth.world_from_robot),
             amiss=self._body.missed_faults,
         )
 
-    def _note_contacts(self, cycle: int) -> None:
+    def _note_events(self, cycle: int) -> None:
+        self._happened += [Happening(cycle, what) for what in self._happening_watch.new_happenings()]
         for contact in self._contact_watch.new_contacts():
             place = contact.place
             self._contacts.append(Collision(cycle, place.locale, place.x_m, place.y_m, contact.speed_m_per_s))

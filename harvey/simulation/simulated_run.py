@@ -19,6 +19,7 @@ from harvey.runner.run import Run
 from harvey.runner.teller import Tell, tell_nothing
 from harvey.simulation.body_replay import BodyReplay
 from harvey.simulation.contacts import ContactWatch
+from harvey.simulation.happenings import HappeningWatch
 from harvey.simulation.referee import Referee
 from harvey.simulation.serial_body import IN_PROCESS, open_body
 from harvey.wiring import knowledge_sources
@@ -171,6 +172,7 @@ class SimulatedRun(Run):
         self.simulated_body = body = stage.body(head.seed)
         self._drawn: tuple[tuple[Face, ...], tuple[Face, ...]] = (), ()
         self._line, self._contact_watch = ExitStack(), ContactWatch(agent.world, body)
+        self._happening_watch = HappeningWatch(body, stage.scenario.moved)
         reached = around(self._line.enter_context(open_body(body, head.body)), lambda: recorder.replaying)
         super().__init__(
             head, agent, reached, recorder, limits=stage.scenario.limits, clock=lambda: body.truth.time_s,
@@ -181,7 +183,7 @@ class SimulatedRun(Run):
     def _draw_truth(self) -> None:
         truth = self.simulated_body.truth
         touched = tuple(contact.place for contact in self._contact_watch.new_contacts())
-        self.recorder.draw_truth(truth.world_from_robot, truth.time_s, touched)
+        self.recorder.draw_truth(truth.world_from_robot, truth.time_s, touched, self._happening_watch.new_happenings())
         differs = self.simulated_body.building.added, self.simulated_body.building.gone
         if differs != self._drawn:
             self._drawn = differs

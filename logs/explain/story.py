@@ -12,7 +12,13 @@ from typing import Any
 from blackboard.servoing import Discrepancy
 from logs.explain import phrases, turning_points
 from logs.explain.phrases import UNREADABLE, capital, named, plainly, sentence, wrap
-from logs.explain.turning_points import TurningPoint, read_collisions, read_turning_points, turn_lines
+from logs.explain.turning_points import (
+    TurningPoint,
+    read_collisions,
+    read_happenings,
+    read_turning_points,
+    turn_lines,
+)
 from logs.records import EntryRecord, is_a
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
@@ -169,7 +175,7 @@ def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
         when = f"in cycle {cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run")
         yield f"{run_name(run)}: {'cut off' if outcome is None else outcome.value.kind} {when}."
         yield from levels_off(run)
-        yield from turn_lines(history, run.read_result())
+        yield from turn_lines(history, run.read_result(), is_whole=outcome is not None)
     except UNREADABLE as error:
         raise _strange(history, error) from error
 
@@ -188,7 +194,8 @@ def tell_run(run: RunDirectory, history: Timeline) -> RunStory:
     try:
         turns = tuple(read_turning_points(history))
         sections = (
-            tell_errand(history), tell_plans(history), tell_lost(history), tell_contacts(history, turns, result),
+            tell_errand(history), tell_happenings(history, result), tell_plans(history), tell_lost(history),
+            tell_contacts(history, turns, result),
             tell_things(turns), tell_camera(history), tell_end(history, result))
         return RunStory(first, turns, sections, read_milestones(history))
     except UNREADABLE as error:
@@ -209,6 +216,14 @@ def tell_errand(history: Timeline) -> Section:
     """What was asked for, and what it was told on the way."""
     told = [_said(history, plainly(r), r) for r in history.of_kind(Command, UserReport, Redirection) if r.observed]
     return Section("What it was to do", tuple(told))
+
+
+def tell_happenings(history: Timeline, result: Mapping[str, Any]) -> Section:
+    """What the simulator did to the robot and its building, as far as its result says."""
+    told = [Sentence(f"{capital(one.text)}.", one.cycle, one.time_s) for one in read_happenings(history, result)]
+    if not told and result.get("happened") is None:
+        told = [Sentence("What was done to the robot nobody recorded: there is no result of the simulator.")]
+    return Section("What was done to it", tuple(told) or (Sentence("The simulator did nothing to it."),))
 
 
 def tell_plans(history: Timeline) -> Section:

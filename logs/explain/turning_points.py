@@ -41,6 +41,9 @@ MARKS, NOT_VERIFIED = ("escalated", "relocalization"), ("refuted", "not testable
 TOLD_KINDS: tuple[type[Any], ...] = (BodyFault, Contact, DoorState, Obstacle, Resumed, UserReport, Redirection)
 KINDS: tuple[type[Any], ...] = (*TOLD_KINDS, Goal, PlanSketch, Certificate, Outcome)
 NOTHING = "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
+ENDED_EARLY = "Nothing had gone wrong when the run was cut off: what would have come of it nobody knows."
+SIMULATOR = "simulator"
+"""The kind of what the simulator did."""
 Get = Callable[[str], Entry[Any] | None]
 """Gives the current revision of an entry by its id."""
 Believed = Callable[[int], Entry[Hypothesis] | None]
@@ -90,6 +93,18 @@ class Collision:
     x_m: float
     y_m: float
     speed_m_per_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """What the simulator did to the robot or its building, in words; ``cycle``: the first that began after it."""
+
+    cycle: int
+    what: str
+
+    def turning_point(self, time_s: float | None = None) -> TurningPoint:
+        """As a turning point, which the robot knows nothing of."""
+        return TurningPoint(self.cycle, SIMULATOR, f"{self.what}, as only the simulator knows", time_s)
 
 
 class TurningPointFinder:
@@ -249,13 +264,30 @@ def read_collisions(history: Timeline, result: Mapping[str, Any]) -> Iterator[Tu
         yield TurningPoint(contact.cycle, "collision", text, history.time_at(contact.cycle))
 
 
-def turn_lines(history: Timeline, result: Mapping[str, Any]) -> Iterator[str]:
-    """Those turning points that a short account must not leave out, and the collisions, a line each."""
+def read_happenings(history: Timeline, result: Mapping[str, Any]) -> Iterator[TurningPoint]:
+    """What the simulator did, as ``result.json`` says. Raises BadInput where that is malformed."""
+    for record in result.get("happened") or ():
+        try:
+            one = Happening(**record)
+            is_told = isinstance(one.what, str)
+        except TypeError:
+            is_told = False
+        if not is_told or history.cycle_of(one.cycle) is None:
+            raise BadInput(f"result.json: happened: expected a cycle of the journal and words, got {record!r}")
+        yield one.turning_point(history.time_at(one.cycle))
+
+
+def turn_lines(history: Timeline, result: Mapping[str, Any], *, is_whole: bool = True) -> Iterator[str]:
+    """Those turning points that a short account must not leave out, and what only the simulator knows, a line each.
+
+    ``is_whole``: the run has an outcome.
+    """
     told = read_turning_points(history, told=True)
-    points = sorted([*told, *read_collisions(history, result)], key=lambda point: point.cycle)
+    truly = (*read_happenings(history, result), *read_collisions(history, result))
+    points = sorted([*truly, *told], key=lambda point: point.cycle)
     unplaced = (result.get("collisions") or 0) - sum(point.kind == "collision" for point in points)
     if not points and unplaced <= 0:
-        yield NOTHING
+        yield NOTHING if is_whole else ENDED_EARLY
         return
     yield "On the way:"
     heads, kinds = [at(point.cycle, point.time_s) for point in points], [point.kind for point in points]

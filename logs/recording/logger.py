@@ -75,6 +75,7 @@ class Moment:
         truth: where the robot truly is; None where nobody knows.
         contacts: where it truly touched something since the last cycle.
         differences: how the building truly differed from its model since then; empty where that did not change.
+        happened: what the simulator did since then, in words.
     """
 
     decision: Decision
@@ -83,6 +84,7 @@ class Moment:
     truth: Pose2 | None = None
     contacts: Sequence[Place] = ()
     differences: Sequence[Difference] = ()
+    happened: Sequence[str] = ()
 
     @cached_property
     def changes(self) -> tuple[Change, ...]:

@@ -68,14 +68,17 @@ class RecordingWriter:
         self._world, self._mirror, self._sim_time_s = world, Mirror(), 0.0
         self._held: Held | None = None
         self._truth: Pose2 | None = None
-        self._contacts, self._differences = list[Place](), list[Difference]()
+        self._contacts, self._differences, self._happened = list[Place](), list[Difference](), list[str]()
         for logger in self._loggers:
             logger.begin(self._stream)
 
-    def truth(self, world_from_robot: Pose2, sim_time_s: float, contacts: Sequence[Place] = ()) -> None:
-        """Where the robot truly is, and where it touched something; drawn with the next decision."""
+    def truth(self, world_from_robot: Pose2, sim_time_s: float, contacts: Sequence[Place] = (),
+              happened: Sequence[str] = ()) -> None:
+        """Where the robot truly is, where it touched something, and what was done to it; drawn with the next decision.
+        """
         self._truth = world_from_robot
         self._contacts += contacts
+        self._happened += happened
         self._sim_time_s = max(self._sim_time_s, sim_time_s)
 
     def true_building(self, added: tuple[Face, ...], gone: tuple[Face, ...]) -> None:
@@ -90,7 +93,8 @@ class RecordingWriter:
             self._held = None
         elif self._held is None or self._held.value is not belief.value:
             self._held = Held(belief.value, belief.value.world_from_robot(self._world))
-        moment = Moment(decision, self._mirror, self._held, self._truth, self._contacts, self._differences)
+        moment = Moment(decision, self._mirror, self._held, self._truth, self._contacts, self._differences,
+                        self._happened)
         times_s = [*(e.value.sim_time_s for e in moment.changed(CameraPicture)),
                    *(e.value.sim_time_s for e in moment.changed(MotionReport))]
         self._sim_time_s = max([self._sim_time_s, *times_s])
@@ -98,7 +102,7 @@ class RecordingWriter:
         for logger in self._loggers:
             logger.log(self._stream, moment)
         self._stream.end_cycle()
-        self._contacts, self._differences = [], []
+        self._contacts, self._differences, self._happened = [], [], []
 
     def flush(self) -> None:
         """Bring everything to the disk and to the viewers now. Raises RecordingError where that fails."""

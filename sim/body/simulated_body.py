@@ -28,7 +28,8 @@ from world_models.camera import Camera, CameraMount
 from world_models.entries.body import BodyFault, CameraPicture, Course, MotionReport, MotorCommand, Ride, RideReport
 from world_models.entries.location import Place
 from world_models.entries.obstacle import Contact, Ranges
-from world_models.frames import Pose2
+from world_models.frames import Pose2, wrap_angle
+from world_models.words import degrees, metres
 
 FRAME_S = 0.1
 """Time that taking a picture takes [s]."""
@@ -72,6 +73,7 @@ class SimulatedBody:
         self._schedule = FaultSchedule.of(faults)
         self._dark_until_s = 0.0
         self._missed: list[str] = []
+        self._happened: list[str] = []
         self._device_faults: dict[str, tuple[DeviceFault, float]] = {}  # with the time at which each began
         self._helped: dict[int, int] = {}
         self._slip: Slip | None = None
@@ -122,6 +124,11 @@ class SimulatedBody:
     def missed_faults(self) -> tuple[str, ...]:
         """Which faults did not happen, or not as they were asked for, in words. Not for knowledge sources."""
         return (*self._missed, *(f"{fault.kind}: its moment did not come" for fault in self._schedule.pending))
+
+    @property
+    def happened(self) -> tuple[str, ...]:
+        """What its faults did to it so far, in words, oldest first. Not for knowledge sources."""
+        return tuple(self._happened)
 
     @property
     def device_faults(self) -> Mapping[str, DeviceFault]:
@@ -340,7 +347,9 @@ class SimulatedBody:
         self._truth = replace(self._truth, time_s=self._truth.time_s + duration_s)
         self._follow_changes()
         for fault in due:
+            before = self._truth.world_from_robot
             fault.apply(self)
+            self._happened.append(f"{fault.words}{_moved(before, self._truth.world_from_robot)}")
         self._truth = replace(self._truth, lights_on=self._truth.time_s >= self._dark_until_s)
         self._track.append(self._truth)
 
@@ -391,3 +400,11 @@ class SimulatedBody:
     def report_missed(self, reason: str) -> None:
         """Record that a fault did not happen as it was asked for."""
         self._missed.append(reason)
+
+
+def _moved(before: Pose2, now: Pose2) -> str:
+    """By how much a robot was moved, in words; "" for one that was not."""
+    if before == now:
+        return ""
+    turned_rad = wrap_angle(now.heading_rad - before.heading_rad)
+    return f": it stands {metres(now.distance_to(before))} from where it stood, turned by {degrees(abs(turned_rad))}"

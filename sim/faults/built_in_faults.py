@@ -29,6 +29,10 @@ class LightsOff(Fault):
 
     duration_s: float = 10.0
 
+    @property
+    def words(self) -> str:
+        return f"the lights go off for {self.duration_s:g} s"
+
     def apply(self, body: FaultTarget) -> None:
         body.turn_lights_off(self.duration_s)
 
@@ -47,6 +51,10 @@ class Occlusion(Fault):
 
     duration_s: float = 10.0
     part: float = 0.2
+
+    @property
+    def words(self) -> str:
+        return f"something covers {self.part:.0%} of the camera's picture for {self.duration_s:g} s"
 
     def apply(self, body: FaultTarget) -> None:
         body.add_occluder(Occluder.draw(self.part, body.truth.time_s + self.duration_s, body.fault_rng))
@@ -132,6 +140,10 @@ class Bump(Displacement):
 
     kind: ClassVar[str] = "bump"
 
+    @property
+    def words(self) -> str:
+        return "somebody bumps into the robot"
+
 
 @dataclass(frozen=True, slots=True)
 class Kidnap(Displacement):
@@ -162,6 +174,10 @@ class Kidnap(Displacement):
         if given:
             expected = "no displacement beside to_locale" if self.to_locale else "to_locale beside the place in it"
             raise ValueError(f"expected {expected}, got {', '.join(given)}")
+
+    @property
+    def words(self) -> str:
+        return "somebody carries the robot off"
 
     @property
     def destination(self) -> Place | None:
@@ -260,6 +276,10 @@ class CameraKnocked(Fault):
     tilt_rad: float = 0.0
     roll_rad: float = 0.0
     yaw_rad: float = 0.0
+
+    @property
+    def words(self) -> str:
+        return "something knocks against the camera, which is turned from then on"
 
     def apply(self, body: FaultTarget) -> None:
         body.turn_camera(self.tilt_rad, self.roll_rad, self.yaw_rad)

@@ -98,6 +98,11 @@ class Fault(ABC):
         """The place where it puts the robot, from the key ``to_locale``; checked against the building beforehand."""
         return None
 
+    @property
+    def words(self) -> str:
+        """What happens, for those who read of the run afterwards."""
+        return f"{self.kind.replace('_', ' ')} happens"
+
     @abstractmethod
     def apply(self, body: FaultTarget) -> None:
         """Make it happen."""
@@ -123,6 +128,10 @@ class DeviceFault(Fault):
     bounds: ClassVar[Mapping[str, Bounds]] = {"duration_s": DURATION}
 
     duration_s: float = 10.0
+
+    @property
+    def words(self) -> str:
+        return f"the {self.part} fails for {self.duration_s:g} s: {self.detail}"
 
     def apply(self, body: FaultTarget) -> None:
         body.start_device_fault(self)

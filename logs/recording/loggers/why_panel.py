@@ -14,7 +14,7 @@ from blackboard.entry import Entry
 from blackboard.kinds import always
 from blackboard.servoing import Discrepancy
 from logs.explain import phrases
-from logs.explain.turning_points import TurningPoint, TurningPointFinder
+from logs.explain.turning_points import SIMULATOR, Happening, TurningPoint, TurningPointFinder
 from logs.mirror import find_belief
 from logs.recording.logger import Logger, Moment, Panel, Subject, log_view
 from logs.recording.loggers.lanes import ACTIVITY_KINDS, activity, doubts, leg_under_way
@@ -156,7 +156,7 @@ ASTRAY_M, BACK_M = 0.2, 0.1
 """The belief is called wrong when it is so far from the truth, and right again when it is so near."""
 COLOURS: Mapping[str, Colour] = {
     **VERDICTS, "goal": PLANNED, "plan": PLANNED, "doubt": LEVELS["plan"], "lost": REJECTED, "found": BELIEVED,
-    "resumed": DONE, "in truth": TRUE, "collision": REJECTED, "contact": BELIEVED, "told": REVISED,
+    "resumed": DONE, "in truth": TRUE, SIMULATOR: TRUE, "collision": REJECTED, "contact": BELIEVED, "told": REVISED,
 }
 
 
@@ -177,8 +177,9 @@ class Chapters(Logger):
             stream.log(CHAPTERS, rr.TextLog, text=[point.text], level=[point.kind], color=[_colour(point)])
 
     def _of_the_truth(self, moment: Moment) -> Iterator[TurningPoint]:
-        """What the robot cannot know: that it touched something, that its belief went wrong, or is right again."""
+        """What the robot cannot know: what was done to it, what it touched, that its belief went wrong, or is right."""
         cycle = moment.decision.cycle
+        yield from (Happening(cycle, what).turning_point() for what in moment.happened)
         for place in moment.contacts:
             yield TurningPoint(cycle, "collision", f"{place.words()}, as only the simulator knows")
         if moment.truth is None or moment.held is None or not moment.changes:

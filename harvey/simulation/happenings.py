@@ -1,0 +1,48 @@
+"""Happenings: what the simulator did to the robot and its building. Only the referee and the recording hear of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from sim.body.simulated_body import SimulatedBody
+from sim.ground_truth.things import MovedThing
+from world_models.building.geometry.faces import Face
+
+LEAF = "true-leaf"
+"""The part of a face's name by which a door's leaf is known."""
+
+
+class HappeningWatch:
+    """Finds what happened since it was asked last; first how the building differs from the robot's model."""
+
+    def __init__(self, body: SimulatedBody, moved: Iterable[MovedThing] = ()) -> None:
+        self._body, self._told = body, 0
+        self._moved = tuple(f"the thing {one.thing} stands elsewhere than in the model" for one in moved)
+        self._added, self._gone = frozenset[str](), frozenset[str]()
+
+    def new_happenings(self) -> tuple[str, ...]:
+        """Each in words, oldest first."""
+        moved, self._moved = self._moved, ()
+        happened = self._body.happened[self._told:]
+        self._told += len(happened)
+        return (*moved, *self._find_changes(), *happened)
+
+    def _find_changes(self) -> Iterator[str]:
+        building = self._body.building
+        added, gone = _names(building.added), _names(building.gone)
+        was_added, was_gone, self._added, self._gone = self._added, self._gone, added, gone
+        for name in sorted(added - was_added):
+            yield _describe(name, "is shut or ajar" if name.endswith(LEAF) else "is there, and the model lacks it")
+        for name in sorted(was_added - added):
+            yield _describe(name, "is open again" if name.endswith(LEAF) else "is taken away again")
+        yield from (f"the thing {name} is not there, and the model has it" for name in sorted(gone - was_gone - added))
+        yield from (f"the thing {name} is there again" for name in sorted(was_gone - gone - was_added))
+
+
+def _describe(name: str, what: str) -> str:
+    return f"the door {name.partition('/')[0]} {what}" if name.endswith(LEAF) else f"the thing {name} {what}"
+
+
+def _names(faces: Iterable[Face]) -> frozenset[str]:
+    """Names of the things and doors whose faces these are."""
+    return frozenset("/".join(face.name.split("/")[:2]) for face in faces)
