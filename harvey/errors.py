@@ -13,7 +13,7 @@ from logs.run_errors import BadInput
 
 __all__ = ["BadInput", "Terminated", "in_one_line", "terminable"]
 
-MOST_LETTERS, MOST_OF_A_WORD = 300, 80
+MOST_LETTERS, MOST_OF_A_WORD = 300, 160
 
 
 class Terminated(BaseException):

@@ -104,7 +104,8 @@ def _paragraphs(history: Timeline, args: Namespace, stories: list[Story]) -> Ite
     if args.depth is not None and refs:
         yield "\nEntry by entry:"
         yield from explain(history, refs, args.depth)
-    yield "\n" + LEGEND
+    if args.entry is None and args.at is None and args.milestone is None:
+        yield "\n" + LEGEND
 
 
 def _record(one: Story) -> dict[str, Any]:
@@ -152,14 +153,14 @@ WHY = CliCommand(
         ("harvey why runs/hallway-kidnap-0 'how far off was it?' --at 350", "belief against truth, from the recording"),
         ("harvey why runs/box-in-the-way-0 'what is in the way?'", "each thing that the model lacks, down to pixels"),
         ("harvey why runs/box-in-the-way-0 'why did you stop?' --at 120", "the last stop up to cycle 120"),
-        ("harvey why runs/box-in-the-way-0 'why that detour?'", "for what plans were withdrawn, and what came instead"),
+        ("harvey why runs/box-in-the-way-0 'why that detour?'", "the plan before and after, and what lay between"),
         ("harvey why runs/door-found-shut-0 'is the door shut?'", "what pictures show in its opening"),
         ("harvey why runs/lab-to-allens-office-0 --check", "whether every decision rests on something"),
         ("harvey why runs/lab-to-allens-office-0 --depth 12", "the whole web of reasons, twelve steps down"),
     ),
     _add_why_arguments, _run_why,
     "Follows the main reasons from an entry down to goal, model and pixels. With --check, exit code 1 where a\n"
-    "decision rests on nothing.",
+    "decision rests on nothing. Without NAME a legend is printed too: what places, pixels and names in brackets are.",
 )
 
 

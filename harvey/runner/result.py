@@ -9,12 +9,12 @@ from typing import Any
 
 from blackboard.change import Posted
 from blackboard.journal import Decision
-from logs.explain.turning_points import Collision, Happening, TurningPoint, TurningPointFinder
+from logs.explain.turning_points import Collision, Happening, TurningPoint, TurningPointFinder, is_adjusted
 from world_models.building.locale_frame import FrameRequest
 from world_models.entries.body import CameraPicture, MotionReport, PictureRequest
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot_state import CameraLesson, CameraState, find_camera_lessons
-from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch
+from world_models.entries.task import Milestone, Outcome, PlanSketch
 
 PARTS = ("contacts", "happened", "turning_points", "camera")
 """What of a result is a list of parts with names."""
@@ -34,7 +34,8 @@ class MissionResult:
         path_length_m, sim_time_s: true in the simulator; on hardware as the wheels claim.
         decisions: how many there were; waits: in how many of them an act only asked for locale frames, and waited.
         milestones: how many were verified, refuted, not testable and (by the truth) accepted falsely.
-        replans: sketches adjusted or drawn anew; relocalizations: how often it found itself again.
+        replans: how often the plan was changed: withdrawn, all of its levels at once, or adjusted.
+        relocalizations: how often it found itself again.
         sketches: how many plan sketches were drawn.
         max_cross_track_m: how far the robot truly strayed from the line of the leg it was driving.
         contacts: each of the collisions.
@@ -112,6 +113,7 @@ class RunCounts:
     def __init__(self) -> None:
         self.decisions = self.waits = self.replans = self.relocalizations = self.sketches = self.frames = 0
         self.probes = 0
+        self._withdrawn_in: int | None = None
         self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0}
         self.path_m = self.time_s = 0.0
         self.turning_points: list[TurningPoint] = []
@@ -141,9 +143,10 @@ class RunCounts:
                 self.probes += value.purpose == PROBE and isinstance(change, Posted)
             elif isinstance(value, PlanSketch):
                 self.sketches += revision == 0
-                self.replans += value.adjustments > 0 and value.verified and change.entry.author == "milestone_passer"
-            elif isinstance(value, Goal):
-                self.replans += value.status == "abandoned"
+                self.replans += is_adjusted(value, change.entry.author)
+                if value.status == "superseded" and self._withdrawn_in != decision.cycle:
+                    self.replans += 1
+                    self._withdrawn_in = decision.cycle
             elif isinstance(value, Hypothesis) and value.is_held:
                 self.relocalizations += value.basis == "relocalization"
 

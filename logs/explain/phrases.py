@@ -116,7 +116,7 @@ def place(p: Place) -> str:
 def pose(h: Hypothesis) -> str:
     """Where a hypothesis says that the robot stands, and how surely."""
     p = h.locale_from_robot
-    sure = f"sure to {metres(h.sigma_m)} and {degrees(h.sigma_rad)}"
+    sure = f"within {metres(h.sigma_m)} and {degrees(h.sigma_rad)}, one sigma"
     return f"{point(p.x_m, p.y_m)} of {h.locale}, heading {degrees(p.heading_rad)} ({sure})"
 
 

@@ -11,9 +11,11 @@ import re
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import SequenceMatcher
 from itertools import groupby
 from typing import Any
 
+from logs.explain import phrases
 from logs.explain.phrases import plainly, sentence
 from logs.explain.story import Section, tell_contacts, tell_lost
 from logs.explain.turning_points import read_turning_points
@@ -27,7 +29,7 @@ from world_models.entries.body import CameraPicture, MotorCommand
 from world_models.entries.door_state import DoorState
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Contact, Obstacle, Ranges
-from world_models.entries.task import Leg, Outcome, PlanSketch
+from world_models.entries.task import Leg, Outcome, PlanSketch, Subgoal
 from world_models.entries.user_reports import Redirection, UserReport
 from world_models.frames import Pose2, wrap_angle
 from world_models.words import count, degrees, metres
@@ -83,12 +85,37 @@ def answers(
 
     Raises BadInput where it is none of the questions that are known, or what it takes is not recorded.
     """
-    asked = set(re.findall(r"[a-z]+", question.lower()))
+    asked = set(re.findall(r"[^\W_](?:[\w'/.-]*\w)?", question.lower()))
     for words, answer in ANSWERS.items():
-        if asked & words:
+        if asked & words and not (foreign := _find_foreign(history, asked)):
             return answer(Asked(run, history, question, at))
-    known = ", ".join(f"'{one}'" for one in QUESTIONS)
-    raise BadInput(f"expected a question as {known}, got {question!r}")
+    heard = f"; {', '.join(map(repr, foreign[:3]))} said nothing" if (foreign := _find_foreign(history, asked)) else ""
+    near = sorted(QUESTIONS, key=lambda one: -_likeness(asked, question, one))[:NEAREST]
+    raise BadInput(f"expected a question as {', '.join(map(repr, near))}, got {question!r}{heard}")
+
+
+def _find_foreign(history: Timeline, asked: set[str]) -> list[str]:
+    """The words of a question that are neither of those that are understood nor names of the building."""
+    left = sorted(asked - KEYWORDS - FILLERS)
+    if not left:
+        return []
+    names = {record.value.locale for record in history.frames()}
+    names |= {record.value.door for record in history.of_kind(DoorState)}
+    names |= {record.value.name for record in history.of_kind(Obstacle)} | _find_passages(history)
+    known = names | {part for name in names for part in re.split(r"[-/]", name)}
+    return [word for word in left if word not in known and not word.isdigit()]
+
+
+def _find_passages(history: Timeline) -> set[str]:
+    """The doors and rides through which any plan led."""
+    return {part.passage for record in history.of_kind(PlanSketch) for part in record.value.subgoals} - {""}
+
+
+def _likeness(asked: set[str], question: str, known: str) -> float:
+    """How near a question is to one that is known: by the words that decide, then by its letters."""
+    words = set(re.findall(r"[a-z]+", known))
+    group = next((group for group in ANSWERS if words & group), frozenset[str]())
+    return len(asked & group) + SequenceMatcher(None, question.lower(), known).ratio()
 
 
 def _tell_way(asked: Asked) -> Iterator[Story]:
@@ -167,18 +194,52 @@ def _tell_reasons(history: Timeline, record: EntryRecord[Any]) -> Iterator[Step]
 
 
 def _tell_detours(asked: Asked) -> Iterator[Story]:
-    """Each plan that was withdrawn because the building is otherwise, and what was planned instead."""
+    """Each plan that was withdrawn because the building is otherwise: before, what lay between, and after."""
     history, heads = asked.history, tuple(f"{kind.__name__}-" for kind in CHANGED)
-    sketches, stories = list(history.of_kind(PlanSketch, until=asked.at)), dict[int, Story]()
+    sketches, withdrawn = list(history.of_kind(PlanSketch, until=asked.at)), dict[int, EntryRecord[PlanSketch]]()
     for one in sketches:
-        if one.cycle in stories or one.field("status") != "superseded":
-            continue
-        if any(ref.startswith(heads) for ref in one.because):
-            new = next((s for s in sketches if s.cycle > one.cycle and s.ref.endswith(".0")), None)
-            instead = [step("instead", plainly(new), new)] if new is not None else []
-            text = f"In cycle {one.cycle} its plan was withdrawn: {sentence(one)}."
-            stories[one.cycle] = story_of(history, one, text, (*_tell_reasons(history, one), *instead))
-    yield from asked.newest([*stories.values()], "It took no detour: no plan was withdrawn for anything in the way.")
+        if one.field("status") == "superseded" and any(ref.startswith(heads) for ref in one.because):
+            known = withdrawn.get(one.cycle)
+            if known is None or len(one.value.path) > len(known.value.path):
+                withdrawn[one.cycle] = one  # the most detailed of those that were withdrawn together
+    stories = [story_of(history, one, f"In cycle {cycle} it planned another way {one.value.where()}.",
+                        _compare_plans(history, one, sketches)) for cycle, one in withdrawn.items()]
+    yield from asked.newest(stories, "It took no detour: no plan was withdrawn for anything in the way.")
+
+
+def _compare_plans(
+    history: Timeline, old: EntryRecord[PlanSketch], sketches: Sequence[EntryRecord[PlanSketch]]
+) -> Iterator[Step]:
+    ahead = old.value.subgoals[old.value.at:]
+    yield step("before", f"It was to go to {phrases.steps(ahead) or 'where it stood'}.", old)
+    for one in _tell_reasons(history, old):
+        found = next((record for ref in one.refs if is_a(record := history.entry(ref), Obstacle)), None)
+        beside = "" if found is None else _beside(ahead, found.value)
+        yield Step("between", f"{one.text.rstrip('.')}{beside}.", one.refs)
+    later = [s for s in sketches if s.cycle > old.cycle and s.is_new]
+    new = next((s for s in later if s.value.locale == old.value.locale), next(iter(later), None))
+    if new is None:
+        yield Step("after", "No other way was planned.", ())
+    else:
+        yield step("after", f"In cycle {new.cycle} it was to go to {phrases.steps(new.value.subgoals)}.", new)
+
+
+def _beside(ahead: Sequence[Subgoal], thing: Obstacle) -> str:
+    """How far from the line of a plan the middle of a thing is; "" where none of it is in its locale."""
+    lines = [(one.origin, one.destination) for one in ahead
+             if one.origin.locale == one.destination.locale == thing.locale]
+    if not lines:
+        return ""
+    off_m, (a, b) = min(((_distance_m(a.x_m, a.y_m, b.x_m, b.y_m, thing), (a, b)) for a, b in lines),
+                        key=lambda pair: pair[0])
+    return f"; its middle is {metres(off_m)} from the line of that plan, from {a.words()} to {b.words()}"
+
+
+def _distance_m(x0: float, y0: float, x1: float, y1: float, thing: Obstacle) -> float:
+    dx, dy = x1 - x0, y1 - y0
+    long2 = dx * dx + dy * dy
+    part = 0.0 if long2 == 0.0 else min(max(((thing.x_m - x0) * dx + (thing.y_m - y0) * dy) / long2, 0.0), 1.0)
+    return math.hypot(thing.x_m - x0 - part * dx, thing.y_m - y0 - part * dy)
 
 
 def _tell_doors(asked: Asked) -> Iterator[Story]:
@@ -187,6 +248,10 @@ def _tell_doors(asked: Asked) -> Iterator[Story]:
     named = [revisions for revisions in doors if revisions[-1].value.door in asked.question.lower()]
     stories = [story_of(history, revisions[-1], headline(revisions[-1]), map(_tell_door, revisions[-MOST_SIGHTS:]))
                for revisions in named or doors]
+    others = [name for name in sorted(_find_passages(history)) if name in asked.question.lower()]
+    if others and not named:
+        yield Story("", f"No picture was judged to tell whether {others[0]} is shut.", "", ())
+        return
     told = [] if doors else [record for record in history.frames(until=asked.at)
                              if any(change.what == "shut" for change in record.value.changes)]
     stories += [story_of(history, record, headline(record)) for record in told[-1:]]
@@ -247,12 +312,26 @@ ANSWERS: Mapping[frozenset[str], Callable[[Asked], Iterator[Story]]] = {
     frozenset({"touch", "touched", "contact", "contacts", "collide", "collided", "collision", "collisions", "hit"}):
         _tell_touched,
     frozenset({"far", "off", "truth", "truly", "error"}): _tell_error,
-    frozenset({"detour", "detours", "round", "around"}): _tell_detours,
+    frozenset({"detour", "detours", "round", "around", "another", "other", "else", "withdrawn", "replan", "replanned",
+               "instead"}): _tell_detours,
     frozenset({"stop", "stopped", "stops", "creep", "slow", "wait"}): _tell_stops,
     frozenset({"door", "doors", "shut", "open", "closed", "ajar"}): _tell_doors,
     frozenset({"way", "obstacle", "obstacles", "there"}): _tell_way,
 }
 """By words of the question; the first that fits."""
+KEYWORDS = frozenset[str]().union(*ANSWERS)
+FILLERS = frozenset(re.findall("[a-z]+", (
+    "a all along always and any anything anywhere are at be been before believe believed by can cannot cycle did "
+    "do does drive driven drove ever find first for found from get go goes going gone got had halt halted has "
+    "have held her his how i in into is it its keep kept know known last leave left let long many me mission "
+    "model much my never new no not now of often old on once one only or out over plan planned plans position "
+    "pose really robot room run say see seen so some somebody something stand standing still such take taken tell "
+    "than that the their them then thing things think thought they this time times to took true turn turned twice "
+    "up us very was way we went were what when where whether which who why will with would you your "
+)))
+"""Words that decide nothing."""
+NEAREST = 4
+"""So many questions are named to who asked another one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,8 +357,8 @@ class TrueError:
         return self.off_m / self.sigma_m if self.sigma_m > 0.0 else math.inf
 
     def words(self) -> str:
-        """``63 mm and 0.1 degrees from where it believed to be (sure to 10 mm and 0.1 degrees)``."""
-        sure = f"sure to {metres(self.sigma_m)} and {degrees(self.sigma_rad)}"
+        """``63 mm and 0.1 degrees from where it believed to be (by its own reckoning within 10 mm ...)``."""
+        sure = f"by its own reckoning within {metres(self.sigma_m)} and {degrees(self.sigma_rad)}, one sigma"
         return f"{metres(self.off_m)} and {degrees(abs(self.off_rad))} from where it believed to be ({sure})"
 
 

@@ -240,6 +240,9 @@ def _plan(history: Timeline, record: EntryRecord[Any]) -> str:
         look = "to look from elsewhere, " if sketch.is_look else ""
         parts = count(len(sketch.subgoals), "part")
         return f"Plan {look}{sketch.where()}, {parts}: to {phrases.steps(sketch.subgoals)}."
+    if not record.is_gone and turning_points.is_adjusted(sketch, record.author):
+        return (f"The plan {sketch.where()} was adjusted in part {min(sketch.at + 1, len(sketch.subgoals))} of "
+                f"{len(sketch.subgoals)}, as a milestone told where the robot is: to {phrases.steps(sketch.subgoals)}.")
     if record.is_gone or sketch.status != "superseded":
         return ""
     causes = listed([cause for ref in record.because if (cause := _cause(history, ref))]) or "it no longer held"

@@ -115,7 +115,7 @@ def _tell_consequences(history: Timeline, certificate: EntryRecord[Any]) -> Iter
         for decision in history.naming(record.ref) if record.kind in FOLLOWED else ():
             if decision.chosen is not None and decision.chosen.trigger == record.ref:
                 said = "; ".join(f"{r.ref}: {sentence(r)}" for r in decision.made if r.kind is not Discrepancy)
-                said = said or "; ".join(map(sentence, decision.made)) or decision.refused or "nothing came of it"
+                said = said or "; ".join(map(sentence, decision.made)) or decision.refused or "it changed nothing"
                 who = words.source(decision.chosen.source)
                 yield step("followed", f"In cycle {decision.cycle} the {who} acted: {said}.", record)
 

@@ -130,6 +130,11 @@ def _get(value: Any, name: str) -> Any:
     return getattr(value, name, None)
 
 
+def is_adjusted(sketch: PlanSketch, author: str) -> bool:
+    """Whether with this revision the rest of a plan was moved to fit the pose of a milestone."""
+    return sketch.adjustments > 0 and sketch.verified and author == "milestone_passer"
+
+
 def is_lost(value: Discrepancy) -> bool:
     """Whether with it nobody below the goal level could correct where the robot believed to be."""
     return value.status == "escalated" and value.level.above is Level.GOAL

@@ -73,8 +73,8 @@ class DoorState:
     def sentence(self) -> str:
         said = f"{self.door} is {self.state}"
         if self.state == "unknown":
-            said = f"{self.door} may be shut"
+            said = f"{self.door} may be shut" if self.log_odds > 0.0 else f"{self.door} is not known to be open or shut"
         seen = f"{self.pictures} picture{'s' * (self.pictures != 1)}"
         touched = "" if self.touched_s is None else f"; something was touched in it at {self.touched_s:.1f} s"
-        return f"{said}: its opening shows {self.last.shows}; {self.certainty:.1%} by {seen}, the last at " \
-               f"{self.seen_s:.1f} s{touched}"
+        return f"{said}, with a probability of {self.certainty:.1%} by {seen}: the last showed {self.last.shows} in " \
+               f"its opening, at {self.seen_s:.1f} s{touched}"

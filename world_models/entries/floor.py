@@ -83,7 +83,9 @@ class FreeFloor:
 
     def sentence(self) -> str:
         far = [far for near, far in zip(self.near_m, self.far_m, strict=True) if far > near]
-        free = f"free up to {words.metres(min(far))} to {words.metres(max(far))}" if far else "nowhere seen to be free"
+        free = "nowhere seen to be free"
+        if far:
+            free = f"free for {words.metres(min(far))} where it is shortest, and {words.metres(max(far))} where longest"
         named = f"; {words.count(len(self.things), 'thing')} that the model lacks" if self.things else ""
         return f"the floor of {self.locale} is {free}, by the {self.sense}{named}; at {self.seen_s:.1f} s"
 

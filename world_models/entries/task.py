@@ -166,10 +166,11 @@ class PlanSketch:
 
     def sentence(self) -> str:
         if self.status != "active":
-            progress = f"{self.status} at milestone M{self.at}"
+            ended = "withdrawn" if self.status == "superseded" else self.status
+            progress = f"{ended} in part {min(self.at + 1, len(self.subgoals))} of {len(self.subgoals)}"
         else:
-            state = "verified" if self.verified else "yet to be verified"
-            progress = f"milestone M{self.at} of M{len(self.subgoals)} {state}"
+            state = "is verified" if self.verified else "is still to be verified"
+            progress = f"M{self.at} of its milestones M0 to M{len(self.subgoals)} {state}"
         steps = " then ".join(step.destination.words() + (f" by {step.passage}" if step.passage else "")
                               for step in self.subgoals)
         adjusted = f", adjusted {words.count(self.adjustments, 'time')}" if self.adjustments else ""

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harvey.cli import main
-from harvey.errors import MOST_LETTERS, in_one_line
+from harvey.errors import MOST_LETTERS, MOST_OF_A_WORD, in_one_line
 
 SCENARIO = """\
 world = "research_center"
@@ -25,13 +25,14 @@ NAME = 1
 def test_any_text_is_one_printable_line(text: str) -> None:
     line = in_one_line(text)
     assert (line.isprintable() or not line) and len(line) <= MOST_LETTERS
-    if text.isprintable() and len(text) <= MOST_LETTERS and all(len(word) <= 80 for word in text.split(" ")):
+    is_short = len(text) <= MOST_LETTERS and all(len(word) <= MOST_OF_A_WORD for word in text.split(" "))
+    if text.isprintable() and is_short:
         assert line == text
 
 
 def test_of_what_is_long_the_middle_is_left_out() -> None:
     line = in_one_line(f"{'a' * 5000}.pgm: expected a picture, got none")
-    assert line.startswith("aaa") and line.endswith("a.pgm: expected a picture, got none") and len(line) < 130
+    assert line.startswith("aaa") and line.endswith("a.pgm: expected a picture, got none") and len(line) < 210
 
 
 def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:

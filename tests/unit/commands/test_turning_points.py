@@ -18,11 +18,18 @@ from blackboard.level import Level
 from harvey.campaign.progress import Lines, Tally
 from harvey.campaign.summary import format_result
 from harvey.errors import BadInput
-from harvey.runner.result import MissionResult
+from harvey.runner.result import MissionResult, RunCounts
 from harvey.simulation.contacts import ContactWatch
 from logs.explain.phrases import describe_decision
-from logs.explain.story import levels_off
-from logs.explain.turning_points import Collision, TurningPoint, TurningPointFinder, read_turning_points, turn_lines
+from logs.explain.story import levels_off, tell_happenings
+from logs.explain.turning_points import (
+    Collision,
+    Happening,
+    TurningPoint,
+    TurningPointFinder,
+    read_turning_points,
+    turn_lines,
+)
 from logs.explain.why import headline, story
 from logs.records import DecisionRecord, decision_of
 from logs.run_directory import RunDirectory
@@ -34,7 +41,7 @@ from sim.truth import Truth
 from world_models.entries.body import BodyFault, Recovery
 from world_models.entries.door_state import DoorPicture, DoorState
 from world_models.entries.obstacle import Contact, Obstacle
-from world_models.entries.task import Outcome
+from world_models.entries.task import Outcome, PlanSketch
 from world_models.frames import Pose2
 
 
@@ -73,9 +80,11 @@ def test_a_door_and_a_thing_are_told_when_they_change_and_not_each_time_that_the
         made = board.apply(effects, author="source", cycle=cycle)
         found += finder.find(Decision(cycle, (), (), Level.ACTION, (), (), None, None, 0, made, ""))
     assert [(point.cycle, point.kind) for point in found] == [(2, "thing"), (2, "door"), (4, "thing"), (4, "door")]
-    assert [point.text.partition(":")[0] for point in found] == [
-        "something 0.5 m wide at (0.20, 0.30) m of hallway is in the way (hallway/obstacle-1)", "library-door is shut",
-        "something 0.5 m wide at (0.20, 0.30) m of hallway is gone (hallway/obstacle-1)", "library-door is open"]
+    assert [point.text.partition(":")[0].partition(",")[0] for point in found if point.kind == "door"] == [
+        "library-door is shut", "library-door is open"]
+    assert [point.text for point in found if point.kind == "thing"] == [
+        "something 0.5 m wide at (0.20, 0.30) m of hallway is in the way (hallway/obstacle-1)",
+        "something 0.5 m wide at (0.20, 0.30) m of hallway is gone (hallway/obstacle-1)"]
 
 
 def test_a_contact_is_told_with_the_place_where_it_believed_to_be() -> None:
@@ -101,6 +110,48 @@ def test_a_short_account_tells_them_with_the_collisions_that_the_simulator_knows
     lines = list(turn_lines(MemoryTimeline(records()[:1]), {"collisions": 2}))
     assert lines[-1] == "  2 collisions; this run does not say where"
     assert "Nothing went wrong on the way" in next(turn_lines(MemoryTimeline(records()[:1]), {}))
+
+
+def test_what_the_simulator_did_is_told_as_that() -> None:
+    happened = [{"cycle": 3, "what": "somebody carries the robot off"}]
+    lines = list(turn_lines(MemoryTimeline(records()), {"happened": happened}))
+    assert lines[2] == "  cycle 3  simulator  somebody carries the robot off, as only the simulator knows"
+    told = tell_happenings(MemoryTimeline(records()), {"happened": happened})
+    assert [(one.cycle, one.text) for one in told.sentences] == [
+        (3, "Somebody carries the robot off, as only the simulator knows.")]
+    (nothing,) = tell_happenings(MemoryTimeline(records()), {"happened": []}).sentences
+    (unknown,) = tell_happenings(MemoryTimeline(records()), {}).sentences
+    assert nothing.text == "The simulator did nothing to it." and "nobody recorded" in unknown.text
+
+
+@pytest.mark.parametrize("record", [{"cycle": 3}, {"cycle": 99, "what": "a bump"}, {"cycle": 3, "what": 7}, 7, "x"])
+def test_a_happening_that_is_none_is_one_error(record: Any) -> None:
+    with pytest.raises(BadInput, match=r"result\.json: happened: expected"):
+        list(turn_lines(MemoryTimeline(records()), {"happened": [record]}))
+
+
+def test_of_a_run_that_was_cut_off_it_is_not_said_that_nothing_went_wrong() -> None:
+    (line,) = turn_lines(MemoryTimeline(records()[:1]), {}, is_whole=False)
+    assert line == "Nothing had gone wrong when the run was cut off: what would have come of it nobody knows."
+
+
+def test_a_plan_that_is_withdrawn_on_all_its_levels_is_replanned_once() -> None:
+    board, counts = Blackboard(), RunCounts()
+    first = PlanSketch("Goal-1", (), "", ())
+
+    def act(cycle: int, *effects: Effect, author: str = "source") -> None:
+        made = board.apply(list(effects), author=author, cycle=cycle)
+        counts(Decision(cycle, (), (), Level.ACTION, (), (), None, None, 0, made, ""))
+
+    act(1, Post(first), Post(replace(first, path=(0,), locale="hallway")))
+    assert counts.replans == 0
+    act(2, *(Revise(board.view[f"PlanSketch-{k}"], replace(board.view[f"PlanSketch-{k}"].value, status="superseded"))
+             for k in (1, 2)))
+    act(3, Post(first))
+    assert (counts.replans, counts.sketches) == (1, 3)
+    act(4, Revise(board.view["PlanSketch-3"], replace(first, adjustments=1, verified=True)), author="milestone_passer")
+    act(5, Revise(board.view["PlanSketch-3"], replace(first, adjustments=1, at=1)))
+    assert counts.replans == 2
 
 
 @pytest.mark.parametrize("contact", [{"cycle": 3}, {"cycle": "3", "locale": "", "x_m": 0.0, "y_m": 0.0}, 7, {},
@@ -151,7 +202,8 @@ def test_the_summary_tells_them_and_the_result_keeps_them() -> None:
         scenario="s", seed=0, outcome="reached", reason="so it was", goal="(ptrans)", final_error_m=0.01,
         final_heading_error_rad=0.0, path_length_m=20.0, sim_time_s=90.0, wall_time_s=10.0, frames=9, decisions=400,
         milestones={"verified": 5, "refuted": 1, "not_testable": 0, "false_accepts": 0}, replans=2, relocalizations=0,
-        sketches=3, collisions=1, max_cross_track_m=1.0, contacts=contacts, turning_points=points)
+        sketches=3, collisions=1, max_cross_track_m=1.0, contacts=contacts, turning_points=points,
+        happened=(Happening(4, "the lights go off for 2 s"),))
     text = format_result(known, None)
     assert "collisions    1\n" in text
     assert format_result(known, None, ("On the way:", "  cycle 4  lost")).endswith("\n\nOn the way:\n  cycle 4  lost")

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import pytest
 
 from blackboard.journal import plain
 from harvey.errors import BadInput
-from logs.explain.questions_in_words import answers, is_question
+from logs.explain.questions_in_words import QUESTIONS, answers, is_question
 from logs.records import DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
 from world_models.building.locale_frame import FrameChange, FrameReference
 from world_models.entries.body import CameraPicture
 from world_models.entries.door_state import DoorPicture, DoorState
+from world_models.entries.location import Place
 from world_models.entries.obstacle import Obstacle
-from world_models.entries.task import Outcome, PlanSketch
+from world_models.entries.task import Outcome, PlanSketch, Subgoal
 
 SQUARE = ((0.0, 0.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5))
 BOX = Obstacle("hallway/obstacle-1", "hallway", SQUARE, 0.05, 0.25, 0.25, 0.5, certainty=0.7, by="camera",
@@ -86,6 +88,48 @@ def test_where_nothing_happened_that_is_said() -> None:
         "It took no detour: no plan was withdrawn for anything in the way."]
 
 
+def test_a_detour_is_told_with_the_plan_before_and_after_and_what_lay_between() -> None:
+    def plan(*points: tuple[float, float]) -> tuple[Subgoal, ...]:
+        places = [Place("hallway", x, y) for x, y in points]
+        return tuple(Subgoal(one, other, True) for one, other in pairwise(places))
+
+    old = PlanSketch("Goal-1", (1,), "hallway", plan((-1.0, 0.15), (2.0, 0.15)))
+    told = history(
+        entry("CameraPicture-3.0", CameraPicture(b"", 3, 1.0), (), 1),
+        entry("PlanSketch-1.0", replace(old, path=(), locale=""), (), 2),
+        entry("PlanSketch-2.0", old, (), 3),
+        entry("Obstacle-1.0", THERE, ("CameraPicture-3.0",), 4),
+        entry("LocaleFrame-1.1", FrameReference("0123", "hallway", (EXTRA,)), ("Obstacle-1.0",), 5),
+        entry("PlanSketch-2.1", replace(old, status="superseded"), ("LocaleFrame-1.1",), 6),
+        entry("PlanSketch-3.0", replace(old, path=(), locale=""), (), 7),
+        entry("PlanSketch-4.0", replace(old, subgoals=plan((-1.0, 0.15), (0.2, 0.9), (2.0, 0.15))), (), 8))
+    for question in ("why that detour?", "why did it go another way?", "why was the plan withdrawn?"):
+        (story,) = answers(told, question)
+        steps = {step.label: step.text for step in story.steps}
+        assert story.headline == "In cycle 6 it planned another way through hallway."
+        assert steps["before"] == "It was to go to (2.00, 0.15) m of hallway."
+        assert "its middle is 100 mm from the line of that plan" in steps["between"]
+        assert steps["after"] == "In cycle 8 it was to go to (0.20, 0.90) m of hallway, then (2.00, 0.15) m of hallway."
+
+
+@pytest.mark.parametrize(("question", "word"), [
+    ("is it raining there?", "raining"), ("is the garage-door shut?", "garage-door"),
+    ("why did you stop at the pub?", "pub"), ("how far off is the moon?", "moon")])
+def test_a_question_with_a_word_that_says_nothing_is_refused_with_the_nearest(question: str, word: str) -> None:
+    with pytest.raises(BadInput, match=f"'{word}' said nothing"):
+        answers(RUN, question)
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_the_questions_that_are_named_are_understood(question: str) -> None:
+    assert question.startswith("how far") or list(answers(RUN, question))
+
+
+def test_the_nearest_question_is_named_first() -> None:
+    with pytest.raises(BadInput, match=r"expected a question as 'is the door shut\?', "):
+        answers(RUN, "is the garage-door shut?")
+
+
 def test_another_question_is_answered_with_those_that_are_known() -> None:
-    with pytest.raises(BadInput, match="expected a question as 'what is in the way"):
-        list(answers(RUN, "what time is it?"))
+    with pytest.raises(BadInput, match=r"expected a question as 'wh.+; 'colour' said nothing"):
+        list(answers(RUN, "what colour is it?"))

@@ -14,13 +14,13 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_068,
+    "world_models": 10_071,
     "knowledge_sources": 22_606,
-    "sim": 5_860,
-    "logs": 7_450,
-    "harvey": 10_620,
+    "sim": 5_901,
+    "logs": 7_593,
+    "harvey": 10_640,
     "experiments": 10_425,
-    "tests": 43_970,
+    "tests": 44_000,
     "extras": 15_170,
 }
 """Of Python files, at most."""

@@ -11,7 +11,8 @@ from rerun.chunk import RrdReader
 
 from journals import read_decisions, read_journal
 from logs.journal_file import JournalFile
-from logs.reader import damage_of, read_frames
+from logs.reader import damage_of, read_frames, read_series
+from logs.recording.paths import CHAPTERS
 from logs.recording.writer import RecordingWriter
 from logs.run_errors import RecordingError
 from scripted_mission import CAMERA, MOUNT, house, picture, play
@@ -58,6 +59,16 @@ def test_without_the_truth_the_true_robot_is_not_drawn(tmp_path: Path) -> None:
              for truth in (True, False)}
     robot = "/world/robot/true"
     assert paths[True] - paths[False] == {robot, f"{robot}/body", f"{robot}/heading", f"{robot}_trail"}
+
+
+def test_what_the_simulator_did_is_a_turning_point_of_the_recording(tmp_path: Path) -> None:
+    recorder = RecordingWriter(tmp_path / "r.rrd", world=house(), camera=CAMERA, mount=MOUNT, title="house",
+                               recording_id="house-0")
+    here = Pose2(1.0, 1.0, 0.0)
+    play([recorder], lambda n: recorder.truth(here, 0.3 * n, (), ("the lights go off for 2 s",) if n == 3 else ()))
+    recorder.close()
+    told = [text for _, text in read_series(tmp_path / "r.rrd", CHAPTERS, "TextLog:text")]
+    assert told.count("the lights go off for 2 s, as only the simulator knows") == 1
 
 
 def test_an_unfinished_recording_holds_what_was_flushed(

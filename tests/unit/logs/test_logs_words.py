@@ -34,8 +34,8 @@ def play_to(until: str = "") -> tuple[list[Decision], Mirror]:
 def test_a_decision_is_told_in_a_sentence() -> None:
     messages = Messages()
     told = "\n".join(sentence(d, messages) for d in play_to()[0])
-    assert ("sketcher: plan sketch from locale to locale: milestone M0 of M2 yet to be verified; "
-            "plan sketch through kitchen: milestone M0 of M1 yet to be verified") in told
+    assert ("sketcher: plan sketch from locale to locale: M0 of its milestones M0 to M2 is still to be verified; "
+            "plan sketch through kitchen: M0 of its milestones M0 to M1 is still to be verified") in told
     assert ("motor: straight leg of 2.24 m, moving after 0 increments; "
             "turn 22.9 degrees left and move 0.60 m ahead") in told
     assert "tracker: the belief moves by 0.58 m and 22.9 degrees, by tracks; " in told
@@ -119,7 +119,7 @@ def test_the_story_says_what_it_wants_expects_sees_doubts_and_does() -> None:
     assert told.startswith("### Looking for a milestone")
     assert "**Goal:** from kitchen (1.00, 1.00) m to parlour (2.00, 2.00) m; active." in told
     assert ("**It believes** that it stands at (1.00, 1.00) m of kitchen, heading 0.0 degrees "
-            "(sure to 20 mm and 0.6 degrees), by command.") in told
+            "(within 20 mm and 0.6 degrees, one sigma), by command.") in told
     assert "**Milestone** the door is expected; " in told and "should show 2 model lines of kitchen-door." in told
     assert "**It sees** 3 line segments found; 2 segments paired with model lines; 1 of 2" in told
     assert "**It doubts:** nothing now." in told
