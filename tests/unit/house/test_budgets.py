@@ -14,13 +14,13 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_071,
+    "world_models": 10_076,
     "knowledge_sources": 22_606,
     "sim": 5_901,
     "logs": 7_593,
-    "harvey": 10_640,
+    "harvey": 10_740,
     "experiments": 10_425,
-    "tests": 44_000,
+    "tests": 44_223,
     "extras": 15_170,
 }
 """Of Python files, at most."""
