@@ -1,14 +1,12 @@
 """How Sphinx builds the documentation: ``sphinx-build -W docs build/site``."""
 
-import os
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-os.environ["COLUMNS"] = "100"  # argparse wraps usage lines to the terminal; the pages are the same everywhere
 
 project = "Harvey"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "docs.tools.site.pages"]
+extensions = ["myst_parser", "docs.tools.site.pages"]
 exclude_patterns = ["tools"]
 highlight_language = "none"
 
@@ -16,13 +14,7 @@ html_theme = "furo"
 html_title = "Harvey"
 html_copy_source = False
 
-myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 4
-
-autodoc_member_order = "bysource"
-autodoc_typehints = "signature"
-autodoc_typehints_format = "short"
-napoleon_use_ivar = True
 
 man_pages = [("reference/command-line", "harvey", "model-directed mobile robot navigation", [], 1)]
 man_make_section_directory = False

@@ -1,4 +1,4 @@
-"""The picture in ARCHITECTURE.md, made from the classes: ``python -m docs.tools.architecture_picture`` writes it."""
+"""The picture in ARCHITECTURE.md, made from the classes: ``python -m docs.tools.fill`` writes it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from xml.sax.saxutils import escape
 from blackboard.kinds import Registry, Role
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level
-from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds
 
 PICTURE = Path(__file__).parents[1] / "architecture.svg"
 WIDTH, MARGIN, GAP = 1000, 16, 40
@@ -173,6 +172,3 @@ def fit(lines: Sequence[Line]) -> int:
     """The height of a box round lines [px]."""
     return sum(map(height_of, lines)) + 24
 
-
-if __name__ == "__main__":
-    PICTURE.write_text(draw_architecture(KNOWLEDGE_SOURCES, load_kinds()), encoding="utf-8")

@@ -1,19 +1,21 @@
-"""The table of docs/knowledge-sources.md, made from the classes.
-
-``python -m docs.tools.knowledge_source_table`` prints it.
-"""
+"""The table of docs/knowledge-sources.md, made from the classes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from blackboard.knowledge_source import KnowledgeSource
-from harvey.wiring import KNOWLEDGE_SOURCES, foreign_sources
+from harvey.wiring import KNOWLEDGE_SOURCES
 from knowledge_sources.priority import Priority
 from world_models.building.locale_frame import FrameRequest
 
 EVERYBODY_WRITES = (FrameRequest,)
 """Left out of the table: each knowledge source of a robot may ask for a locale frame."""
+
+
+def describe_knowledge_sources() -> str:
+    """The table of those that come with Harvey."""
+    return "\n".join(rows(KNOWLEDGE_SOURCES))
 
 
 def rows(sources: Iterable[type[KnowledgeSource]]) -> list[str]:
@@ -37,6 +39,3 @@ def _tell_priority(source: type[KnowledgeSource]) -> str:
         return "by the case"
     return source.priority.name.lower() if isinstance(source.priority, Priority) else f"{source.priority:g}"
 
-
-if __name__ == "__main__":
-    print("\n".join(rows((*KNOWLEDGE_SOURCES, *foreign_sources().values()))))

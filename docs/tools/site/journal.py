@@ -1,6 +1,6 @@
 """The reference of ``journal.jsonl``, and its JSON Schema, from the kinds of entries.
 
-``python -m docs.tools.site.journal`` writes the schema anew. Where a reader of the old journal would fail on the new
+``python -m docs.tools.fill`` writes both anew. Where a reader of the old journal would fail on the new
 one, raise :data:`logs.run_directory.JOURNAL_VERSION` first.
 """
 
@@ -145,6 +145,3 @@ def format_schema() -> str:
     """The schema as its file has it."""
     return json.dumps(build_schema(), indent=1) + "\n"
 
-
-if __name__ == "__main__":
-    SCHEMA.write_text(format_schema(), encoding="utf-8")

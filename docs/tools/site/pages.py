@@ -1,39 +1,20 @@
-"""A Sphinx extension: what pages take from the code and from documents outside ``docs/``, when the site is built.
+"""A Sphinx extension: documents outside ``docs/`` as pages of the site.
 
-In a page, ``<!-- generate: NAME -->`` stands for the Markdown that the generator of this name makes, and
-``<!-- document: FILE -->`` for a document of the repository. Links to those documents lead to their pages.
+The pages under ``docs/project/`` link to those documents; when the site is built, each is replaced by its document.
+Links to these documents lead to their pages.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from sphinx.application import Sphinx
 
-from docs.tools.site.command_line import describe_commands
-from docs.tools.site.journal import describe_kinds
-from docs.tools.site.mission_files import (
-    describe_faults,
-    describe_hardware_tables,
-    describe_scenario_tables,
-    describe_shared_tables,
-)
-from docs.tools.site.setting_tables import describe_settings
-from docs.tools.site.world_files import describe_world_keys
-from world_models import frames
-
 ROOT = Path(__file__).parents[3]
 DOCS = ROOT / "docs"
-
-
-def describe_frames() -> str:
-    """What the module of coordinate frames says of them."""
-    return f"```text\n{(frames.__doc__ or '').strip()}\n```"
-
-
 PAGES: Mapping[str, str] = {
     "README.md": "project/readme.md",
     "ARCHITECTURE.md": "project/architecture.md",
@@ -42,14 +23,6 @@ PAGES: Mapping[str, str] = {
     "tests/README.md": "project/tests.md",
 }
 """The page of each document that is kept outside ``docs/``."""
-GENERATORS: Mapping[str, Callable[[], str]] = {
-    "commands": describe_commands, "settings": describe_settings, "kinds": describe_kinds,
-    "shared-tables": describe_shared_tables, "hardware-tables": describe_hardware_tables,
-    "scenario-tables": describe_scenario_tables, "faults": describe_faults, "world-keys": describe_world_keys,
-    "frames": describe_frames,
-}
-"""What makes Markdown from the code, by the name that pages use."""
-MARKER = re.compile(r"^<!-- (generate|document): (\S+) -->$", re.MULTILINE)
 LINK = re.compile(r"\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]*)?\)")
 
 
@@ -65,14 +38,9 @@ def _fill_in(app: Sphinx, name: str, source: list[str]) -> None:
 
 
 def fill_in(text: str, page: Path) -> str:
-    """The page's text with its markers replaced. Raises KeyError for a generator that there is not, OSError."""
-    def replace(marker: re.Match[str]) -> str:
-        kind, name = marker.groups()
-        if kind == "generate":
-            return GENERATORS[name]()
-        return lead_links((ROOT / name).read_text(encoding="utf-8"), ROOT / name, page)
-
-    return MARKER.sub(replace, lead_links(text, page, page))
+    """A page's text, or that of the document for which it stands, with links as they must be there. Raises OSError."""
+    document = next((ROOT / name for name, of in PAGES.items() if DOCS / of == page), page)
+    return lead_links(text if document == page else document.read_text(encoding="utf-8"), document, page)
 
 
 def lead_links(text: str, document: Path, page: Path) -> str:

@@ -15,6 +15,7 @@ from harvey.cli import main
 from harvey.commands.listing import format_value
 from harvey.errors import BadInput
 from knowledge_sources.settings import DEFAULT, Row, Settings, list_rows, replace_value
+from sim.scenario import load_scenario, with_settings
 from world_models.entries.body import LAST_REQUESTS
 from world_models.entries.percepts import LAST_SEGMENTS
 
@@ -79,8 +80,12 @@ def test_setting_one_changes_it_and_nothing_else(row: Row) -> None:
 
 @pytest.mark.parametrize("word", ["on", "yes", "true", "True", "off", "no", "false"])
 def test_a_switch_takes_any_word_for_on_and_off(word: str) -> None:
+    """A setting, and a key of the scenario."""
     is_on = word.lower() in ("on", "yes", "true")
     assert build_settings([("floor.use_ranges", word)]).floor.use_ranges is is_on
+    if word != "True":  # of a key only what TOML says
+        mission = with_settings(load_scenario("forty-foot-hallway"), {"motion.continuous": word, "servo.plan": word})
+        assert mission.motion.continuous is is_on and mission.servo.plan is is_on
 
 
 def test_no_more_is_asked_of_the_board_than_it_keeps() -> None:

@@ -1,4 +1,4 @@
-"""README and ARCHITECTURE say what is: table and picture are current, commands parse."""
+"""Documents say what is: what is generated in them is current, links lead somewhere, nothing is a placeholder."""
 
 from __future__ import annotations
 
@@ -6,22 +6,71 @@ import re
 import shlex
 from pathlib import Path
 
+import pytest
+
 from docs.tools.architecture_picture import PICTURE, draw_architecture, name_of
-from docs.tools.knowledge_source_table import rows
+from docs.tools.fill import GENERATORS, MARKED, fill, list_pages
 from harvey.cli import parser
 from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds
+from world_models.plugins import EXTRAS, list_absent
 
 ROOT = Path(__file__).parents[3]
+DOCUMENTS = sorted(path.relative_to(ROOT) for path in (
+    *ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("tests/*.md"), *ROOT.glob("extras/*/*.md"),
+    *(ROOT / "examples").rglob("*.md")))
+FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\]\((?![a-z]+:)([^)#\s]*)(#[^)\s]+)?\)")
 
 
-def test_the_table_of_knowledge_sources_is_the_one_that_the_classes_give() -> None:
-    text = (ROOT / "docs" / "knowledge-sources.md").read_text(encoding="utf-8")
-    table = text.split("<!-- knowledge sources -->\n")[1].split("\n<!-- /knowledge sources -->")[0]
-    assert table.splitlines() == rows(KNOWLEDGE_SOURCES)
+@pytest.mark.parametrize("page", [*list_pages()], ids=lambda page: page.stem)
+def test_what_is_generated_in_a_page_is_what_its_generator_makes_now(page: Path) -> None:
+    """``python -m docs.tools.fill`` writes it anew."""
+    if page.name == "command-line.md" and (absent := [name for group in EXTRAS for name in list_absent(group)]):
+        pytest.skip(f"expected the extras, whose commands are in the page, got none that adds {', '.join(absent)}")
+    text = page.read_text(encoding="utf-8")
+    assert fill(text) == text
+    assert [name for name, made in MARKED.findall(text) if not made.strip()] == []
+
+
+def test_no_generated_part_is_without_its_page() -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in list_pages())
+    assert sorted(name for name, _ in MARKED.findall(text)) == sorted(GENERATORS)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=str)
+def test_a_document_has_no_placeholder(document: Path) -> None:
+    """Neither a marker between whose ends nothing stands, nor a word that says that something is still to come."""
+    text = (ROOT / document).read_text(encoding="utf-8")
+    assert re.findall(r"<!--.*?-->", MARKED.sub("", text), re.DOTALL) == []
+    assert re.findall(r"\b(?:TODO|TBD|FIXME|XXX|lorem ipsum|coming soon)\b", text, re.IGNORECASE) == []
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=str)
+def test_every_link_leads_to_a_file_and_to_a_heading_in_it(document: Path) -> None:
+    text = FENCED.sub("", (ROOT / document).read_text(encoding="utf-8"))
+    astray = []
+    for name, anchor in LINK.findall(text):
+        target = (ROOT / document).parent / name if name else ROOT / document
+        if not target.exists() or (anchor and anchor[1:] not in anchors_of(target)):
+            astray.append(name + anchor)
+    assert astray == []
+
+
+def test_a_link_that_leads_nowhere_is_seen() -> None:
+    assert anchors_of(ROOT / "README.md") >= {"licence"}
+    assert "nowhere" not in anchors_of(ROOT / "README.md")
+    found = LINK.findall("[a](b.md#c) [d](#e) ![f](g.png) [h](https://i.j/k.md)")
+    assert found == [("b.md", "#c"), ("", "#e"), ("g.png", "")]
+
+
+def anchors_of(document: Path) -> set[str]:
+    """Of its headings, as GitHub makes them and Sphinx does."""
+    headings = re.findall(r"^#+ (.*)$", FENCED.sub("", document.read_text(encoding="utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", one.lower()).replace(" ", "-") for one in headings}
 
 
 def test_the_picture_is_the_one_that_the_classes_give() -> None:
-    """It names every knowledge source and every kind of entry; ``python -m docs.tools.architecture_picture``."""
+    """It names every knowledge source and every kind of entry."""
     picture = PICTURE.read_text(encoding="utf-8")
     assert picture == draw_architecture(KNOWLEDGE_SOURCES, load_kinds())
     words = {name for text in re.findall(r"<text[^>]*>([^<]*)</text>", picture) for name in text.split(" · ")}

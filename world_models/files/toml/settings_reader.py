@@ -103,10 +103,14 @@ def suggest_keys(key: str, known: Iterable[str]) -> str:
     return "one of " + ", ".join(alike) + more
 
 
+SWITCHES: Mapping[str, bool] = {"on": True, "yes": True, "off": False, "no": False}
+"""How ``--set`` may say true and false beside TOML's own words."""
+
+
 def parse_value(text: str) -> Any:
-    """The value of a ``--set key=value``: on or off, a TOML value, or else the text itself."""
-    if text.lower() in ("on", "off"):
-        return text.lower() == "on"
+    """The value of a ``--set key=value``: on, yes, off or no, a TOML value, or else the text itself."""
+    if text.lower() in SWITCHES:
+        return SWITCHES[text.lower()]
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except (ValueError, RecursionError):
