@@ -25,6 +25,7 @@ from docs.tools.site.mission_files import (
 from docs.tools.site.python_page import describe_python
 from docs.tools.site.setting_tables import describe_settings
 from docs.tools.site.world_files import describe_world_keys
+from docs.tools.status import describe_experiments, describe_seeds
 from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds
 from world_models import frames
 
@@ -42,6 +43,7 @@ GENERATORS: Mapping[str, Callable[[], str]] = {
     "shared-tables": describe_shared_tables, "hardware-tables": describe_hardware_tables,
     "scenario-tables": describe_scenario_tables, "faults": describe_faults, "world-keys": describe_world_keys,
     "frames": describe_frames, "python": describe_python, "knowledge-sources": describe_knowledge_sources,
+    "experiments": describe_experiments, "seeds": describe_seeds,
 }
 """What makes Markdown from the code, by the name that pages use."""
 

@@ -8,6 +8,7 @@ from argparse import Action, ArgumentParser, Namespace, _SubParsersAction
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby, zip_longest
 from math import degrees
+from pathlib import Path
 from textwrap import fill, wrap
 from typing import TYPE_CHECKING, Any
 
@@ -157,15 +158,26 @@ def _add_experiment_arguments(parser: ArgumentParser) -> None:
                         help="a small version, of seconds to two minutes; it claims only what it can show")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.add_argument("--seed", metavar="N", type=whole, default=0, help="of all random numbers (0)")
+    parser.add_argument("--out", metavar="FILE.json", help="also write the claims there, with date, commit and options")
     add_worker_arguments(parser)
     parser.add_argument("--missions", metavar="N", type=whole, help="how many, for the experiments that say so")
 
 
 def _run_experiment(args: Namespace) -> int:
-    import experiments
+    import time
 
+    import experiments
+    from experiments.results import build_result, write_result
+
+    if args.out and not Path(args.out).parent.is_dir():
+        raise BadInput(f"--out: expected a file in a folder that there is, got {args.out!r}")
+    since_s = time.monotonic()
     with choose_workers(parse_workers(args)):
         report = experiments.run(args.experiment, quick=args.quick, seed=args.seed, missions=args.missions or None)
+    if args.out:
+        options = " ".join(["--quick"] * args.quick + [f"--missions {args.missions}"] * bool(args.missions))
+        took_s = time.monotonic() - since_s
+        write_result(build_result(args.experiment, report, options, args.seed, took_s), Path(args.out))
     print(json.dumps(report.record(), indent=2) if args.json else report.text())
     return 0 if report.holds else 1
 
@@ -178,6 +190,7 @@ EXPERIMENT = CliCommand(
         ("harvey experiment obstacles --missions 200", "a fifth of its missions"),
         ("harvey experiment missions --workers 4", "on four processors"),
         ("harvey experiment levels --json", "for further use"),
+        ("harvey experiment figure12 --out figure12.json", "its claims, with date and commit, for docs/status.md"),
     ),
     _add_experiment_arguments, _run_experiment,
     "It prints a table, notes (assumptions, and what the columns mean) and claims, each with 'holds' or 'FAILS'.\n"

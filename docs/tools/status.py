@@ -1,0 +1,83 @@
+"""The tables of docs/status.md: what each experiment found last, and the missions of four seeds.
+
+``harvey experiment NAME --out docs/results/NAME.json`` writes what an experiment found; ``python -m docs.tools.status``
+drives the seeds and writes ``docs/results/seeds/``. ``python -m docs.tools.fill`` makes the tables of both.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import harvey
+from docs.tools.site.markdown import escape, table
+from experiments import EXPERIMENTS
+from experiments.results import STALE_AFTER, Result, find_commit, is_stale, read_results
+from world_models.words import count
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "docs" / "results"
+SCENARIO, SEEDS = "lab-to-allens-office", range(4)
+SEEDS_FILE = RESULTS / "seeds" / f"{SCENARIO}.json"
+FIGURES: Mapping[str, str] = {
+    "outcome": "outcome", "error_mm": "error mm", "milestones": "milestones", "refuted": "refuted", "wrong": "wrong",
+    "replans": "replans", "collisions": "collisions", "path_m": "path m", "robot_s": "robot s", "cycles": "cycles",
+}
+"""Of a mission, with their columns. None depends on the machine."""
+
+
+def describe_experiments() -> str:
+    """A row for each claim of each experiment, those that were not driven too."""
+    found = {result.experiment: result for result in read_results(RESULTS)}
+    rows = [row for folder in EXPERIMENTS.values() for name, asked in folder.items()
+            for row in _rows(name, asked, found.get(name))]
+    held = [holds for result in found.values() for _, holds in result.claims]
+    total = (f"{count(len(found), 'experiment')} of {sum(map(len, EXPERIMENTS.values()))} driven;"
+             f" of {count(len(held), 'claim')} {held.count(True)} hold.")
+    return "\n".join([total, *table(("experiment", "what", "holds", "driven"), rows)])
+
+
+def _rows(name: str, asked: str, result: Result | None) -> Iterator[tuple[str, ...]]:
+    if result is None:
+        yield (f"`{name}`", escape(asked), "not driven", "")
+        return
+    how = " ".join(filter(None, (result.options, f"--seed {result.seed}" if result.seed else "")))
+    driven = ", ".join(filter(None, (f"`{how}`" if how else "whole", result.date[:10], result.commit)))
+    driven += f"; **stale**: more than {STALE_AFTER} commits ago" if is_stale(result) else ""
+    if not result.claims:
+        yield (f"`{name}`", f"{escape(asked)} (claims nothing)", "", driven)
+    for claim, holds in result.claims:
+        yield (f"`{name}`", escape(claim), "yes" if holds else "**no**", driven)
+
+
+def describe_seeds() -> str:
+    """The missions of four seeds, by which commit."""
+    found = json.loads(SEEDS_FILE.read_text(encoding="utf-8"))
+    rows = [(str(seed), *(str(row[name]) for name in FIGURES)) for seed, row in found["missions"].items()]
+    return "\n".join([f"`harvey run {SCENARIO} --seed 0..{SEEDS[-1]}`, commit {found['commit']}:",
+                      *table(("seed", *FIGURES.values()), rows)])
+
+
+def drive_seed(seed: int) -> dict[str, Any]:
+    """The figures of one mission."""
+    result = harvey.run(SCENARIO, seed=seed)
+    return {
+        "outcome": result.outcome, "error_mm": round(1000 * result.error_m, 1),
+        "milestones": result.milestones["verified"], "refuted": result.milestones["refuted"],
+        "wrong": result.milestones["false_accepts"], "replans": result.replans, "collisions": result.collisions,
+        "path_m": round(result.path_length_m, 1), "robot_s": round(result.sim_time_s), "cycles": result.cycles}
+
+
+def main() -> int:
+    """Drive the seeds, and keep what came."""
+    found = {"commit": find_commit(), "missions": {seed: drive_seed(seed) for seed in SEEDS}}
+    SEEDS_FILE.parent.mkdir(parents=True, exist_ok=True)
+    SEEDS_FILE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
