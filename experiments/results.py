@@ -27,7 +27,7 @@ class Result:
         experiment: its name; title: of its report.
         options: as they were given: ``--quick``, ``--missions 12``; seed: of all random numbers.
         date: when it ended, in UTC; seconds: how long it took.
-        commit: of the code; with a + where that was changed and not committed; empty where nobody knows.
+        commit: as by :func:`find_commit`.
         claims: each with whether it holds.
     """
 
@@ -63,9 +63,14 @@ def read_results(folder: Path) -> Iterator[Result]:
 
 
 def find_commit() -> str:
-    """The commit of this copy of the project, with a + where its code has been changed since; "" where it is none."""
-    commit = _git("rev-parse", "--short=8", "HEAD") or ""
-    return f"{commit}+" if _git("status", "--porcelain", "--untracked-files=no", "--", *CODE) else commit
+    """The commit of this copy of the project, the newest that others have; "" where nobody knows.
+
+    With a + where the code has been changed since.
+    """
+    commit = _git("merge-base", "HEAD", "@{upstream}") or _git("rev-parse", "HEAD")
+    if not commit:
+        return ""
+    return commit[:8] + "+" * bool(_git("diff", "--name-only", commit, "--", *CODE))
 
 
 def count_commits_since(date: str) -> int | None:
