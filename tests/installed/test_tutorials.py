@@ -64,12 +64,14 @@ def follow(line: str, folder: Path) -> None:
     assert done.stdout or line.startswith(("python photograph.py", PLUGIN)), f"{line} says nothing"
 
 
-def test_the_python_of_the_first_page_runs(tmp_path: Path) -> None:
-    blocks = [text for language, text in blocks_of(ROOT / "docs" / "start.md") if language == "python"]
+@pytest.mark.parametrize(("page", "says"), [("README.md", r"reached, \d.*refuted.*the same decisions again: True"),
+                                            ("docs/start.md", r"reached 0\.0")])
+def test_the_python_of_a_first_page_runs(page: str, says: str, tmp_path: Path) -> None:
+    blocks = [text for language, text in blocks_of(ROOT / page) if language == "python"]
     assert blocks
     (tmp_path / "start.py").write_text("\n".join(blocks), encoding="utf-8")
     done = run_line("python start.py", tmp_path)
-    assert done.returncode == 0 and done.stdout.startswith("reached 0.0"), done.stderr
+    assert done.returncode == 0 and re.match(says, done.stdout, re.DOTALL), done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
