@@ -86,6 +86,7 @@ class RunRecorder:
                     drawing, world=world, camera=robot.lens, mount=robot.mount, live=live, line_of=line_of,
                     title=f"harvey {head.name}", recording_id=f"{head.name}-{head.seed}")
                 opened.callback(self._drawing.close)
+                self._drawing.tell(scenario=head.name, seed=head.seed)
             self._opened = opened.pop_all()
 
     @property
@@ -113,6 +114,11 @@ class RunRecorder:
         """How the building truly differs from its model from now on: faces that are there besides, and that are not."""
         if self._drawing is not None:
             self._drawing.true_building(added, gone)
+
+    def draw_end(self, outcome: str, error_m: float | None) -> None:
+        """How it ended, and how far from the goal in truth; None where nobody knows that."""
+        if self._drawing is not None:
+            self._drawing.tell(outcome=outcome, **({} if error_m is None else {"error_m": error_m}))
 
     def close(self) -> None:
         """No more decisions. Raises RecordingError where the recording's last part could not be written."""

@@ -141,7 +141,7 @@ class Run:
             if files is not None and not isinstance(error, BadInput):
                 error.add_note(f"what was recorded is kept; harvey resume {files.path} goes on with it")
             raise
-        not_drawn = self._close()
+        not_drawn = self._close(outcome)
         result = self._result(replace(outcome, reason=outcome.reason + not_drawn))
         if files is not None:
             with suppress(OSError):  # where the disk is full, the outcome that is there, unfinished, is true as well
@@ -150,10 +150,12 @@ class Run:
                     files.write_camera(build_camera_text(camera, self.head.name))
         return result
 
-    def _close(self) -> str:
+    def _close(self, outcome: Outcome | None = None) -> str:
         """Stop the body and close the files; what to say where the recording's last part could not be written."""
         self.body.stop()
         try:
+            if outcome is not None:
+                self.recorder.draw_end(outcome.kind, self._result(outcome).final_error_m)
             self.recorder.close()
         except RecordingError:
             return "; the last part of its recording is not written (harvey repair draws it anew)"

@@ -13,7 +13,7 @@ from harvey.agent_settings import Pairs
 from harvey.errors import BadInput
 from harvey.runner.ports import Body
 from harvey.runner.replay import check_same, open_originals, replay
-from harvey.runner.result import MissionResult
+from harvey.runner.result import UNFINISHED, MissionResult
 from harvey.runner.resume import Remains, continue_run, find_remains, replay_run
 from harvey.runner.run import Run
 from harvey.runner.teller import Tell, tell_nothing
@@ -122,6 +122,8 @@ def redraw(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
             scheduler = agent.scheduler(sinks=(*recorder.sinks, *sinks))
             for decision in replay(run, open_originals(run, agent.store), scheduler):
                 check_same(run, decision)
+        ended = run.read_result()
+        recorder.draw_end(ended.get("outcome", UNFINISHED), ended.get("final_error_m"))
         recorder.close()
         os.replace(part, run.recording)
     finally:

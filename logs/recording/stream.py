@@ -103,6 +103,10 @@ class RecordingStream:
         """Log archetypes that hold at all times."""
         self._stream.log(path, what[0], *what[1:], static=True)
 
+    def tell(self, **values: str | int | float) -> None:
+        """Properties of the whole recording, by which a catalog of runs is searched: ``property:harvey:outcome``."""
+        self._stream.send_property(APPLICATION, rr.AnyValues(True, **values))
+
     def copy(self, recording: Path, content: str) -> None:
         """Take over what another recording holds at all times, as ``/world/building/**``."""
         self._stream.send_chunks(RrdReader(recording).stream().filter(content=content, is_static=True))

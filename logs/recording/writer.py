@@ -104,6 +104,10 @@ class RecordingWriter:
         self._stream.end_cycle()
         self._contacts, self._differences, self._happened = [], [], []
 
+    def tell(self, **values: str | int | float) -> None:
+        """Properties of the run as a whole, as its outcome; what is told later is added."""
+        self._stream.tell(**values)
+
     def flush(self) -> None:
         """Bring everything to the disk and to the viewers now. Raises RecordingError where that fails."""
         self._stream.flush()

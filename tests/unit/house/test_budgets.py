@@ -20,7 +20,7 @@ LINES = {
     "logs": 7_593,
     "harvey": 10_740,
     "experiments": 10_500,
-    "tests": 44_223,
+    "tests": 44_260,
     "extras": 15_170,
 }
 """Of Python files, at most."""
