@@ -2,9 +2,10 @@
 
 import math
 
-import numpy as np
-
 import harvey  # before numpy: it settles how the libraries calculate
+
+# isort: split
+import numpy as np
 
 rng = np.random.default_rng(7)
 camera = harvey.Camera.from_field_of_view(math.radians(65.0))

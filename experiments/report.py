@@ -61,7 +61,7 @@ class Report:
 
     def text(self) -> str:
         """The report as text for a terminal."""
-        shown = table(self.columns, [[_format_cell(cell) for cell in row] for row in self.rows])
+        shown = table(self.columns, [[format_cell(cell) for cell in row] for row in self.rows])
         claims = [f"{'holds' if held else 'FAILS'}: {claim}" for claim, held in self.claims]
         words = [fill(line, WIDTH, subsequent_indent="  ") for line in (*self.notes, *claims)]
         return "\n".join([self.title, "", shown, *([""] if words else []), *words])
@@ -106,7 +106,8 @@ def _unpack_single(figures: Mapping[str, Cell]) -> Cell | Mapping[str, Cell]:
     return dict(figures) if len(figures) > 1 else next(iter(figures.values()), None)
 
 
-def _format_cell(cell: Cell) -> str:
+def format_cell(cell: Cell) -> str:
+    """A cell for a person: four digits, a dash for what was not measured."""
     if cell is None:
         return "-"
     if not isinstance(cell, float):

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
-from experiments.report import Report
+from experiments.report import Cell, Report
 from harvey.errors import BadInput
 
 ROOT = Path(__file__).parents[1]
@@ -29,6 +30,7 @@ class Result:
         date: when it ended, in UTC; seconds: how long it took.
         commit: as by :func:`find_commit`.
         claims: each with whether it holds.
+        columns, rows: of its table.
     """
 
     experiment: str
@@ -39,12 +41,15 @@ class Result:
     seconds: float
     commit: str
     claims: tuple[tuple[str, bool], ...]
+    columns: tuple[str, ...] = ()
+    rows: tuple[tuple[Cell, ...], ...] = ()
 
 
 def build_result(name: str, report: Report, options: str, seed: int, seconds: float) -> Result:
     """The result of a report that has just been made."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    return Result(name, report.title, options, seed, now, round(seconds, 1), find_commit(), report.claims)
+    return Result(name, report.title, options, seed, now, round(seconds, 1), find_commit(), report.claims,
+                  report.columns, report.rows)
 
 
 def write_result(result: Result, path: Path) -> None:
@@ -59,7 +64,11 @@ def read_results(folder: Path) -> Iterator[Result]:
     """The results that a folder has, by the names of their files."""
     for path in sorted(folder.glob("*.json")):
         given = json.loads(path.read_text(encoding="utf-8"))
-        yield Result(**{**given, "claims": tuple((claim, holds) for claim, holds in given["claims"])})
+        yield Result(**{name: _frozen(value) for name, value in given.items()})
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
 
 
 def find_commit() -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 
 from docs.tools.architecture_picture import PICTURE, draw_architecture
@@ -25,7 +26,7 @@ from docs.tools.site.mission_files import (
 from docs.tools.site.python_page import describe_python
 from docs.tools.site.setting_tables import describe_settings
 from docs.tools.site.world_files import describe_world_keys
-from docs.tools.status import describe_experiments, describe_seeds
+from docs.tools.status import describe_experiments, describe_rows, describe_seeds
 from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds
 from world_models import frames
 
@@ -44,6 +45,9 @@ GENERATORS: Mapping[str, Callable[[], str]] = {
     "scenario-tables": describe_scenario_tables, "faults": describe_faults, "world-keys": describe_world_keys,
     "frames": describe_frames, "python": describe_python, "knowledge-sources": describe_knowledge_sources,
     "experiments": describe_experiments, "seeds": describe_seeds,
+    **{f"rows-{name}": partial(describe_rows, name)
+       for name in ("table1", "figure12", "table2", "table3", "planning", "pose-speed")},
+    "rows-fragments": partial(describe_rows, "table3", "60%"),
 }
 """What makes Markdown from the code, by the name that pages use."""
 

@@ -15,6 +15,7 @@ from typing import Any
 import harvey
 from docs.tools.site.markdown import escape, table
 from experiments import EXPERIMENTS
+from experiments.report import format_cell
 from experiments.results import STALE_AFTER, Result, find_commit, is_stale, read_results
 from world_models.words import count
 
@@ -51,6 +52,15 @@ def _rows(name: str, asked: str, result: Result | None) -> Iterator[tuple[str, .
         yield (f"`{name}`", f"{escape(asked)} (claims nothing)", "", driven)
     for claim, holds in result.claims:
         yield (f"`{name}`", escape(claim), "yes" if holds else "**no**", driven)
+
+
+def describe_rows(name: str, wanted: str = "") -> str:
+    """The table of an experiment's last result, or those of its rows that begin with a text."""
+    result = next(result for result in read_results(RESULTS) if result.experiment == name)
+    rows = [[escape(format_cell(cell)) for cell in row] for row in result.rows if str(row[0]).startswith(wanted)]
+    how = " ".join(filter(None, (f"harvey experiment {name}", result.options)))
+    return "\n".join([f"`{how}`, {result.date[:10]}, commit {result.commit}:",
+                      *table([escape(column) for column in result.columns], rows)])
 
 
 def describe_seeds() -> str:

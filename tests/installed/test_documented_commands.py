@@ -23,6 +23,7 @@ import pytest
 
 from docs.tools.fill import MARKED
 from elsewhere import ROOT
+from harvey.runner.result import UNFINISHED
 
 TOLD_ELSEWHERE = ("tutorials", "faq.md", "course")
 """Documents whose commands other tests of this folder run."""
@@ -99,7 +100,7 @@ def run(command: str, here: Path) -> tuple[int, str]:
 def prepare(command: str, here: Path) -> None:
     """What the command names is there: runs, campaigns, files."""
     for folder in re.findall(r"\bruns/[\w./-]+", command):
-        if "--out" in command or (here / folder).exists():
+        if "--out" in command or is_whole(here / folder):
             continue
         name, _, seed = folder.removeprefix("runs/").rpartition("-")
         if folder == "runs/cluttered":
@@ -113,6 +114,12 @@ def prepare(command: str, here: Path) -> None:
     for name, made_by in FILES.items():
         if name in command and made_by not in command and not (here / name).exists():
             make(made_by, here)
+
+
+def is_whole(folder: Path) -> bool:
+    """Whether it is a run with its outcome, or a campaign."""
+    result = folder / "result.json"
+    return (folder / "results.jsonl").is_file() or (result.is_file() and UNFINISHED not in result.read_text("utf-8"))
 
 
 def make(command: str, here: Path) -> None:
