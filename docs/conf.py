@@ -14,6 +14,7 @@ html_theme = "furo"
 html_title = "Harvey"
 html_copy_source = False
 
+myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 4
 
 man_pages = [("reference/command-line", "harvey", "model-directed mobile robot navigation", [], 1)]

@@ -96,6 +96,17 @@ def test_the_table_says_what_failed_what_was_not_driven_and_what_is_stale(
     assert any(line.startswith("| `soak` |") and "not driven" in line for line in lines)
 
 
+def test_rows_stand_in_a_document_as_they_were_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = (("60% wrong: a|b", 0.123456, None), ("70% wrong", 3, "x"))
+    made = replace(OLD, columns=("what", "ours", "peer"), rows=rows)
+    write_result(made, tmp_path / "doors.json")
+    assert list(read_results(tmp_path)) == [made]
+    monkeypatch.setattr(status, "RESULTS", tmp_path)
+    head, _, columns, _, row = status.describe_rows("doors", "60%").splitlines()
+    assert head == "`harvey experiment doors --quick`, 2001-01-01, commit 0123abcd:"
+    assert (columns, row) == ("| what | ours | peer |", r"| 60% wrong: a\|b | 0.1235 | - |")
+
+
 def test_the_command_writes_what_it_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "figure12.json"
     assert main(["experiment", "figure12", "--out", str(out)]) == 0
