@@ -39,6 +39,11 @@ def describe_frames() -> str:
     return f"```text\n{(frames.__doc__ or '').strip()}\n```"
 
 
+def show_example(name: str) -> str:
+    """A program of ``examples/`` as a block."""
+    return f"```python\n{(ROOT / 'examples' / name).with_suffix('.py').read_text(encoding='utf-8')}```"
+
+
 GENERATORS: Mapping[str, Callable[[], str]] = {
     "commands": describe_commands, "settings": describe_settings, "kinds": journal.describe_kinds,
     "shared-tables": describe_shared_tables, "hardware-tables": describe_hardware_tables,
@@ -48,6 +53,7 @@ GENERATORS: Mapping[str, Callable[[], str]] = {
     **{f"rows-{name}": partial(describe_rows, name)
        for name in ("table1", "figure12", "table2", "table3", "planning", "pose-speed")},
     "rows-fragments": partial(describe_rows, "table3", "60%"),
+    **{f"example-{name}": partial(show_example, name) for name in ("hearsay", "sudoku", "recorded_model")},
 }
 """What makes Markdown from the code, by the name that pages use."""
 

@@ -14,8 +14,18 @@ from world_models.plugins import EXTRAS, list_absent
 
 ROOT = Path(__file__).parents[3]
 DOCUMENTS = sorted(path.relative_to(ROOT) for path in (
-    *ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("tests/*.md"), *ROOT.glob("extras/*/*.md"),
+    *ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("tests/*.md"), *ROOT.glob("blackboard/*.md"),
+    *ROOT.glob("extras/*/*.md"),
     *(ROOT / "examples").rglob("*.md")))
+TESTED = {
+    "python": ("README.md", "docs/start.md", "docs/course/", "docs/how-to/knowledge-source.md", "docs/locale-frames.md",
+               "blackboard/README.md"),
+    "toml": ("docs/hardware.md", "docs/how-to/README.md", "docs/missions.md", "docs/locale-frames.md"),
+    "console": ("docs/background/faq.md",),
+    "{code-block}": ("docs/tutorials/",),
+    "{toctree}": ("docs/index.md", "docs/course/index.md"),
+}
+"""Language of a block, and the documents in which tests run it, compare it or build it."""
 FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\((?![a-z]+:)([^)#\s]*)(#[^)\s]+)?\)")
 
@@ -52,6 +62,20 @@ def test_every_link_leads_to_a_file_and_to_a_heading_in_it(document: Path) -> No
         if not target.exists() or (anchor and anchor[1:] not in anchors_of(target)):
             astray.append(name + anchor)
     assert astray == []
+
+
+def test_every_block_is_of_a_kind_that_some_test_runs_or_compares() -> None:
+    """Commands, those without a language, are run by ``installed/test_documented_commands.py``."""
+    found = {(language, document.as_posix()) for document in DOCUMENTS for language in re.findall(
+        r"^```(\S+).*\n(?:.*\n)*?^```$", MARKED.sub("", (ROOT / document).read_text(encoding="utf-8")), re.MULTILINE)}
+    assert found
+    assert [one for one in sorted(found) if not any(one[1].startswith(named) for named in TESTED.get(one[0], ()))] == []
+
+
+def test_the_block_of_an_entry_point_is_that_of_the_example() -> None:
+    text = (ROOT / "docs/how-to/README.md").read_text(encoding="utf-8")
+    block, = re.findall(r"^```toml\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    assert block in (ROOT / "examples/plugin/pyproject.toml").read_text(encoding="utf-8")
 
 
 def test_a_link_that_leads_nowhere_is_seen() -> None:
