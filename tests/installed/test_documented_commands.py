@@ -39,6 +39,7 @@ NOT_RUN = {
     r"^(make|cd|cp) ": "a shell; the targets of make are looked for",
     r"\.(ifc|gml)\b": "a building by others; the tests of harvey-buildings make some",
     r"traced_paths": "the path tracer",
+    r"harvey serve runs/": "a run that another command is driving; the tests of harvey-serve drive one",
     r"--go-on": "a campaign that was cut off; the laws of campaigns cut many off",
 }
 ENDLESS = re.compile(r"harvey (serve|emulate)|--live$")
@@ -51,8 +52,8 @@ FILES = {
     "second-floor.toml": "world new second-floor --rooms office,kitchen,lab",
 }
 """Files of the reader's, and what makes them here."""
-MAY_FAIL = r"servo.plan=off|rough-day|light.lamps_off|experiment"
-"""A mission that may end otherwise than reached; an experiment of whose claims one may fail."""
+MAY_FAIL = r"servo.plan=off|rough-day|light.lamps_off|experiment|harvey diff"
+"""A mission may end otherwise than reached, a claim of an experiment fail, two runs differ."""
 
 
 def commands() -> Iterator[str]:
