@@ -14,13 +14,13 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_076,
+    "world_models": 10_080,
     "knowledge_sources": 22_606,
     "sim": 5_901,
-    "logs": 7_593,
-    "harvey": 10_740,
+    "logs": 7_645,
+    "harvey": 10_765,
     "experiments": 10_529,
-    "tests": 44_459,
+    "tests": 44_725,
     "extras": 15_170,
 }
 """Of Python files, at most."""
