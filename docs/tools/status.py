@@ -36,7 +36,8 @@ def describe_experiments() -> str:
     rows = [row for folder in EXPERIMENTS.values() for name, asked in folder.items()
             for row in _rows(name, asked, found.get(name))]
     held = [holds for result in found.values() for _, holds in result.claims]
-    total = (f"{count(len(found), 'experiment')} of {sum(map(len, EXPERIMENTS.values()))} driven;"
+    every, small = sum(map(len, EXPERIMENTS.values())), sum(1 for result in found.values() if result.options)
+    total = (f"Of {every} experiments {len(found) - small} were driven whole and {small} in a smaller version;"
              f" of {count(len(held), 'claim')} {held.count(True)} hold.")
     return "\n".join([total, *table(("experiment", "what", "holds", "driven"), rows)])
 
