@@ -170,7 +170,16 @@ def is_a(record: EntryRecord[Any] | None, kind: type[K]) -> TypeGuard[EntryRecor
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """An activation, as the journal tells it; ``reason`` says why it was dropped, if it was."""
+    """An activation, as the journal tells it: a knowledge source that was woken, and could act.
+
+    Attributes:
+        number: sequence number; ties go by it.
+        source, level: who would act, and at which servo level: action, plan or goal.
+        trigger, kind: the entry whose change woke it, as ``Leg-3.0``, and which change: Posted, Revised or Retracted.
+        rating: how urgent, 0 to 1.
+        since: the cycle in which it was woken.
+        reason: why it was dropped, if it was.
+    """
 
     number: int
     source: str
@@ -184,7 +193,21 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class DecisionRecord:
-    """One line of the journal; the attributes are those of :class:`blackboard.journal.Decision`."""
+    """One decision: a line of the journal, as ``RecordedRun.decisions()`` yields them.
+
+    Attributes:
+        cycle: its number, from 1.
+        focus: the servo level in focus: action, plan or goal.
+        observed: entries that came from outside: commands, pictures, odometry.
+        seen: the changes that were taken up, as ``Leg-3.0``.
+        activated, obviated: who was woken, and whose turn was dropped, with the reason.
+        chosen, runner_up: who acted and who was next best; None where nobody could.
+        pending: how many were left waiting.
+        made: the entries that the act wrote.
+        refused: why the act was not applied, or "".
+        data: the line as JSON types.
+        used: the revisions of traced kinds that the act read, as ``LocaleFrame-1.0``.
+    """
 
     cycle: int
     focus: str

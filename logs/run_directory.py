@@ -31,6 +31,7 @@ RESULT: Mapping[str, tuple[Any, str]] = {
     **dict.fromkeys(("decisions", "collisions", "replans", "relocalizations"), (int | None, "a number")),
     "contacts": (list, "a list"),
     "happened": (list | None, "a list"),
+    "starved": (list, "a list"),
     **dict.fromkeys(("final_error_m", "sim_time_s", "path_length_m"), (int | float | None, "a number")),
 }
 """Keys of ``result.json`` that others read, with the JSON types that they have; null is what nobody knows."""

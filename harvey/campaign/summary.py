@@ -42,6 +42,7 @@ def format_result(r: MissionResult, out: Path | None, story: Sequence[str] = ())
         f"  collisions    {r.collisions}",
         *(f"  camera        {lesson.text()}" for lesson in r.camera),
         *(f"  amiss         {text}" for text in r.amiss),
+        *(f"  starved       {text}" for text in r.starved),
         f"  way           {r.path_length_m:.1f} m in {r.sim_time_s:.0f} s of the robot's time",
         f"  took          {r.wall_time_s:.1f} s for {count(r.cycles, 'cycle')} and {count(r.frames, 'picture')}, with"
         f" {count(r.waits, 'more cycle')} to ask for locale frames",
@@ -58,7 +59,7 @@ def format_result(r: MissionResult, out: Path | None, story: Sequence[str] = ())
 def format_results(results: Sequence[MissionResult]) -> str:
     """A table, one row a seed, with a summary row."""
     rows = table(COLUMNS, [*(_cells(r) for r in results), _total(results)], last_is_summary=True)
-    return "\n".join([rows, *(f"seed {r.seed}: {text}" for r in results for text in r.amiss)])
+    return "\n".join([rows, *(f"seed {r.seed}: {text}" for r in results for text in (*r.amiss, *r.starved))])
 
 
 def format_previews(ahead: Sequence[MilestonePreview]) -> str:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from blackboard.agenda import Activation
 from blackboard.change import Posted
 from blackboard.journal import Decision
 from logs.explain.turning_points import Collision, Happening, TurningPoint, TurningPointFinder, is_adjusted
@@ -15,6 +17,7 @@ from world_models.entries.body import CameraPicture, MotionReport, PictureReques
 from world_models.entries.location import Hypothesis
 from world_models.entries.robot_state import CameraLesson, CameraState, find_camera_lessons
 from world_models.entries.task import Milestone, Outcome, PlanSketch
+from world_models.words import count
 
 PARTS = ("contacts", "happened", "turning_points", "camera")
 """What of a result is a list of parts with names."""
@@ -45,6 +48,7 @@ class MissionResult:
         probes: pictures that it asked for to find out where it is; None in the results of older versions.
         happened: what the simulator did to the robot and its building; None on hardware, and in the results of older
             versions.
+        starved: which knowledge sources of other packages seldom got their turn, in words.
         belief_off_m: true distance of where it believed to be at the end; None where nobody knows it.
     """
 
@@ -74,6 +78,7 @@ class MissionResult:
     probes: int | None = None
     belief_off_m: float | None = None
     happened: Sequence[Happening] | None = None
+    starved: Sequence[str] = ()
 
     @property
     def cycles(self) -> int:
@@ -107,6 +112,38 @@ class MissionResult:
                                 "happened": happened})
 
 
+MIN_WOKEN, MAX_STARVED_SHARE = 10, 0.1
+"""A knowledge source starves that was woken so often at least, and acted in less than this share of it."""
+
+
+class TurnCounts:
+    """A sink that counts how often each knowledge source that is not Harvey's was woken, and how often it acted."""
+
+    def __init__(self) -> None:
+        self._woken, self._acted = Counter[str](), Counter[str]()
+        self._best: dict[str, Activation] = {}
+
+    def __call__(self, decision: Decision) -> None:
+        for one in decision.activated:
+            if not type(one.source).__module__.startswith("knowledge_sources."):
+                name = one.source.name
+                self._woken[name] += 1
+                self._best[name] = max(self._best.get(name, one), one, key=lambda best: best.rating)
+        if decision.chosen is not None:
+            self._acted[decision.chosen.source.name] += 1
+
+    def starved(self) -> tuple[str, ...]:
+        """Those that seldom got their turn, a sentence each."""
+        return tuple(self._tell(name) for name, woken in self._woken.items()
+                     if woken >= MIN_WOKEN and self._acted[name] < MAX_STARVED_SHARE * woken)
+
+    def _tell(self, name: str) -> str:
+        best = self._best[name]
+        return (f"{name} acted {count(self._acted[name], 'time')} of the {self._woken[name]} that it was woken: at the "
+                f"{best.source.level} level, rated {best.rating:.2f} at most, others came first (harvey why RUN --not "
+                f"{name}; docs/how-to/knowledge-source.md says which level and priority)")
+
+
 class RunCounts:
     """A sink that counts what was decided, and adds up what the wheels claim."""
 
@@ -117,12 +154,14 @@ class RunCounts:
         self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0}
         self.path_m = self.time_s = 0.0
         self.turning_points: list[TurningPoint] = []
+        self.turns = TurnCounts()
         self.told_camera: CameraState | None = None
         self.camera: CameraState | None = None
         self._finder = TurningPointFinder()
 
     def __call__(self, decision: Decision) -> None:
         self.decisions += 1
+        self.turns(decision)
         self.waits += bool(decision.made) and all(isinstance(c.entry.value, FrameRequest) for c in decision.made)
         self.turning_points += [point for point in self._finder.find(decision) if point.is_told]
         for change in decision.observed:
@@ -165,5 +204,5 @@ class RunCounts:
             milestones={**self.milestones, "false_accepts": None}, replans=self.replans,
             relocalizations=self.relocalizations, sketches=self.sketches, collisions=None, max_cross_track_m=None,
             turning_points=tuple(self.turning_points), waits=self.waits, camera=self.camera_lessons(),
-            probes=self.probes,
+            probes=self.probes, starved=self.turns.starved(),
         )

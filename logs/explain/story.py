@@ -372,6 +372,7 @@ def tell_end(history: Timeline, result: Mapping[str, Any]) -> Section:
         now = history.newest[last.id] == last.ref and history.retraction(last.ref) is None
         text = "It believed that it stood at" if now else "The last place where it had believed to stand was"
         told.append(_said(history, f"{text} {phrases.pose(last.value)}.", last))
+    told += [Sentence(f"{capital(text)}.") for text in result.get("starved") or ()]
     truth = ", ".join(_truth(result))
     told.append(Sentence(f"In truth, by the simulator's result.json: {truth}." if truth else
                          "Where it truly was nobody recorded: there is no result of the simulator."))

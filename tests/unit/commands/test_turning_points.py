@@ -207,7 +207,7 @@ def test_the_summary_tells_them_and_the_result_keeps_them() -> None:
     text = format_result(known, None)
     assert "collisions    1\n" in text
     assert format_result(known, None, ("On the way:", "  cycle 4  lost")).endswith("\n\nOn the way:\n  cycle 4  lost")
-    assert MissionResult.of_record(json.loads(json.dumps(known.record()))) == replace(known, amiss=[])
+    assert MissionResult.of_record(json.loads(json.dumps(known.record()))) == replace(known, amiss=[], starved=[])
 
 
 def test_progress_says_that_it_is_lost_and_found() -> None:

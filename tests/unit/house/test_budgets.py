@@ -17,10 +17,10 @@ LINES = {
     "world_models": 10_080,
     "knowledge_sources": 22_606,
     "sim": 5_901,
-    "logs": 7_645,
-    "harvey": 10_765,
+    "logs": 7_670,
+    "harvey": 11_073,
     "experiments": 10_529,
-    "tests": 44_725,
+    "tests": 44_802,
     "extras": 15_170,
 }
 """Of Python files, at most."""
