@@ -2,13 +2,8 @@
 
 The Python interface. Everything below is loaded when it is first used:
 
-<<<<<<< HEAD
-- missions: :func:`run`, :func:`open_run`, :class:`RecordedRun`, :class:`MissionResult`, :func:`load_scenario`; a run's
-  decisions and changes of entries as they were recorded: :class:`DecisionRecord`, :class:`EntryRecord`
-=======
 - missions: :func:`run`, :func:`open_run`, :class:`RecordedRun`, :class:`MissionResult`, :func:`load_scenario`;
   what a recorded run yields: :class:`DecisionRecord`, with :class:`EntryRecord` and :class:`Candidate`
->>>>>>> 1206e6bb (A knowledge source of another package that starves is told of at the end of a run; the recipe says which level and priority; what run.decisions() yields is exported and documented)
 - building models: :func:`load_world`, :func:`build_world`, :class:`World`
 - poses from matched lines: :func:`med_r_and_t`, :func:`trunc_r_and_t`, :func:`r_and_t_ml`, :func:`planar_from_lines`
   (``knowledge_sources.methods.pose`` says which to use when), :class:`Camera`, :class:`Pose`, :class:`Pose2`
@@ -56,11 +51,7 @@ if TYPE_CHECKING:
         r_and_t_ml,
         trunc_r_and_t,
     )
-<<<<<<< HEAD
-    from logs.records import DecisionRecord, EntryRecord
-=======
     from logs.records import Candidate, DecisionRecord, EntryRecord
->>>>>>> 1206e6bb (A knowledge source of another package that starves is told of at the end of a run; the recipe says which level and priority; what run.decisions() yields is exported and documented)
     from sim.scenario import load_scenario
     from world_models.building.world import World
     from world_models.camera import Camera, CameraMount
@@ -82,11 +73,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "harvey.runner.result": ("MissionResult",),
     "knowledge_sources.methods.pose": (
         "PlanarEstimate", "PoseEstimate", "med_r_and_t", "planar_from_lines", "r_and_t_ml", "trunc_r_and_t"),
-<<<<<<< HEAD
-    "logs.records": ("DecisionRecord", "EntryRecord"),
-=======
     "logs.records": ("Candidate", "DecisionRecord", "EntryRecord"),
->>>>>>> 1206e6bb (A knowledge source of another package that starves is told of at the end of a run; the recipe says which level and priority; what run.decisions() yields is exported and documented)
     "sim.scenario": ("load_scenario",),
     "world_models.building.world": ("World",),
     "world_models.camera": ("Camera", "CameraMount"),
@@ -96,20 +83,12 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
 _MODULE_OF: Mapping[str, str] = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
-<<<<<<< HEAD
-    "BadInput", "Camera", "CameraMount", "Change", "Decision", "DecisionRecord", "Effect", "Entry", "EntryRecord",
-    "KnowledgeSource", "Level", "MissionResult", "PlanarEstimate", "Pose", "Pose2", "PoseEstimate", "Post",
-    "Posted", "RecordedRun", "Retract", "Retracted", "Revise", "Revised", "RunPicture", "Scheduler", "TrackPoint",
-    "View", "Watch", "World", "build_world", "inference", "load_scenario", "load_world", "med_r_and_t",
-    "observation", "open_run", "planar_from_lines", "r_and_t_ml", "request", "run", "trunc_r_and_t",
-=======
     "BadInput", "Camera", "CameraMount", "Candidate", "Change", "Decision", "DecisionRecord", "Effect", "Entry",
     "EntryRecord", "KnowledgeSource", "Level",
     "MissionResult", "PlanarEstimate", "Pose", "Pose2", "PoseEstimate", "Post", "Posted", "RecordedRun", "Retract",
     "Retracted", "Revise", "Revised", "RunPicture", "Scheduler", "TrackPoint", "View", "Watch", "World",
     "build_world", "inference", "load_scenario", "load_world", "med_r_and_t", "observation", "open_run",
     "planar_from_lines", "r_and_t_ml", "request", "run", "trunc_r_and_t",
->>>>>>> 1206e6bb (A knowledge source of another package that starves is told of at the end of a run; the recipe says which level and priority; what run.decisions() yields is exported and documented)
 ]
 
 
