@@ -16,8 +16,8 @@ from docs.tools.site.markdown import describe_fields, prose, table
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "Missions and runs": (
-        "run", "open_run", "load_scenario", "RecordedRun", "DecisionRecord", "EntryRecord", "MissionResult",
-        "TrackPoint", "RunPicture", "BadInput"),
+        "run", "open_run", "load_scenario", "RecordedRun", "DecisionRecord", "EntryRecord", "Candidate",
+        "MissionResult", "TrackPoint", "RunPicture", "BadInput"),
     "Building models": ("load_world", "build_world", "World"),
     "Poses from matched lines": (
         "med_r_and_t", "trunc_r_and_t", "r_and_t_ml", "planar_from_lines", "PoseEstimate", "PlanarEstimate", "Camera",
