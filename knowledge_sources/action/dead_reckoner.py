@@ -97,7 +97,7 @@ class DeadReckoner(RobotKnowledgeSource):
             return
         contact = find_contact(view, request.id)
         what = "something was touched on the move" if on_the_move else (
-            f"something stopped the robot: {report.move_m:.2f} m of {request.value.move_m:.2f} m are claimed")
+            f"something stopped the robot: the wheels report {report.move_m:.2f} m of {request.value.move_m:.2f} m")
         is_short = not on_the_move and report.move_m < MIN_CLAIMED_PART * request.value.move_m
         if contact is not None or is_short:
             bound_px = self._settings.plan.max_deviation_px

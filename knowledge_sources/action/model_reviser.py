@@ -112,4 +112,4 @@ class ModelReviser(RobotKnowledgeSource):
 def _answer(is_taken: bool, error: str | None) -> str:
     if error is not None:
         return f"which cannot be: {error}"
-    return "and took it over" if is_taken else "as it was known"
+    return "and believes it from now on" if is_taken else "which it knew already"

@@ -63,5 +63,6 @@ class BeliefChecker(RobotKnowledgeSource):
         if tried:
             headings = find_untried(turn_headings(pose, self._settings), tried) or [heading]
             heading = choose_heading(robot, pose, headings, CHECK_TOLERANCE_M, settings=self._settings)
-        check = Milestone("", -1, f"check of the belief, because {doubt.value.what}", heading, tried=tried)
+        what = f"the place where it believes to be, because {doubt.value.what}"
+        check = Milestone("", -1, what, heading, tried=tried)
         yield Post(replace(check, told=list_told(view, check, self._settings)), (doubt, belief))

@@ -87,7 +87,7 @@ class MilestoneRow:
     Attributes:
         cycle: of the verdict; of a milestone that was not judged its last.
         time_s: since the run began; None where nothing told it.
-        name: ``M1 of hallway``, or ``check of the belief``.
+        name: ``M1 of hallway``, or ``the place where it believes to be``.
         verdict: verified, refuted, not testable; or withdrawn, expected, turning.
         expected, matched: numbers of model lines.
         deviation_m, deviation_rad: from the belief that predicted it; None where it was not judged.

@@ -39,7 +39,7 @@ def test_dry_run_then_a_mission_in_which_line_and_camera_fail_and_come_back(
     assert abs(there.world_from_robot.x_m - GOAL_M) < INCH_M and there.collisions == 0
     told = capsys.readouterr().err
     assert "base: link lost: over" in told and "camera: camera unplugged: over" in told
-    assert "check of the belief, because" in told
+    assert "the place where it believes to be, because" in told
     result = result_of(tmp_path)
     assert result["outcome"] == "reached"
     assert result["final_error_m"] is None and result["collisions"] is None

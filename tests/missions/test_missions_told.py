@@ -70,7 +70,7 @@ def test_told_that_a_door_is_shut_it_goes_by_the_other() -> None:
     assert (result.outcome, result.collisions) == ("reached", 0)
     assert routes(decisions) == [["reception-north-door", "archive-north-door"],
                                  ["reception-south-door", "archive-south-door"]]
-    assert answers(decisions) == ["and took it over"]
+    assert answers(decisions) == ["and believes it from now on"]
 
 
 def test_told_that_a_thing_on_the_way_is_gone_it_goes_where_it_stood(tmp_path: Path) -> None:
@@ -88,7 +88,7 @@ def test_told_that_a_thing_on_the_way_is_gone_it_goes_where_it_stood(tmp_path: P
 def test_told_twice_it_is_told_twice_and_revises_once(tmp_path: Path) -> None:
     result, decisions = drive(two_doors(tmp_path, (SHUT, (3.5, "north-door", "shut"))))
     assert (result.outcome, result.collisions) == ("reached", 0)
-    assert answers(decisions) == ["and took it over", "as it was known"]
+    assert answers(decisions) == ["and believes it from now on", "which it knew already"]
     assert len(made(decisions, LocaleFrame)) == 2  # one of each room of the door
     assert routes(decisions) == [["north-door"], ["south-door"]]
 
@@ -99,7 +99,7 @@ def test_told_that_it_is_open_again_it_is_as_the_file_says(tmp_path: Path) -> No
     frames = made(decisions, LocaleFrame)
     assert [bool(entry.value.changes) for entry in frames] == [True, True, False, False]
     assert all(entry.value is entry.value.filed or entry.value.filed is None for entry in frames[2:])
-    assert answers(decisions) == ["and took it over", "and took it over"]
+    assert answers(decisions) == ["and believes it from now on", "and believes it from now on"]
 
 
 def test_told_that_the_only_door_is_shut_it_is_blocked_and_says_by_what(tmp_path: Path) -> None:
@@ -139,7 +139,7 @@ def test_told_of_what_is_not_there_it_says_so_and_revises_nothing(tmp_path: Path
     said = answers(decisions)
     assert all(answer.startswith("which cannot be: expected ") for answer in said[:4])
     assert "open door of study (north-door, south-door)" in said[1].replace("an open", "open")
-    assert said[4] == "as it was known"
+    assert said[4] == "which it knew already"
 
 
 def test_told_nonsense_of_a_room_it_still_asks_for_that_room(tmp_path: Path) -> None:

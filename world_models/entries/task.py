@@ -277,7 +277,7 @@ class Milestone:
         return unpack_errors(self.displacement_modes, self.displacements, len(self.expected))
 
     def name(self) -> str:
-        """``M1 of the route``, or ``check of the belief``; without the reason for a check."""
+        """``M1 of the route``, or ``the place where it believes to be``; without the reason for a check."""
         return self.what.partition(", because")[0]
 
     def sentence(self) -> str:

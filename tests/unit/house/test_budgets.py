@@ -20,7 +20,7 @@ LINES = {
     "logs": 7_670,
     "harvey": 11_073,
     "experiments": 10_529,
-    "tests": 44_802,
+    "tests": 44_803,
     "extras": 15_170,
 }
 """Of Python files, at most."""
