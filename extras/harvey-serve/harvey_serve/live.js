@@ -7,7 +7,18 @@ function byId(id) {
   return document.getElementById(id);
 }
 
-function showPlans(belief, candidates) {
+/** A line on a plan, through those of its points that are on this storey. */
+function showLine(svg, plan, kind, points) {
+  let line = svg.querySelector(`.${kind}`);
+  if (line === null) {
+    line = drawn("polyline", { class: `path ${kind}` });
+    svg.querySelector(".candidates").before(line);
+  }
+  const on = points.filter(([locale]) => plan.rooms.includes(locale));
+  line.setAttribute("points", on.map(([, x, y]) => `${plan.scale * (x - plan.left)},${plan.scale * (plan.top - y)}`).join(" "));
+}
+
+function showPlans(belief, candidates, trail, way) {
   document.querySelectorAll("#plans svg").forEach((svg, number) => {
     const plan = plans[number];
     const here = belief !== null && plan.rooms.includes(belief.locale);
@@ -18,6 +29,8 @@ function showPlans(belief, candidates) {
     if (here) placeBelief(plan, mark, belief);
     const marks = candidates.filter((one) => plan.rooms.includes(one.locale)).map((one) => candidateMark(plan, one));
     svg.querySelector(".candidates").replaceChildren(...marks);
+    showLine(svg, plan, "trail", trail);
+    showLine(svg, plan, "way", here ? [[belief.locale, belief.x, belief.y], ...way] : way);
   });
 }
 
@@ -53,9 +66,14 @@ source.addEventListener("message", (event) => {
   byId("state").textContent = run.ended ? `ended, ${run.ended}` : run.state;
   byId("cycle").textContent = run.cycle;
   byId("time").textContent = run.time_s === null ? "0.0" : run.time_s.toFixed(1);
-  showPlans(run.belief, run.candidates);
+  showPlans(run.belief, run.candidates, run.trail, run.way);
+  const lost = !run.ended && run.lost !== "";
+  byId("where").textContent = run.ended ? "ENDED" : lost ? "LOST" : run.belief === null ? "No belief yet" : "Knows where it is";
+  byId("where").className = lost ? "lost" : "";
+  byId("goal-now").textContent = run.goal ? `; goal: ${run.goal}` : "";
   showPicture(run.picture);
-  byId("belief").textContent = run.belief === null ? "It has no belief yet." : `${run.belief.ref}: ${run.belief.says}`;
+  const why = lost ? `Lost: ${run.lost}. What it believed until then is not relied on. ` : "";
+  byId("belief").textContent = run.belief === null ? "It has no belief yet." : `${why}${run.belief.ref}: ${run.belief.says}`;
   byId("candidates").replaceChildren(...run.candidates.map((one) =>
     element("li", {}, `may stand at ${one.place}, weight ${one.weight.toFixed(2)}; ${one.evidence}`)));
   document.querySelector("#milestones tbody").replaceChildren(...run.milestones.map((one) => {
@@ -80,7 +98,7 @@ async function post(path, body, answer) {
   byId(answer).textContent = said.trim();
 }
 
-showPlans(null, []);
+showPlans(null, [], [], []);
 byId("orders").hidden = token === "";
 byId("go").hidden = token === "";
 byId("only-watching").hidden = token !== "";

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import deque
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
@@ -10,6 +11,8 @@ from typing import Any, NamedTuple
 from blackboard.change import Change, Retracted
 from blackboard.entry import Entry
 from blackboard.journal import Decision
+from blackboard.level import Level, highest
+from blackboard.servoing import Discrepancy
 from harvey.report.data import Lenses, placed, shrink
 from world_models import words
 from world_models.building.world import World
@@ -17,10 +20,12 @@ from world_models.camera import Camera
 from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
-from world_models.entries.task import Milestone
+from world_models.entries.task import Goal, Milestone, PlanSketch
 
 DECISIONS, MILESTONES = 12, 12
 """So many of the last are shown."""
+TRAIL, TRAIL_STEP_M = 500, 0.1
+"""So many of the last places, so far from one another, are kept."""
 
 
 class Shown(NamedTuple):
@@ -58,6 +63,10 @@ class LiveState:
         self._segments: Entry[Segments] | None = None
         self._match: Entry[LineMatch] | None = None
         self._lines: dict[str, Any] = {}
+        self._goal: Entry[Goal] | None = None
+        self._sketches: dict[str, PlanSketch] = {}
+        self._doubts: dict[str, Discrepancy] = {}
+        self._trail: deque[tuple[str, float, float]] = deque(maxlen=TRAIL)
         self.ended = ""
 
     def __call__(self, decision: Decision) -> None:
@@ -103,6 +112,9 @@ class LiveState:
             "state": "ended" if self.ended else state, "ended": self.ended,
             "cycle": self._decisions[-1].cycle if self._decisions else 0,
             "time_s": None if self._frame is None else self._frame.value.sim_time_s,
+            "goal": "" if self._goal is None else self._goal.value.destination.words(),
+            "lost": next((doubt.what for doubt in self._doubts.values()), ""),
+            "way": self._list_way(), "trail": list(self._trail),
             "belief": belief, "candidates": candidates, "picture": self._draw_picture(),
             "milestones": [{"id": id, "what": one.what, "status": one.status}
                            for id, one in self._milestones.items()],
@@ -112,15 +124,24 @@ class LiveState:
 
     def _follow(self, change: Change) -> None:
         entry, value = change.entry, change.entry.value
+        for kept, shows in ((self._sketches, isinstance(value, PlanSketch) and value.is_active),
+                            (self._doubts, isinstance(value, Discrepancy) and value.is_open and value.level is highest(
+                                Level))):
+            kept.pop(entry.id, None)
+            if shows and not isinstance(change, Retracted):
+                kept[entry.id] = value
         if isinstance(value, Hypothesis):
             self._believed.pop(entry.id, None)
             if not isinstance(change, Retracted):
                 if value.is_held:
                     self._belief = str(entry.ref), value
+                    self._walk(value)
                 elif value.status == "candidate":
                     self._believed[entry.id] = value
         elif isinstance(change, Retracted):
             return
+        elif isinstance(value, Goal):
+            self._goal = entry if value.is_active else self._goal
         elif isinstance(value, Milestone):
             self._milestones.pop(entry.id, None)
             self._milestones[entry.id] = value
@@ -137,6 +158,22 @@ class LiveState:
             self._match = entry
         elif isinstance(value, PoseFix):
             self._agree(value)
+
+    def _walk(self, belief: Hypothesis) -> None:
+        here = belief.world_from_robot(self._world)
+        if not self._trail or math.dist(self._trail[-1][1:], here.position) >= TRAIL_STEP_M:
+            self._trail.append((belief.locale, round(here.x_m, 3), round(here.y_m, 3)))
+
+    def _list_way(self) -> list[tuple[str, float, float]]:
+        """Where the sketches of the goal lead from here, the most detailed first."""
+        goal = None if self._goal is None else self._goal.id
+        way: list[tuple[str, float, float]] = []
+        asked = sorted((s for s in self._sketches.values() if s.goal == goal), key=lambda s: -len(s.path))
+        for depth, sketch in enumerate(asked):
+            for subgoal in sketch.subgoals[sketch.at + (depth > 0):]:
+                there = subgoal.destination.in_world(self._world)
+                way.append((subgoal.destination.locale, round(there.x_m, 3), round(there.y_m, 3)))
+        return way
 
     def _agree(self, fix: PoseFix) -> None:
         match, seen = self._match, self._segments

@@ -17,19 +17,26 @@ from hypothesis import strategies as st
 pytest.importorskip("starlette", reason="the extra 'serve' is not installed")
 from starlette.testclient import TestClient
 
+from blackboard.change import Change, Posted, Revised
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from generated_boards import Bench
 from harvey.cli import main
 from harvey.errors import BadInput
 from harvey.runner.teller import LiveTeller
 from harvey_serve.app import MOST_WATCHERS, MOST_WORDS, build_app
 from harvey_serve.connections import MOST_CONNECTIONS
 from harvey_serve.live_page import LivePage
-from harvey_serve.live_state import LiveState
+from harvey_serve.live_state import LiveState, Shown
 from harvey_serve.run_gate import WHY, Gate, GatedBody
 from harvey_serve.server import bind, serving
 from scripted_turns import decisions
 from world_models.camera import Camera
 from world_models.entries.body import STOP_KEY, BodyFault, MotionReport
+from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries.task import Goal, PlanSketch, Subgoal
 from world_models.files.world_files import load_world
+from world_models.frames import Pose2
 
 FLAT = Path(__file__).parents[3] / "docs" / "flat" / "flat.toml"
 TOKEN = "the-token"
@@ -119,6 +126,35 @@ def test_a_watcher_is_told_what_was_decided_last_and_how_it_ended(client: TestCl
     assert [row["cycle"] for row in told["decisions"]] == [one.cycle for one in made][-12:]
     last = [str(change.entry.ref) for change in (*made[-1].observed, *made[-1].made)]
     assert [one["says"].split(":")[0] for one in told["decisions"][-1]["made"]] == last
+
+
+def test_a_watcher_is_told_where_it_was_where_it_goes_and_that_it_is_lost() -> None:
+    bench = Bench()
+    goal = bench.put(Goal(Place("hall", 1.0, 2.0), Place("kitchen", 3.0, 1.0)))
+    near, far = Place("hall", 3.0, 2.0), Place("kitchen", 1.0, 1.0)
+    bench.put(PlanSketch(goal.id, (), "", (Subgoal(Place("hall", 1.0, 2.0), far, False), Subgoal(far, Place(
+        "kitchen", 3.0, 1.0), False)), 0, True))
+    bench.put(PlanSketch(goal.id, (0,), "hall", (Subgoal(Place("hall", 1.0, 2.0), near, True), Subgoal(
+        near, far, True)), 1, True))
+    held = bench.put(Hypothesis("hall", Pose2(1.0, 2.0, 0.0), diagonal(0.01, 0.01), "milestone"))
+    doubt = bench.put(Discrepancy(Level.GOAL, "the check was refuted", None, (5.0, 30.0), "px"))
+    live = LiveState(load_world(FLAT), Camera(512.0, 512.0, 256.0, 256.0, 512, 512))
+
+    def tell(*changes: Change) -> dict[str, Any]:
+        live.show(Shown(1, "action", "", "", "", changes))
+        live.take()
+        told: dict[str, Any] = json.loads(live.message("running"))
+        return told
+
+    told = tell(*(Posted(bench.view[entry.id]) for entry in (goal, held, doubt)),
+                *(Posted(entry) for entry in bench.view.all(PlanSketch)))
+    assert told["lost"] == "the check was refuted" and told["goal"] == "kitchen (3.00, 1.00) m"
+    assert [place for place, _, _ in told["way"]] == ["kitchen", "kitchen"] and len(told["trail"]) == 1
+    moved = [bench.revise(held, locale_from_robot=Pose2(x, 2.0, 0.0)) for x in (1.05, 1.2)]
+    told = tell(*map(Revised, moved), Revised(bench.revise(doubt, status="corrected")))
+    assert told["lost"] == "" and len(told["trail"]) == 2
+    gone = [Revised(bench.revise(entry, status="done")) for entry in bench.view.all(PlanSketch)]
+    assert tell(*gone)["way"] == []
 
 
 def test_who_has_the_token_sends_it_elsewhere(page: Page, client: TestClient) -> None:
