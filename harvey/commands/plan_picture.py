@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from world_models.building.plan_view import GROUND, Shape, build_drawing
+from world_models.building.plan_view import GROUND, build_drawing
 from world_models.building.world import World
 
 PIXELS_PER_M, MAX_PIXELS = 30.0, 6000.0
@@ -14,7 +14,9 @@ LOOKS: Mapping[str, tuple[str, str]] = {
     "board": ("#6d8fb3", "#34516f"), "paving": ("#e3ded0", "#8a8678"), "doorway": ("#bfe3b4", "#3c7a2c"),
 }
 """Face and edge of each kind of surface."""
-LINES: Mapping[str, tuple[str, float]] = {"leaf": ("#8c1d1d", 2.4), "axis": ("#b03030", 1.0)}
+LINES: Mapping[str, tuple[str, float]] = {"leaf": ("#8c1d1d", 2.4), "axis": ("#b03030", 1.0), "mark": ("white", 1.5)}
+LETTERS_M: Mapping[str, float] = {"title": 0.7, "name": 0.42, "note": 0.34, "door-name": 0.24}
+"""Size of the letters of each kind that is written."""
 
 
 def draw_plan(world: World, out: Path) -> None:
@@ -39,12 +41,10 @@ def draw_plan(world: World, out: Path) -> None:
         elif shape.kind == "link":
             axes.plot(x, y, "o", color="#7d4fa3", markersize=5, zorder=order)
         else:
-            bold = shape.kind == "title"
-            axes.text(x[0], y[0], shape.text, ha="center", va="center", color="white" if bold else "#222222",
-                      fontsize=_points(shape, scale), fontweight="bold" if bold else "normal", zorder=order)
+            axes.text(x[0], y[0], shape.text, ha="left" if shape.kind == "note" else "center",
+                      va="baseline" if shape.kind == "note" else "center",
+                      color="white" if shape.kind in ("title", "note") else "#222222",
+                      fontsize=LETTERS_M[shape.kind] * scale * 72.0 / 100.0,
+                      fontweight="bold" if shape.kind == "title" else "normal", zorder=order)
     figure.savefig(out, format="png")
 
-
-def _points(shape: Shape, scale: float) -> float:
-    """Size of letters: a third of a metre high."""
-    return (0.7 if shape.kind == "title" else 0.42) * scale * 72.0 / 100.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
 
@@ -19,6 +19,15 @@ SCALE = 40.0
 
 MARGIN_M = 0.6
 TITLE_M = 0.9
+LEGEND: Mapping[str, str] = {
+    "doorway": "doorway", "leaf": "door that is shut", "obstacle": "stands on the floor", "board": "on the wall",
+    "paving": "on the floor", "outdoors": "outdoors", "link": "elevator or stairs", "axis": "origin and x of a frame"}
+"""What is said of a kind, where it is drawn."""
+DOOR_NAME_M = 0.25
+"""So far within the first of its rooms a doorway's name is written."""
+LEGEND_M = 0.5
+"""Height of a line of the legend."""
+SCALE_BARS_M = (1, 2, 5, 10, 20, 50, 100)
 MAX_STOREY_STEP_M = 0.5
 """Rooms whose floors differ by no more are drawn as one storey."""
 
@@ -30,7 +39,8 @@ class Shape:
     """A shape of the drawing.
 
     Attributes:
-        kind: outdoors, room, obstacle, board, paving, doorway, leaf, link, axis or name, title.
+        kind: outdoors, room, obstacle, board, paving, doorway, leaf, link, axis, mark (scale, north); of what is
+            written: name, title, door-name, note.
         points: (k, 2) on the drawing [m], x to the right and y up.
         text: its label.
     """
@@ -85,7 +95,24 @@ def build_drawing(world: World) -> Drawing:
             left += float(panel.size[0])
         top -= height
     width = max(math.fsum(float(panel.size[0]) for panel in row) for row in rows)
-    return Drawing(np.array([width, math.fsum(heights)]), tuple(shapes))
+    legend = _list_legend({shape.kind for shape in shapes})
+    foot_m = LEGEND_M * len(legend)
+    raised = (Shape(s.kind, s.points + np.array([0.0, foot_m]), s.text) for s in shapes)
+    size = np.array([width, math.fsum(heights) + foot_m])
+    return Drawing(size, (*raised, *(shape for line in legend for shape in line)))
+
+
+def _list_legend(kinds: Collection[str]) -> list[list[Shape]]:
+    """A sign and its words for each kind that is drawn, line by line from the bottom."""
+    shown = [(kind, text) for kind, text in LEGEND.items() if kind in kinds]
+    lines = []
+    for number, (kind, text) in enumerate(reversed(shown)):
+        low, high = LEGEND_M * number + 0.1, LEGEND_M * number + 0.35
+        corners = [(MARGIN_M, low), (MARGIN_M + 0.5, low), (MARGIN_M + 0.5, high), (MARGIN_M, high)]
+        sign = [(MARGIN_M, (low + high) / 2.0), (MARGIN_M + 0.5, (low + high) / 2.0)]
+        points = sign[:1] if kind == "link" else sign if kind in ("leaf", "axis") else corners
+        lines.append([Shape(kind, np.array(points)), Shape("note", np.array([(MARGIN_M + 0.7, low)]), text)])
+    return lines
 
 
 def _draw_panel(world: World, floor_m: float, rooms: list[str], titled: bool) -> DrawnStorey:
@@ -97,8 +124,19 @@ def _draw_panel(world: World, floor_m: float, rooms: list[str], titled: bool) ->
     if titled:
         text = f"{_title_of(world, rooms)}, floor at {floor_m:.2f} m"
         shapes.append(Shape("title", np.array([[width / 2, height + TITLE_M / 3]]), text))
+    shapes += _draw_marks(float(width))
     size = np.array([width, height + (TITLE_M if titled else 0.0)])
     return DrawnStorey(tuple(rooms), low, Drawing(size, tuple(shapes)))
+
+
+def _draw_marks(width: float) -> Iterator[Shape]:
+    """A scale and an arrow to the north (the y axis of the world), in the lower margin."""
+    bar_m = max([length for length in SCALE_BARS_M if length <= width / 4.0], default=1)
+    yield Shape("mark", np.array([(MARGIN_M, 0.3), (MARGIN_M, 0.2), (MARGIN_M + bar_m, 0.2), (MARGIN_M + bar_m, 0.3)]))
+    yield Shape("note", np.array([(MARGIN_M + bar_m + 0.15, 0.15)]), f"{bar_m} m")
+    x = width - 0.25
+    yield Shape("mark", np.array([(x, 0.1), (x, 0.55), (x - 0.1, 0.4), (x, 0.55), (x + 0.1, 0.4)]))
+    yield Shape("note", np.array([(x - 0.4, 0.15)]), "N")
 
 
 def find_storeys(world: World) -> list[tuple[float, list[str]]]:
@@ -128,6 +166,10 @@ def _draw_storey(world: World, rooms: list[str]) -> Iterator[Shape]:
     doorways = {doorway.name: doorway for name in rooms for doorway in world.doorways_of(name)}
     for doorway in doorways.values():
         yield Shape("doorway", doorway.thresholds_world.reshape(-1, 2), doorway.name)
+        foot = doorway.threshold_of(doorway.between[0]).mean(axis=0)
+        inwards = foot - doorway.centre_world[:2]
+        inwards *= DOOR_NAME_M / max(float(np.hypot(*inwards)), 1e-9)
+        yield Shape("door-name", (foot + inwards)[None], doorway.name)
     for name in rooms:
         for face in world.faces_of(name):
             if face.name.endswith(("/leaf", "/shut")):
@@ -161,6 +203,8 @@ def drawing_svg(drawing: Drawing, more: str = "") -> str:
     return "\n".join([head, _STYLE, ground, *shapes, *([more] if more else []), "</svg>\n"])
 
 
+WRITTEN = frozenset(("name", "title", "door-name", "note"))
+"""Kinds of shapes that are a text at a point."""
 GROUND = "#777"
 _STYLE = """<style>
 .room { fill: #f7f4ea; stroke: #222; stroke-width: 2 } .outdoors { fill: #b9cf9d; stroke: #3c5a2c; stroke-width: 2 }
@@ -169,18 +213,19 @@ _STYLE = """<style>
 .leaf { stroke: #8c1d1d; stroke-width: 5; fill: none }
 .link { fill: #7d4fa3; stroke: #3f2756 }
 .axis { stroke: #b03030; stroke-width: 2; fill: none } text { font: 16px sans-serif; text-anchor: middle; fill: #222 }
-text.title { font-size: 20px; font-weight: bold; fill: #fff }
+text.title { font-size: 20px; font-weight: bold; fill: #fff } text.door-name { font-size: 9px }
+text.note { font-size: 12px; text-anchor: start; fill: #fff } .mark { stroke: #fff; stroke-width: 2; fill: none }
 </style>"""
 
 
 def _svg_element(shape: Shape, height: float) -> str:
     xy = np.column_stack([shape.points[:, 0] * SCALE, height - shape.points[:, 1] * SCALE])
     x, y = xy[0]
-    if shape.kind in ("name", "title"):
+    if shape.kind in WRITTEN:
         return f'<text class="{shape.kind}" x="{x:.1f}" y="{y:.1f}">{escape(shape.text)}</text>'
     named = f"<title>{escape(shape.text)}</title>" if shape.text else ""
     if shape.kind == "link":
         return f'<circle class="link" cx="{x:.1f}" cy="{y:.1f}" r="9">{named}</circle>'
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in xy)
-    tag = "polyline" if shape.kind in ("axis", "leaf") else "polygon"
+    tag = "polyline" if shape.kind in ("axis", "leaf", "mark") else "polygon"
     return f'<{tag} class="{shape.kind}" points="{points}">{named}</{tag}>'

@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_080,
+    "world_models": 10_090,
     "knowledge_sources": 22_606,
     "sim": 5_901,
     "logs": 7_670,

@@ -143,6 +143,6 @@ def test_the_plan_has_a_panel_for_every_storey(campus: World, tmp_path: Path) ->
     boxes = [(shape.points.min(axis=0), shape.points.max(axis=0)) for shape in plan.shapes if shape.kind == "room"]
     for index, (low, high) in enumerate(boxes):
         assert not any((low < h - 0.01).all() and (high > w + 0.01).all() for w, h in boxes[index + 1 :])
-    assert plan_svg(campus).count('class="outdoors"') == 1
+    assert plan_svg(campus).count('class="outdoors"') == 1 + 1  # and the legend's
     draw_plan(campus, tmp_path / "plan.png")
     assert (tmp_path / "plan.png").read_bytes()[:4] == b"\x89PNG"

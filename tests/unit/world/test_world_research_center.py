@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from world_models.building.geometry.outlines import distance_to_border, inside_polygon
-from world_models.building.plan_view import plan_svg
+from world_models.building.plan_view import LEGEND, build_drawing, plan_svg
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
@@ -140,6 +140,11 @@ def test_flat_boards_are_no_obstacles_but_furniture_is(world: World) -> None:
 
 def test_a_plan_shows_every_room_and_thing(world: World) -> None:
     plan = plan_svg(world)
-    assert plan.startswith("<svg") and plan.count("<text") == len(world.rooms)
+    assert plan.startswith("<svg") and plan.count('<text class="name"') == len(world.rooms)
+    drawn = build_drawing(world).shapes
+    doorways = {doorway.name for room in world.rooms for doorway in world.doorways_of(room)}
+    assert {shape.text for shape in drawn if shape.kind == "door-name"} == doorways
+    notes = {shape.text for shape in drawn if shape.kind == "note"}
+    assert {"N", "5 m"} | {LEGEND[kind] for kind in {shape.kind for shape in drawn} & LEGEND.keys()} == notes
     assert all(f">{room}</text>" in plan for room in world.rooms)
     assert all(f"<title>{thing.name}</title>" in plan for thing in world.things)
