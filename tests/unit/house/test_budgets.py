@@ -14,14 +14,14 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_090,
+    "world_models": 10_125,
     "knowledge_sources": 22_606,
     "sim": 5_901,
     "logs": 7_670,
     "harvey": 11_073,
     "experiments": 10_529,
-    "tests": 44_803,
-    "extras": 15_170,
+    "tests": 44_900,
+    "extras": 15_240,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}
