@@ -27,19 +27,23 @@ MAX_APART_SIGMAS = 3.0
 """Wheels that say otherwise than what is believed by more than this slipped, or the robot was pushed."""
 
 
-def find_motion_between(view: View, then: FloorView, now: Belief) -> MotionBetween:
-    """The motion from where a picture was kept to where the robot is believed to be now."""
+def find_motion_between(
+    view: View, then: FloorView, now: Belief
+) -> tuple[MotionBetween, tuple[Entry[MotionReport] | Entry[Drift], ...]]:
+    """The motion from where a picture was kept to where the robot is believed to be now, and what told of it beside the
+    belief.
+    """
     believed = _compare_beliefs(then, now)
     reports = _list_reports(view, then.motion, now.value.motion)
     drift = view.latest(Drift)
     if drift is None or not reports or any(_is_broken(view, report) for report in reports):
-        return believed
+        return believed, ()
     rolled = add_reports(now.robot.actuator, drift.value, [report.value for report in reports])
     off = believed.moved.position - rolled.moved.position
     turned = wrap_angle(believed.moved.heading_rad - rolled.moved.heading_rad)
     is_apart = (abs(turned) > MAX_APART_SIGMAS * math.hypot(believed.sigma_rad, rolled.sigma_rad)
                 or math.hypot(*off) > MAX_APART_SIGMAS * math.hypot(believed.sigma_m, rolled.sigma_m))
-    return believed if is_apart else min(believed, rolled, key=_measure_unsure_m)
+    return believed if is_apart else min(believed, rolled, key=_measure_unsure_m), (drift, *reports)
 
 
 def add_reports(actuator: ActuatorModel, drift: Drift, reports: list[MotionReport]) -> MotionBetween:

@@ -75,14 +75,17 @@ class FloorWatcher(RobotKnowledgeSource):
                 if entry.value.belief == belief.id and entry.value.floor_m == floor_m]
         apart_m = FLOOR_VIEW_DISTANCE_M
         earlier = [entry for entry in kept if _measure_way_m(entry.value, pose) >= apart_m]
+        motions = [find_motion_between(view, entry.value, case.belief) for entry in earlier]
+        wheels = {entry.id: entry for _, told in motions for entry in told}
         lit = _find_lit(view, frame.value.sim_time_s)
         seen, learnt = see_free_floor(
             robot, locale, pose, case.belief.covariance, frame.value.jpeg,
-            [Seen(view[e.value.frame].value.jpeg, _pose_of(e.value), find_motion_between(view, e.value, case.belief))
-             for e in earlier],
+            [Seen(view[entry.value.frame].value.jpeg, _pose_of(entry.value), motion)
+             for entry, (motion, _) in zip(earlier, motions, strict=True)],
             {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings,
             None if lit is None else lit.value.light)
-        reasons = (*earlier, *(known[name] for name in (locale,) if name in known), *(() if lit is None else (lit,)))
+        reasons = (*earlier, *wheels.values(), *(known[name] for name in (locale,) if name in known),
+                   *(() if lit is None else (lit,)))
         yield Post(seen, (frame, belief, *reasons))
         for appearance in learnt:
             old, because = known.get(appearance.locale), (frame, belief, *earlier)

@@ -54,7 +54,11 @@ class Way:
         return self.bench.put(report(turn_rad, move_m), self.bench.put(MotorCommand(turn_rad, move_m)))
 
     def find(self) -> MotionBetween:
-        return find_motion_between(self.bench.view, self.kept, HELD.of(self.bench.view))
+        motion, told = find_motion_between(self.bench.view, self.kept, HELD.of(self.bench.view))
+        asked = {entry.id for entry in told}
+        assert not asked or asked == {"Drift-1", *(entry.id for entry in self.reports)}
+        assert asked or self.believes(motion)
+        return motion
 
     def believes(self, found: MotionBetween) -> bool:
         """Whether it is the motion by both beliefs."""

@@ -32,6 +32,7 @@ from knowledge_sources.motion_between import find_motion_between
 from world_models.entries.body import CameraPicture, Course, MotionReport
 from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor, Light
 from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.robot_state import Drift
 from world_models.frames import Pose2
 
 HERE = Pose2(3.0, 2.0, 0.4)
@@ -145,7 +146,7 @@ def test_it_compares_with_the_pictures_kept_from_far_enough_by_this_belief_on_th
     assert [seen.jpeg for seen in earlier] == [room.bench.view[e.value.frame].value.jpeg for e in far]
     held = HELD.of(room.bench.view)
     assert [(seen.pose, seen.since) for seen in earlier] == [
-        (Pose2(e.value.x_m, e.value.y_m, e.value.heading_rad), find_motion_between(room.bench.view, e.value, held))
+        (Pose2(e.value.x_m, e.value.y_m, e.value.heading_rad), find_motion_between(room.bench.view, e.value, held)[0])
         for e in far]
     (seen,) = [e for e in effects if isinstance(e.value, FreeFloor)]
     assert isinstance(seen, Post) and seen.value == floor()
@@ -164,6 +165,18 @@ def test_it_keeps_a_picture_after_a_turn_on_the_spot(eye: Eye, aside_rad: float)
         room = Room()
         room.view(0.0, aside_rad=side * aside_rad)
         assert bool(made(room.look(), FloorView)) == (aside_rad > FLOOR_VIEW_TURN_RAD)
+
+
+def test_it_names_the_reports_of_the_wheels_and_their_drift(eye: Eye) -> None:
+    room = Room()
+    _, before = room.bench.move(0.0, 0.1)
+    kept = room.view(0.9)
+    room.bench.revise(kept, motion=before.id)
+    drift = room.bench.put(Drift(0.0, 0.01, 0.0))
+    reports = [room.bench.move(0.0, 0.3)[1] for _ in range(3)]
+    room.belief = room.bench.revise(room.belief, motion=reports[-1].id)
+    (seen,) = [e for e in room.look() or () if isinstance(e.value, FreeFloor)]
+    assert {drift.id, *(report.id for report in reports)} <= reasons(seen) and before.id not in reasons(seen)
 
 
 def test_it_is_told_the_looks_of_floors_and_revises_what_it_learns(eye: Eye) -> None:
