@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 
@@ -62,15 +62,32 @@ def find_picture(run: RunDirectory, cycle: int) -> EntryRecord[CameraPicture]:
     return newest
 
 
-def write_picture(run: RunDirectory, record: EntryRecord[CameraPicture], out: Path) -> tuple[int, int]:
-    """Writes it as PNG with the pixels of the camera's JPEG; returns width and height [px]. Raises BadInput."""
-    from PIL import Image, UnidentifiedImageError
+LINE_COLOURS: Mapping[str, str] = {"found": "#9adfff", "expected": "#ffd84a", "agreed": "#54f08f"}
+"""Of what is drawn over a picture, from the bottom up."""
+
+
+def write_picture(
+    run: RunDirectory, record: EntryRecord[CameraPicture], out: Path, lines: Mapping[str, Iterable[Sequence[float]]]
+) -> tuple[int, int]:
+    """Writes it as PNG with the pixels of the camera's JPEG, and lines over it; returns width and height [px].
+
+    Args:
+        lines: rows of u0, v0, u1, v1 [px] for each of :data:`LINE_COLOURS` that is there.
+
+    Raises:
+        BadInput: the picture is none, or cannot be written.
+    """
+    from PIL import Image, ImageDraw, UnidentifiedImageError
 
     try:
         picture = Image.open(BytesIO(open_pictures(run)[record.fields["number"]]))
         picture.load()
     except (UnidentifiedImageError, OSError) as error:
         raise BadInput(f"{record.id}: expected a picture of the camera as JPEG, got: {error}") from None
+    draw = ImageDraw.Draw(picture)
+    for kind, colour in LINE_COLOURS.items():
+        for line in lines.get(kind, ()):
+            draw.line(tuple(line), fill=colour, width=2)
     try:
         picture.save(out, "PNG")
     except OSError as error:

@@ -39,19 +39,20 @@ def _run_report(args: Namespace) -> int:
     if is_one:
         if args.each:
             raise BadInput("--each: expected several runs or a campaign, got one run")
-        _write(out, _page_of(RunDirectory(first)))
+        write_page(out, build_run_page(RunDirectory(first)))
     else:
         missions = read_missions(found)
         if args.each:
             _write_each(missions, out)
         from harvey.report.several import build_page_of_several
 
-        _write(out, build_page_of_several(missions, _title(args.run, missions), out))
+        write_page(out, build_page_of_several(missions, _title(args.run, missions), out))
     print(f"{out}: {out.stat().st_size / 1e6:.1f} MB; opens in any browser, without network")
     return 0
 
 
-def _page_of(run: RunDirectory) -> str:
+def build_run_page(run: RunDirectory) -> str:
+    """The report of a run as HTML."""
     from harvey.report.page import build_page
     from logs.timeline import Timeline
 
@@ -72,14 +73,15 @@ def _write_each(missions: Sequence[MissionSummary], out: Path) -> None:
     for mission, run in tqdm(kept, unit=" reports", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False):
         place = report_path(mission, out)
         try:
-            page = _page_of(run)
+            page = build_run_page(run)
         except BadInput as error:
             print(f"{mission.name}: no report: {error}", file=sys.stderr)
             continue
-        _write(place, page, make_folder=True)
+        write_page(place, page, make_folder=True)
 
 
-def _write(out: Path, page: str, *, make_folder: bool = False) -> None:
+def write_page(out: Path, page: str, *, make_folder: bool = False) -> None:
+    """Write a page. Raises BadInput where it cannot be written."""
     try:
         if make_folder:
             out.parent.mkdir(exist_ok=True)

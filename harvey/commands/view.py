@@ -11,6 +11,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
@@ -31,15 +32,19 @@ def _arguments(parser: ArgumentParser) -> None:
     how.add_argument("--web", action="store_true",
                      help="in a browser; the viewer serves it on this machine only, until Ctrl-C")
     how.add_argument("--picture", metavar="AT", type=whole,
-                     help="write the camera picture that was seen last in cycle AT, as PNG, and open nothing")
+                     help="write the camera picture that was seen last in cycle AT, as PNG, with the lines that were"
+                          " found in it and those that were expected, and open nothing")
+    parser.add_argument("--plain", action="store_true", help="with --picture: without lines")
 
 
 def _run(args: Namespace) -> int:
     is_one = len(args.runs) == 1 and not _is_campaign(find_directory(args.runs[0]))
+    if args.plain and args.picture is None:
+        raise BadInput("--plain: expected it with --picture")
     if args.picture is not None:
         if not is_one:
             raise BadInput("--picture: expected one run, got several")
-        return _write_picture(open_run(args.runs[0]), args.picture, args.save)
+        return _write_picture(open_run(args.runs[0]), args.picture, args.save, plain=args.plain)
     if is_one:
         if args.save:
             raise BadInput("--save: expected several runs, or a directory of them, got one run")
@@ -53,17 +58,30 @@ def _run(args: Namespace) -> int:
     return _open(overview, args.web)
 
 
-def _write_picture(run: RunDirectory, cycle: int, name: str | None) -> int:
+def _write_picture(run: RunDirectory, cycle: int, name: str | None, *, plain: bool) -> int:
     from logs.pictures import find_picture, write_picture
 
     out = Path(name or f"{run.path.resolve().name}-{cycle}.png")
     if out.suffix != ".png":
         raise BadInput(f"--save: expected a name that ends in .png, got {str(out)!r}")
     record = find_picture(run, cycle)
-    width, height = write_picture(run, record, out)
+    lines = {} if plain else _find_lines(run, record.id)
+    width, height = write_picture(run, record, out, lines)
     print(f"{out}: {record.id}, seen in cycle {record.cycle}, taken at {record.fields['sim_time_s']:.1f} s; "
           f"{width} x {height} px")
+    if counts := [f"{len(lines[kind])} {kind} ({colour})" for kind, colour in (
+            ("expected", "yellow"), ("found", "blue"), ("agreed", "green")) if kind in lines]:
+        print(f"lines: {', '.join(counts)}; --plain leaves them out")
     return 0
+
+
+def _find_lines(run: RunDirectory, picture: str) -> dict[str, Any]:
+    """What was found in a picture, and what was expected there."""
+    from harvey.report.data import Lenses, list_lines
+    from harvey.report.page import find_known
+    from logs.timeline import Timeline
+
+    return list_lines(Timeline(run.journal), Lenses(find_known(run)[1])).get(picture, {})
 
 
 def _whole(run: RunDirectory) -> Path:
@@ -150,7 +168,7 @@ VIEW = CliCommand(
         ("harvey view runs/lab-to-allens-office", "all runs of a campaign, one row each"),
         ("harvey view runs/bump-0 runs/hallway-kidnap-0 --save both.rrd", "two runs side by side, kept in a file"),
         ("harvey view runs/bump-0 --web", "in a browser"),
-        ("harvey view runs/bump-0 --picture 88", "what the camera saw in cycle 88: bump-0-88.png"),
+        ("harvey view runs/bump-0 --picture 88", "what the camera saw in cycle 88, with lines: bump-0-88.png"),
     ),
     _arguments, _run,
 )

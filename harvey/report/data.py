@@ -110,7 +110,7 @@ def read_pictures(
     history: Timeline, pictures: Mapping[int, bytes], camera: Camera | None
 ) -> Iterator[dict[str, Any]]:
     """The pictures that are kept, each since the cycle in which it was seen, with its lines."""
-    lines = _lines(history, Lenses(camera))
+    lines = list_lines(history, Lenses(camera))
     frames = [record for record in history.of_kind(CameraPicture) if not record.is_gone]
     for record in _chosen(frames, lines):
         number = record.fields.get("number")
@@ -147,8 +147,10 @@ def shrink(jpeg: bytes, kind: Literal["JPEG", "WEBP"] = "JPEG") -> tuple[str, tu
     return base64.b64encode(out.getvalue()).decode("ascii"), size
 
 
-def _lines(history: Timeline, lenses: Lenses) -> dict[str, dict[str, Any]]:
-    """By frame: what was found, what was expected of a milestone there, and what agreed with it."""
+def list_lines(history: Timeline, lenses: Lenses) -> dict[str, dict[str, Any]]:
+    """By picture, rows of u0, v0, u1, v1 [px]: what was found, what was expected of a milestone, and what agreed with
+    it.
+    """
     found: dict[str, dict[str, Any]] = {}
     for record in history.of_kind(Segments):
         if not record.is_gone:

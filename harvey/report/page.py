@@ -33,7 +33,7 @@ def build_page(run: RunDirectory, history: Timeline) -> str:
         BadInput, RecordingError: journal, pictures, result or recording cannot be read.
     """
     story = tell_run(run, history)
-    world, camera, is_simulated = _known(run)
+    world, camera, is_simulated = find_known(run)
     track = read_true_track(run.recording) if is_simulated and world is not None else []
     errors = read_errors(run, history) if track else ()
     beliefs = list(data.beliefs(history, world))
@@ -93,7 +93,7 @@ def lost_spans(story: RunStory, history: Timeline) -> Iterator[tuple[int, int]]:
         yield since, history.cycles[-1]
 
 
-def _known(run: RunDirectory) -> tuple[World | None, Camera | None, bool]:
+def find_known(run: RunDirectory) -> tuple[World | None, Camera | None, bool]:
     """World and camera of the run, where its files are as they were; and whether the truth is recorded."""
     try:
         head = RunHead.read(run.path)

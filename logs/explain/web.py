@@ -39,14 +39,28 @@ NAMING: Mapping[type[Any], str] = {Milestone: "landmarks", Tracks: "items", Plan
 Kind = Callable[[EntryRecord[Any]], str | None]
 
 
-def printing(out: TextIO) -> Sink:
-    """A sink that prints every cycle."""
+def printing(out: TextIO, *, whole: bool) -> Sink:
+    """A sink that prints every cycle: whole, or in a line."""
     trace = Trace()
 
     def sink(decision: Decision) -> None:
-        out.write("\n".join(trace.lines(decision_of(decision_record(decision)))) + "\n")
+        record = decision_of(decision_record(decision))
+        out.write("\n".join(trace.lines(record) if whole else [cycle_line(record)]) + "\n")
 
     return sink
+
+
+MAX_LINE = 160
+
+
+def cycle_line(decision: DecisionRecord) -> str:
+    """One cycle in a line: who acted, woken by what, and what came of it."""
+    outside = f"{', '.join(change.ref for change in decision.observed)} came; " if decision.observed else ""
+    who = "nobody acts" if decision.chosen is None else f"{decision.chosen.source} on {decision.chosen.trigger}"
+    made = ", ".join(f"{change.change.lower()} {change.ref}" for change in decision.made)
+    line = f"{decision.cycle:5}  {decision.focus:<6}  {outside}{who}{': ' if made else ''}{made}"
+    line += " (refused)" if decision.refused else ""
+    return line if len(line) <= MAX_LINE else f"{line[:MAX_LINE - 4]} ..."
 
 
 class Trace:

@@ -35,11 +35,27 @@ def test_the_picture_of_a_cycle_is_the_newest_that_was_seen(
     assert len(pictures) > 1
     for cycle in range(pictures[0].cycle, 1 + max(decision.cycle for decision in run.decisions())):
         expected = [picture for picture in pictures if picture.cycle <= cycle][-1]
-        assert main(["view", str(run.path), "--picture", str(cycle), "--save", str(out)]) == 0
+        assert main(["view", str(run.path), "--picture", str(cycle), "--plain", "--save", str(out)]) == 0
         assert f"{expected.entry}, seen in cycle {expected.cycle}" in capsys.readouterr().out
         with Image.open(out) as written, Image.open(BytesIO(expected.jpeg)) as taken:
             assert written.format == "PNG"
             assert np.array_equal(np.asarray(written), np.asarray(taken))
+
+
+def test_the_picture_of_a_milestone_shows_what_was_expected_and_what_was_found(
+    run: harvey.RecordedRun, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    judged = next(decision.cycle for decision in run.decisions()
+                  if any(change.type == "PoseFix" for change in decision.made))
+    drawn, plain = tmp_path / "lines.png", tmp_path / "plain.png"
+    assert main(["view", str(run.path), "--picture", str(judged), "--save", str(drawn)]) == 0
+    assert re.search(r"lines: \d+ expected \(yellow\), \d+ found \(blue\), \d+ agreed \(green\)",
+                     capsys.readouterr().out)
+    assert main(["view", str(run.path), "--picture", str(judged), "--plain", "--save", str(plain)]) == 0
+    with Image.open(drawn) as one, Image.open(plain) as other:
+        changed = (np.asarray(one) != np.asarray(other)).any(axis=2)
+        colours = {tuple(colour) for colour in np.asarray(one)[changed].tolist()}
+    assert {(0xFF, 0xD8, 0x4A), (0x54, 0xF0, 0x8F)} <= colours and 0.0 < changed.mean() < 0.3
 
 
 @pytest.mark.parametrize(("given", "said"), [
@@ -49,6 +65,7 @@ def test_the_picture_of_a_cycle_is_the_newest_that_was_seen(
     (["--picture", "20", "--save", "nowhere/seen.png"], "expected a file to write to"),
     (["--picture", "-1"], "expected a whole number from 0, got '-1'"),
     (["--picture", "20", "--web"], "not allowed with argument"),
+    (["--plain"], "expected it with --picture"),
 ])
 def test_what_cannot_be_shown_is_refused(
     run: harvey.RecordedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],

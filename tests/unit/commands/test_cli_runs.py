@@ -37,7 +37,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A mission that was given 36 cycles, in 6 of which an act only asks for locale frames, and its trace."""
     out, printed = tmp_path_factory.mktemp("runs") / "short", io.StringIO()
     with redirect_stdout(printed):
-        assert main(["run", "lab-to-allens-office", *SHORT, "--out", str(out), "--trace"]) == 1
+        assert main(["run", "lab-to-allens-office", *SHORT, "--out", str(out), "--trace-all"]) == 1
     return out, printed.getvalue()
 
 

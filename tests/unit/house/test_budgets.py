@@ -15,9 +15,9 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 10_125,
-    "knowledge_sources": 22_606,
+    "knowledge_sources": 22_620,
     "sim": 5_901,
-    "logs": 7_670,
+    "logs": 7_705,
     "harvey": 11_073,
     "experiments": 10_529,
     "tests": 44_900,
