@@ -34,6 +34,7 @@ def _add_replay_arguments(parser: ArgumentParser) -> None:
                               " may be repeated")
     what_if.add_argument("--record-only", action="store_true",
                          help="end where the record no longer answers, instead of going on in the simulator")
+    what_if.add_argument("--values", action="store_true", help="show the first decision that differs, value by value")
     what_if.add_argument("--out", metavar="DIR", help="keep what would have been as a run, for diff, why and view")
 
 
@@ -41,8 +42,8 @@ def _run_replay(args: Namespace) -> int:
     run, settings = open_run(args.run), parse_pairs(args.settings)
     if args.without or settings:
         return _otherwise(run, args, settings)
-    if args.out or args.record_only:
-        raise BadInput("--out and --record-only: expected --without or --set beside them, got neither")
+    if args.out or args.record_only or args.values:
+        raise BadInput("--out, --record-only and --values: expected --without or --set beside them, got neither")
     return _again(run)
 
 
@@ -56,13 +57,31 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
         raise BadInput(f"--out {args.out}: expected another directory than that of the run, got the same")
     elsewhere = RunHead.read(run.path).decided_elsewhere()
     answer = what_if(run, args.without, settings, out=out, go_on=not args.record_only)
+    if out is not None:
+        _draw_ways(run, out)
     print("\n".join(describe_answer(answer, run, [*(f"without {name}" for name in args.without),
-                                       *(f"with {key} = {value}" for key, value in settings)])))
+                                       *(f"with {key} = {value}" for key, value in settings)], values=args.values)))
     if elsewhere:
         print(f"\nnote: the run {elsewhere}, so what differs may come of that as well: harvey replay {run.path} tells")
     if out is not None:
         print(f"\nit is kept in {out.path}; compare with    harvey diff {run.path} {out.path}")
     return 0
+
+
+def _draw_ways(run: RunDirectory, other: RunDirectory) -> None:
+    """A picture of where the robot believed to be in both."""
+    from harvey.commands.plan_picture import draw_ways
+    from harvey.report import data
+    from harvey.report.page import find_known
+    from logs.timeline import Timeline
+
+    world, picture = find_known(run)[0], other.path / "ways.png"
+    if world is not None:
+        named = (("as recorded", run), ("as it would have been", other))
+        beliefs = {name: data.beliefs(Timeline(that.journal), world) for name, that in named}
+        draw_ways(world, {name: [(one["locale"], one["x"], one["y"]) for one in believed]
+                          for name, believed in beliefs.items()}, picture)
+        print(f"{picture}: both ways on the plan\n")
 
 
 def _again(run: RunDirectory) -> int:

@@ -1,11 +1,14 @@
-"""The plan of a world as a picture (PNG)."""
+"""The plan of a world as a picture (PNG), also with ways on it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from world_models.building.plan_view import GROUND, build_drawing
+import numpy as np
+
+from world_models.building.plan_view import GROUND, Drawing, DrawnStorey, build_drawing, draw_storeys
 from world_models.building.world import World
 
 PIXELS_PER_M, MAX_PIXELS = 30.0, 6000.0
@@ -19,11 +22,37 @@ LETTERS_M: Mapping[str, float] = {"title": 0.7, "name": 0.42, "note": 0.34, "doo
 """Size of the letters of each kind that is written."""
 
 
+WAY_COLOURS = "#0063a0", "#b3240f"
+
+
 def draw_plan(world: World, out: Path) -> None:
     """Write the plan as a PNG. Raises OSError."""
+    figure, _ = _draw(build_drawing(world))
+    figure.savefig(out, format="png")
+
+
+def draw_ways(world: World, ways: Mapping[str, Sequence[tuple[str, float, float]]], out: Path) -> None:
+    """Write two ways as a PNG, on the plan of the storey that most of them are on. Raises OSError.
+
+    Args:
+        ways: by what they are called, locales with x, y [m, world].
+    """
+    def count(storey: DrawnStorey) -> int:
+        return len([room for way in ways.values() for room, _, _ in way if room in storey.rooms])
+
+    storey = max(draw_storeys(world), key=count)
+    figure, axes = _draw(storey.drawing)
+    for number, ((name, way), colour) in enumerate(zip(ways.items(), WAY_COLOURS, strict=True)):
+        points = np.array([(x, y) for room, x, y in way if room in storey.rooms]).reshape(-1, 2) - storey.origin
+        axes.plot(*points.T, color=colour, linewidth=4.0 - 2.0 * number, label=name, zorder=1000 + number)
+    axes.legend(loc="lower center")
+    figure.savefig(out, format="png")
+
+
+def _draw(plan: Drawing) -> tuple[Any, Any]:
+    """A figure of matplotlib, and its axes [m]."""
     from matplotlib.figure import Figure
 
-    plan = build_drawing(world)
     scale = min(PIXELS_PER_M, MAX_PIXELS / float(plan.size.max()))
     figure = Figure(figsize=(plan.size[0] * scale / 100.0, plan.size[1] * scale / 100.0), dpi=100, facecolor=GROUND)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
@@ -46,5 +75,4 @@ def draw_plan(world: World, out: Path) -> None:
                       color="white" if shape.kind in ("title", "note") else "#222222",
                       fontsize=LETTERS_M[shape.kind] * scale * 72.0 / 100.0,
                       fontweight="bold" if shape.kind == "title" else "normal", zorder=order)
-    figure.savefig(out, format="png")
-
+    return figure, axes

@@ -322,22 +322,32 @@ def _find_time_s(view: View) -> float:
     return max(newest, default=0.0)
 
 
-def describe_answer(answer: Answer, run: RunDirectory, changes: Sequence[str]) -> Iterator[str]:
-    """The first decision that differs, what changed, and how it ends; ``changes`` as ``without line_finder``."""
+def describe_answer(
+    answer: Answer, run: RunDirectory, changes: Sequence[str], *, values: bool = False
+) -> Iterator[str]:
+    """How it would have ended, and where it would have done something else; ``changes`` as ``without line_finder``.
+
+    Args:
+        values: also the first decision that differs, value by value.
+    """
     yield f"{run.path}, {' and '.join(changes)}:"
     if answer.then is None and answer.now is None:
         but = f", but for {listed(answer.revised)}, by which it was asked" if answer.revised else ""
         yield (f"nothing would have changed: all of its {count(answer.agreed, 'decision')} are the same, byte for"
                f" byte{but}.")
         return
-    yield "first: as recorded; second: as it would have been"
-    yield from describe(answer.agreed, answer.then, answer.now)
-    yield ""
-    yield from _parting(answer)
     yield from _end(answer, run)
+    yield from _parting(answer, values)
+    first = answer.then or answer.now
+    if values:
+        yield from ("", "first: as recorded; second: as it would have been")
+        yield from describe(answer.agreed, answer.then, answer.now)
+    elif first is not None:
+        yield (f"The first decision that differs is that of cycle {first.cycle}, after {answer.agreed} that are the"
+               " same; --values shows it.")
 
 
-def _parting(answer: Answer) -> Iterator[str]:
+def _parting(answer: Answer, values: bool) -> Iterator[str]:
     if answer.parting is None:
         yield "It asks its body for the same as in the record to the end, so what was observed holds to the end."
         return
@@ -345,7 +355,7 @@ def _parting(answer: Answer) -> Iterator[str]:
     yield f"What was observed holds for {held} to the body, which are the same. Then it asks for something else:"
     yield f"  as recorded:              {_describe_requests(answer.parting.then, answer.parting.requests)}"
     yield f"  as it would have been:    {_describe_requests(answer.parting.now, answer.parting.requests)}"
-    yield from _leaves(answer.parting)
+    yield from _leaves(answer.parting) if values else ()
     if answer.outcome.kind == UNFINISHED:
         yield "From there the record cannot tell what it would have observed."
     else:
@@ -372,10 +382,9 @@ def _end(answer: Answer, run: RunDirectory) -> Iterator[str]:
     if answer.outcome.kind == UNFINISHED:
         return
     before = run.read_result()
-    yield ""
-    yield "How it ends:"
     error_m = before.get("final_error_m")
     truly = f", {format_error(error_m)} from the goal" if isinstance(error_m, int | float) else ""
     yield f"  as recorded:              {before.get('outcome', UNFINISHED)}{truly}"
     now = f", {format_error(answer.result.error_m)} from the goal" if answer.result is not None else ""
     yield f"  as it would have been:    {answer.outcome.kind}{now}: {answer.outcome.reason}"
+    yield ""

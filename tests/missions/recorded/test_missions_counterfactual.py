@@ -6,7 +6,9 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from harvey.cli import main
 from harvey.errors import BadInput
@@ -92,6 +94,10 @@ def test_without_an_expert_the_simulated_robot_goes_on_by_itself(
     out = tmp_path / "otherwise"
     assert main(["replay", str(run.path), "--without", "correlator_tracker", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
+    assert printed.startswith(f"{out / 'ways.png'}: both ways on the plan")
+    with Image.open(out / "ways.png") as picture:
+        colours = set(map(tuple, np.asarray(picture.convert("RGB")).reshape(-1, 3).tolist()))
+    assert {(0x00, 0x63, 0xA0), (0xB3, 0x24, 0x0F)} <= colours
     assert "as recorded:              reached" in printed and "the simulated robot went on by itself" in printed
     records, others = (list(read_records(d / "journal.jsonl")) for d in (run.path, out))
     assert not any(e.author == "correlator_tracker" for record in others for e in record.made)
