@@ -227,7 +227,8 @@ def test_two_pictures_shut_a_door_and_a_few_open_it_again() -> None:
 def test_a_state_says_what_is_seen() -> None:
     state = look([(4.5, 0.0), (4.5, 1.0)])[-1]
     assert state is not None and not state.is_passable
-    assert state.sentence() == "d is shut: its opening shows something; 99.3% by 2 pictures, the last at 1.0 s"
+    assert state.sentence() == (
+        "d is shut, with a probability of 99.3% by 2 pictures: the last showed something in its opening, at 1.0 s")
 
 
 @pytest.mark.parametrize("state", ["open", "shut"])

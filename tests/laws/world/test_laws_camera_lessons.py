@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -49,11 +50,10 @@ def test_a_camera_that_looks_lower_is_told_so() -> None:
 @given(steps)
 def test_the_next_mission_begins_with_what_was_learnt(step: tuple[float, ...]) -> None:
     state = learnt(step)
-    with pytest.MonkeyPatch.context() as patch:
-        text = build_camera_text(state, "a mission")
-        patch.setattr(Path, "read_text", lambda *_, **__: text)
-        patch.setattr(Path, "read_bytes", lambda *_: text.encode())
-        read = load_camera(Path("camera.toml"))
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "camera.toml"
+        file.write_text(build_camera_text(state, "a mission"), encoding="utf-8")
+        read = load_camera(file)
     assert read.mount is not None and read.camera.fx == pytest.approx(state.lens.fx)
     for name in ("height_m", "forward_m", "tilt_rad", "roll_rad", "yaw_rad"):
         assert getattr(read.mount, name) == pytest.approx(getattr(state.mount, name), abs=1e-12)
