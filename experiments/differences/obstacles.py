@@ -115,7 +115,6 @@ def count_stops(motions: Iterable[str]) -> int:
 MAX_DRAWS, NEXT_DRAW = 20, 50_000_000
 """Where a seed's floor has no room for what is wanted, another's is taken, this far away."""
 EXTRA = "\n[[truth.extra]]"
-MAX_CREEP_M_PER_S = 0.1
 
 MISSIONS, QUICK_MISSIONS = 1_000, 2
 CAMERA, WITH_RING, EMPTY, EMPTY_UNSEEN = "camera", "and ranges", "empty", "empty, unseen"
@@ -250,9 +249,7 @@ class Witness:
 
 
 def _name_motion(command: MotorCommand) -> str:
-    speed_m_per_s = getattr(command, "speed_m_per_s", None)
-    is_slow = command.move_m > 0.0 and speed_m_per_s is not None and 0.0 < speed_m_per_s < MAX_CREEP_M_PER_S
-    return "creep" if is_slow else "go"
+    return "creep" if command.is_creeping else "go"
 
 
 def drive(trial: Trial) -> ObstacleEnd:

@@ -17,8 +17,8 @@ from typing import Any
 
 from logs.explain import phrases
 from logs.explain.phrases import plainly, sentence
-from logs.explain.story import Section, tell_contacts, tell_lost
-from logs.explain.turning_points import read_turning_points
+from logs.explain.story import Section, Sentence, tell_contacts, tell_end, tell_happenings, tell_lost
+from logs.explain.turning_points import read_happenings, read_turning_points
 from logs.explain.why import Step, Story, headline, label_of, step, story_of
 from logs.records import EntryRecord, is_a
 from logs.run_directory import RunDirectory
@@ -35,7 +35,8 @@ from world_models.frames import Pose2, wrap_angle
 from world_models.words import count, degrees, metres
 
 QUESTIONS = ("what is in the way?", "why did you stop?", "why that detour?", "is the door shut?", "when was it lost?",
-             "where did it touch anything?", "how far off was it?")
+             "where did it touch anything?", "how far off was it?", "what was done to it?", "what went wrong?",
+             "how did it end?")
 MOST_STORIES = 6
 """So many things, stops or doors are told of, the newest."""
 MOST_SIGHTS = 4
@@ -166,7 +167,7 @@ def _is_stop(record: EntryRecord[Any]) -> bool:
     if is_a(record, Leg):
         return record.value.status == "halted" or record.value.looking_rad is not None
     if is_a(record, MotorCommand):
-        return record.value.speed_m_per_s is not None
+        return record.value.is_creeping
     return record.kind is Contact or record.value.kind != "reached"
 
 
@@ -273,6 +274,27 @@ def _tell_touched(asked: Asked) -> Iterator[Story]:
     yield from _stories(section, asked.at, "Up to then it touched nothing.")
 
 
+def _tell_happenings(asked: Asked) -> Iterator[Story]:
+    result = {} if asked.run is None else asked.run.read_result()
+    return _stories(tell_happenings(asked.history, result), asked.at, "Up to then the simulator did nothing to it.")
+
+
+def _tell_trouble(asked: Asked) -> Iterator[Story]:
+    """What a short account of the run does not leave out."""
+    result = {} if asked.run is None else asked.run.read_result()
+    points = [*read_happenings(asked.history, result), *read_turning_points(asked.history, told=True)]
+    told = [Sentence(f"{point.kind}: {point.text}.", point.cycle, point.time_s)
+            for point in sorted(points, key=lambda point: point.cycle)]
+    is_whole = any(True for _ in asked.history.of_kind(Outcome))
+    nothing = "Nothing went wrong." if is_whole else "Nothing had gone wrong when the run was cut off."
+    return _stories(Section("", tuple(told)), asked.at, nothing)
+
+
+def _tell_end(asked: Asked) -> Iterator[Story]:
+    result = {} if asked.run is None else asked.run.read_result()
+    return _stories(tell_end(asked.history, result), asked.at, "Up to then it had not ended.")
+
+
 def _stories(section: Section, at: int | None, nothing: str) -> Iterator[Story]:
     told = [one for one in section.sentences if at is None or (one.cycle is not None and one.cycle <= at)]
     for one in told:
@@ -308,6 +330,9 @@ def _tell_error(asked: Asked) -> Iterator[Story]:
 
 
 ANSWERS: Mapping[frozenset[str], Callable[[Asked], Iterator[Story]]] = {
+    frozenset({"wrong", "trouble", "happened"}): _tell_trouble,
+    frozenset({"done", "simulator", "bumped", "carried"}): _tell_happenings,
+    frozenset({"end", "ended", "ends", "outcome", "finish", "finished"}): _tell_end,
     frozenset({"lost"}): lambda asked: _stories(tell_lost(asked.history), asked.at, "Up to then it was not lost."),
     frozenset({"touch", "touched", "contact", "contacts", "collide", "collided", "collision", "collisions", "hit"}):
         _tell_touched,

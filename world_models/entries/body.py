@@ -16,6 +16,8 @@ RecoveryStatus = Literal["asked", "in vain", "over"]
 LAST_REQUESTS = 8
 """The newest requests and faults that stay on the board: the fault handler looks back over a few of them."""
 
+CREEP_M_PER_S = 0.1
+"""A move that is slower creeps."""
 LAST_REPORTS = 32
 """The newest reports of the wheels that stay: they tell the motion between two pictures that are compared."""
 
@@ -58,9 +60,15 @@ class MotorCommand:
         if self.speed_m_per_s is not None and not self.speed_m_per_s > 0.0:
             raise ValueError(f"expected a speed above 0 m/s, got {self.speed_m_per_s}")
 
+    @property
+    def is_creeping(self) -> bool:
+        """Whether it goes so slowly that a touch does no harm."""
+        return self.move_m > 0.0 and self.speed_m_per_s is not None and self.speed_m_per_s < CREEP_M_PER_S
+
     def sentence(self) -> str:
-        slowly = "" if self.speed_m_per_s is None else f", slowly, at {self.speed_m_per_s:.2f} m/s"
-        return words.motion(self.turn_rad, self.move_m) + slowly
+        slowly = ", slowly" * self.is_creeping
+        most = "" if self.speed_m_per_s is None else f", at {self.speed_m_per_s:.2f} m/s"
+        return words.motion(self.turn_rad, self.move_m) + slowly + most
 
 
 @request(keep=LAST_REQUESTS)

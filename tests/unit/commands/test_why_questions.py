@@ -14,7 +14,7 @@ from logs.explain.questions_in_words import QUESTIONS, answers, is_question
 from logs.records import DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
 from world_models.building.locale_frame import FrameChange, FrameReference
-from world_models.entries.body import CameraPicture
+from world_models.entries.body import CameraPicture, MotorCommand
 from world_models.entries.door_state import DoorPicture, DoorState
 from world_models.entries.location import Place
 from world_models.entries.obstacle import Obstacle
@@ -81,6 +81,24 @@ def test_a_stop_is_told_with_the_door_that_it_is_for() -> None:
     (story,) = answers(RUN, "why did you stop there?")
     assert "blocked" in story.headline
     assert [step.label for step in story.steps] == ["door"]
+
+
+def test_only_a_move_that_creeps_is_a_stop() -> None:
+    told = history(entry("MotorCommand-1.0", MotorCommand(0.0, 0.6, 0.4), (), 1),
+                   entry("MotorCommand-2.0", MotorCommand(0.0, 0.3, 0.09), (), 2),
+                   entry("MotorCommand-3.0", MotorCommand(0.2, 0.0), (), 3))
+    (story,) = answers(told, "why did you stop?")
+    assert story.ref == "MotorCommand-2.0" and "slowly, at 0.09 m/s" in story.headline
+    assert "slowly" not in MotorCommand(0.0, 0.6, 0.4).sentence()
+
+
+def test_what_went_wrong_and_how_it_ended_are_told() -> None:
+    assert any("library-door is shut" in story.headline for story in answers(RUN, "what went wrong?"))
+    assert any("library-door is shut" in story.headline for story in answers(RUN, "how did it end?"))
+    (cut,) = answers(history(entry("CameraPicture-3.0", CameraPicture(b"", 3, 1.0))), "what went wrong?")
+    assert cut.headline == "Nothing had gone wrong when the run was cut off."
+    (nobody,) = answers(RUN, "what was done to it?")
+    assert "there is no result of the simulator" in nobody.headline
 
 
 def test_where_nothing_happened_that_is_said() -> None:
