@@ -1,11 +1,14 @@
-"""The table of docs/knowledge-sources.md, made from the classes."""
+"""The table of docs/knowledge-sources.md, made from the classes.
+
+``python -m docs.tools.knowledge_source_table`` prints it with the rows of other packages.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from blackboard.knowledge_source import KnowledgeSource
-from harvey.wiring import KNOWLEDGE_SOURCES
+from harvey.wiring import KNOWLEDGE_SOURCES, foreign_sources
 from knowledge_sources.priority import Priority
 from world_models.building.locale_frame import FrameRequest
 
@@ -39,3 +42,6 @@ def _tell_priority(source: type[KnowledgeSource]) -> str:
         return "by the case"
     return source.priority.name.lower() if isinstance(source.priority, Priority) else f"{source.priority:g}"
 
+
+if __name__ == "__main__":
+    print("\n".join(rows((*KNOWLEDGE_SOURCES, *foreign_sources().values()))))
