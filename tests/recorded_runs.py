@@ -61,6 +61,7 @@ RECIPES: Mapping[str, Recipe] = {
     "hard bump": Recipe(_of_text(HARD_BUMP, "bump-in-allens-office"), 3),
     "hallway": Recipe(_of_text(FAULTY, "faulty"), 0),
     "two doors": Recipe(lambda folder: two_doors(folder, TOLD), 3),
+    "box": Recipe(lambda _folder: Task("box-in-the-way", (("limits.max_cycles", "200"),), 0).stage(), 0, "failed"),
     "shut door": Recipe(lambda _folder: Task("shut-door", (("limits.max_cycles", "300"),), 0).stage(), 0, "failed"),
 }
 """In the hallway it is unplugged, pushed aside and carried off; bumped hard it is lost, and asks for every room."""

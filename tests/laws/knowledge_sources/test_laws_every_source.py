@@ -37,7 +37,7 @@ from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch, Subg
 
 pytestmark = pytest.mark.slow
 
-RUNS = ("two doors", "shut door", "resumed", "office", "hallway", "kidnap", "hard bump")
+RUNS = ("two doors", "shut door", "box", "resumed", "office", "hallway", "kidnap", "hard bump")
 ACTS_EACH = 4
 """So many acts of each source are asked again, at most: of each run the first, and one from its midst."""
 SLOW = {"localizer"}
