@@ -289,9 +289,7 @@ class CameraStateSettings:
     max_known_px: float = setting(
         4.0, "px", "Up to this uncertainty in the picture the camera is taken as believed when lines are matched.")
     focal_starts: tuple[float, ...] = setting(
-        (0.0, -1.5, 1.5), "1", "Focal lengths that are tried beyond it, in deviations, in this order.")
-    clear_sharp_part: float = setting(
-        0.85, "1", "Where so much of the lines' length is covered sharply, no other focal length is tried.")
+        (-1.5, 0.0, 1.5), "1", "Focal lengths that are tried beyond it, in deviations.")
     pair_px: float = setting(8.0, "px", "Largest distance of a data end from its model line then.")
     match_sigma_px: float = setting(2.5, "px", "Standard deviation of a data end across its model line then.")
     sharp_px: float = setting(1.0, "px", "A line is covered sharply by segments within this distance.")

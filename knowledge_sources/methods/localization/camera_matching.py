@@ -43,8 +43,8 @@ def match_with_camera(
 ) -> CameraMatch:
     """Match model lines to data lines within what the priors of pose and camera allow.
 
-    The mounting and the pose on the floor move the camera in six unknowns; of several focal lengths the first is taken
-    with which the lines of the model are covered well enough, else the one with which they are covered best.
+    The mounting and the pose on the floor move the camera in six unknowns; of several focal lengths the one is taken
+    with which the lines of the model are covered best.
 
     Args:
         model_lines_world: (m, 2, 3) [m]. data_px: (k, 2, 2), rectified. camera: without distortion.
@@ -65,8 +65,6 @@ def match_with_camera(
                                pair_px=s.pair_px, sigma_px=s.match_sigma_px)
         found.append(rate_match(
             match, lines, data, camera, mount, prior, prior_covariance, camera_covariance, settings))
-        if found[-1].sharp_part >= s.clear_sharp_part:
-            break
     return max(found, key=lambda tried: tried.sharp_part)
 
 
