@@ -1,4 +1,4 @@
-"""Connections: who sends no request is hung up on, so that whoever has an order is heard."""
+"""Connections: a client that sends no request is cut off, so that others can still send orders."""
 
 from __future__ import annotations
 
