@@ -55,9 +55,9 @@ class _PrintVersion(Action):
 def parser(name: str | None = None) -> ArgumentParser:
     """The parser of all commands, or of the one of this name alone: the others need not be imported."""
     from harvey.commands import find_commands
-    from harvey.commands.command import add_parser
+    from harvey.commands.command import OneLineParser, add_parser
 
-    top = ArgumentParser(
+    top = OneLineParser(
         prog="harvey", epilog=EPILOG, formatter_class=RawDescriptionHelpFormatter,
         description="Model-directed mobile robot navigation on a blackboard, after the UMass Mobile Robot system.",
     )

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,17 @@ class CliCommand:
     def epilog(self) -> str:
         width = max(len(command) for command, _ in self.examples)
         return "examples:\n" + "\n".join(f"  {command.ljust(width)}   {what}" for command, what in self.examples)
+
+
+class OneLineParser(ArgumentParser):
+    """Says what is wrong in one line, as all other errors are said, and where the usage stands."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raises SystemExit(2)."""
+        from harvey.errors import in_one_line
+
+        print(in_one_line(f"{self.prog}: {message}; see {self.prog} --help"), file=sys.stderr)
+        raise SystemExit(2)
 
 
 def add_parser(commands: Any, command: CliCommand) -> ArgumentParser:

@@ -117,7 +117,7 @@ class Verdict(NamedTuple):
 
 def tell_odds(p_wrong: float, most_p_wrong: float) -> str:
     """A probability of a wrong place beside its bound, in words."""
-    return f"wrong with a probability of {say_percent(p_wrong)}, and at most {say_percent(most_p_wrong)} may be"
+    return f"wrong with a probability of {say_percent(p_wrong)}; the limit is {say_percent(most_p_wrong)}"
 
 
 def say_percent(p: float) -> str:

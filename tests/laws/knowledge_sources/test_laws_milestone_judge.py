@@ -120,7 +120,7 @@ def test_a_verdict_says_one_count_of_lines_and_the_bound_that_decided(
     said = judge_place(weigh(matched=matched, p_false=p_false, p_wrong=p_wrong, most_p_wrong=most, shift_px=shift_px,
                              is_inexact=is_inexact), DEFAULT)
     assert re.findall(r"(\d+) of (\d+) lines", said.reason) == [(str(matched), "20")]
-    told = re.findall(r"wrong with a probability of ([^ ]+)%, and at most ([^ ]+)% may be", said.reason)
+    told = re.findall(r"wrong with a probability of ([^ ]+)%; the limit is ([^ ]+)%", said.reason)
     assert "e+" not in said.reason
     assert not told or [float(percent) for percent in told[0]] == pytest.approx(
         [100.0 * said.p_wrong, 100.0 * said.most_p_wrong], rel=0.05)
