@@ -21,7 +21,7 @@ LINES = {
     "harvey": 11_073,
     "experiments": 10_529,
     "tests": 44_900,
-    "extras": 15_240,
+    "extras": 16_120,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}
