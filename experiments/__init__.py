@@ -53,6 +53,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "kidnap": "Kidnaps to anywhere on generated floors of 40 rooms",
         "malformed-worlds": "World and building files with errors put in",
         "missions": "1,000 missions without trouble and 1,000 with",
+        "other-worlds": "Missions in rooms drawn by others (miniworld)",
         "rosmaps": "ROS maps traced into worlds: rooms, doorways, missions",
         "serial-chaos": "Drivers of bases over serial lines with errors",
         "soak": "Errands in one building, day after day: 1,000 km",

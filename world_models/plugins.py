@@ -33,7 +33,8 @@ WORKERS_GROUP, RENDERERS_GROUP = "harvey.workers", "harvey.renderers"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
     COMMANDS_GROUP: {"serve": "harvey-serve", "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
     "harvey.experiments": {
-        "imported-building": "harvey-buildings", "rosmaps": "harvey-buildings", "watchers": "harvey-serve"},
+        "imported-building": "harvey-buildings", "other-worlds": "harvey-miniworld", "rosmaps": "harvey-buildings",
+        "watchers": "harvey-serve"},
     PAGES_GROUP: {"live": "harvey-serve"}, WORKERS_GROUP: {"dask": "harvey-cluster"},
     RENDERERS_GROUP: {"lit": "harvey-light"},
     **{group: {"p2os": "harvey-bases", "create2": "harvey-bases"} for group in ("harvey.bases", "harvey.emulators")},

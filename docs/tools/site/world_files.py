@@ -22,7 +22,7 @@ DEFAULTS: Mapping[str, str] = {
     "ceiling": "finish of the ceiling",
     "baseboard": 'finish of the baseboards, or `"none"`',
     "moulding": 'finish of the moulding under the ceiling, or `"none"`',
-    "frame": "finish of door frames",
+    "frame": "finish of door frames, or `\"none\"`: plain openings in the wall",
     "leaf": "finish of closed doors",
     "threshold": "finish of the floor in doorways",
     "kind": "of locales: a word of your own, as `room`",

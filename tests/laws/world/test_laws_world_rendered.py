@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -36,9 +37,10 @@ POINTS = 4_000
 """In all: enough that a part of a thousandth is several points."""
 
 
-def count_agreement(rng: np.random.Generator, views: int, rays: int) -> tuple[int, int]:
+def count_agreement(rng: np.random.Generator, views: int, rays: int, frame: str) -> tuple[int, int]:
     """Count the points on which model and renderer agree, and all points, in one generated house."""
-    world = read_world(Source.parse(generate_house(rng), "house.toml"))
+    text = generate_house(rng).replace('frame = "plain"', f'frame = "{frame}"')
+    world = read_world(Source.parse(text, "house.toml"))
     mesh, lens, same, asked = build_mesh(world.faces), Pinhole.of(CAMERA), 0, 0
     for _ in range(views):
         pose = MOUNT.camera_from_robot @ draw_pose(world, rng).lifted().inverse()
@@ -86,10 +88,11 @@ def intersect(polygons: NDArray[np.float64], planes: NDArray[np.float64], eye: N
     return np.flatnonzero(inside & (planes[:, :3] @ ray < -1e-9) & (planes[:, :3] @ eye > planes[:, 3]))
 
 
-def test_the_model_agrees_with_the_renderer_on_what_is_hidden() -> None:
+@pytest.mark.parametrize("frame", ["plain", "none"])
+def test_the_model_agrees_with_the_renderer_on_what_is_hidden(frame: str) -> None:
     same = asked = 0
     for number in range(5):
-        more = count_agreement(np.random.default_rng([7, number]), views=5, rays=220)
+        more = count_agreement(np.random.default_rng([7, number]), views=5, rays=220, frame=frame)
         same, asked = same + more[0], asked + more[1]
     assert asked > POINTS
     assert same >= MIN_AGREEMENT * asked, f"{asked - same} of {asked} points"

@@ -14,14 +14,14 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_135,
+    "world_models": 10_175,
     "knowledge_sources": 22_620,
     "sim": 5_901,
     "logs": 7_730,
-    "harvey": 11_073,
-    "experiments": 10_529,
-    "tests": 44_900,
-    "extras": 16_120,
+    "harvey": 11_090,
+    "experiments": 10_530,
+    "tests": 44_980,
+    "extras": 17_030,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}

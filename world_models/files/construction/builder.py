@@ -15,7 +15,14 @@ from world_models.building.geometry.solids import Solid
 from world_models.building.locales import ROBOT_TOP_M, Doorway, Finding, Link, Locale, Thing
 from world_models.building.world import World, build_frames
 from world_models.files.construction.doors import LEAF_DEPTH_M, DoorSide, build_closed_door, build_open_door
-from world_models.files.construction.rooms import Opening, RoomShell, Wall, build_walls, coordinate_along_wall
+from world_models.files.construction.rooms import (
+    CASING_WIDTH_M,
+    Opening,
+    RoomShell,
+    Wall,
+    build_walls,
+    coordinate_along_wall,
+)
 from world_models.files.construction.specs import DoorSpec, LinkSpec, LocaleSpec, ThingSpec, WorldSpec
 from world_models.frames import Pose, Pose2, flattened
 
@@ -93,7 +100,8 @@ class _WorldBuilder:
         across = _coordinate_along(near.name, wall_from_locale, door.along_m)
         half = door.width_m / 2
         neighbours = (*door.between[1:], None) if door.is_open else (None,)
-        opening = Opening(door.name, across - half, across + half, door.height_m, neighbours[0])
+        frame_m = CASING_WIDTH_M if door.casing else 0.0
+        opening = Opening(door.name, across - half, across + half, door.height_m, neighbours[0], frame_m)
         _check_fit(near, opening)
         if len(door.between) == 1:
             return [(near.locale, near.name, opening)]
@@ -113,7 +121,8 @@ class _WorldBuilder:
             behind = -MAX_WALL_M <= ends[0, 1] <= 1e-6
             if faces_back and behind and ends[1, 0] >= 0 and ends[0, 0] <= wall.length_m:
                 neighbour = door.between[0] if door.is_open else None
-                opening = Opening(door.name, float(ends[1, 0]), float(ends[0, 0]), door.height_m, neighbour)
+                frame_m = CASING_WIDTH_M if door.casing else 0.0
+                opening = Opening(door.name, float(ends[1, 0]), float(ends[0, 0]), door.height_m, neighbour, frame_m)
                 if best is None or -ends[0, 1] < best[0] - 1e-9:
                     best = -float(ends[0, 1]), wall, opening
         if best is not None:

@@ -47,8 +47,20 @@ class DoorSide:
     def x(self) -> Range:
         return self.opening.left_m, self.opening.right_m
 
+    @property
+    def casing(self) -> Finish:
+        """Finish of jambs and soffit, and of the boards where there are some; a plain opening is of the wall's."""
+        return self.spec.casing or self.wall.finish
+
+    @property
+    def casing_m(self) -> float:
+        """How far the boards stand before the wall."""
+        return CASING_DEPTH_M if self.spec.casing else 0.0
+
     def casing_faces(self) -> list[Face]:
         """The boards round the opening, but for their inner sides: those are one with jambs and soffit."""
+        if self.spec.casing is None:
+            return []
         (a, b), h, y, finish = self.x, self.opening.top_m, (0.0, CASING_DEPTH_M), self.spec.casing
         boxes = (
             Box((a - CASING_WIDTH_M, a), y, (0.0, h + CASING_WIDTH_M), finish),
@@ -67,13 +79,13 @@ class DoorSide:
 
     def lining(self, back_m: float) -> list[Face]:
         """Jambs and soffit from the front of the casing to y = -``back_m``."""
-        (a, b), h, front, back = self.x, self.opening.top_m, CASING_DEPTH_M, -back_m
+        (a, b), h, front, back = self.x, self.opening.top_m, self.casing_m, -back_m
         sides = {
             "right-jamb": [(a, front, 0), (a, back, 0), (a, back, h), (a, front, h)][::-1],
             "left-jamb": [(b, front, 0), (b, back, 0), (b, back, h), (b, front, h)],
             "soffit": [(a, front, h), (b, front, h), (b, back, h), (a, back, h)],
         }
-        return [self._build_face(name, corners, self.spec.casing) for name, corners in sides.items()]
+        return [self._build_face(name, corners, self.casing) for name, corners in sides.items()]
 
     def threshold(self, finish: Finish) -> Face:
         """The floor between the jambs."""
@@ -87,7 +99,7 @@ class DoorSide:
         middle = self.wall.world_from_wall @ _translation((self.x[0] + self.x[1]) / 2, -self.depth_m)
         surface = surface_from_polygon(polygon, self.spec.leaf)
         panel = Solid(f"{self.name}/panel", self.spec.panel, middle, (*self._surfaces, surface))
-        (a, b), h, y, frame = self.x, self.opening.top_m, -self.depth_m, self.spec.casing
+        (a, b), h, y, frame = self.x, self.opening.top_m, -self.depth_m, self.casing
         edges = [
             self._edge_row((a, y, 0), (a, y, h), "+x", "+y", frame, self.spec.leaf),
             self._edge_row((b, y, 0), (b, y, h), "-x", "+y", frame, self.spec.leaf),
@@ -98,9 +110,12 @@ class DoorSide:
         return faces, Edges.concatenate([Edges.from_rows(edges), panel.edges()])
 
     def casing_edges(self) -> Edges:
-        """Outer edges of the boards, and their inner edges along the jambs."""
-        (a, b), h, p, w = self.x, self.opening.top_m, CASING_DEPTH_M, CASING_WIDTH_M
-        frame, wall = self.spec.casing, self.wall.finish
+        """Outer edges of the boards, and their inner edges along the jambs; of a plain opening the wall's edges."""
+        (a, b), h, p, w = self.x, self.opening.top_m, self.casing_m, CASING_WIDTH_M
+        frame, wall = self.casing, self.wall.finish
+        if self.spec.casing is None:
+            sides = [self._edge_row((x, 0, 0), (x, 0, h), "+y", into, wall, wall) for x, into in ((a, "+x"), (b, "-x"))]
+            return Edges.from_rows([*sides, self._edge_row((a, 0, h), (b, 0, h), "+y", "-z", wall, wall)])
         rows = []
         for x, out, into in ((a, -1, "+x"), (b, 1, "-x")):
             side, outer = ("-x" if out < 0 else "+x"), x + out * w
@@ -114,7 +129,7 @@ class DoorSide:
 
     def lining_edges(self, back_m: float, floor: Finish) -> Edges:
         """Edges where the jambs meet soffit and floor."""
-        (a, b), h, front, back, frame = self.x, self.opening.top_m, CASING_DEPTH_M, -back_m, self.spec.casing
+        (a, b), h, front, back, frame = self.x, self.opening.top_m, self.casing_m, -back_m, self.casing
         rows = []
         for x, into in ((a, "+x"), (b, "-x")):
             rows.append(self._edge_row((x, back, h), (x, front, h), into, "-z", frame, frame))
@@ -158,7 +173,7 @@ class DoorSide:
 
 def build_open_door(near: DoorSide, far: DoorSide) -> tuple[list[Face], Landmark]:
     """Faces and the landmark of a doorway between two rooms."""
-    back = near.depth_m + CASING_DEPTH_M
+    back = near.depth_m + far.casing_m
     faces = [near.doorway_face(), far.doorway_face(), *near.lining(back), near.threshold(near.spec.threshold)]
     for side in (near, far):
         faces += side.casing_faces()

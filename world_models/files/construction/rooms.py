@@ -35,13 +35,18 @@ _Row = tuple[NDArray[np.float64], tuple[NDArray[np.float64], NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Opening:
-    """A hole in a wall from the floor up: extent along the wall and height [m], and the locale beyond."""
+    """A hole in a wall from the floor up: extent along the wall and height [m], and the locale beyond.
+
+    Attributes:
+        frame_m: how wide the boards round it are; 0 where it has none.
+    """
 
     name: str
     left_m: float
     right_m: float
     top_m: float
     neighbour: str | None
+    frame_m: float = CASING_WIDTH_M
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +86,10 @@ class Wall:
         """(4, 3) an upright rectangle parallel to the wall, counter-clockwise as seen from inside [m, world]."""
         return self.world_from_wall.apply([(x[1], y, z[0]), (x[0], y, z[0]), (x[0], y, z[1]), (x[1], y, z[1])])
 
-    def free_of_openings(self, margin_m: float = 0.0) -> list[Range]:
-        """The stretches between its openings, each enlarged by the margin on both sides."""
-        taken = [(o.left_m - margin_m, o.right_m + margin_m) for o in self.openings]
+    def free_of_openings(self, *, with_frames: bool = False) -> list[Range]:
+        """The stretches between its openings; ``with_frames``: and between the boards round them."""
+        margins = [o.frame_m if with_frames else 0.0 for o in self.openings]
+        taken = [(o.left_m - m, o.right_m + m) for o, m in zip(self.openings, margins, strict=True)]
         return subtract_intervals((0.0, self.length_m), taken, MIN_STRETCH_M)
 
     def with_opening(self, opening: Opening) -> Wall:
@@ -163,7 +169,7 @@ class RoomShell:
         wall, finishes = self.walls[index], self.spec.finishes
         solids = []
         if finishes.baseboard:
-            stretches = wall.free_of_openings(CASING_WIDTH_M)
+            stretches = wall.free_of_openings(with_frames=True)
             z = (0.0, BASEBOARD_HEIGHT_M)
             solids.append(self._build_strip(index, "baseboard", finishes.baseboard, stretches, z, BASEBOARD_DEPTH_M))
         if finishes.moulding:
@@ -200,7 +206,7 @@ class RoomShell:
         else:
             flats.append((wall.height_m, finishes.ceiling, -UP, finishes.moulding))
         for z, finish, normal, board in flats:
-            for x in wall.free_of_openings(CASING_WIDTH_M) if board is None and z == 0.0 else [(0.0, wall.length_m)]:
+            for x in wall.free_of_openings(with_frames=True) if board is None and z == 0.0 else [(0.0, wall.length_m)]:
                 if board is None and x[1] - x[0] >= MIN_LINE_M:
                     line = wall.world_from_wall.apply([(x[0], 0, z), (x[1], 0, z)])
                     brightness = (wall.brightness, expected_brightness(finish, normal), nan)

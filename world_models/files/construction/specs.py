@@ -61,7 +61,8 @@ class DoorSpec:
         between: the locale in whose wall it is, and the modelled locale beyond, if there is one.
         wall: name of the wall of ``between[0]``.
         along_m: position of its centre along that wall, in the frame of ``between[0]``.
-        casing, leaf, threshold: finishes of the boards round it (the door's frame), the leaf and the threshold.
+        casing: finish of the boards round it (the door's frame); None: a plain opening in the wall.
+        leaf, threshold: finishes of the leaf and the threshold.
         panel: boxes on the closed leaf.
     """
 
@@ -72,7 +73,7 @@ class DoorSpec:
     width_m: float
     height_m: float
     is_open: bool
-    casing: Finish
+    casing: Finish | None
     leaf: Finish
     threshold: Finish
     panel: tuple[Box, ...]

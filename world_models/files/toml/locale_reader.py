@@ -83,6 +83,13 @@ class LocaleReader:
         given = self._given(node, key)
         return self.shared.finish(given) if given else otherwise
 
+    def finish_or_none(self, node: Node, key: str, otherwise: Finish | None = None) -> Finish | None:
+        """The same of what may be left out by ``"none"``."""
+        given = self._given(node, key)
+        if given is None:
+            return otherwise
+        return None if given.value == "none" else self.shared.finish(given)
+
     def read_pose(self, node: Node) -> Pose:
         """The coordinate frame given by ``at`` (x, y[, z]) and ``turn`` (degrees, counter-clockwise)."""
         limit = self.shared.max_coordinate
@@ -132,11 +139,10 @@ class LocaleReader:
         return {name: self.shared.length(item, 0.1, height_m) for name, item in heights.entries()}
 
     def _read_finishes(self, node: Node, walls: Sequence[str]) -> RoomFinishes:
-        boards = [self._given(node, key) for key in ("baseboard", "moulding")]
         return RoomFinishes(
             self._read_wall_finishes(node, walls),
             self.finish(node, "floor", GREY_FLOOR), self.finish(node, "ceiling", WHITE_CEILING),
-            *(self.shared.finish(board) if board and board.value != "none" else None for board in boards),
+            self.finish_or_none(node, "baseboard"), self.finish_or_none(node, "moulding"),
         )
 
     def _read_wall_finishes(self, node: Node, walls: Sequence[str]) -> Mapping[str, Finish]:

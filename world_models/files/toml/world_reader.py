@@ -185,7 +185,8 @@ class WorldReader:
         if "sigma_cm" in node:
             for room in between:
                 self._sigmas_m.setdefault(room, {}).update(dict.fromkeys((name, f"{room}/{name}"), read_sigma(node)))
-        casing, leaf, threshold = (self.reader.finish(node, key, DOOR_FINISH) for key in ("frame", "leaf", "threshold"))
+        casing = self.reader.finish_or_none(node, "frame", DOOR_FINISH)
+        leaf, threshold = (self.reader.finish(node, key, DOOR_FINISH) for key in ("leaf", "threshold"))
         return DoorSpec(
             name, between, self._read_wall(node["wall"], between[0]), along_m,
             self.reader.length(node, "width", 0.1, 20.0, 0.9, "door_width"),

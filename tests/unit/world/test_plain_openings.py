@@ -1,0 +1,71 @@
+"""Doorways without a frame: ``frame = "none"`` is a hole in the wall, whose edges are the wall's."""
+
+import numpy as np
+import pytest
+
+import harvey
+from harvey.errors import BadInput
+from world_models.building.world import World
+
+WORLD = """
+name = "two"
+units = "metres"
+[defaults]
+kind = "room"
+{defaults}
+[locales.a]
+size = [4, 5]
+baseboard = "grey"
+[locales.b]
+at = [4.2, 0]
+size = [4, 5]
+[doors]
+way = {{ between = ["a", "b"], wall = "east", along = 2.5, width = 1.0, height = 2.1, open = true{door} }}
+shut = {{ between = ["a"], wall = "west", along = 2.5, width = 1.0, height = 2.1{door} }}
+[finishes]
+grey = {{ colour = [0.6, 0.6, 0.6] }}
+"""
+
+
+def build(defaults: str = "", door: str = "") -> World:
+    return harvey.build_world(WORLD.format(defaults=defaults, door=door))
+
+
+def lines_of(world: World, name: str) -> np.ndarray:
+    return next(mark for mark in world.landmarks if mark.name == name).edges.lines_world
+
+
+@pytest.mark.parametrize("world", [build('frame = "none"'), build(door=', frame = "none"')])
+def test_a_plain_opening_has_its_own_edges_and_no_boards(world: World) -> None:
+    lines = lines_of(world, "way")
+    assert np.isin(lines[..., 0].round(9), (4.0, 4.2)).all() and np.isin(lines[..., 1].round(9), (2.0, 3.0)).all()
+    assert np.isin(lines[..., 2].round(9), (0.0, 2.1)).all()
+    upright = lines[np.ptp(lines[..., 2], axis=1) > 1.0]
+    assert len(upright) == 4  # two jambs, each with an edge on either side of the wall
+    assert not [face.name for face in world.faces if "casing" in face.name]
+    assert {face.name.split("/")[-1] for face in world.faces if "way" in face.name} >= {
+        "left-jamb", "right-jamb", "soffit", "threshold", "doorway"}
+
+
+def test_a_frame_is_drawn_where_nothing_is_said() -> None:
+    world = build()
+    assert [face.name for face in world.faces if "casing" in face.name]
+    assert lines_of(world, "way")[..., 1].min() == pytest.approx(1.9)
+
+
+def test_the_baseboard_reaches_to_the_opening() -> None:
+    plain, framed = ((lines_of(build(text), "a/east-wall")[..., 1] - 2.0) for text in ('frame = "none"', ""))
+    assert np.abs(plain).min() < 1e-9
+    assert np.abs(framed).min() == pytest.approx(0.1)
+
+
+def test_a_closed_door_may_have_no_frame_either() -> None:
+    world = build('frame = "none"')
+    assert lines_of(world, "a/shut")[..., 1].min() == pytest.approx(2.0)
+    assert [face.name for face in world.faces if face.name.endswith("shut/leaf")]
+
+
+def test_a_frame_of_an_unknown_finish_is_refused() -> None:
+    with pytest.raises(BadInput, match="one of the finishes grey"):
+        build('frame = "nothing"')
+
