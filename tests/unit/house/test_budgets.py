@@ -18,10 +18,10 @@ LINES = {
     "knowledge_sources": 22_620,
     "sim": 5_901,
     "logs": 7_730,
-    "harvey": 11_090,
+    "harvey": 11_130,
     "experiments": 10_530,
     "tests": 44_980,
-    "extras": 17_030,
+    "extras": 17_200,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}
