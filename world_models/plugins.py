@@ -3,6 +3,7 @@
 ============================  ==========================================================================
 ``harvey.knowledge_sources``  a class under ``blackboard.knowledge_source.KnowledgeSource``
 ``harvey.bases``              a ``harvey.hardware.drivers.base_driver.BaseKind``
+``harvey.cameras``            a ``harvey.hardware.drivers.capture.CameraKind``
 ``harvey.emulators``          a ``sim.emulators.emulator.EmulatorKind``
 ``harvey.faults``             a class under ``sim.faults.fault.Fault``
 ``harvey.loggers``            a class under ``logs.recording.logger.Logger``
@@ -28,7 +29,7 @@ from typing import Any
 SOURCES_GROUP = "harvey.knowledge_sources"
 """The group of knowledge sources: named in ``run.json`` and put round the board, so it is said once, here."""
 
-COMMANDS_GROUP, PAGES_GROUP = "harvey.commands", "harvey.pages"
+COMMANDS_GROUP, PAGES_GROUP, CAMERAS_GROUP = "harvey.commands", "harvey.pages", "harvey.cameras"
 WORKERS_GROUP, RENDERERS_GROUP = "harvey.workers", "harvey.renderers"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
     COMMANDS_GROUP: {"serve": "harvey-serve", "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
@@ -37,7 +38,9 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
         "watchers": "harvey-serve"},
     PAGES_GROUP: {"live": "harvey-serve"}, WORKERS_GROUP: {"dask": "harvey-cluster"},
     RENDERERS_GROUP: {"lit": "harvey-light"},
-    **{group: {"p2os": "harvey-bases", "create2": "harvey-bases"} for group in ("harvey.bases", "harvey.emulators")},
+    **{group: {"p2os": "harvey-bases", "create2": "harvey-bases", "ros2": "harvey-ros2"}
+       for group in ("harvey.bases", "harvey.emulators")},
+    CAMERAS_GROUP: {"ros2": "harvey-ros2"},
 }
 """By group: the names that extras of this project have, each with its extra."""
 

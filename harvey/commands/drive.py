@@ -32,8 +32,10 @@ OPTIONS: Mapping[str, tuple[str, str, str]] = {
     "goal": ("goal", "GOAL", 'from where to where: "Go from the hall to the kitchen", middle to middle; or in feet '
              'in each locale: "(ptrans (hall (3,4,0)) (kitchen (6,5,0)))"'),
     "heading": ("start.heading_deg", "DEGREES", "where the robot looks at the start, in the first locale's frame"),
-    "base": ("base.port", "BASE", "denning:PORT, as denning:/dev/ttyUSB0; with harvey-bases p2os:PORT or create2:PORT"),
-    "camera": ("camera.source", "CAMERA", "number of a device, a video file, or a URL"),
+    "base": ("base.port", "BASE", "denning:PORT, as denning:/dev/ttyUSB0; with harvey-bases p2os:PORT or create2:PORT,"
+             " with harvey-ros2 ros2:robot.toml"),
+    "camera": ("camera.source", "CAMERA", "number of a device, a video file, or a URL; with harvey-ros2"
+               " ros2:robot.toml"),
     "calibration": ("camera.calibration", "FILE", "what harvey calibrate wrote"),
 }
 

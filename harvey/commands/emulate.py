@@ -15,7 +15,8 @@ from harvey.errors import BadInput
 if TYPE_CHECKING:
     from sim.body.simulated_body import SimulatedBody
     from sim.emulators.camera_server import CameraServer
-    from sim.emulators.emulator import Emulator, Ground
+    from sim.emulators.emulator import EmulatorKind, Ground
+    from sim.scenario import Scenario
 
 MAX_PORT = 65535
 TELL_S = 1.0
@@ -24,7 +25,7 @@ TELL_S = 1.0
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("kind", metavar="KIND", help="which protocol it speaks: denning; with harvey-bases p2os or"
-                        " create2; or one that another installed package brings")
+                        " create2; with harvey-ros2 ros2; or one that another installed package brings")
     parser.add_argument("--scenario", metavar="NAME",
                         help="put it where a scenario begins, with the scenario's walls, wheels and faults; else on an"
                              " endless floor")
@@ -35,6 +36,8 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--calibration", metavar="FILE", help="write what harvey calibrate would find of that camera")
     parser.add_argument("--speed", metavar="X", type=_factor, default=1.0,
                         help="run X times as fast as real time, watchdog and all (1)")
+    parser.add_argument("--at", metavar="ADDRESS", help="with ros2: where its Zenoh router listens, as"
+                        " tcp/127.0.0.1:7447; else on any free port")
     parser.add_argument("--trace", action="store_true", help="print the traffic, and where the robot is")
 
 
@@ -55,12 +58,25 @@ def _factor(text: str) -> float:
 
 
 def _run(args: Namespace) -> int:
-    from sim.emulators.line import PseudoTerminal
+    from sim.emulators.emulator import Served
+    from sim.emulators.line import FaultyLine, PseudoTerminal
 
     if args.scenario is None and not (args.camera_port is None and args.calibration is None):
         raise BadInput("--camera-port and --calibration: expected a --scenario to look at, got none")
-    emulator, where, body = _base(args)
-    trace = _Trace(args.kind, where) if args.trace else None
+    kind = _kind(args.kind)
+    ground, where, body, scenario = _ground(args)
+    trace = _Trace(args.kind == "denning" or kind.serve is not None, where) if args.trace else None
+    if kind.serve is not None:
+        if args.camera_port is not None:
+            raise BadInput(f"--camera-port: expected none with {args.kind}, which brings its camera along")
+        sight = None if scenario is None else scenario.camera
+        kind.serve(Served(
+            ground, body, args.at or "", args.speed, trace.tell_place if trace else lambda: False, trace=trace,
+            camera=None if sight is None else sight.camera, mount=None if sight is None else sight.mount))
+        return 0
+    if args.at is not None:
+        raise BadInput(f"--at: expected none with {args.kind}, which is on a serial port")
+    emulator = kind.on_ground(ground) if body is None else FaultyLine(kind.on_ground(ground), body)
     with _camera(args.camera_port, body) as camera, closing(PseudoTerminal(emulator, trace)) as terminal:
         print(f"an emulated {args.kind} base is at {terminal.name}; Ctrl-C ends it", flush=True)
         if camera is not None:
@@ -89,35 +105,30 @@ def _camera(port: int | None, body: SimulatedBody | None) -> Iterator[CameraServ
         yield camera
 
 
-def _base(args: Namespace) -> tuple[Emulator, Callable[[], tuple[float, str]], SimulatedBody | None]:
-    """The base, what tells its time and its true place, and the simulated body, if one is under it.
-
-    With a scenario the line fails when the scenario's faults say so.
-    """
+def _kind(name: str) -> EmulatorKind:
     from harvey.hardware.bases import say_what_to_install
     from sim.emulators.emulator_registry import emulator_kinds
-    from sim.emulators.line import FaultyLine
 
     kinds = emulator_kinds()
-    if args.kind not in kinds:
-        raise BadInput(f"expected a kind of base, one of {', '.join(kinds)}, got {args.kind!r}"
-                       f"{say_what_to_install(args.kind)}")
-    ground, where, body = _ground(args)
-    emulator = kinds[args.kind].on_ground(ground)
-    return emulator if body is None else FaultyLine(emulator, body), where, body
+    if name not in kinds:
+        raise BadInput(f"expected a kind of base, one of {', '.join(kinds)}, got {name!r}{say_what_to_install(name)}")
+    return kinds[name]
 
 
-def _ground(args: Namespace) -> tuple[Ground, Callable[[], tuple[float, str]], SimulatedBody | None]:
+def _ground(
+    args: Namespace
+) -> tuple[Ground, Callable[[], tuple[float, str]], SimulatedBody | None, Scenario | None]:
+    """What it rolls on, what tells its time and true place, the simulated body and its scenario, if there are any."""
     from sim.emulators.emulator import IdealGround, SimulatedGround
 
     if args.scenario is None:
         floor = IdealGround()
-        return floor, lambda: (floor.time_s, f"{floor.pose.x_m:.3f} {floor.pose.y_m:.3f} m"), None
-    body = _body(args.scenario, args.seed, args.calibration)
-    return SimulatedGround(body), lambda: (body.truth.time_s, _place(body)), body
+        return floor, lambda: (floor.time_s, f"{floor.pose.x_m:.3f} {floor.pose.y_m:.3f} m"), None, None
+    body, scenario = _body(args.scenario, args.seed, args.calibration)
+    return SimulatedGround(body), lambda: (body.truth.time_s, _place(body)), body, scenario
 
 
-def _body(name: str, seed: int, calibration: str | None) -> SimulatedBody:
+def _body(name: str, seed: int, calibration: str | None) -> tuple[SimulatedBody, Scenario]:
     from sim.scenario import ScenarioError, load_scenario
     from sim.stage import build_stage
     from world_models.files.toml.camera_file import camera_text
@@ -131,7 +142,7 @@ def _body(name: str, seed: int, calibration: str | None) -> SimulatedBody:
     if calibration is not None:
         text = camera_text(scenario.camera.camera, scenario.camera.mount, (f"the simulated camera of {name}",))
         Path(calibration).write_text(text, encoding="utf-8")
-    return body
+    return body, scenario
 
 
 def _place(body: SimulatedBody) -> str:
@@ -143,8 +154,8 @@ def _place(body: SimulatedBody) -> str:
 class _Trace:
     """Prints the traffic: lines of text as they are, bytes in hexadecimal; and now and then where the robot is."""
 
-    def __init__(self, kind: str, where: Callable[[], tuple[float, str]]) -> None:
-        self._text, self._where = kind == "denning", where
+    def __init__(self, is_text: bool, where: Callable[[], tuple[float, str]]) -> None:
+        self._text, self._where = is_text, where
         self._told_s, self._place = 0.0, ""
 
     def __call__(self, direction: str, data: bytes) -> None:
@@ -167,6 +178,8 @@ EMULATE = CliCommand(
         ("harvey emulate denning", "the documented line protocol; docs/protocol-denning.md"),
         ("harvey emulate create2 --trace", "a Create 2, with every byte printed"),
         ("harvey emulate p2os --scenario lab-to-allens-office", "a Pioneer in the robot laboratory, walls and all"),
+        ("harvey emulate ros2 --scenario lab-to-allens-office --calibration camera.toml",
+         "a robot that speaks ROS 2 over Zenoh, with its camera; docs/how-to/ros2.md"),
         ("harvey emulate create2 --scenario link-lost --camera-port 8090 --calibration camera.toml",
          "with its camera, for harvey drive; docs/hardware.md"),
     ),

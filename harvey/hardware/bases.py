@@ -54,6 +54,11 @@ def kind_of(port: str) -> tuple[BaseKind, str]:
 def open_base(port: str) -> Base:
     """The base, its port open; whether anything answers is not known yet. Raises BadInput."""
     kind, url = kind_of(port)
+    if kind.open_at is not None:
+        try:
+            return kind.open_at(url)
+        except OSError as error:
+            raise BadInput(f"base: {error}") from None
     try:
         return kind.connect(SerialLink(url, kind.baud))
     except OSError as error:

@@ -23,7 +23,7 @@ class BaseSettings:
 
     Attributes:
         port: ``denning:/dev/ttyUSB0``, ``p2os:...`` or ``create2:...``; what follows the colon is a device, or a URL
-            that pyserial knows.
+            that pyserial knows; of ``ros2:`` a robot's file, or a router's address.
         radius_m: of the robot's disc.
     """
 
@@ -40,7 +40,8 @@ class EyeSettings:
     """The camera.
 
     Attributes:
-        source: number of a device, a file, or a URL, as ``0`` or ``http://127.0.0.1:8080/stream.mjpg``.
+        source: number of a device, a file, or a URL, as ``0`` or ``http://127.0.0.1:8080/stream.mjpg``; or
+            ``ros2:robot.toml``.
         calibration: the file that ``harvey calibrate`` wrote: intrinsics, distortion, mounting.
         rate_hz: pictures a second that the mission needs.
         late_s: how long a picture may take to come.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from sim.body.simulated_body import SimulatedBody
+from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 
 
@@ -114,6 +115,28 @@ class SimulatedGround:
 
 
 @dataclass(frozen=True, slots=True)
+class Served:
+    """What a kind on no serial line is served with.
+
+    Attributes:
+        ground: that its wheels roll on; body: under it, with a camera; None without a scenario.
+        camera, mount: of that body, as a calibration would find them.
+        at: where it is to be met; "" for any free place.
+        speed: how many times as fast as real time.
+        until: asked again and again whether it is over; trace: hears of the traffic, as lines of text.
+    """
+
+    ground: Ground
+    body: SimulatedBody | None
+    at: str
+    speed: float
+    until: Callable[[], bool]
+    camera: Camera | None = None
+    mount: CameraMount | None = None
+    trace: Callable[[str, bytes], None] | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class EmulatorKind:
     """A kind of emulated base.
 
@@ -122,9 +145,11 @@ class EmulatorKind:
         on_ground: one whose wheels roll on a ground in real time, for ``harvey emulate``.
         on_body: one under which a simulated body moves, for missions over ``--body serial:NAME``.
         keeps_time: whether its driver waits by the base's time; else a motion is over at once.
+        serve: serves one that is on no serial line, in real time, for ``harvey emulate``; None where it is on one.
     """
 
     name: str
     on_ground: Callable[[Ground], Emulator]
     on_body: Callable[[SimulatedBody], Emulator]
     keeps_time: bool = True
+    serve: Callable[[Served], None] | None = None

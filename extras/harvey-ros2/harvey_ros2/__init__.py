@@ -1,5 +1,7 @@
 """ROS 2 without ROS: a robot's base and camera, what others see of a run, bags.
 
 In reading order: ``messages`` (types and bytes), ``middleware`` (publish, subscribe, close), ``zenoh_middleware`` and
-``dds_middleware`` (over what they go).
+``dds_middleware`` (over what they go); ``robot_file`` (how a robot calls things), ``node``, ``odometry``,
+``ros2_base``, ``ros2_camera`` (a robot that is driven), ``pipe``; ``robot_emulator``, ``robot_server`` (one that is not
+there).
 """

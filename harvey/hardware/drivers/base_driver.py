@@ -100,7 +100,19 @@ class Base(Protocol):
         ...
 
 
-class BytePipe(Protocol):
+class Line(Protocol):
+    """What a base is reached over."""
+
+    def reopen(self) -> None:
+        """Try the line again after it was gone; what had come before is forgotten. Raises OSError."""
+        ...
+
+    def close(self) -> None:
+        """Let the line go. Never raises."""
+        ...
+
+
+class BytePipe(Line, Protocol):
     """A byte pipe that may garble, lose and break. Every method raises OSError where the line is gone."""
 
     def write(self, data: bytes) -> None:
@@ -113,14 +125,6 @@ class BytePipe(Protocol):
 
     def now(self) -> float:
         """The time [s] on the clock that timeouts are counted by. Never raises."""
-        ...
-
-    def reopen(self) -> None:
-        """Try the line again after it was gone; what had come before is forgotten."""
-        ...
-
-    def close(self) -> None:
-        """Let the line go. Never raises."""
         ...
 
 
@@ -172,6 +176,7 @@ class BaseKind:
         watchdog: what stops it when it hears nothing any more, in words.
         connect_emulated: its driver over a line to an emulated base, where that must be otherwise: no real time passes
             there, and two runs must send the same bytes.
+        open_at: its driver by what stands behind the colon, where that is no serial port; raises OSError and BadInput.
     """
 
     name: str
@@ -179,17 +184,18 @@ class BaseKind:
     connect: Callable[[BytePipe], Base]
     watchdog: str
     connect_emulated: Callable[[BytePipe], Base] | None = None
+    open_at: Callable[[str], Base] | None = None
 
     def connect_to_emulator(self, link: BytePipe) -> Base:
         """The driver over a line to an emulated base."""
         return (self.connect_emulated or self.connect)(link)
 
 
-class Driver(ABC):
-    """A base over a line: one call at a time, a stop that comes through, and a line that is tried again."""
+class LineDriver(ABC):
+    """A base over any line: one call at a time, a stop that comes through, and a line that is tried again."""
 
-    def __init__(self, link: BytePipe) -> None:
-        self._link = link
+    def __init__(self, line: Line) -> None:
+        self._line = line
         self._lock = threading.Lock()
         self._stop_asked = threading.Event()
         self._gone = self._closed = False
@@ -250,7 +256,7 @@ class Driver(ABC):
         with suppress(BaseFault):  # there is nobody left to tell; what stops it now is the base's watchdog
             self.stop()
         self._closed = True
-        self._link.close()
+        self._line.close()
 
     @abstractmethod
     def _carried_out(self, command: MotorCommand) -> MotionReport:
@@ -282,10 +288,18 @@ class Driver(ABC):
                 raise BaseFault("disconnected", "this driver was closed", stopped=True)
             try:
                 if self._gone:
-                    self._link.reopen()
+                    self._line.reopen()
                     self._gone = False
                     self._after_reopening()
                 yield
             except OSError as error:
                 self._gone = True
                 raise self._fault("disconnected", str(error) or "the line is gone") from None
+
+
+class Driver(LineDriver):
+    """A base over a pipe of bytes."""
+
+    def __init__(self, link: BytePipe) -> None:
+        super().__init__(link)
+        self._link = link

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Literal, Protocol, get_args
@@ -17,6 +18,8 @@ from typing import Any, Literal, Protocol, get_args
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from world_models.plugins import CAMERAS_GROUP, list_absent, load_plugins
 
 QUALITY = 95
 """JPEG quality of pictures that do not come compressed as JPEG."""
@@ -68,6 +71,31 @@ Opener = Callable[[str], Capture]
 
 
 @dataclass(frozen=True, slots=True)
+class CameraKind:
+    """A kind of camera that another package brings, as it is named before the colon: ``ros2:robot.toml``.
+
+    Attributes:
+        name: of the kind.
+        open: its pictures, by what stands behind the colon; raises CameraFault.
+    """
+
+    name: str
+    open: Opener
+
+
+@cache
+def camera_kinds() -> Mapping[str, CameraKind]:
+    """Every such kind by its name. Raises PluginError where one cannot be loaded."""
+    return load_plugins(CAMERAS_GROUP, CameraKind)
+
+
+def _kind_of(source: str) -> tuple[CameraKind, str] | None:
+    """The kind of a source, and where it is; None for what OpenCV opens."""
+    name, colon, where = source.partition(":")
+    return (camera_kinds()[name], where) if colon and name in camera_kinds() else None
+
+
+@dataclass(frozen=True, slots=True)
 class CapturedPicture:
     """One picture: its JPEG bytes, size [px], and whether it is black."""
 
@@ -94,6 +122,8 @@ def open_capture(source: str) -> Capture:
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     if source.isdecimal() and int(source) > MAX_DEVICE:
         raise CameraFault("unplugged", f"expected a device's number from 0 to {MAX_DEVICE}, got {source}")
+    if (found := _kind_of(source)) is not None:
+        return found[0].open(found[1])
     capture = cv2.VideoCapture(int(source) if source.isdecimal() else source)
     return _Untimed(capture) if source.startswith(("http://", "https://")) else capture
 
@@ -125,6 +155,8 @@ def open_in_time(open_source: Opener, source: str, max_open_s: float = MAX_OPEN_
 def is_file(source: str) -> bool:
     """Whether a source is a file, whose pictures wait for us, and not a device, a pipe or a stream, whose do not."""
     path = Path(source)
+    if _kind_of(source) is not None:
+        return False
     special = re.match(r"[a-z][a-z0-9+.-]*://", source) or source.startswith("/dev/") or path.is_fifo()
     return not (source.isdecimal() or special) or path.is_file()
 
@@ -132,7 +164,9 @@ def is_file(source: str) -> bool:
 def prepare(capture: Capture, source: str, size: tuple[int, int] | None) -> Capture:
     """An opened capture, set to hand over JPEGs as they come and, a device, to the size wanted. Raises CameraFault."""
     if not capture.isOpened():
-        raise CameraFault("unplugged", f"expected a device's number, a video file or a URL that opens, got {source!r}")
+        needs = list_absent(CAMERAS_GROUP).get(source.partition(":")[0])
+        raise CameraFault("unplugged", f"expected a device's number, a video file or a URL that opens, got {source!r}"
+                                       f"{f'; it needs {needs}' if needs else ''}")
     if is_file(source):
         if _is_mjpg(capture):
             capture.set(cv2.CAP_PROP_FORMAT, -1)

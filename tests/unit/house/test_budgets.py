@@ -16,12 +16,12 @@ LINES = {
     "blackboard": 2_200,
     "world_models": 10_175,
     "knowledge_sources": 22_620,
-    "sim": 5_901,
+    "sim": 5_926,
     "logs": 7_730,
-    "harvey": 11_130,
+    "harvey": 11_162,
     "experiments": 10_530,
     "tests": 44_980,
-    "extras": 17_200,
+    "extras": 18_965,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}

@@ -1,0 +1,114 @@
+"""Odometry out of whatever comes: late, doubled, out of order, garbled, from two senders, by a clock that jumps.
+
+What does no harm is passed over and counted. What could mislead is a fault.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+from harvey_ros2.messages import MessageError, MessageTypes, seconds
+from harvey_ros2.middleware import Heard
+from world_models.entries.body import Odometry
+from world_models.frames import wrap_angle
+
+JUMP_S = 2.0
+"""A clock that goes back by more, or ahead by so much more than time passed, has jumped; less is out of order [s]."""
+MOST_SPEED_M_PER_S, MOST_SPEED_RAD_PER_S, MOST_JUMP_M, MOST_JUMP_RAD = 5.0, 8.0, 0.1, 0.2
+"""Wheels that count more than so fast, and so far at once, have lost count."""
+HASTE = 20.0
+"""A simulator may run so many times as fast as we."""
+SENDER_S = 1.0
+"""Who was silent for so long is gone, and another may take over [s]."""
+
+
+class OdometryFault(Exception):
+    """What could mislead, in words. The next message begins anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class Counted:
+    """One reading.
+
+    Attributes:
+        odometry: where the wheels count that the robot is, by its own clock.
+        speed_m_per_s, turn_rad_per_s: as it says.
+        came_s: when the message came.
+    """
+
+    odometry: Odometry
+    speed_m_per_s: float
+    turn_rad_per_s: float
+    came_s: float
+
+    @property
+    def is_standing(self) -> bool:
+        return abs(self.speed_m_per_s) < 0.005 and abs(self.turn_rad_per_s) < 0.01
+
+
+class OdometryReader:
+    """Reads one robot's odometry.
+
+    Attributes:
+        passed_over: how many messages of each kind were: ``doubled``, ``out of order``, ``garbled``.
+    """
+
+    def __init__(self, types: MessageTypes) -> None:
+        self._types = types
+        self._last: Counted | None = None
+        self._sender = ""
+        self.passed_over: Counter[str] = Counter()
+
+    def read(self, heard: Heard) -> Counted | None:
+        """A reading; None where the message is passed over. Raises OdometryFault."""
+        try:
+            found = _read(self._types.decode(heard.cdr, "nav_msgs/msg/Odometry"), heard.came_s)
+        except MessageError:
+            found = None
+        if found is None:
+            self.passed_over["garbled"] += 1
+            return None
+        last, self_sender = self._last, self._sender
+        if last is None:
+            self._last, self._sender = found, heard.sender
+            return found
+        if heard.sender != self_sender and heard.came_s - last.came_s < SENDER_S:
+            raise OdometryFault("two publish its odometry")
+        return self._compare(last, found, heard.sender)
+
+    def forget(self) -> None:
+        """Begin anew with the next message."""
+        self._last = None
+
+    def _compare(self, last: Counted, found: Counted, sender: str) -> Counted | None:
+        later_s = found.odometry.time_s - last.odometry.time_s
+        passed_s = found.came_s - last.came_s
+        if -JUMP_S <= later_s <= 0.0 and sender == self._sender:
+            self.passed_over["doubled" if later_s == 0.0 else "out of order"] += 1
+            return None
+        self._last, self._sender = found, sender
+        if later_s < 0.0:
+            raise OdometryFault(f"its clock went back by {-later_s:.1f} s")
+        if later_s > JUMP_S + HASTE * passed_s:
+            raise OdometryFault(f"its clock went ahead by {later_s:.1f} s in {passed_s:.2f} s")
+        away_m = math.hypot(found.odometry.x_m - last.odometry.x_m, found.odometry.y_m - last.odometry.y_m)
+        turned = abs(wrap_angle(found.odometry.heading_rad - last.odometry.heading_rad))
+        most = MOST_JUMP_M + MOST_SPEED_M_PER_S * later_s, MOST_JUMP_RAD + MOST_SPEED_RAD_PER_S * later_s
+        if away_m > most[0] or turned > most[1]:
+            raise OdometryFault(f"its odometry jumped by {away_m:.2f} m and {math.degrees(turned):.0f} degrees")
+        return found
+
+
+def _read(message: Any, came_s: float) -> Counted | None:
+    at, spin = message.pose.pose.position, message.pose.pose.orientation
+    moving, turning = message.twist.twist.linear.x, message.twist.twist.angular.z
+    values = (at.x, at.y, spin.x, spin.y, spin.z, spin.w, moving, turning)
+    length = math.hypot(spin.x, spin.y, spin.z, spin.w)
+    if not (all(map(math.isfinite, values)) and abs(length - 1.0) < 0.01 and max(abs(at.x), abs(at.y)) < 1e6):
+        return None
+    heading = math.atan2(2.0 * (spin.w * spin.z + spin.x * spin.y), 1.0 - 2.0 * (spin.y**2 + spin.z**2))
+    odometry = Odometry(float(at.x), float(at.y), heading, seconds(message.header.stamp))
+    return Counted(odometry, float(moving), float(turning), came_s)

@@ -1,0 +1,91 @@
+"""Missions over ROS 2: without a network the same bytes each time; over Zenoh with a robot in another process."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from ros2_robot import GOAL_M, emulated
+
+from harvey.cli import main
+from harvey.simulation.simulated_run import run_mission
+from harvey_ros2.robot_file import DriveSettings, RobotFile, read_robot
+from sim.scenario import load_scenario
+from sim.stage import build_stage
+
+ROOT = Path(__file__).parents[3]
+INCH_M = 0.0254
+
+
+def test_a_mission_through_messages_is_the_same_each_time_and_its_replay_too(tmp_path: Path) -> None:
+    short = replace(load_scenario("forty-foot-hallway"), goal="(ptrans (hallway (4,4,0)) (hallway (9,4,0)))")
+    journals = []
+    for name in ("one", "two"):
+        result = run_mission(build_stage(short), 0,
+                             out=tmp_path / name, body="ros2")
+        assert result.outcome == "reached" and result.final_error_m is not None and result.final_error_m < INCH_M
+        journals.append((tmp_path / name / "journal.jsonl").read_bytes())
+    assert journals[0] == journals[1]
+    assert main(["replay", str(tmp_path / "one")]) == 0
+
+
+def test_a_mission_over_zenoh_in_which_the_robots_process_stands_still_for_a_while(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with emulated(tmp_path) as robot:
+        assert main(["drive", str(robot.mission), "--dry-run"]) == 0
+        assert "FAILED" not in capsys.readouterr().out and not (tmp_path / "run").exists()
+
+        def hold() -> None:
+            while not any(x > 4 * 0.3048 + 0.6 for x, _ in robot.places):
+                time.sleep(0.01)
+            os.kill(robot.process.pid, signal.SIGSTOP)
+            time.sleep(2.5)
+            os.kill(robot.process.pid, signal.SIGCONT)
+
+        holding = threading.Thread(target=hold, daemon=True)
+        holding.start()
+        assert main(["drive", str(robot.mission), "--out", str(tmp_path / "run")]) == 0
+        holding.join(1.0)
+        time.sleep(1.5)  # its place is told once a second
+        x, y = robot.places[-1]
+    assert abs(x - GOAL_M) < INCH_M and abs(y - 4 * 0.3048) < INCH_M
+    told = capsys.readouterr().err
+    assert "base: link lost (no odometry for 0.4 s" in told and "base: link lost: over" in told
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["outcome"] == "reached"
+    assert main(["replay", str(tmp_path / "run")]) == 0
+
+
+def test_the_documented_robots_file_is_read_and_has_every_default() -> None:
+    text = (ROOT / "docs/flat/robot.toml").read_text(encoding="utf-8")
+    assert f"```toml\n{text}```" in (ROOT / "docs/how-to/ros2.md").read_text(encoding="utf-8")
+    read = read_robot(str(ROOT / "docs/flat/robot.toml"))
+    assert replace(read, topics=replace(read.topics, hazards=""), drive=replace(
+        read.drive, turn_rad_per_s=DriveSettings().turn_rad_per_s)) == RobotFile()
+
+
+def test_what_is_wrong_with_a_robots_file_or_its_network_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "robot.toml").write_text('router = "tcp/127.0.0.1:1"\n')
+    (tmp_path / "wrong.toml").write_text('[drive]\nfresh_s = 0.0\n')
+    (tmp_path / "odd.toml").write_text('[topics]\nodom = "a b"\n')
+    mission = tmp_path / "mission.toml"
+    mission.write_text('world = "research_center"\ngoal = "Go from the hallway to the library"\n')
+    for where, said in (
+        (tmp_path / "robot.toml", "expected a Zenoh router at tcp/127.0.0.1:1"),
+        (tmp_path / "wrong.toml", "wrong.toml:2: drive.fresh_s: expected a number from 0.05 to 5, got 0.0"),
+        (tmp_path / "odd.toml", "expected odom = the name of a topic, as camera/image_raw, got 'a b'"),
+        (tmp_path / "none.toml", "none.toml: expected a readable file, got: No such file or directory"),
+    ):
+        assert main(["drive", str(mission), "--dry-run", "--base", f"ros2:{where}", "--camera", f"ros2:{where}"]) == 2
+        lines = [line for line in capsys.readouterr().out.splitlines()
+                 if line.startswith(("FAILED  base", "FAILED  cam"))]
+        assert len(lines) == 2 and all(said in line for line in lines), (lines, said)
