@@ -13,6 +13,7 @@
 ``harvey.renderers``          a ``sim.render.lights.LitRenderers``, named ``lit``
 ``harvey.experiments``        the ``run`` of an experiment, by its name
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
+``harvey.run_exporters``      a ``logs.run_exporter.RunExporter``, named ``mcap``
 ``harvey.exporters``          a ``harvey_buildings.exporters.Exporter``
 ``harvey.experiments``        a module as those of ``experiments``
 ============================  ==========================================================================
@@ -30,7 +31,7 @@ SOURCES_GROUP = "harvey.knowledge_sources"
 """The group of knowledge sources: named in ``run.json`` and put round the board, so it is said once, here."""
 
 COMMANDS_GROUP, PAGES_GROUP, CAMERAS_GROUP = "harvey.commands", "harvey.pages", "harvey.cameras"
-WORKERS_GROUP, RENDERERS_GROUP = "harvey.workers", "harvey.renderers"
+WORKERS_GROUP, RENDERERS_GROUP, RUN_EXPORTERS_GROUP = "harvey.workers", "harvey.renderers", "harvey.run_exporters"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
     COMMANDS_GROUP: {"serve": "harvey-serve", "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
     "harvey.experiments": {
@@ -40,7 +41,7 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
     RENDERERS_GROUP: {"lit": "harvey-light"},
     **{group: {"p2os": "harvey-bases", "create2": "harvey-bases", "ros2": "harvey-ros2"}
        for group in ("harvey.bases", "harvey.emulators")},
-    CAMERAS_GROUP: {"ros2": "harvey-ros2"},
+    CAMERAS_GROUP: {"ros2": "harvey-ros2"}, RUN_EXPORTERS_GROUP: {"mcap": "harvey-ros2"},
 }
 """By group: the names that extras of this project have, each with its extra."""
 

@@ -66,7 +66,7 @@ class MessageTypes:
             lines = "\n".join(line.strip() for line in text.strip().splitlines())
             self.store.register(get_types_from_msg(lines, name))
 
-    def build(self, name: str, **fields: Any) -> Any:
+    def build(self, name: str, /, **fields: Any) -> Any:
         """A message of a type, ``pkg/msg/Type``; what is not given is zero or empty, and a mapping is a message within.
 
         Raises:

@@ -14,14 +14,14 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_175,
+    "world_models": 10_176,
     "knowledge_sources": 22_620,
     "sim": 5_926,
-    "logs": 7_730,
-    "harvey": 11_162,
+    "logs": 7_756,
+    "harvey": 11_171,
     "experiments": 10_530,
     "tests": 44_980,
-    "extras": 18_965,
+    "extras": 19_394,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}
