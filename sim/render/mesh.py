@@ -46,6 +46,10 @@ class FaceLike(Protocol):
     def back(self) -> Sequence[RegionLike]: ...
 
 
+DRAWN_GREY = 0.6
+"""What the simulator draws where a world file says that it knows no colour."""
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """P patches with V vertices in total.
@@ -183,6 +187,8 @@ def _origin(region: RegionLike, polygon: NDArray[np.float64], axes: NDArray[np.f
 
 def _colour(region: RegionLike) -> NDArray[np.float64]:
     colour = np.asarray(region.colour, float)
+    if colour.shape == (3,) and np.all(np.isnan(colour)):
+        return np.full(3, DRAWN_GREY)
     if colour.shape != (3,) or not np.all((colour >= 0) & (colour <= 1)):
         raise ValueError(f"region {region.name}: expected a colour of three numbers in 0..1, got {region.colour!r}")
     return colour

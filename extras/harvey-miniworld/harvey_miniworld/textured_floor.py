@@ -159,20 +159,21 @@ class TexturedFloor:
 def _plan_lines(floor: TexturedFloor) -> Iterator[str]:
     yield from (f"# What a floor plan says of floor {floor.seed}: no colours, no textures, no chairs.",
                 f'name = "floor-{floor.seed}"', 'units = "metres"', "", "[finishes]",
-                "grey = { colour = [0.6, 0.6, 0.6] }", "", "[defaults]",
-                'kind = "room"', 'frame = "none"', 'threshold = "grey"', 'floor = "grey"')
+                "plain = { colour = \"unknown\" }", "", "[defaults]",
+                'kind = "room"', 'frame = "none"',
+                *(f'{key} = "plain"' for key in ("walls", "floor", "ceiling", "threshold")))
     for room in floor.rooms:
         (x0, x1), (y0, y1) = room.x, room.y
         yield from ("", f"[locales.{room.name}]", f"at = [{x0:.3f}, {y0:.3f}]",
                     f"size = [{x1 - x0:.3f}, {y1 - y0:.3f}]", f"height = {room.height_m:.3f}", "things = [")
-        boxes = ", ".join(f"{{ x = [{low}, {high}], y = [0.0, {DESK_M[1]}], z = [0.0, {top}], finish = \"grey\" }}"
+        boxes = ", ".join(f"{{ x = [{low}, {high}], y = [0.0, {DESK_M[1]}], z = [0.0, {top}], finish = \"plain\" }}"
                           for (low, high), top in DESK_BOXES)
         for number, (_, side, along, _) in enumerate((d for d in floor.desks if d[0] == room.name), 1):
             yield f'  {{ name = "desk-{number}", wall = "{side}", along = {along:.3f}, boxes = [{boxes}] }},'
         for number, p in enumerate((p for p in floor.pictures if p.room == room.name), 1):
             yield (f'  {{ name = "picture-{number}", wall = "{p.side}", along = {p.along_m:.3f}, up = {p.up_m:.3f},'
                    f' boxes = [{{ x = [{-p.width_m / 2:.3f}, {p.width_m / 2:.3f}], y = [0.0, {PICTURE_DEPTH_M}],'
-                   f' z = [{-p.height_m / 2:.4f}, {p.height_m / 2:.4f}], finish = "grey" }}] }},')
+                   f' z = [{-p.height_m / 2:.4f}, {p.height_m / 2:.4f}], finish = "plain" }}] }},')
         yield "]"
     for door in floor.doorways:
         yield from ("", f"[doors.{door.name}]", f'between = ["{door.between[0]}", "{door.between[1]}"]',

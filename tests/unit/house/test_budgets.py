@@ -14,14 +14,14 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_176,
+    "world_models": 10_190,
     "knowledge_sources": 22_620,
-    "sim": 5_926,
+    "sim": 5_935,
     "logs": 7_756,
     "harvey": 11_171,
     "experiments": 10_530,
-    "tests": 44_980,
-    "extras": 19_394,
+    "tests": 45_060,
+    "extras": 19_420,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}

@@ -1,10 +1,11 @@
-"""Doorways without a frame: ``frame = "none"`` is a hole in the wall, whose edges are the wall's."""
+"""What a floor plan says: doorways without a frame, ``frame = "none"``, and no colours, ``colour = "unknown"``."""
 
 import numpy as np
 import pytest
 
 import harvey
 from harvey.errors import BadInput
+from sim.render.mesh import DRAWN_GREY, build_mesh
 from world_models.building.world import World
 
 WORLD = """
@@ -69,3 +70,29 @@ def test_a_frame_of_an_unknown_finish_is_refused() -> None:
     with pytest.raises(BadInput, match="one of the finishes grey"):
         build('frame = "nothing"')
 
+
+
+PLAN = WORLD.replace("[0.6, 0.6, 0.6]", '"unknown"')
+UNKNOWN = "\n".join(f'{key} = "grey"' for key in ("walls", "floor", "ceiling", "threshold"))
+
+
+def test_a_plan_without_colours_has_the_same_lines_and_expects_no_colour() -> None:
+    known, unknown = (harvey.build_world(text.format(defaults=f'frame = "none"\n{UNKNOWN}', door=""))
+                      for text in (WORLD, PLAN))
+    assert np.array_equal(lines_of(known, "way"), lines_of(unknown, "way"))
+    assert np.isnan([region.colour for face in unknown.faces if "wall" in face.name for region in face.front]).all()
+    eye = (1.0, 1.0, 1.2)
+    shows = unknown.scene.edges.contrasts(eye)
+    assert np.isfinite(shows).all()
+    assert ((shows > 0.0) | (known.scene.edges.contrasts(eye) == 0.0)).all()  # all that shows with colours shows
+
+
+def test_what_has_no_known_colour_is_drawn_grey_in_the_simulator() -> None:
+    world = harvey.build_world(PLAN.format(defaults=UNKNOWN, door=""))
+    mesh = build_mesh([face for face in world.faces if face.name.endswith("a/floor")])
+    assert np.all(mesh.colours == DRAWN_GREY)
+
+
+def test_an_unknown_colour_has_no_texture() -> None:
+    with pytest.raises(BadInput, match="one of the keys colour, got 'texture'"):
+        harvey.build_world(PLAN.format(defaults="", door="").replace('"unknown"', '"unknown", texture = "wood"'))

@@ -59,10 +59,14 @@ class Edges:
                        for name in ("lines_world", "normals_world", "brightness")))
 
     def contrasts(self, centre_world: Any) -> NDArray[np.float64]:
-        """(n,) brightness step, 0..1, across each line as seen from a point (3,); 0 where the line does not show."""
+        """(n,) brightness step, 0..1, across each line as seen from a point (3,); 0 where the line does not show.
+
+        Where a colour is unknown, a middling one.
+        """
         towards = np.asarray(centre_world, float) - self.lines_world[:, 0]
         facing = np.einsum("nij,nj->ni", self.normals_world, towards) > 1e-6
         crease = np.abs(self.brightness[:, 0] - self.brightness[:, 1])
+        crease = np.where(np.isnan(crease), CONTOUR_CONTRAST, crease)
         seen = np.where(facing[:, 0], self.brightness[:, 0], self.brightness[:, 1])
         behind = np.abs(seen - self.brightness[:, 2])
         contour = np.where(np.isnan(behind), CONTOUR_CONTRAST, behind)

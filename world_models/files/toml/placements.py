@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from world_models.building.geometry.faces import TEXTURES, Finish
+from world_models.building.geometry.faces import TEXTURES, UNKNOWN, Finish
 from world_models.building.geometry.solids import Box, Range
 from world_models.files.toml.source import Node
 from world_models.units import FOOT_M
@@ -40,6 +40,9 @@ class SharedParts:
 
     def _read_finish(self, node: Node) -> Finish:
         node.table(("colour",), ("texture", "scale"))
+        if node["colour"].value == "unknown":
+            node.table(("colour",))
+            return UNKNOWN
         red, green, blue = node["colour"].numbers((3,), 0.0, 1.0)
         texture = node["texture"].choice(*TEXTURES) if "texture" in node else "plain"
         scale = self.length(node["scale"], MIN_LENGTH_M, 100.0) if "scale" in node else 0.1
