@@ -26,6 +26,7 @@ from world_models.building.world import World
 from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.settings_reader import parse_value, suggest_keys
 from world_models.frame_store import FrameStore
+from world_models.plugins import GUESTS_GROUP
 from world_models.robot import RobotModel
 
 SERVO = "servo."
@@ -101,7 +102,7 @@ def _foreign(head: RunHead, given: Set[str]) -> list[type[KnowledgeSource]]:
     Raises BadInput where one is not installed here.
     """
     needed = {name: package for name, package in head.plugins.items() if name not in given}
-    installed = foreign_sources() if needed else {}
+    installed = {**foreign_sources(GUESTS_GROUP), **foreign_sources()} if needed else {}
     for name, package in needed.items():
         if name not in installed:
             raise BadInput(f"run.json: plugins: expected the knowledge source {name!r} of {package}, which decided "

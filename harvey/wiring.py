@@ -136,16 +136,16 @@ def build(source: type[KnowledgeSource], settings: Settings) -> KnowledgeSource:
 
 
 @cache
-def foreign_sources() -> Mapping[str, type[KnowledgeSource]]:
-    """The knowledge sources of other installed packages, by name.
+def foreign_sources(group: str = SOURCES_GROUP) -> Mapping[str, type[KnowledgeSource]]:
+    """The knowledge sources of other installed packages, by name; or those that sit only where a run names them.
 
     Raises:
         PluginError: one cannot be loaded, or is called otherwise than its entry point.
     """
-    found = load_plugin_classes(SOURCES_GROUP, KnowledgeSource)
+    found = load_plugin_classes(group, KnowledgeSource)
     for name, source in found.items():
         if source.called() != name:
-            raise PluginError(f"entry point {SOURCES_GROUP}, {name}: expected the name of its class, {source.called()}")
+            raise PluginError(f"entry point {group}, {name}: expected the name of its class, {source.called()}")
     return found
 
 

@@ -2,6 +2,7 @@
 
 ============================  ==========================================================================
 ``harvey.knowledge_sources``  a class under ``blackboard.knowledge_source.KnowledgeSource``
+``harvey.guest_sources``      the same, of one that sits only at the boards of runs that name it in ``run.json``
 ``harvey.bases``              a ``harvey.hardware.drivers.base_driver.BaseKind``
 ``harvey.cameras``            a ``harvey.hardware.drivers.capture.CameraKind``
 ``harvey.emulators``          a ``sim.emulators.emulator.EmulatorKind``
@@ -27,13 +28,13 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-SOURCES_GROUP = "harvey.knowledge_sources"
-"""The group of knowledge sources: named in ``run.json`` and put round the board, so it is said once, here."""
+SOURCES_GROUP, GUESTS_GROUP = "harvey.knowledge_sources", "harvey.guest_sources"
+"""The groups of knowledge sources: named in ``run.json`` and put round the board, so it is said once, here."""
 
 COMMANDS_GROUP, PAGES_GROUP, CAMERAS_GROUP = "harvey.commands", "harvey.pages", "harvey.cameras"
 WORKERS_GROUP, RENDERERS_GROUP, RUN_EXPORTERS_GROUP = "harvey.workers", "harvey.renderers", "harvey.run_exporters"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
-    COMMANDS_GROUP: {"serve": "harvey-serve", "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
+    COMMANDS_GROUP: {"follow": "harvey-ros2", "serve": "harvey-serve", "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
     "harvey.experiments": {
         "imported-building": "harvey-buildings", "other-worlds": "harvey-miniworld", "rosmaps": "harvey-buildings",
         "watchers": "harvey-serve"},

@@ -28,6 +28,8 @@ from world_models.frames import Pose2
 CAMERA_FRAME = "camera_optical"
 UNKNOWN = 1e6
 """Variance of a pose that nothing vouches for [m^2, rad^2]."""
+DOUBTFUL = 0.5
+"""A picture by which the place is wrong with this probability ends the certainty until the next that verifies it."""
 KINDS: tuple[type[Any], ...] = (
     MotionReport, CameraPicture, Hypothesis, Certificate, Milestone, PlanSketch, Discrepancy)
 """What is told of."""
@@ -73,7 +75,9 @@ class RunMessages:
     """
 
     def __init__(self, types: MessageTypes, world: World, camera: Camera, mount: CameraMount,
-                 frames: FrameNames = FrameNames()) -> None:  # noqa: B008
+                 frames: FrameNames = FrameNames(), *, counts: bool = True) -> None:  # noqa: B008
+        """``counts``: whether the odometry is made from the wheels' reports; else who has it sets :attr:`odometry`."""
+        self._counts = counts
         self._types, self._world, self._camera, self._mount, self._frames = types, world, camera, mount, frames
         self.odometry = Pose2(0.0, 0.0, 0.0)
         self.is_certified, self.lost, self.time_s = False, "", 0.0
@@ -90,6 +94,8 @@ class RunMessages:
         """The messages of an entry of one of :data:`KINDS`."""
         if isinstance(value, MotionReport):
             self.time_s = max(self.time_s, value.sim_time_s)
+            if not self._counts:
+                return
             self.odometry = self.odometry @ Pose2(0.0, 0.0, value.turn_rad) @ Pose2(value.move_m, 0.0, 0.0)
             yield self._tell_odometry(value)
             yield self._transform(self._frames.odom, self._frames.base, self.odometry)
@@ -97,7 +103,7 @@ class RunMessages:
             self.time_s = max(self.time_s, value.sim_time_s)
             yield from self._tell_picture(value)
         elif isinstance(value, Hypothesis):
-            if value.is_held:
+            if value.is_held and self._counts:
                 yield from self._tell_belief(value)
         elif isinstance(value, Certificate):
             yield from self._tell_verdict(value)
@@ -161,7 +167,8 @@ class RunMessages:
 
     def _tell_verdict(self, verdict: Certificate) -> Iterator[TimedMessage]:
         self._reason = f"{verdict.verdict}: {verdict.reason}"
-        self.is_certified = (self.is_certified or verdict.verdict == "verified") and not self.lost
+        vouched = self.is_certified and verdict.p_wrong < DOUBTFUL and verdict.verdict != "refuted"
+        self.is_certified = (vouched or verdict.verdict == "verified") and not self.lost
         yield self.diagnosis()
 
     def _tell_doubt(self, doubt: Discrepancy) -> Iterator[TimedMessage]:

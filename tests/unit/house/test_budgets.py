@@ -18,10 +18,10 @@ LINES = {
     "knowledge_sources": 22_620,
     "sim": 5_935,
     "logs": 7_756,
-    "harvey": 11_171,
+    "harvey": 11_172,
     "experiments": 10_530,
     "tests": 45_060,
-    "extras": 19_420,
+    "extras": 20_383,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}

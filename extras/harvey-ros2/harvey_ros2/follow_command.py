@@ -1,0 +1,198 @@
+"""``harvey follow``: a recording of a robot that somebody else drove: where it was, certified, and when it was lost."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from harvey.commands.command import CliCommand
+from harvey.errors import BadInput
+from logs.run_directory import RUNS, check_vacant
+
+if TYPE_CHECKING:
+    from harvey_ros2.bag_reader import Bag, BagItem
+    from harvey_ros2.onlooker import FirstGuess, Onlooker
+    from harvey_ros2.run_messages import TimedMessage
+    from world_models.building.world import World
+    from world_models.frames import Pose2
+    from world_models.robot import RobotModel
+
+
+def _arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("bag", metavar="BAG", help="a bag of ROS 2: its folder, or an .mcap file")
+    parser.add_argument("--world", metavar="FILE", required=True,
+                        help="the building: a world file, or the name of one that comes with Harvey")
+    parser.add_argument("--start", metavar="PLACE", help='where it was first, in feet, as "(hallway (4,4,0))";'
+                        " without it begins lost")
+    parser.add_argument("--heading", metavar="DEGREES", type=float, default=0.0, help="and where it looked there (0)")
+    parser.add_argument("--sigma", metavar="METRES", type=float, default=0.2,
+                        help="standard deviation of that place (0.2)")
+    parser.add_argument("--calibration", metavar="FILE",
+                        help="the camera's file; else CameraInfo and tf_static of the bag say it")
+    parser.add_argument("--odom", metavar="TOPIC", default="", help="the odometry, where there are several")
+    parser.add_argument("--picture", metavar="TOPIC", default="", help="the pictures, where there are several")
+    parser.add_argument("--base", metavar="FRAME", default="base_link", help="the robot's frame (base_link)")
+    parser.add_argument("--distro", metavar="NAME", default="jazzy",
+                        help="of a bag that does not say its types: humble, jazzy, kilted (jazzy)")
+    parser.add_argument("--reach", metavar="X", type=float, default=1.0,
+                        help="what the tape says of what the wheels claim (1)")
+    parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/BAG-follow)")
+
+
+def _run(args: Namespace) -> int:
+    from harvey_ros2.bag_reader import Bag
+    from harvey_ros2.messages import message_types
+    from harvey_ros2.onlooker import Onlooker, build_onlooker_head
+    from harvey_ros2.run_messages import RunMessages
+    from world_models.files.toml.mission import named_file
+    from world_models.files.toml.source import WORLDS
+
+    path = Path(args.bag)
+    world = named_file(args.world, WORLDS, Path())
+    if args.distro not in ("humble", "jazzy", "kilted"):
+        raise BadInput(f"--distro: expected humble, jazzy or kilted, got {args.distro!r}")
+    out = check_vacant(Path(args.out) if args.out else RUNS / f"{path.stem}-follow")
+    with Bag(path, odometry=args.odom, picture=args.picture, distro=args.distro) as bag:
+        known, robot = build_robot(bag, world, args)
+        guess, events = _guess(args, known), _Events()
+        messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
+        onlooker = Onlooker(build_onlooker_head(path.stem, world, robot, guess), out, events.hear, messages=messages)
+        took_s = follow_bag(bag.items(), onlooker)
+        why = f"the recording ends; {'lost' if onlooker.is_lost else 'it knows where it is'}"
+        onlooker.close(why)
+    print(f"{why}: {onlooker.pictures} pictures checked, {events.certified} certified, lost {events.lost} times\n"
+          f"{_tell_times(took_s)}\n\nopen it with    harvey view {out}\nhave it told    harvey story {out}\n"
+          f"for others      harvey export {out} --mcap {path.stem}.mcap")
+    return 1 if onlooker.is_lost else 0
+
+
+def follow_bag(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
+    """Show a recording to an onlooker; returns how long each picture took [s]."""
+    took_s: list[float] = []
+    last: Pose2 | None = None
+    began_s: float | None = None
+    for time_s, counted, jpeg in pair_with_odometry(items):
+        began_s = time_s if began_s is None else began_s
+        if last is not None:
+            onlooker.move(last.inverse() @ counted)
+        last = onlooker.messages.odometry = counted
+        if onlooker.wants(time_s - began_s):
+            then = time.perf_counter()
+            onlooker.look(jpeg, time_s - began_s)
+            took_s.append(time.perf_counter() - then)
+    return took_s
+
+
+def pair_with_odometry(items: Iterable[BagItem]) -> Iterator[tuple[float, Pose2, bytes]]:
+    """Each picture with its time and where the wheels counted to be then, between two readings of the odometry."""
+    from world_models.frames import Pose2, wrap_angle
+
+    waiting: list[BagItem] = []
+    before: tuple[float, Pose2] | None = None
+    for item in items:
+        if item.odometry is None:
+            waiting.append(item)
+            continue
+        after = item.time_s, item.odometry
+        while waiting and waiting[0].time_s <= after[0]:
+            picture = waiting.pop(0)
+            if before is None or after[0] <= before[0]:
+                continue
+            part = (picture.time_s - before[0]) / (after[0] - before[0])
+            if part < 0.0:
+                continue
+            (_, a), (_, b) = before, after
+            turned = wrap_angle(b.heading_rad - a.heading_rad)
+            yield picture.time_s, Pose2(a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m),
+                                        wrap_angle(a.heading_rad + part * turned)), picture.jpeg
+        before = after
+
+
+def build_robot(bag: Bag, world: Path, args: Namespace) -> tuple[World, RobotModel]:
+    """The building, and the robot by the bag and the options. Raises BadInput and WorldError."""
+    from logs.run_head import load_known_world
+    from world_models.actuator import ActuatorModel
+    from world_models.camera import NOT_STATED
+    from world_models.files.toml.camera_file import load_camera
+    from world_models.robot import RobotModel
+
+    try:
+        known = load_known_world(world)
+    except OSError as error:
+        raise BadInput(f"--world {args.world}: expected a world file, got: {error.strerror}") from None
+    deviation = NOT_STATED
+    if args.calibration:
+        camera, mount, deviation = load_camera(Path(args.calibration))
+    else:
+        camera, mount = bag.find_camera(args.base)
+    if mount is None:
+        raise BadInput(f"{bag.path}: expected tf_static to lead from {args.base} to the camera, or --calibration with "
+                       "a [mount]")
+    try:
+        actuator = ActuatorModel(reach=args.reach)
+    except ValueError as error:
+        raise BadInput(f"--reach: {error}") from None
+    return known, RobotModel(known, camera, mount, actuator, deviation=deviation)
+
+
+def _guess(args: Namespace, world: World) -> FirstGuess:
+    import math
+
+    from harvey_ros2.onlooker import FirstGuess
+    from world_models.commands import parse_command
+
+    if not (math.isfinite(args.heading) and 0.0 < args.sigma <= 5.0):
+        raise BadInput(f"--heading and --sigma: expected degrees and 0 to 5 m, got {args.heading:g} and {args.sigma:g}")
+    if args.start:
+        try:
+            origin, _ = parse_command(f"(ptrans {args.start} {args.start})", world)
+        except ValueError as error:
+            raise BadInput(f"--start: {error}") from None
+        if world.locale_at(origin.in_world(world).position) is None:
+            raise BadInput(f"--start: expected a place within a room, got {args.start}")
+        return FirstGuess(args.start, math.radians(args.heading), args.sigma, max(0.05, args.sigma / 2.0))
+    return FirstGuess(f"({world.rooms[0]} (1,1,0))", sigma_m=None)
+
+
+class _Events:
+    """Prints when it is lost and found; counts."""
+
+    def __init__(self) -> None:
+        self.certified = self.lost = 0
+        self._said = ""
+
+    def hear(self, messages: Iterable[TimedMessage]) -> None:
+        for item in messages:
+            if item.topic != "/diagnostics":
+                continue
+            status = item.message.status[0]
+            self.certified += status.values[0].value.startswith("verified")
+            if status.message != self._said:
+                self.lost += status.level == 2
+                self._said = status.message
+                print(f"{item.time_s:8.1f} s  {status.message}", file=sys.stderr, flush=True)
+
+
+def _tell_times(took_s: list[float]) -> str:
+    if len(took_s) < 20:
+        return f"{len(took_s)} pictures"
+    cuts = statistics.quantiles(took_s, n=20)
+    return f"a picture took {1e3 * statistics.median(took_s):.0f} ms, 95 of 100 at most {1e3 * cuts[-1]:.0f} ms"
+
+
+COMMAND = CliCommand(
+    "follow", "a recording of a robot that somebody else drove: where it was, certified, or lost",
+    (
+        ('harvey follow bag --world research_center --start "(hallway (4,4,0))"', "a bag of ROS 2, and where it began"),
+        ("harvey follow drive.mcap --world house.toml --calibration camera.toml", "it begins lost, and finds itself"),
+    ),
+    _arguments, _run,
+    "Odometry and pictures of the bag come to the same board as in a mission; what drives is left out. A pose is\n"
+    "certain only where a certificate vouches for it. The run is kept, with its journal: harvey replay, why and story\n"
+    "work as for a mission. Exit code 0: in the end it knows where the robot is; 1: it is lost; 2: bad input.",
+)

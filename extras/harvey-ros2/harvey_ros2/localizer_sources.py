@@ -1,0 +1,159 @@
+"""The knowledge sources of a robot that somebody else drives, beside those of Harvey that read pictures and search.
+
+They sit only at a board whose run names them: no other run has them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from blackboard.board import View
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
+from blackboard.level import Level
+from blackboard.servoing import Discrepancy
+from knowledge_sources.conditions import HELD, LOST, NO_MILESTONE, NOT_LOST, Belief
+from knowledge_sources.looking import find_robot_and_pose
+from knowledge_sources.methods.verification.view_quality import list_seen_locales, predict_milestone
+from knowledge_sources.priority import Priority
+from knowledge_sources.questions import find_frames
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.while_lost import find_panorama
+from world_models.entries.body import CameraPicture, MotionReport
+from world_models.entries.location import Hypothesis, PlaceSearch
+from world_models.entries.obstacle import Obstruction
+from world_models.entries.task import Certificate, Milestone
+
+CONTRADICTED = 2
+"""So many pictures one after the other that contradict the believed place, and it is lost."""
+MIN_P_WRONG, MIN_EXPECTED = 0.95, 8
+"""A picture contradicts a place from this probability of a wrong one, where at least so many lines should be seen."""
+MOST_SIGMA_M, MOST_SIGMA_RAD = 0.8, 0.3
+"""A belief that is less sure is none."""
+MOST_GLIMPSES = 8
+"""After so many looks that did not tell the place, the search begins anew: the robot has gone on meanwhile."""
+
+
+def contradicts(verdict: Certificate) -> bool:
+    """Whether a picture in which much should be seen speaks against the place, be the camera well known or not."""
+    return verdict.verdict == "refuted" or (verdict.p_wrong >= MIN_P_WRONG and verdict.expected >= MIN_EXPECTED)
+
+
+class ReportCase(NamedTuple):
+    """What the wheels report, and the belief before it."""
+
+    report: Entry[MotionReport]
+    belief: Belief
+
+
+class ClaimReckoner(RobotKnowledgeSource):
+    """Moves the belief by what the wheels of a robot report that somebody else drives."""
+
+    level, priority = Level.ACTION, Priority.ENTER
+    on = (Watch(MotionReport, (Posted,)),)
+    needs = (HELD,)
+    writes = (Hypothesis,)
+
+    def bind(self, view: View, trigger: Change) -> ReportCase:
+        return ReportCase(trigger.entry, HELD.of(view))
+
+    def act(self, view: View, case: ReportCase) -> Iterable[Effect]:
+        told, held = case
+        report, world = told.value, held.robot.world
+        pose, covariance = held.robot.actuator.propagate_move(
+            held.pose, held.covariance, report.turn_rad, report.move_m)
+        there = world.locale_at([*pose.position, world.floor_m(held.locale)])
+        locale = there if there and world.is_room(there) else held.locale
+        moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=told.id)
+        yield Revise(held.entry, moved, (told, held.entry))
+
+
+class ViewCase(NamedTuple):
+    """A picture that is to be checked, the belief, and what is known to stand before the camera: one or none."""
+
+    picture: Entry[CameraPicture]
+    belief: Entry[Hypothesis]
+    hidden: tuple[Entry[Obstruction], ...]
+
+
+class ViewExpecter(RobotKnowledgeSource):
+    """Says, before a picture is read, what it should show of the place where the robot is believed to be."""
+
+    level, priority = Level.PLAN, Priority.ENTER
+    on = (Watch(CameraPicture, (Posted,), lambda picture: picture.purpose == "milestone"),)
+    needs = (HELD, NOT_LOST, NO_MILESTONE)
+    writes = (Milestone,)
+
+    def bind(self, view: View, trigger: Change) -> ViewCase:
+        hidden = view.latest(Obstruction)
+        return ViewCase(trigger.entry, HELD.of(view).entry, () if hidden is None else (hidden,))
+
+    def act(self, view: View, case: ViewCase) -> Iterable[Effect]:
+        picture, belief, hidden = case
+        robot, pose = find_robot_and_pose(view, belief.value)
+        here = Milestone("", 0, "the place where it believes to be", pose.heading_rad)
+        expected = predict_milestone(robot, pose, here, "", self._settings)
+        frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale, self._settings))
+        yield Post(expected, (picture, belief, *hidden, *frames))
+
+
+class LossDeclarer(RobotKnowledgeSource):
+    """Declares a robot lost that somebody else drives: contradicted twice, or hardly known any more where it is.
+
+    One picture that contradicts the place may be of somebody who walks by: what it leaves open at the plan level ends
+    with the next one. Where a search has not told the place in so many looks, it begins anew.
+    """
+
+    level, priority = Level.PLAN, Priority.ENTER
+    on = (
+        Watch(Certificate, (Posted,), contradicts),
+        Watch(Discrepancy, (Posted, Revised), lambda doubt: doubt.exceeds and doubt.level is Level.PLAN),
+        Watch(Hypothesis, (Posted, Revised), lambda h: h.is_held and (
+            h.sigma_m > MOST_SIGMA_M or h.sigma_rad > MOST_SIGMA_RAD)),
+        Watch(PlaceSearch, (Posted,), lambda search: search.status != "found"),
+    )
+    writes = (Discrepancy,)
+
+    def bind(self, view: View, trigger: Change) -> Entry[Any] | None:
+        value, doubt = trigger.entry.value, LOST.find(view)
+        if isinstance(value, PlaceSearch):
+            panorama = None if doubt is None else find_panorama(view, doubt)
+            return None if panorama is None or len(panorama.value.glimpses) < MOST_GLIMPSES else trigger.entry
+        if isinstance(value, Certificate):
+            last = view.all(Certificate)[-CONTRADICTED:]
+            if len(last) < CONTRADICTED or not all(contradicts(one.value) for one in last):
+                return None
+        return trigger.entry if doubt is None or isinstance(value, Discrepancy) else None
+
+    def act(self, view: View, case: Entry[Any]) -> Iterable[Effect]:
+        value, bound_px = case.value, self._settings.plan.max_deviation_px
+        if isinstance(value, Discrepancy):
+            yield Revise(case, value.corrected(), (case,))
+        elif isinstance(value, PlaceSearch):
+            doubt = LOST.of(view)
+            yield Revise(doubt, replace(doubt.value, times=doubt.value.times + 1), (doubt, case))
+        else:
+            last = view.all(Certificate)[-CONTRADICTED:] if isinstance(value, Certificate) else (case,)
+            what = (f"{len(last)} pictures contradict the place where it believes to be"
+                    if isinstance(value, Certificate) else f"its place is known to {value.sigma_m:.1f} m only")
+            yield Post(Discrepancy(Level.GOAL, what, None, (0.0, bound_px), "px"), last)
+
+
+class PlaceConfirmer(RobotKnowledgeSource):
+    """Ends the doubt of a lost robot whose place a search has found: its looks are the evidence."""
+
+    level = closes = Level.GOAL
+    priority = Priority.CORRECT
+    on = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "relocalization"),)
+    needs = (LOST,)
+    writes = (Discrepancy,)
+
+    def bind(self, view: View, trigger: Change) -> tuple[Entry[Hypothesis], Entry[Discrepancy]]:
+        return trigger.entry, LOST.of(view)
+
+    def act(self, view: View, case: tuple[Entry[Hypothesis], Entry[Discrepancy]]) -> Iterable[Effect]:
+        place, doubt = case
+        yield Revise(doubt, doubt.value.corrected(), (place, doubt))

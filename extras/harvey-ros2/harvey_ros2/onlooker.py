@@ -1,0 +1,217 @@
+"""Localizer mode: somebody else drives, and Harvey says where the robot is, with a certificate, or that it is lost.
+
+The board, the sources that read pictures, judge and search, the journal and its replay are those of a mission; what
+drives is left out. What is sensed comes as observations: what the wheels counted, and pictures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blackboard.effect import Effect, Post
+from blackboard.journal import Decision
+from blackboard.scheduler import Scheduler
+from harvey.agent import Agent, build_agent
+from harvey.errors import BadInput
+from harvey.runner.world_port import WorldPort, tell_robot
+from harvey.wiring import KNOWLEDGE_SOURCES
+from harvey_ros2.run_messages import KINDS, RunMessages, TimedMessage
+from knowledge_sources.conditions import HELD, LOST
+from knowledge_sources.goal.interpreter import Interpreter
+from knowledge_sources.goal.localizer import Localizer
+from knowledge_sources.goal.panorama_builder import PanoramaBuilder
+from knowledge_sources.goal.pose_adopter import PoseAdopter
+from knowledge_sources.plan.line_finder import LineFinder
+from knowledge_sources.plan.matcher import Matcher
+from knowledge_sources.plan.med_r_and_t import MedRAndT
+from knowledge_sources.plan.milestone_judge import MilestoneJudge
+from knowledge_sources.plan.plan_adjuster import PlanAdjuster
+from logs.run_directory import RunDirectory
+from logs.run_head import HARDWARE, RunHead
+from logs.run_recorder import RunRecorder
+from world_models.commands import check_command
+from world_models.entries.body import CameraPicture, MotionReport
+from world_models.entries.location import diagonal
+from world_models.entries.task import Command, Outcome
+from world_models.files.toml.mission import Servo
+from world_models.frames import Pose2
+from world_models.plugins import GUESTS_GROUP, list_plugins
+from world_models.robot import RobotModel
+
+SEATED = (Interpreter, LineFinder, Matcher, MedRAndT, MilestoneJudge, PlanAdjuster, PanoramaBuilder, Localizer,
+          PoseAdopter)
+"""The sources of a mission that are wanted here too."""
+GUESTS = ("claim_reckoner", "view_expecter", "loss_declarer", "place_confirmer")
+AUTHOR = "onlooker"
+EVERY_S = 0.5
+"""Pictures are checked no more often, by their own time [s]."""
+APART_M, APART_RAD = 0.3, math.radians(20.0)
+"""A lost robot's looks are at least so far apart."""
+FLOOR_SIGMA_M, FLOOR_SIGMA_RAD = 0.015, math.radians(0.3)
+"""What a picture on the move leaves open beside its lines: stamps, blur, a model that is not exact."""
+STILL_M, STILL_RAD = 2e-4, 2e-4
+SIGMA_ANYWHERE_M, SIGMA_ANYWHERE_RAD = 5.0, math.pi
+
+
+@dataclass(frozen=True, slots=True)
+class FirstGuess:
+    """Where the robot is at the beginning, as somebody says.
+
+    Attributes:
+        place: a locale with a point in feet, as ``(hallway (4,4,0))``; a bare locale where nothing more is known.
+        heading_rad: in the locale's frame.
+        sigma_m, sigma_rad: standard deviations; None where nobody knows: it begins lost.
+    """
+
+    place: str
+    heading_rad: float = 0.0
+    sigma_m: float | None = 0.1
+    sigma_rad: float = 0.1
+
+    def command(self) -> Command:
+        """As an entry. Raises BadInput where the place is none."""
+        text = f"(ptrans {self.place} {self.place})"
+        try:
+            check_command(text)
+        except ValueError as error:
+            raise BadInput(f"--start {self.place}: {error}") from None
+        sigmas = (SIGMA_ANYWHERE_M, SIGMA_ANYWHERE_RAD) if self.sigma_m is None else (self.sigma_m, self.sigma_rad)
+        return Command(text, self.heading_rad, None, diagonal(*sigmas))
+
+
+def build_onlooker_head(name: str, world: Path, robot: RobotModel, guess: FirstGuess) -> RunHead:
+    """The head of a run in localizer mode: it names who sits at its board."""
+    seated = {source.called() for source in SEATED}
+    away = tuple(source.called() for source in KNOWLEDGE_SOURCES if source.called() not in seated)
+    installed = list_plugins(GUESTS_GROUP)
+    return RunHead.of(HARDWARE, name, 0, world, robot, Servo(), guess.command(), without=away,
+                      plugins={guest: installed[guest] for guest in GUESTS})
+
+
+class Onlooker:
+    """A run in localizer mode.
+
+    Attributes:
+        scheduler: its board, and who sits round it.
+        messages: what is told of it; whether its belief is certified, and why it is lost.
+        pictures: how many were checked.
+    """
+
+    def __init__(
+        self, head: RunHead, out: Path | None = None, tell: Callable[[Iterable[TimedMessage]], None] = lambda _: None,
+        *, messages: RunMessages,
+    ) -> None:
+        """Begin it; ``tell`` gets the messages for others as they come about. Raises BadInput and OSError."""
+        self._agent: Agent = build_agent(head)
+        self.messages, self._tell = messages, tell
+        self._files = None if out is None else RunDirectory(out)
+        self._recorder = RunRecorder(self._files, head, self._agent.world, self._agent.robot)
+        port = self._recorder.record_port(WorldPort(self._agent.store))
+        self.scheduler: Scheduler = self._agent.scheduler(ports=(port,), sinks=(*self._recorder.sinks, self._hear))
+        tell_robot(self.scheduler, self._agent.robot)
+        self.scheduler.post([Post(head.task())], "user")
+        self._settle()
+        if HELD.find(self.scheduler.view) is None:
+            raise BadInput("--start: expected a place in the building, got none that was understood")
+        self._moved, self._last_s, self._glimpsed = Pose2(0.0, 0.0, 0.0), -math.inf, Pose2(math.inf, 0.0, 0.0)
+        self._reported_s = 0.0
+        self.pictures = 0
+
+    @property
+    def is_lost(self) -> bool:
+        return LOST.find(self.scheduler.view) is not None
+
+    def belief(self) -> tuple[Pose2, NDArray[np.float64]]:
+        """Where the robot is believed to be, with all motion so far, and the covariance (3, 3) of the last report."""
+        held = HELD.of(self.scheduler.view)
+        turn, move = self._agent.robot.actuator, self._moved
+        forward = Pose2(move.x_m * turn.reach, move.y_m * turn.reach, move.heading_rad)
+        return held.pose @ forward, held.covariance
+
+    def move(self, step: Pose2) -> None:
+        """The wheels counted a motion: a pose in the frame of the one before."""
+        self._moved = self._moved @ step
+
+    def wants(self, time_s: float) -> bool:
+        """Whether a picture of this time is of use now."""
+        if self.is_lost:
+            there = self._glimpsed if not math.isfinite(self._glimpsed.x_m) else self._glimpsed @ self._moved
+            return not math.isfinite(there.x_m) or math.hypot(there.x_m, there.y_m) >= APART_M or (
+                abs(there.heading_rad) >= APART_RAD)
+        return time_s - self._last_s >= EVERY_S
+
+    def look(self, jpeg: bytes, time_s: float) -> None:
+        """A picture, taken where the wheels have counted up to now [s, of the run]."""
+        lost = self.is_lost
+        self._report(time_s)
+        lost = lost or self.is_lost  # it may have become so by the report
+        picture = CameraPicture(jpeg, self.pictures, time_s, "probe" if lost else "milestone")
+        self.pictures, self._last_s = self.pictures + 1, time_s
+        if lost:
+            self._glimpsed = Pose2(0.0, 0.0, 0.0)
+        effect = Post(picture)
+        self._recorder.record_picture(effect)
+        self._post(effect)
+        if not self.is_lost:
+            self._glimpsed = Pose2(math.inf, 0.0, 0.0)
+        self.tell_pose()
+
+    def tell_pose(self) -> None:
+        """Tell where the robot is and, where that is certified, how its odometry lies in the map."""
+        pose, covariance = self.belief()
+        covariance = covariance + np.diag([FLOOR_SIGMA_M**2, FLOOR_SIGMA_M**2, FLOOR_SIGMA_RAD**2])
+        self._tell([self.messages.pose(pose, covariance)])
+        if self.messages.is_certified:
+            self._tell([self.messages.transform(pose, self.messages.odometry)])
+
+    def close(self, why: str) -> None:
+        """End the run."""
+        kind = "lost" if self.is_lost else "reached"
+        self._post(Post(Outcome(kind, why)))
+        self._recorder.draw_end(kind, None)
+        self._recorder.close()
+        if self._files is not None:
+            self._files.write_result({
+                "scenario": self._files.path.name, "seed": 0, "outcome": kind, "reason": why,
+                "decisions": self.scheduler.cycle, "pictures": self.pictures})
+
+    def _report(self, time_s: float) -> None:
+        """Post the motion since the last picture: a turn toward where it came, the way there, and a turn."""
+        moved, took_s = self._moved, max(0.0, time_s - self._reported_s)
+        self._moved, self._reported_s = Pose2(0.0, 0.0, 0.0), time_s
+        gone = math.hypot(moved.x_m, moved.y_m)
+        parts: list[tuple[float, float]] = []
+        if gone > STILL_M:
+            ahead = math.atan2(moved.y_m, moved.x_m)
+            back = abs(ahead) > math.pi / 2.0
+            first = math.remainder(ahead + math.pi, math.tau) if back else ahead
+            parts.append((first, -gone if back else gone))
+            moved = replace(moved, heading_rad=math.remainder(moved.heading_rad - first, math.tau))
+        if abs(moved.heading_rad) > STILL_RAD:
+            parts.append((moved.heading_rad, 0.0))
+        for turn, move in parts:
+            if math.isfinite(self._glimpsed.x_m):
+                self._glimpsed = self._glimpsed @ Pose2(0.0, 0.0, turn) @ Pose2(move, 0.0, 0.0)
+            self._post(Post(MotionReport(turn, move, took_s / len(parts), time_s)))
+
+    def _post(self, effect: Effect) -> None:
+        self.scheduler.post([effect], AUTHOR)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Cycle until nothing is left to do."""
+        while self.scheduler.step() is not None:
+            pass
+
+    def _hear(self, decision: Decision) -> None:
+        for change in (*decision.observed, *decision.made):
+            value: Any = change.entry.value
+            if isinstance(value, KINDS):
+                self._tell(self.messages.take(value))

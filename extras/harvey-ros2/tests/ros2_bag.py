@@ -1,0 +1,71 @@
+"""Bags that another controller drives: the emulated robot, its camera, and somebody who knows the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from harvey_ros2.messages import message_types
+from harvey_ros2.robot_emulator import RobotEmulator, write_camera_info, write_mount, write_picture
+from sim.emulators.emulator import SimulatedGround
+from sim.faults.fault import Fault
+from sim.scenario import load_scenario
+from sim.stage import build_stage
+from world_models.frames import Pose2, wrap_angle
+
+TYPES = message_types("jazzy")
+TICK_S, PICTURE_S = 0.05, 0.2
+START = "(hallway (4,4,0))"
+Truth = list[tuple[float, Pose2]]
+
+
+def drive_bag(
+    folder: Path, way: Sequence[tuple[float, float]], *, seed: int = 0, scenario: str = "forty-foot-hallway",
+    faults: tuple[Fault, ...] = (), storage: StoragePlugin = StoragePlugin.MCAP,
+) -> Truth:
+    """Drive along points [m, world] by pure pursuit on the truth, and record a bag; returns (time, true pose)s."""
+    stage = build_stage(replace(load_scenario(scenario), faults=faults))
+    body, camera = stage.body(seed), stage.scenario.camera
+    robot = RobotEmulator(SimulatedGround(body), epoch_s=1000.0)
+    truth: Truth = []
+    kinds = {"odom": "nav_msgs/msg/Odometry", "camera/image_raw/compressed": "sensor_msgs/msg/CompressedImage",
+             "camera/camera_info": "sensor_msgs/msg/CameraInfo", "tf_static": "tf2_msgs/msg/TFMessage"}
+    with Writer(folder, version=9, storage_plugin=storage) as writer:
+        out = {name: writer.add_connection(f"/{name}", kind, typestore=TYPES.store) for name, kind in kinds.items()}
+
+        def record(name: str, cdr: bytes) -> None:
+            writer.write(out[name], round(robot.time_s * 1e9), cdr)
+
+        record("tf_static", write_mount(robot.time_s, camera.mount))
+        due_s, points = 0.0, list(way)
+        while points and len(truth) < 3000:
+            here = body.truth.world_from_robot
+            speed, rate = _pursue(here, points)
+            twist: Any = TYPES.build("geometry_msgs/msg/Twist", linear={"x": speed}, angular={"z": rate})
+            robot.hear("cmd_vel", TYPES.encode(twist))
+            robot.advance(TICK_S)
+            truth.append((robot.time_s, body.truth.world_from_robot))
+            for name, cdr in robot.take():
+                if name in out:
+                    record(name, cdr)
+            due_s -= TICK_S
+            if due_s <= 0.0:
+                due_s += PICTURE_S
+                record("camera/image_raw/compressed", write_picture(robot.time_s, body.picture()))
+                record("camera/camera_info", write_camera_info(robot.time_s, camera.camera))
+    return truth
+
+
+def _pursue(here: Pose2, points: list[tuple[float, float]]) -> tuple[float, float]:
+    """Speed and rate toward the first point; one that is reached is taken off."""
+    x, y = points[0]
+    if math.hypot(x - here.x_m, y - here.y_m) < 0.15:
+        points.pop(0)
+        return 0.0, 0.0
+    off = wrap_angle(math.atan2(y - here.y_m, x - here.x_m) - here.heading_rad)
+    return (0.0 if abs(off) > 0.6 else 0.3), max(-0.6, min(0.6, 1.5 * off))

@@ -1,0 +1,161 @@
+"""Localizer mode on recordings that another controller drove: certain only where it is right, lost when carried off."""
+
+from __future__ import annotations
+
+import math
+from argparse import Namespace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from ros2_bag import START, Truth, drive_bag
+from rosbags.rosbag2 import StoragePlugin
+
+from harvey.cli import main
+from harvey_ros2.bag_reader import Bag, BagItem, find_mount
+from harvey_ros2.follow_command import build_robot, follow_bag, pair_with_odometry
+from harvey_ros2.messages import message_types
+from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
+from harvey_ros2.run_messages import RunMessages, TimedMessage
+from sim.faults.built_in_faults import Kidnap
+from world_models.camera import CameraMount
+from world_models.files.toml.mission import named_file
+from world_models.files.toml.source import WORLDS
+from world_models.frames import Pose, Pose2, wrap_angle
+
+WORLD = named_file("research_center", WORLDS, Path())
+REACH = 0.951
+OPTIONS = Namespace(calibration=None, base="base_link", reach=REACH, world="research_center")
+WAY = [(5.0, 1.3), (8.5, 0.9), (6.5, 1.2)]
+
+
+def follow(bag: Path, guess: FirstGuess, out: Path | None = None) -> tuple[list[TimedMessage], Onlooker]:
+    """What is told of a recording."""
+    told: list[TimedMessage] = []
+    with Bag(bag) as recording:
+        known, robot = build_robot(recording, WORLD, OPTIONS)
+        messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
+        onlooker = Onlooker(build_onlooker_head("bag", WORLD, robot, guess), out, told.extend, messages=messages)
+        follow_bag(recording.items(), onlooker)
+        onlooker.close("the recording ends")
+    return told, onlooker
+
+
+def check_poses(told: list[TimedMessage], truth: Truth, began_s: float) -> int:
+    """Each certain pose is within three standard deviations of the truth; returns how many there are."""
+    times, certain = np.array([time_s for time_s, _ in truth]), 0
+    for item in told:
+        if item.topic != "harvey/pose" or item.message.pose.covariance[0] >= 1e6:
+            continue
+        certain += 1
+        there = truth[int(np.argmin(np.abs(times - began_s - item.time_s)))][1]
+        at, turn, c = item.message.pose.pose.position, item.message.pose.pose.orientation, item.message.pose.covariance
+        off = np.array([at.x - there.x_m, at.y - there.y_m])
+        assert off @ np.linalg.solve(np.array([[c[0], c[1]], [c[6], c[7]]]), off) < 11.8, (item.time_s, off)
+        assert abs(wrap_angle(2.0 * math.atan2(turn.z, turn.w) - there.heading_rad)) < 3.0 * math.sqrt(c[35])
+    return certain
+
+
+def list_states(told: list[TimedMessage]) -> list[tuple[float, str]]:
+    """When it was certified, not certified or lost: each change with its time [s, of the recording]."""
+    states: list[tuple[float, str]] = []
+    for item in told:
+        if item.topic == "/diagnostics":
+            said = item.message.status[0].message.partition(":")[0]
+            if not states or states[-1][1] != said:
+                states.append((item.time_s, said))
+    return states
+
+
+@pytest.fixture(scope="module")
+def carried_off(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Truth]:
+    """A recording in which somebody carries the robot off and turns it."""
+    folder = tmp_path_factory.mktemp("bags") / "carried"
+    kidnap = Kidnap(after_m=2.0, forward_m=2.0, left_m=0.3, turn_rad=math.radians(50.0))
+    return folder, drive_bag(folder, WAY, faults=(kidnap,))
+
+
+def test_carried_off_it_is_lost_within_three_seconds_and_finds_itself(
+    carried_off: tuple[Path, Truth], tmp_path: Path
+) -> None:
+    bag, truth = carried_off
+    jumps = [time_s for (_, before), (time_s, after) in pairwise(truth)
+             if before.distance_to(after) > 0.5]
+    assert len(jumps) == 1
+    told, onlooker = follow(bag, FirstGuess(START), tmp_path / "run")
+    began_s = truth[0][0]
+    states = list_states(told)
+    lost_s = next(time_s for time_s, said in states if said == "lost")
+    assert 0.0 < lost_s - (jumps[0] - began_s) < 3.0
+    found_s = next(time_s for time_s, said in states if said == "certified" and time_s > lost_s)
+    assert not onlooker.is_lost and onlooker.pictures > 40
+    assert check_poses([item for item in told if not jumps[0] - began_s <= item.time_s < found_s], truth, began_s) > 25
+    inside = [item for item in told if lost_s <= item.time_s < found_s]
+    assert not any(item.topic == "/tf" for item in inside)
+    # Between the moment when it is carried off and the first picture after it nobody can know.
+    wrong = [item for item in told if item.topic == "harvey/pose" and item.message.pose.covariance[0] < 1e6
+             and jumps[0] - began_s <= item.time_s < found_s]
+    assert wrong == []
+    assert main(["replay", str(tmp_path / "run")]) == 0
+    assert main(["story", str(tmp_path / "run")]) == 0
+    assert main(["export", str(tmp_path / "run"), "--mcap", str(tmp_path / "run.mcap")]) == 0
+
+
+def test_without_a_first_guess_it_begins_lost_and_the_command_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    truth = drive_bag(tmp_path / "bag", [(3.5, 1.3)], storage=StoragePlugin.SQLITE3)
+    arguments = ["follow", str(tmp_path / "bag"), "--world", "research_center", "--reach", str(REACH)]
+    assert main([*arguments, "--out", str(tmp_path / "run")]) == 0
+    captured = capsys.readouterr()
+    assert "lost: its place is known to 5.0 m only" in captured.err and "certified" in captured.err
+    assert "it knows where it is" in captured.out and "lost 1 times" in captured.out
+    told, _ = follow(tmp_path / "bag", FirstGuess("(hallway (1,1,0))", sigma_m=None))
+    assert check_poses(told, truth, truth[0][0]) >= 3
+
+
+def test_a_pose_comes_from_between_two_readings_of_the_odometry() -> None:
+    items = [BagItem(0.9, jpeg=b"early"), BagItem(1.0, Pose2(0.0, 0.0, 3.1)), BagItem(1.25, jpeg=b"a"),
+             BagItem(2.0, Pose2(4.0, 2.0, -3.1)), BagItem(2.5, jpeg=b"late")]
+    (time_s, pose, jpeg), = pair_with_odometry(items)
+    assert (time_s, jpeg) == (1.25, b"a") and (pose.x_m, pose.y_m) == (1.0, 0.5)
+    assert abs(wrap_angle(pose.heading_rad - (3.1 + 0.25 * (2.0 * math.pi - 6.2)))) < 1e-9
+
+
+@given(st.floats(0.2, 2.0), st.floats(-0.5, 0.5), st.floats(-0.7, 0.7), st.floats(-1.0, 1.0), st.floats(-3.0, 3.0))
+def test_a_mount_is_found_through_its_frames(height: float, ahead: float, tilt: float, roll: float, yaw: float) -> None:
+    mount = CameraMount(height, ahead, tilt, roll, yaw)
+    housing = Pose.from_rotation_vector([0.1, -0.2, 0.3], [0.02, 0.03, 0.4])
+    camera = mount.camera_from_robot.inverse()
+    edges = {"optical": ("housing", housing.inverse() @ camera), "housing": ("base_link", housing)}
+    found = find_mount(edges, "base_link", "optical")
+    assert found is not None
+    for key in ("height_m", "forward_m", "tilt_rad", "roll_rad", "yaw_rad"):
+        assert abs(wrap_angle(getattr(found, key) - getattr(mount, key))) < 1e-6
+    assert find_mount(edges, "base_footprint", "optical") is None
+
+
+def test_what_cannot_be_used_is_one_line(
+    carried_off: tuple[Path, Truth], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "no.mcap").write_bytes(b"no bag at all")
+    bag, out = str(carried_off[0]), str(tmp_path / "out")
+
+    def said(*arguments: Any) -> str:
+        assert main(["follow", *map(str, arguments), "--out", out]) == 2
+        return capsys.readouterr().err
+
+    for text, expected in (
+        (said(tmp_path / "no.mcap", "--world", "research_center"), "expected a bag of ROS 2"),
+        (said(tmp_path / "none", "--world", "research_center"), "expected a bag of ROS 2"),
+        (said(bag, "--world", "atlantis"), "atlantis"),
+        (said(bag, "--world", "research_center", "--start", "(moon (1,1,0))"), "moon"),
+        (said(bag, "--world", "research_center", "--odom", "/wheels"), "expected --odom to name one topic"),
+        (said(bag, "--world", "research_center", "--base", "base"), "expected tf_static to lead from base to the"),
+        (said(bag, "--world", "research_center", "--distro", "noetic"), "expected humble, jazzy or kilted"),
+    ):
+        assert expected in text and text.count("\n") == 1 and len(text) <= 301, text
