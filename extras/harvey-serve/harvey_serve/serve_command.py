@@ -20,8 +20,8 @@ def _arguments(parser: ArgumentParser) -> None:
                         " or the folder of a run that another command is driving, to watch")
     parser.add_argument("--port", metavar="N", type=int, default=PORT, help=f"0 for any that is free ({PORT})")
     parser.add_argument("--host", metavar="ADDRESS", default="127.0.0.1",
-                        help="the address of this machine on which it listens; 0.0.0.0 lets every machine of the network"
-                             " watch (127.0.0.1)")
+                        help="the address of this machine on which it listens; 0.0.0.0 lets every machine of the"
+                             " network watch (127.0.0.1)")
     parser.add_argument("--seed", metavar="N", default="0", help="seed of all random numbers (0)")
     parser.add_argument("--speed", metavar="X", type=float, default=1.0,
                         help="how many times as fast as the robot's own time it may go; 0: as fast as it computes (1)")
