@@ -20,7 +20,7 @@ LINES = {
     "logs": 7_756,
     "harvey": 11_172,
     "experiments": 10_530,
-    "tests": 45_060,
+    "tests": 45_110,
     "extras": 20_383,
 }
 """Of Python files, at most."""
