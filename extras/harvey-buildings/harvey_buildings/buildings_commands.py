@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
@@ -42,7 +43,13 @@ def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
     made = import_building(path, wall_height_m, with_bar)
     target.write_text(made.text, encoding="utf-8")
     print(f"{made.report}\n")
-    return print_check(load_file(str(target), []), str(target))
+    code = print_check(load_file(str(target), []), str(target))
+    rooms = made.layout.rooms
+    if not code and len(rooms) > 1 and len(made.layout.shut_off) == len(rooms) - 1:
+        print(f"{target}: none of its {len(rooms)} rooms has a way to another, so no mission can be driven between "
+              "them", file=sys.stderr)
+        return 1
+    return code
 
 
 def _export(args: Namespace) -> int:
@@ -69,7 +76,9 @@ IMPORT = CliCommand(
      ("harvey world import campus.geojson --out campus.toml", "what export writes, or unit.geojson of IMDF"),
      ("harvey world import map.yaml --out floor.toml --wall-height 2.7", "rooms and doors traced from a ROS map")),
     _import_arguments, lambda args: _import(args.file, args.out, args.wall_height),
-    "Then checks it, as harvey world check does.",
+    "Then checks it, as harvey world check does. Exit code 0: it has no faults. 1: none of its rooms, two or more,\n"
+    "has a way to another: no doorway, opening, stairs or lift; the file is written. 2: it cannot be read, or has\n"
+    "faults, or is a ROS map most of whose rooms have no doorway.",
 )
 EXPORT = CliCommand(
     "export", "write a world for other programs: a ROS map, SVG, GeoJSON or glTF",

@@ -91,7 +91,8 @@ def _read(path: Path, send: Callable[[ReadingProgress], None]) -> BuildingPlan:
     except READ_ERRORS as error:
         if isinstance(error, BuildingError):
             raise
-        raise BuildingError(f"{path.name}: expected an IFC file with spaces, got: {first_line(error)}") from None
+        raise BuildingError(f"{path.name}: expected an IFC file with spaces, got, {file.doing}: {first_line(error)}"
+                            ) from None
 
 
 def _is_truncated(path: Path) -> bool:
@@ -119,11 +120,14 @@ def _build_shape_reader() -> Callable[[Any, bool], ElementShape]:
     rough.set("dimensionality", ifcopenshell.ifcopenshell_wrapper.CURVES_SURFACES_AND_SOLIDS)
 
     def shape(element: Any, roughly: bool) -> ElementShape:
+        ifcopenshell.get_log()  # empties it
         try:
             made = geometry.create_shape(rough if roughly else settings, element)
-        except RuntimeError:
-            given = "a shape that cannot be read" if getattr(element, "Representation", None) else "no shape"
-            raise ValueError(f"the file gives it {given}") from None
+        except RuntimeError as error:
+            if not getattr(element, "Representation", None):
+                raise ValueError("the file gives it no shape") from None
+            reason = _find_reason(ifcopenshell.get_log()) or first_line(error)
+            raise ValueError(f"the file gives it a shape that cannot be read: {reason}") from None
         points = np.array(made.geometry.verts, float).reshape(-1, 3)
         frame = np.array(made.transformation.matrix, float).reshape(4, 4).T[:3]
         if not len(points) or not np.isfinite(points).all() or not np.isfinite(frame).all():
@@ -132,6 +136,12 @@ def _build_shape_reader() -> Callable[[Any, bool], ElementShape]:
                             np.array(made.geometry.edges, int).reshape(-1, 2))
 
     return shape
+
+
+def _find_reason(log: str) -> str | None:
+    """The first error of ifcopenshell's log, with the kind of entity that it is about; None where there is none."""
+    found = re.search(r"^\[error\] (?:\[[^]\n]*\] )*(.+?)(?::\n#\d+=(\w+).*)?$", log, re.MULTILINE)
+    return found and first_line(ValueError(" ".join(part for part in found.groups() if part)))
 
 
 def _read_height(element: Any) -> float | None:

@@ -242,7 +242,7 @@ class IfcFile:
         model: the file as ifcopenshell has it.
         shape: reads the shape of an element; with True also roughly, from its bounding box or its lines on the plan.
         height: reads the height of an element's placement, in the file's unit.
-        send: takes progress messages.
+        send: takes progress messages. doing: what is read now, with its entity.
         unit_m: the file's unit of length [m].
         origin: origin and direction of the plan in the file; known once the spaces are.
         by_id: the plan's name of each space, by the file's id.
@@ -256,6 +256,7 @@ class IfcFile:
     height: Callable[[Any], float | None]
     send: Callable[[ReadingProgress], None]
     unit_m: float = 1.0
+    doing: str = "reading its unit of length"
     plan: BuildingPlan = field(init=False)
     names: Names = field(init=False)
     origin: PlanOrigin = field(init=False)
@@ -294,7 +295,8 @@ class IfcFile:
 
     def report_progress(self, element: Any) -> None:
         """Report that an element is read now, which starts its time limit."""
-        self.send(ReadingProgress(f"reading {element.is_a()} #{element.id()}", ELEMENT_S))
+        self.doing = f"reading {element.is_a()} #{element.id()}"
+        self.send(ReadingProgress(self.doing, ELEMENT_S))
 
     def body(self, element: Any) -> ElementShape:
         """Shape of an element on the plan. Raises ValueError, or what ifcopenshell raises, where it has none."""

@@ -59,6 +59,8 @@ MAX_OLD_WALL_M = 0.89
 DOORWAY_CLEARANCE_M = 0.05
 MIN_OPENING_M = 0.05
 MAX_STEP_M = 0.05
+LINTEL_M, MIN_PANE_M = 0.1, 0.02
+"""Wall above a window, and its least height."""
 
 
 @dataclass
@@ -219,10 +221,21 @@ def _place_windows(layout: Layout, storey: str) -> None:
     plan, report = layout.plan, layout.plan.report
     outlines = _outlines(layout, storey)
     for window in (w for w in plan.windows if w.storey == storey):
-        found = [(pane, window) for pane in find_panes(window, outlines)]
-        layout.panes += found
-        if not found:
+        panes = find_panes(window, outlines)
+        if not panes:
             report.left_out.append(f"window {window.name}: no wall of a space runs along it")
+        for pane in panes:
+            space = plan.space(pane.room)
+            low, high = window.sill_m - space.floor_m, window.sill_m + window.height_m - space.floor_m
+            ceiling_m = space.height_m - LINTEL_M
+            if min(high, ceiling_m) - max(low, 0.0) < MIN_PANE_M:
+                report.left_out.append(f"window {window.name}: from {low:.2f} to {high:.2f} m above the floor of "
+                                       f"{pane.room}, whose ceiling is at {space.height_m:.2f} m")
+                continue
+            layout.panes.append((pane, window))
+            if high > space.height_m:
+                report.guessed.append(f"window {window.name}: ends at {ceiling_m:.2f} m, as the ceiling of {pane.room} "
+                                      f"is at {space.height_m:.2f} m and its top at {high:.2f} m")
 
 
 def _place_furniture(layout: Layout) -> None:

@@ -252,6 +252,10 @@ def read_ros_map(path: Path, wall_height_m: float = WALL_HEIGHT_M, *, watched: W
         raise BuildingError(f"{file.image.name}: expected a room of {1.5:g} m2 or more with walls, got none in "
                             f"{cells.shape[1]} x {cells.shape[0]} cells of {file.resolution_m:g} m")
     _add_doors(plan, labels, gaps, names, grid)
+    joined = {room for opening in plan.openings for room in opening.rooms}
+    if len(names) > 1 and len(joined) < len(names) / 2:
+        raise BuildingError(f"{file.image.name}: expected a doorway to most rooms, got none to "
+                            f"{len(names) - len(joined)} of {len(names)}: its walls or gaps are not those of rooms")
     _report(plan, file, grid, labels, len(things))
     return plan
 

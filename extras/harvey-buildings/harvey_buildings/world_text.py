@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from harvey_buildings.building_plan import Furnishing, Space, Storey, Window
-from harvey_buildings.layout import Layout
+from harvey_buildings.layout import LINTEL_M, Layout
 from harvey_buildings.placement import PlacedOpening, PlacedWindow
 from harvey_buildings.polygons import Floats, find_center
 
@@ -99,8 +99,8 @@ def _make_unique(name: str, taken: set[str]) -> str:
 
 def _pane(pane: PlacedWindow, window: Window, space: Space, name: str) -> str:
     sill = max(0.0, window.sill_m - space.floor_m)
-    top = min(window.sill_m + window.height_m - space.floor_m, space.height_m - 0.1)
-    box = _box((-pane.width_m / 2, pane.width_m / 2, 0.0, 0.05, 0.0, max(top - sill, 0.02)))
+    top = min(window.sill_m + window.height_m - space.floor_m, space.height_m - LINTEL_M)
+    box = _box((-pane.width_m / 2, pane.width_m / 2, 0.0, 0.05, 0.0, top - sill))
     rim = ', rim = "walnut", rim_width = 0.06' if min(pane.width_m, top - sill) > 0.2 else ""
     return (f'{{ name = {_text(name)}, wall = "side-{pane.side}", along = {_n(pane.along_m)}, up = {_n(sill)}, '
             f'boxes = [{{ {box}, finish = "glass"{rim} }}] }}')
