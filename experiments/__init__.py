@@ -46,6 +46,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "matcher": "2D matching of growing problems: success and time",
         "milestones": "Milestones at right and wrong places: error rates",
         "milestones-calibrate": "Fits the weights of the evidence for milestones",
+        "repeats": "Stairs, shelves, doors: a pose one repetition off",
     },
     "robustness": {
         "crash": "Missions killed at random moments and resumed",

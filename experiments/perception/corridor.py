@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.paper.pose_peer import NOT_INSTALLED, Peer
-from experiments.perception.locate_camera import CAMERA_MIN_LINE_LENGTH_PX
 from experiments.perception.photographs import (
     MAX_ERROR_RAD,
     MAX_ERROR_STEPS,
@@ -23,6 +22,7 @@ from experiments.perception.photographs import (
     run_attempt,
     select_visible,
 )
+from experiments.perception.rivals import MIN_LINE_LENGTH_PX
 from experiments.report import Cell, Report
 from experiments.shared_data import CORRIDOR, describe_absence
 from experiments.trials import campaign_folder, run_trials
@@ -136,7 +136,7 @@ def _notes(data: Corridor, seed: int, folder: Path) -> tuple[str, ...]:
         f" {data.step:.3f} of the survey's units. Seed {seed}. Directions of shift and turn are uniform on the sphere,"
         " sizes uniform where the row says 'up to'. The reference poses are the publishers', and have errors too.",
         f"Covered: a segment within {COVER_PX} px and {COVER_RAD} rad of a projected model line of"
-        f" {CAMERA_MIN_LINE_LENGTH_PX:.0f} px or more, at the reference pose. Peer there: the"
+        f" {MIN_LINE_LENGTH_PX:.0f} px or more, at the reference pose. Peer there: the"
         " publishers' own segments.",
         f"Recovered: within {MAX_ERROR_STEPS} step and {math.degrees(MAX_ERROR_RAD):.1f} degrees. All from our own"
         " segments; the prior's standard deviation per axis is half of 0.5 step and 3 degrees, in every test.",

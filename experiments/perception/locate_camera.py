@@ -8,13 +8,22 @@ covariance alone, which looks the same at a wrong place.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
 import numpy as np
+from scipy.special import bdtr
 
+from experiments.perception.rivals import (
+    DETECTION_RATE,
+    MIN_LINE_LENGTH_PX,
+    PoseScore,
+    compute_pose_score,
+    find_self_motions,
+    project_leaders,
+)
 from knowledge_sources.methods.arrays import Floats, Indices
 from knowledge_sources.methods.features.lines import LineSegments, find_lines, remove_duplicates
 from knowledge_sources.methods.matching import match_in_space
@@ -26,9 +35,10 @@ from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose
 
-CAMERA_MIN_LINE_LENGTH_PX = 8.0  # shortest projected model line that is matched
 CAMERA_BAND_PX = 6.0  # half-width of the bands that are searched for edges around the first pose
 CAMERA_SECOND_PRIOR = 0.15  # standard deviation of the first pose, as a part of the prior's
+CAMERA_NEAR_PRIOR = 0.5  # the same of a second try from the prior, where nothing is verified from the whole of it
+CAMERA_START_SIGMAS = 1.5  # shifts of further tries, in the prior's deviations
 CAMERA_COARSE_PAIR_PX = 5.0  # restricted space of the first match (§6.1.4)
 CAMERA_COARSE_SIGMA_PX = 1.5  # deviation of an end of a pair of the first match
 CAMERA_FINE_PAIR_PX = 3.0  # restricted space of the second match (§6.1.4)
@@ -40,7 +50,12 @@ CAMERA_MAX_P_FALSE = 1e-4  # largest chance of a pose that is not refuted
 CAMERA_MIN_COVERAGE = 2.0 / 3.0  # smallest covered part of the model of a verified pose
 CAMERA_DISPLACEMENT_SIGMAS = 2.0  # displacement of the poses at which chance is counted, in the prior's deviations
 CAMERA_TOLERANCE_SIGMAS = 3.0  # standard deviations of a verified pose that fit into the tolerance
-CAMERA_MAX_RESTARTS = 3  # most times that a pose is replaced by a better one found from it
+CAMERA_MAX_RESTARTS = 5  # most times that a pose is replaced by a better one found from it
+CAMERA_MAX_P_MISSED = 1e-3  # largest chance that a right pose shows so few of its lines, of a refuted pose
+RIVAL_MIN_LEAD = 5.0  # log likelihood ratio by which a verified pose leads every rival, and
+RIVAL_LEAD_PER_LINE = 0.25  # so much for each line: those of one thing are hidden, missed or displaced together
+RIVAL_MAX_PRIOR = 2.0  # log likelihood ratio that the prior says at most, as priors are wrong too
+RIVAL_MAX_REFINED = 10  # most rivals that are refined, the likeliest
 
 RESTLESS = "each pose that is found leads to a better one"
 
@@ -54,6 +69,20 @@ class PoseVerdict(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Rival:
+    """Another pose.
+
+    Attributes:
+        lead: log likelihood ratio of the pose in question to this one; negative where this one is better.
+        needed: the lead from which the pose in question may be verified.
+    """
+
+    camera_from_world: Pose
+    lead: float
+    needed: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CameraFix:
     """A camera pose and how far it can be trusted.
 
@@ -63,8 +92,10 @@ class CameraFix:
         segments_px: (k, 2, 2) found around the projected model.
         evidence: which of the model lines are matched, and how many would be by chance.
         coverage: covered part of their length in view, 0..1.
-        verdict: refuted if the agreement may well be by chance, where so many lines would tell; verified only if most
-            of the model is covered, and the covariance, scaled by the residuals, fits into the tolerance.
+        verdict: refuted if the agreement may well be by chance, and a right pose would hardly show so few lines;
+            verified only if most of the model is covered, the covariance, scaled by the residuals, fits into the
+            tolerance, and no other pose explains comparably much.
+        rival: the pose that explains most besides, where the model repeats itself.
         reason: why it is not verified, in words; "" where it is.
     """
 
@@ -75,6 +106,7 @@ class CameraFix:
     coverage: float
     verdict: PoseVerdict
     reason: str = ""
+    rival: Rival | None = None
 
     @property
     def camera_from_world(self) -> Pose:
@@ -108,13 +140,19 @@ def locate_camera(
         rng: draws subsets of lines.
         segments: those of the whole image, if they are known already.
     """
-    if segments is None:
-        segments = find_lines(image)
-    parameters = build_camera_parameters(prior, prior_covariance)
-    search = _Search(
-        parameters, np.asarray(model_lines_world, float), image, camera, np.asarray(prior_covariance, float),
-        segments.segments_px, tolerance_m, tolerance_rad, rng)
-    best = search.locate(prior, search.covariance)
+    segments_px = (find_lines(image) if segments is None else segments).segments_px
+    spread = np.asarray(prior_covariance, float)
+    search = CameraSearch(
+        build_camera_parameters(prior, spread), np.asarray(model_lines_world, float), image, camera, spread,
+        segments_px, tolerance_m, tolerance_rad, rng)
+    best = search.locate(prior, spread)
+    away = CAMERA_START_SIGMAS * np.linalg.cholesky(spread)[3:, 3:].T
+    for shift in (np.zeros(3), *away, *-away):  # starts are sparse in a wide prior, and may see nothing of the model
+        if best is not None and best.verdict is PoseVerdict.VERIFIED:
+            break
+        near = search.locate(prior.perturbed(np.zeros(3), shift), CAMERA_NEAR_PRIOR**2 * spread)
+        if near is not None and (best is None or near.coverage > best.coverage):
+            best = near
     for _ in range(CAMERA_MAX_RESTARTS):
         best, is_better = search.look_elsewhere(best)
         if best is None or not is_better:
@@ -125,7 +163,7 @@ def locate_camera(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Search:
+class CameraSearch:
     """One picture, one model and one prior; see :func:`locate_camera`."""
 
     prior: CameraParameters
@@ -139,7 +177,7 @@ class _Search:
     rng: np.random.Generator
 
     def look_elsewhere(self, best: CameraFix | None) -> tuple[CameraFix | None, bool]:
-        """A better pose that is found from here, and whether it is another place."""
+        """A better pose, from here or where the model repeats itself; else the same, held against its rivals."""
         if best is None:
             return None, False
         pose = best.camera_from_world
@@ -147,8 +185,47 @@ class _Search:
         if other is not None and other.coverage > best.coverage:
             if not self.is_same(other.camera_from_world, pose):
                 return other, True
-            best = other
+            best, pose = other, other.camera_from_world
+        others, spread = find_self_motions(self.model, self.camera, pose)
+        rivals = self.find_rivals(pose, best.evidence.chance, others, spread)
+        if rivals and rivals[0].lead < rivals[0].needed:  # and one repetition further, from the likeliest of them
+            others, _ = find_self_motions(self.model, self.camera, rivals[0].camera_from_world)
+            rivals += self.find_rivals(pose, best.evidence.chance, others, spread)
+        for rival in sorted(rivals, key=lambda rival: rival.lead):
+            there = self.locate(rival.camera_from_world, spread) if rival.lead < rival.needed else None
+            if there is not None and self.is_same(there.camera_from_world, pose):
+                continue  # looked at closely, it is this pose
+            if there is not None and rival.lead < 0.0:
+                return there, True
+            best = replace(best, rival=rival)
+            if best.verdict is PoseVerdict.VERIFIED and rival.lead < rival.needed:
+                away = np.linalg.norm(pose.inverse().translation - rival.camera_from_world.inverse().translation)
+                reason = f"a pose {100.0 * away:.0f} cm away explains comparably much"
+                best = replace(best, verdict=PoseVerdict.NOT_TESTABLE, reason=reason)
+            break
         return best, False
+
+    def find_rivals(self, pose: Pose, chance: float, others: Sequence[Pose], spread: Floats) -> list[Rival]:
+        """Which of ``others``, with covariance ``spread`` (6, 6), explain the picture too, the likeliest first.
+
+        ``chance`` is the probability that a line is found at a wrong pose.
+        """
+
+        def score(at: Pose) -> PoseScore:
+            found = compute_pose_score(project_leaders(self.model, self.camera, at), self.segments_px, chance)
+            step = self.prior.compute_step(at)
+            far = min(0.5 * float(step @ self.prior.information @ step), RIVAL_MAX_PRIOR)
+            return replace(found, log_likelihood=found.log_likelihood - far)
+
+        own, best = score(pose), sorted(others, key=lambda at: -score(at).log_likelihood)[:RIVAL_MAX_REFINED]
+        needed, rivals = RIVAL_MIN_LEAD + RIVAL_LEAD_PER_LINE * own.count, []
+        for other in best:
+            near = self._solve(
+                self.segments_px, other, spread, (CAMERA_COARSE_PAIR_PX, CAMERA_COARSE_SIGMA_PX), trunc_r_and_t)
+            refined = other if near is None else near[0].camera_from_world
+            if not self.is_same(other, pose) and not self.is_same(refined, pose):
+                rivals += [Rival(at, own.log_likelihood - score(at).log_likelihood, needed) for at in (other, refined)]
+        return sorted(rivals, key=lambda rival: rival.lead)
 
     def locate(self, prior: Pose, covariance: Floats) -> CameraFix | None:
         """The pose that the picture shows within a prior, with its own verdict."""
@@ -171,7 +248,7 @@ class _Search:
         """Indices of the model lines that are visible from a pose at some length."""
         px, visible = self.camera.project_segments(self.model, pose)
         length = np.linalg.norm(px[visible, 1] - px[visible, 0], axis=1)
-        visible[visible] = length >= CAMERA_MIN_LINE_LENGTH_PX
+        visible[visible] = length >= MIN_LINE_LENGTH_PX
         return np.flatnonzero(visible)
 
     def _find_near(self, pose: Pose) -> Floats:
@@ -207,15 +284,18 @@ class _Search:
 
     def _judge(self, estimate: PoseEstimate, pairs: Indices, near: Floats) -> CameraFix:
         """The verdict, by the segments of the whole image, which were not searched for at this pose."""
-        pose = estimate.camera_from_world
-        displaced = np.array([self.camera.project_segments(self.model, wrong)[0] for wrong in self._displace(pose)])
-        here = self.camera.project_segments(self.model, pose)[0]
-        lengths = np.linalg.norm(here[:, 1] - here[:, 0], axis=1)
-        here[~(np.nan_to_num(lengths) >= CAMERA_MIN_LINE_LENGTH_PX)] = np.nan
-        agreement = compute_agreement(here, self.segments_px, displaced)
-        coverage = agreement.covered_length(lengths)
+        agreement, coverage = self.measure_agreement(estimate.camera_from_world)
         verdict, reason = self._decide(estimate, agreement, coverage)
         return CameraFix(estimate, pairs, near, agreement, coverage, verdict, reason=reason)
+
+    def measure_agreement(self, pose: Pose) -> tuple[Agreement, float]:
+        """Which model lines agree with the picture at a pose, and the covered part of their length."""
+        here = project_leaders(self.model, self.camera, pose)
+        lengths = np.linalg.norm(here[:, 1] - here[:, 0], axis=1)
+        once = self.model[~np.isnan(lengths)]
+        displaced = np.array([self.camera.project_segments(once, wrong)[0] for wrong in self._displace(pose)])
+        agreement = compute_agreement(here, self.segments_px, displaced)
+        return agreement, agreement.covered_length(lengths)
 
     def _decide(self, estimate: PoseEstimate, agreement: Agreement, coverage: float) -> tuple[PoseVerdict, str]:
         """The verdict by this pose alone, and why it is not verified."""
@@ -223,8 +303,11 @@ class _Search:
         if agreement.visible < CAMERA_MIN_MATCHED_LINES or best_possible > CAMERA_MAX_P_FALSE:
             return PoseVerdict.NOT_TESTABLE, f"{agreement.visible} lines in view: too few to tell the place by"
         if agreement.matched < CAMERA_MIN_MATCHED_LINES or agreement.p_false > CAMERA_MAX_P_FALSE:
-            found = f"{agreement.matched} of {agreement.visible} lines are found"
-            return PoseVerdict.REFUTED, f"{found}; at a wrong place {agreement.chance:.0%} are"
+            found = f"{agreement.matched} of {agreement.visible} lines are found; at a wrong place"
+            found = f"{found} {agreement.chance:.0%} are"
+            if bdtr(agreement.matched, agreement.visible, DETECTION_RATE) > CAMERA_MAX_P_MISSED:
+                return PoseVerdict.NOT_TESTABLE, found
+            return PoseVerdict.REFUTED, found
         if not estimate.ok:
             return PoseVerdict.NOT_TESTABLE, estimate.reason or ""
         if coverage < CAMERA_MIN_COVERAGE:

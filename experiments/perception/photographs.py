@@ -15,12 +15,8 @@ from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
 from experiments.paper.pose_peer import Peer
-from experiments.perception.locate_camera import (
-    CAMERA_MIN_LINE_LENGTH_PX,
-    CameraFix,
-    PoseVerdict,
-    locate_camera,
-)
+from experiments.perception.locate_camera import CameraFix, PoseVerdict, locate_camera
+from experiments.perception.rivals import MIN_LINE_LENGTH_PX
 from experiments.report import OURS, PEER, chart
 from experiments.shared_data import CORRIDOR, data_path, describe_absence
 from harvey.errors import BadInput
@@ -186,7 +182,7 @@ def locate_from(number: int, prior: Pose, rng: np.random.Generator) -> CameraFix
 def select_visible(lines: Array, frame: CorridorFrame, pose: Pose) -> tuple[Array, Array]:
     """Select model lines (n, 2, 3) in view and long enough, with their projections (n, 2, 2) [px]."""
     px, visible = frame.camera.project_segments(lines, pose)
-    long = np.nan_to_num(np.linalg.norm(px[:, 1] - px[:, 0], axis=1)) >= CAMERA_MIN_LINE_LENGTH_PX
+    long = np.nan_to_num(np.linalg.norm(px[:, 1] - px[:, 0], axis=1)) >= MIN_LINE_LENGTH_PX
     return lines[visible & long], px[visible & long]
 
 
