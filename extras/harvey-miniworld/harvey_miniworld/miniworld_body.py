@@ -7,6 +7,7 @@ import math
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.ops import nearest_points
 
 from harvey.hardware.own_body import OwnBody
 from harvey_miniworld.drawn_floor import DrawnFloor
@@ -88,7 +89,7 @@ class MiniworldBody(OwnBody):
         self._time_s += takes_s
         if step.x_m and self.clearance_m(there) < min(0.0, self.clearance_m(self.pose)):
             self.contacts.append(speed_m_per_s)
-            near = self._edge.interpolate(self._edge.project(shapely.Point(there.x_m, there.y_m)))
+            _, near = nearest_points(shapely.Point(there.x_m, there.y_m), self._edge)
             direction = math.atan2(near.y - there.y_m, near.x - there.x_m) - there.heading_rad
             width = math.tau / SECTORS
             middle = math.remainder(round(direction / width) * width, math.tau)
