@@ -21,7 +21,7 @@ LINES = {
     "harvey": 11_172,
     "experiments": 11_212,
     "tests": 45_205,
-    "extras": 20_520,
+    "extras": 20_620,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}
