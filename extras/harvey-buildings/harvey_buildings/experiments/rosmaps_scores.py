@@ -38,7 +38,7 @@ def read_truth(plain: Path, divided: Path, cell_m: float) -> MapTruth:
     white, parted = _read_white(plain), _read_white(divided)
     rooms, count = ndimage.label(parted)
     rooms[(np.bincount(rooms.ravel(), minlength=count + 1) * cell_m**2 < MIN_ROOM_M2)[rooms]] = 0
-    lines, _ = ndimage.label(white & (rooms == 0), np.ones((3, 3)))
+    lines, _ = ndimage.label(white & ~parted, np.ones((3, 3)))  # a pocket in a wall is white in both
     doorways = []
     for number, bounds in enumerate(ndimage.find_objects(lines), 1):
         low = np.array([max(s.start - 2, 0) for s in bounds])
