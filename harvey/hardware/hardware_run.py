@@ -11,11 +11,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.journal import Sink
+from blackboard.scheduler import Scheduler
 from harvey.agent import build_agent
 from harvey.agent_settings import Pairs
 from harvey.errors import BadInput
@@ -34,11 +35,21 @@ from logs.records import EntryRecord, read_records
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import Extent, RunRecorder
+from world_models.building.world import World
 from world_models.entries.body import BodyFault, CameraPicture
 from world_models.robot import RobotModel
 
 Around = Callable[[HardwareBody, Callable[[], None]], Body]
 """Puts something between the agent and the body; the second argument is to be called often while it lets it wait."""
+
+
+@runtime_checkable
+class AccompaniedBase(Protocol):
+    """A base through which others hear of a run, and may tell it something."""
+
+    def accompany(self, world: World, robot: RobotModel, /) -> tuple[Sink, Tell]:
+        """What hears each decision, and what is called before each cycle."""
+        ...
 
 
 def unchanged(body: HardwareBody, _tick: Callable[[], None]) -> Body:
@@ -62,7 +73,16 @@ def drive(
                       scenario=mission.source.data, folder=str(mission.folder.resolve()), constants=settings)
     files = RunDirectory(out)
     eye = WatchedCamera(camera, clock, mission.camera.rate_hz)
-    with _hardware_run(mission, head, base, eye, clock, files, sinks, live, around=around, tell=tell) as run:
+    tells = [tell]
+    if isinstance(base, AccompaniedBase):
+        sink, told = base.accompany(head.load_world(), robot)
+        sinks, tells = (*sinks, sink), [tell, told]
+
+    def tell_all(scheduler: Scheduler) -> None:
+        for one in tells:
+            one(scheduler)
+
+    with _hardware_run(mission, head, base, eye, clock, files, sinks, live, around=around, tell=tell_all) as run:
         return run.drive(files)
 
 

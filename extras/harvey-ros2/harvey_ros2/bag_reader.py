@@ -17,6 +17,7 @@ from harvey.errors import BadInput
 from harvey.hardware.drivers.capture import picture_of
 from harvey_ros2.messages import BAD, message_types, seconds
 from harvey_ros2.ros2_camera import read_pixels
+from harvey_ros2.ros2_company import read_odometry
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
 
@@ -124,15 +125,20 @@ class Bag:
             return None
         time_s = seconds(message.header.stamp)
         if connection.msgtype == ODOMETRY:
-            at, turn = message.pose.pose.position, message.pose.pose.orientation
-            heading = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
-            return BagItem(time_s, Pose2(at.x, at.y, heading)) if math.isfinite(at.x + at.y + heading) else None
-        if connection.msgtype.endswith("CompressedImage"):
-            jpeg = bytes(message.data)
-            return BagItem(time_s, jpeg=jpeg) if jpeg.startswith(b"\xff\xd8") else None
-        pixels = read_pixels(message)
-        picture = None if pixels is None else picture_of(pixels)
-        return None if picture is None else BagItem(time_s, jpeg=picture.jpeg)
+            counted = read_odometry(message)
+            return None if counted is None else BagItem(time_s, counted)
+        return read_picture_message(message)
+
+
+def read_picture_message(message: Any) -> BagItem | None:
+    """A CompressedImage or an Image; None where it is not whole, or of a kind that is not understood."""
+    time_s = seconds(message.header.stamp)
+    if hasattr(message, "format"):
+        jpeg = bytes(message.data)
+        return BagItem(time_s, jpeg=jpeg) if jpeg.startswith(b"\xff\xd8") else None
+    pixels = read_pixels(message)
+    picture = None if pixels is None else picture_of(pixels)
+    return None if picture is None else BagItem(time_s, jpeg=picture.jpeg)
 
 
 def find_mount(edges: Mapping[str, tuple[str, Pose]], base: str, frame: str) -> CameraMount | None:

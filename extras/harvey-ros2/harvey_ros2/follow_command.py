@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("bag", metavar="BAG", help="a bag of ROS 2: its folder, or an .mcap file")
+    parser.add_argument("bag", metavar="BAG", help="a bag of ROS 2: its folder, or an .mcap file; or a robot that goes"
+                        " on, as ros2:robot.toml")
     parser.add_argument("--world", metavar="FILE", required=True,
                         help="the building: a world file, or the name of one that comes with Harvey")
     parser.add_argument("--start", metavar="PLACE", help='where it was first, in feet, as "(hallway (4,4,0))";'
@@ -52,6 +53,8 @@ def _run(args: Namespace) -> int:
     from world_models.files.toml.mission import named_file
     from world_models.files.toml.source import WORLDS
 
+    if args.bag.startswith("ros2:"):
+        return _run_live(args)
     path = Path(args.bag)
     world = named_file(args.world, WORLDS, Path())
     if args.distro not in ("humble", "jazzy", "kilted"):
@@ -69,6 +72,30 @@ def _run(args: Namespace) -> int:
           f"{_tell_times(took_s)}\n\nopen it with    harvey view {out}\nhave it told    harvey story {out}\n"
           f"for others      harvey export {out} --mcap {path.stem}.mcap")
     return 1 if onlooker.is_lost else 0
+
+
+def _run_live(args: Namespace) -> int:
+    from harvey_ros2.live_robot import follow_robot
+    from logs.run_head import load_known_world
+    from world_models.actuator import ActuatorModel
+    from world_models.files.toml.camera_file import load_camera
+    from world_models.files.toml.mission import named_file
+    from world_models.files.toml.source import WORLDS
+    from world_models.robot import RobotModel
+
+    if not args.calibration:
+        raise BadInput("--calibration: expected a camera file with a [mount] for a robot that goes on, got none")
+    world = named_file(args.world, WORLDS, Path())
+    known, (camera, mount, deviation) = load_known_world(world), load_camera(Path(args.calibration))
+    if mount is None:
+        raise BadInput(f"{args.calibration}: expected a [mount], got none")
+    robot = RobotModel(known, camera, mount, ActuatorModel(reach=args.reach), deviation=deviation)
+    out = check_vacant(Path(args.out) if args.out else RUNS / "robot-follow")
+    events = _Events()
+    is_lost = follow_robot(args.bag.partition(":")[2], world, known, robot, _guess(args, known), out, events.hear)
+    print(f"it was left {'lost' if is_lost else 'knowing where it is'}: {events.certified} pictures certified, lost "
+          f"{events.lost} times\n\nopen it with    harvey view {out}\nhave it told    harvey story {out}")
+    return 1 if is_lost else 0
 
 
 def follow_bag(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
@@ -189,10 +216,13 @@ COMMAND = CliCommand(
     "follow", "a recording of a robot that somebody else drove: where it was, certified, or lost",
     (
         ('harvey follow bag --world research_center --start "(hallway (4,4,0))"', "a bag of ROS 2, and where it began"),
+        ("harvey follow ros2:robot.toml --world house.toml --calibration camera.toml", "a robot that Nav2 drives"),
         ("harvey follow drive.mcap --world house.toml --calibration camera.toml", "it begins lost, and finds itself"),
     ),
     _arguments, _run,
     "Odometry and pictures of the bag come to the same board as in a mission; what drives is left out. A pose is\n"
-    "certain only where a certificate vouches for it. The run is kept, with its journal: harvey replay, why and story\n"
-    "work as for a mission. Exit code 0: in the end it knows where the robot is; 1: it is lost; 2: bad input.",
+    "certain only where a certificate vouches for it. A robot that goes on gets the transform from map to odometry as\n"
+    "long as that is so; rviz's 2D Pose Estimate begins anew; Ctrl-C ends it. The run is kept, with its journal:\n"
+    "harvey replay, why and story work as for a mission. Exit code 0: in the end it knows where the robot is; 1: it is lost;\n"
+    "2: bad input.",
 )

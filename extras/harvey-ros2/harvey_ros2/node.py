@@ -58,12 +58,16 @@ class RobotMessages(Protocol):
 
 
 class RosNode:
-    """A node that speaks with one robot: a :class:`RobotMessages`."""
+    """A node that speaks with one robot: a :class:`RobotMessages`.
+
+    Attributes:
+        robot: how it speaks; closed: set when the node is gone.
+    """
 
     def __init__(self, robot: RobotFile) -> None:
         """Open it, and listen to what a base says. Raises OSError and BadInput."""
         self.robot, self.types = robot, robot.types
-        self._middleware = robot.open()
+        self._middleware, self.closed = robot.open(), threading.Event()
         self._arrived, self._waiting = threading.Condition(), deque[tuple[str, Heard]](maxlen=WAITING)
         self._heard_odometry: Heard | None = None
         self._picture_came_s: float | None = None
@@ -112,14 +116,18 @@ class RosNode:
         except MessageError:
             return 0.0
 
-    def counted_s(self) -> float:
-        """The stamp of the newest odometry [s]; 0 where none was heard."""
+    def counted(self) -> Any:
+        """The newest odometry as a message; None where none was heard, or it is garbled."""
         heard = self._heard_odometry
         try:
-            return 0.0 if heard is None else seconds(self.types.decode(heard.cdr, self.robot.topic("odom").type)
-                                                     .header.stamp)
+            return None if heard is None else self.types.decode(heard.cdr, self.robot.topic("odom").type)
         except MessageError:
-            return 0.0
+            return None
+
+    def counted_s(self) -> float:
+        """The stamp of the newest odometry [s]; 0 where none was heard."""
+        message = self.counted()
+        return 0.0 if message is None else seconds(message.header.stamp)
 
     def look(self, picture: Callable[[Heard], None] | None) -> None:
         """Hand over pictures from now on; None: nobody looks any more. Raises OSError."""
@@ -142,6 +150,7 @@ class RosNode:
 
     def close_for_good(self) -> None:
         """Say goodbye."""
+        self.closed.set()
         self._middleware.close()
 
     def _taking(self, key: str) -> Callable[[Heard], None]:

@@ -56,6 +56,8 @@ APART_M, APART_RAD = 0.3, math.radians(20.0)
 """A lost robot's looks are at least so far apart."""
 FLOOR_SIGMA_M, FLOOR_SIGMA_RAD = 0.015, math.radians(0.3)
 """What a picture on the move leaves open beside its lines: stamps, blur, a model that is not exact."""
+STANDING_M, STANDING_RAD = 0.02, math.radians(1.0)
+"""A robot that has not moved so far since it was certified is not looked for again."""
 STILL_M, STILL_RAD = 2e-4, 2e-4
 SIGMA_ANYWHERE_M, SIGMA_ANYWHERE_RAD = 5.0, math.pi
 
@@ -145,6 +147,9 @@ class Onlooker:
             there = self._glimpsed if not math.isfinite(self._glimpsed.x_m) else self._glimpsed @ self._moved
             return not math.isfinite(there.x_m) or math.hypot(there.x_m, there.y_m) >= APART_M or (
                 abs(there.heading_rad) >= APART_RAD)
+        if self.messages.is_certified and math.hypot(self._moved.x_m, self._moved.y_m) < STANDING_M and (
+                abs(self._moved.heading_rad) < STANDING_RAD):
+            return False  # the same picture again tells nothing
         return time_s - self._last_s >= EVERY_S
 
     def look(self, jpeg: bytes, time_s: float) -> None:

@@ -10,15 +10,20 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from blackboard.journal import Sink
 from harvey.hardware.drivers.base_driver import Base, BaseFault, BaseKind, BytePipe, LineDriver
+from harvey.runner.teller import Tell
 from harvey_ros2.messages import MessageError, stamp
-from harvey_ros2.node import RobotMessages, open_node
+from harvey_ros2.node import RobotMessages, RosNode, open_node
 from harvey_ros2.odometry import Counted, OdometryFault, OdometryReader
 from harvey_ros2.pipe import PipeMessages
 from harvey_ros2.robot_file import DriveSettings, RobotFile
+from harvey_ros2.ros2_company import RosCompany
+from world_models.building.world import World
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
 from world_models.entries.obstacle import Contact, Ranges
 from world_models.frames import wrap_angle
+from world_models.robot import RobotModel
 
 SAY_S = 0.05
 """A speed is said at least this often [s]."""
@@ -227,6 +232,19 @@ class Ros2Base(LineDriver):
         self._messages.send("cmd_vel", message)
 
 
+class AccompaniedRos2Base(Ros2Base):
+    """The same on a network, where others see what the robot believes and may send it elsewhere."""
+
+    def __init__(self, node: RosNode) -> None:
+        super().__init__(node, node.robot.drive)
+        self._node = node
+
+    def accompany(self, world: World, robot: RobotModel) -> tuple[Sink, Tell]:
+        """What publishes each decision, and what hands over goals."""
+        company = RosCompany(self._node, world, robot)
+        return company.hear, company.tell
+
+
 class _Turning:
     """What a turn on the spot is counted by."""
 
@@ -261,7 +279,7 @@ def _apart(before: Counted, now: Counted) -> bool:
 def open_ros2_base(where: str) -> Base:
     """The base of a robot over ROS 2. Raises OSError and BadInput."""
     node = open_node(where)
-    return Ros2Base(node, node.robot.drive)
+    return AccompaniedRos2Base(node)
 
 
 def connect_pipe(link: BytePipe) -> Base:

@@ -71,7 +71,8 @@ class RunMessages:
 
     Attributes:
         is_certified: whether a certificate vouches for the belief; lost: what it is lost by, or "".
-        time_s: of the newest entry that has a time.
+        time_s: of the newest entry that has a time; epoch_s: of the robot's clock when the run's says 0.
+        odometry: where the wheels have counted to be.
     """
 
     def __init__(self, types: MessageTypes, world: World, camera: Camera, mount: CameraMount,
@@ -80,7 +81,7 @@ class RunMessages:
         self._counts = counts
         self._types, self._world, self._camera, self._mount, self._frames = types, world, camera, mount, frames
         self.odometry = Pose2(0.0, 0.0, 0.0)
-        self.is_certified, self.lost, self.time_s = False, "", 0.0
+        self.is_certified, self.lost, self.time_s, self.epoch_s = False, "", 0.0, 0.0
         self._reason = "nothing was verified yet"
 
     def begin(self) -> Iterator[TimedMessage]:
@@ -103,7 +104,7 @@ class RunMessages:
             self.time_s = max(self.time_s, value.sim_time_s)
             yield from self._tell_picture(value)
         elif isinstance(value, Hypothesis):
-            if value.is_held and self._counts:
+            if value.is_held and self._counts:  # else who has the odometry tells the pose
                 yield from self._tell_belief(value)
         elif isinstance(value, Certificate):
             yield from self._tell_verdict(value)
@@ -201,7 +202,7 @@ class RunMessages:
                                         "orientation": {"w": 1.0}}} for at, height_m in poses])
 
     def _header(self, frame: str, time_s: float | None = None) -> dict[str, Any]:
-        return {"stamp": stamp(self.time_s if time_s is None else time_s), "frame_id": frame}
+        return {"stamp": stamp(self.epoch_s + (self.time_s if time_s is None else time_s)), "frame_id": frame}
 
     def _out(self, topic: str, time_s: float | None = None, **fields: Any) -> TimedMessage:
         return TimedMessage(topic, self._types.build(TYPES[topic][0], **fields),

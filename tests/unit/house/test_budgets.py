@@ -18,10 +18,10 @@ LINES = {
     "knowledge_sources": 22_620,
     "sim": 5_935,
     "logs": 7_756,
-    "harvey": 11_172,
+    "harvey": 11_192,
     "experiments": 11_212,
     "tests": 45_205,
-    "extras": 20_620,
+    "extras": 21_082,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}
