@@ -223,6 +223,6 @@ COMMAND = CliCommand(
     "Odometry and pictures of the bag come to the same board as in a mission; what drives is left out. A pose is\n"
     "certain only where a certificate vouches for it. A robot that goes on gets the transform from map to odometry as\n"
     "long as that is so; rviz's 2D Pose Estimate begins anew; Ctrl-C ends it. The run is kept, with its journal:\n"
-    "harvey replay, why and story work as for a mission. Exit code 0: in the end it knows where the robot is; 1: it is lost;\n"
-    "2: bad input.",
+    "harvey replay, why and story work as for a mission. Exit code 0: in the end it knows where the robot is; 1: it\n"
+    "is lost; 2: bad input.",
 )
