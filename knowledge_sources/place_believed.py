@@ -14,7 +14,12 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.localization.place_odds import compute_prior
 from knowledge_sources.questions import open_discrepancy
 from knowledge_sources.settings import LocalizationSettings
-from world_models.entries.location import PlaceOdds, TwinOdds
+from world_models.entries.location import Hypothesis, PlaceOdds, Travel, TwinOdds
+
+PLACED_BY = ("command", "relocalization")
+"""Bases of a belief that no motion has followed yet."""
+MAX_STANDING_M = 0.1
+"""Up to such a way the robot has only turned: what wheels do in turns is far less."""
 
 
 def find_p_there(view: View, refuted: int, settings: LocalizationSettings) -> float:
@@ -55,3 +60,11 @@ def _refutes(view: View, doubt: Entry[Discrepancy]) -> bool:
         if cause is not None and isinstance(cause.value, Discrepancy):
             return cause.value.magnitude is not None and math.isfinite(cause.value.magnitude)
     return True
+
+
+def has_only_turned(view: View, belief: Hypothesis) -> bool:
+    """Whether the robot has only turned since it was put down, was found, or verified a milestone; nothing pushed it.
+    """
+    way = view.latest(Travel)
+    return belief.basis in PLACED_BY or (
+        way is not None and not way.value.is_broken and way.value.gone_m <= MAX_STANDING_M)

@@ -437,8 +437,11 @@ class PlanSettings:
     max_obstruction_looks: int = setting(6, "count", "Number of last looks that are compared.", most=8)
 
     # Milestone judge
+    p_wrong_standing: float = setting(
+        0.02, "1", "Prior probability of a wrong belief where the robot stands as it was put down, or found.",
+        "as localization.p_told has it")
     p_wrong_followed: float = setting(
-        0.05, "1", "Prior probability of a wrong belief where landmarks were followed up to here.")
+        0.05, "1", "The same where landmarks were followed up to here.")
     max_followed_px: float = setting(
         15.0, "px", "Where the belief leaves more than this open in the picture, followed landmarks tell of no place.",
         "half of max_deviation_px")

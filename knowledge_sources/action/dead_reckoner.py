@@ -17,6 +17,7 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import HELD, Belief
 from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
+from knowledge_sources.place_believed import PLACED_BY
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_camera, find_contact
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -28,9 +29,6 @@ from world_models.entries.robot_state import Drift
 from world_models.frames import Pose2
 
 MIN_CLAIMED_PART = 0.7  # if the wheels claim less than this part of a move, something stopped the robot
-
-UNSEEN = ("command", "relocalization")
-"""What a belief rests on that no way is measured from."""
 
 
 class Case(NamedTuple):
@@ -84,7 +82,7 @@ class DeadReckoner(RobotKnowledgeSource):
         rolled = drift.after_motion(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)
         yield Post(rolled, (told,)) if known is None else Revise(known, rolled, (told, known))
         travel = view.latest(Travel)
-        if travel is None or belief.value.basis in UNSEEN:
+        if travel is None or belief.value.basis in PLACED_BY:
             way = begin_travel(before, held.covariance, camera.mount.yaw_rad, yaw_variance)
         else:
             way = travel.value

@@ -24,6 +24,7 @@ from knowledge_sources.methods.calibration.camera_state import (
 )
 from knowledge_sources.methods.localization.camera_matching import match_with_camera, rate_match
 from knowledge_sources.methods.matching import Match, PoseMatch, match_lines, match_on_floor
+from knowledge_sources.methods.verification.line_check import find_distinct
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_camera, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -51,7 +52,7 @@ class Matcher(RobotKnowledgeSource):
 
     Search, objective and starts are §6.1's. Where the belief is sure enough, the projected model is fitted as a rigid
     figure in the image; else it is fitted by a pose on the floor near the believed one. Where the camera is not well
-    known, the pose and the camera's state are fitted together.
+    known, the pose and the camera's state are fitted together. Lines in a pattern that the model lacks are not asked.
     """
 
     level, priority = Level.PLAN, Priority.SEE
@@ -66,26 +67,28 @@ class Matcher(RobotKnowledgeSource):
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         segments, milestone, belief = case
-        m = milestone.value
+        m, data_px = milestone.value, segments.value.segments_px
         lines_world = np.array(m.expected, float).reshape(-1, 2, 3)
-        data_px = segments.value.segments_px
-        if not len(lines_world):
+        expected_px = np.array(m.expected_px, float).reshape(-1, 2, 2)
+        asked = np.flatnonzero(find_distinct(expected_px, data_px, self._settings.verification))
+        if not len(asked):
             none = np.zeros((0, 2), np.int64)
-            yield Post(LineMatch(milestone.id, segments.id, none, frozen(lines_world), frozen(data_px[:0]), 0.0,
-                                 frozen(np.zeros(0))), (segments, milestone, belief))
+            yield Post(LineMatch(milestone.id, segments.id, none, frozen(lines_world[:0]), frozen(data_px[:0]), 0.0,
+                                 frozen(np.zeros(len(lines_world)))), (segments, milestone, belief))
             return
-        found, is_open = self._match(view, m, lines_world, data_px, belief.value)
-        pairs = np.asarray(found.pairs, np.int64).reshape(-1, 2)
+        found, is_open = self._match(view, expected_px[asked], lines_world[asked], data_px, belief.value)
+        pairs, coverage = np.asarray(found.pairs, np.int64).reshape(-1, 2).copy(), np.zeros(len(lines_world))
+        pairs[:, 0], coverage[asked] = asked[pairs[:, 0]], found.coverage
         yield Post(
             LineMatch(
                 milestone.id, segments.id, pairs, frozen(lines_world[pairs[:, 0]]), frozen(data_px[pairs[:, 1]]),
-                float(found.e_match), frozen(found.coverage), is_open,
+                float(found.e_match), frozen(coverage), is_open,
             ),
             (segments, milestone, belief),
         )
 
     def _match(
-        self, view: View, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
+        self, view: View, expected_px: Floats, lines_world: Floats, data_px: Floats, belief: Hypothesis
     ) -> tuple[Match | PoseMatch, bool]:
         """The match, and whether it takes the camera for knocked: much more agrees with the picture then."""
         robot, camera, s = find_robot(view).on_floor_of(belief.locale), find_camera(view), self._settings.camera_state
@@ -94,7 +97,7 @@ class Matcher(RobotKnowledgeSource):
         given = lines_world, data_px, robot.camera, robot.mount
         if not is_camera_known(robot, known, self._settings):
             return match_with_camera(*given, *prior, known, self._settings).match, False
-        found = rate_match(self._match_with_known_camera(robot, milestone, lines_world, data_px, belief), *given,
+        found = rate_match(self._match_with_known_camera(robot, expected_px, lines_world, data_px, belief), *given,
                            prior[0], loosen(prior[1]), known, self._settings)
         if found.sharp_part >= s.min_sharp_part and found.prior_chi2 <= s.max_chi2:
             return found.match, False
@@ -104,12 +107,11 @@ class Matcher(RobotKnowledgeSource):
         return (knocked if is_knocked else found).match, is_knocked
 
     def _match_with_known_camera(
-        self, robot: RobotModel, milestone: Milestone, lines_world: Floats, data_px: Floats, belief: Hypothesis
+        self, robot: RobotModel, expected_px: Floats, lines_world: Floats, data_px: Floats, belief: Hypothesis
     ) -> Match | PoseMatch:
         sigma_px = robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / RIGID_DISTANCE_M)
         if sigma_px <= MAX_RIGID_SIGMA_PX:
-            model_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
-            return match_lines(model_px, data_px, self._settings.matching)
+            return match_lines(expected_px, data_px, self._settings.matching)
         return match_on_floor(
             lines_world, data_px, robot.camera, robot.mount.camera_from_robot,
             belief.world_from_robot(robot.world), belief.covariance_world(robot.world), self._settings.matching)

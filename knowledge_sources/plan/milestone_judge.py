@@ -31,12 +31,12 @@ from knowledge_sources.methods.verification.weigh import (
     tell_odds,
     weigh_picture,
 )
-from knowledge_sources.place_believed import find_p_not_alias
+from knowledge_sources.place_believed import find_p_not_alias, has_only_turned
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_camera, find_followed, find_robot_in, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import CameraPicture
-from world_models.entries.location import Hypothesis
+from world_models.entries.location import Hypothesis, Travel
 from world_models.entries.percepts import LineMatch, PoseFix, Segments
 from world_models.entries.task import Certificate, Milestone
 
@@ -93,7 +93,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         milestone = case.milestone
         weighed = self.weigh(view, case)
         verdict = self._hold_against_others(view, case, weighed, judge_place(weighed, self._settings))
-        because = case.fix, milestone, *find_followed(view, self._settings.action)
+        because = case.fix, milestone, *find_followed(view, self._settings.action), *view.all(Travel)
         certificate = Post(certify((milestone.id, case.fix.id), weighed, verdict, case.fix.value), because)
         yield certificate
         yield Revise(milestone, replace(milestone.value, status=verdict.kind), (certificate,))
@@ -117,7 +117,7 @@ class MilestoneJudge(RobotKnowledgeSource):
             covariance = add_yaw(covariance, np.array(fix.camera_covariance), known)
         before = Before(
             belief.world_from_robot(robot.world), covariance, open_discrepancy(view, Level.PLAN) is not None,
-            bool(find_followed(view, s.action)), belief.basis == "command", is_camera_known(robot, known, s))
+            bool(find_followed(view, s.action)), has_only_turned(view, belief), is_camera_known(robot, known, s))
         seen = PictureEvidence(case.frame.value.jpeg, case.segments.value, case.milestone.value, fix)
         return weigh_picture(robot, seen, before, s)
 

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from scipy.special import betainc
 
-from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose.displacements import fit_displacements
 from knowledge_sources.methods.pose.planar import compute_camera_poses, compute_point_jacobian, to_pose2
 from knowledge_sources.settings import DEFAULT, PoseSettings, VerificationSettings
@@ -36,6 +36,9 @@ Morel 2008, ch. 3)."""
 CHANCE_BOUNDS = 0.02, 0.95  # of the probability that a line is matched at a wrong pose
 DISPLACEMENT_M = 0.35  # shift of the nearer wrong poses at which chance is counted; the farther are at twice as much
 DISPLACEMENT_RAD = 0.07  # turn of the nearer wrong poses at which chance is counted; the farther are at twice as much
+PATTERN_REACH_PX = 8.0, 32.0  # how far aside it is looked for a pattern: nearer ones are the line's own edges
+PATTERN_STEP_PX = 2.0  # of the places aside at which it is looked
+MAX_PATTERN_PART = 0.4  # part of the places aside, covered by what the model lacks, from which it is a pattern
 LINE_TOLERANCE_RAD = 0.06  # largest angle between a segment and the line that it covers
 MAX_LINE_WEIGHT_PX = 100.0  # length from which a longer line weighs no more
 
@@ -111,6 +114,32 @@ def compute_p_false(matched: int, visible: int, chance: float) -> float:
     # As scipy.stats.binom.sf to the bit, whose import takes a quarter of a second.
     tail = float(betainc(matched, visible - matched + 1, chance)) if matched else 1.0
     return min(1.0, TEST_COUNT * tail)
+
+
+def find_distinct(
+    lines_px: Floats, segments_px: Floats, settings: VerificationSettings = DEFAULT.verification
+) -> Mask:
+    """Which (m,) of the lines (m, 2, 2) tell of a place: beside the others segments (k, 2, 2) lie wherever one looks.
+
+    Bricks, planks and tiles that the model does not have cover a line by accident, wherever it is. The chance of that
+    is measured in the picture itself: by how many of the places beside the line are covered as well, beyond those that
+    the other lines cover by the model.
+    """
+    if not len(lines_px):
+        return np.zeros(0, np.bool_)
+    along = lines_px[:, 1] - lines_px[:, 0]
+    aside = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+    near, far = PATTERN_REACH_PX
+    steps = np.arange(near, far + 1e-9, PATTERN_STEP_PX)
+    shifts = np.concatenate([-steps, steps])[:, None, None, None] * aside[None, :, None, :]
+    places = (lines_px + shifts).reshape(-1, 2, 2)
+
+    def measure(segments: Floats) -> Floats:
+        covered = compute_coverage(places, segments, settings.line_tolerance_px, LINE_TOLERANCE_RAD)
+        return np.asarray(np.mean(covered.reshape(len(shifts), -1) >= MIN_COVERED_FRACTION, axis=0))
+
+    expected = lines_px[~np.isnan(lines_px).any(axis=(1, 2))]
+    return np.asarray(measure(segments_px) - measure(expected) <= MAX_PATTERN_PART)
 
 
 def compute_coverage(lines_px: Floats, segments_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
@@ -197,6 +226,11 @@ def check_lines(
     agreement = compute_agreement(here[0], segments_px, displaced, settings)
     lengths = np.linalg.norm(here[0, :, 1] - here[0, :, 0], axis=1)
     return LineCheck(agreement, agreement.covered_length(lengths), here[0])
+
+
+def project_lines(robot: RobotModel, lines_world: Floats, world_from_robot: Pose2) -> Floats:
+    """(m, 2, 2) the lines (m, 2, 3) [m, world] as seen from a pose, NaN where not in view [px]."""
+    return np.asarray(_project(robot, lines_world, world_from_robot.vector[None])[0])
 
 
 def _project(robot: RobotModel, lines_world: Floats, states: Floats) -> Floats:

@@ -205,9 +205,14 @@ class PoseConfidence:
     refute: float
 
     def p_false(self, evidence: PoseEvidence) -> float:
-        """Compute the probability that the pose is wrong."""
-        weights = self.lines_and_colors if evidence.color_count > 0.0 else self.lines_only
-        return float(weights.p_false(evidence.values[None])[0])
+        """Compute the probability that the pose is wrong.
+
+        Colors that agree raise trust; colors that do not say that walls were painted, not that the robot is elsewhere:
+        so a pose is never less certain than by its lines alone.
+        """
+        values = evidence.values[None]
+        by_lines = float(self.lines_only.p_false(values)[0])
+        return min(by_lines, float(self.lines_and_colors.p_false(values)[0])) if evidence.color_count else by_lines
 
     @staticmethod
     def from_table(table: dict[str, Any]) -> PoseConfidence:

@@ -13,7 +13,14 @@ from knowledge_sources.methods.belief.odds import Alike, Look, add_looks, to_log
 from knowledge_sources.methods.belief.places import BelievedPlace
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors
-from knowledge_sources.methods.verification.line_check import LineCheck, check_lines, find_errors, predict_lines
+from knowledge_sources.methods.verification.line_check import (
+    LineCheck,
+    check_lines,
+    find_distinct,
+    find_errors,
+    predict_lines,
+    project_lines,
+)
 from knowledge_sources.methods.verification.pose_confidence import (
     POSE_CONFIDENCE,
     compute_evidence,
@@ -35,7 +42,7 @@ class Before(NamedTuple):
     Attributes:
         pose: world; covariance: of it, (3, 3).
         in_doubt: whether that is in doubt; has_followed: whether landmarks were followed up to here.
-        is_as_put_down: whether it is no more than what the mission says of where the robot was put down.
+        stands: whether the robot stands where it was told or found to be, but for turns on the spot.
         is_camera_known: whether the camera's mounting is known well enough for a picture to be predicted.
     """
 
@@ -43,7 +50,7 @@ class Before(NamedTuple):
     covariance: Floats
     in_doubt: bool
     has_followed: bool
-    is_as_put_down: bool
+    stands: bool
     is_camera_known: bool
 
 
@@ -64,7 +71,8 @@ class Weighed:
         robot: the model on the floor of the belief, behind what stands before its camera.
         segments: of the picture.
         pose: as solved for; before, covariance: as believed before the look, (3, 3).
-        expected: number of lines that should be seen.
+        expected: number of lines that should be seen, and tell of the place.
+        patterned: number of those that lie in a pattern which the model does not have, and tell nothing.
         lines: how they agree with the segments; faces: how the faces' colours agree.
         p_false: probability that the pose is wrong, by lines and colours.
         p_wrong: the same with what was believed before, and with the looks in other directions.
@@ -84,6 +92,7 @@ class Weighed:
     before: Pose2
     covariance: Floats
     expected: int
+    patterned: int
     lines: LineCheck
     faces: ColorCheck
     p_false: float
@@ -132,7 +141,9 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     """
     milestone, fix, segments_px, s = seen.milestone, seen.fix, seen.segments.segments_px, settings
     lines, pose = np.array(milestone.expected, float).reshape(-1, 2, 3), fix.world_from_robot
-    agreed = check_lines(robot, lines, segments_px, pose, s.verification, milestone.errors, s.pose)
+    asked = find_distinct(project_lines(robot, lines, pose), segments_px, s.verification)
+    lines, errors = lines[asked], milestone.errors.take(np.flatnonzero(asked))
+    agreed = check_lines(robot, lines, segments_px, pose, s.verification, errors, s.pose)
     plain_px = agreed.projected_px if not milestone.displacement_modes else check_lines(
         robot, lines, segments_px, pose, s.verification).projected_px
     faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors, s)
@@ -141,12 +152,11 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     motion_px = compute_motion_tolerance_px(
         robot, lines, before.pose, before.covariance + fix.covariance, s.verification)
     followed = before.has_followed and motion_px <= s.plan.max_followed_px
-    expected_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)
+    expected_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)[asked]
     if fix.camera_step:  # how far the robot is from where it was believed, not the camera
         expected_px = robot.camera.project_segments(lines, robot.camera_from_world(before.pose))[0]
-    p_wrong = s.plan.p_wrong_followed if followed else s.plan.p_wrong_unfollowed
     believed = BelievedPlace(before.pose, before.covariance + fix.covariance,
-                             1.0 - (s.plan.p_wrong_in_doubt if before.in_doubt else p_wrong))
+                             1.0 - _find_prior(before, s.plan, followed=followed))
     p_after = update(believed.compute_p_wrong(pose), _sum_told(milestone) + to_log_odds(p_false))
     most = 1.0 - s.localization.min_p_believed if is_last_look(milestone, s.plan) else POSE_CONFIDENCE.accept
     return Weighed(
@@ -156,18 +166,28 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         before=before.pose,
         covariance=before.covariance,
         expected=len(lines),
+        patterned=int(np.count_nonzero(~asked)),
         lines=agreed,
         faces=faces,
         p_false=p_false,
         p_wrong=p_after,
         most_p_wrong=most,
         shift_px=_median_shift(expected_px, plain_px),
-        tolerance_px=_find_tolerance_px(before, motion_px, p_false <= POSE_CONFIDENCE.accept, s),
+        tolerance_px=_find_tolerance_px(before, motion_px, p_after <= POSE_CONFIDENCE.accept, s),
         is_weak=before.in_doubt or not followed,
         is_inexact=bool(milestone.displacement_modes),
         camera_chi2=fix.camera_chi2,
         is_camera_known=before.is_camera_known,
     )
+
+
+def _find_prior(before: Before, plan: PlanSettings, *, followed: bool) -> float:
+    """The probability that the belief is wrong, before the look. Who only turned is where it was told to be."""
+    if before.in_doubt:
+        return plan.p_wrong_in_doubt
+    if before.stands:
+        return plan.p_wrong_standing
+    return plan.p_wrong_followed if followed else plan.p_wrong_unfollowed
 
 
 def _sum_told(milestone: Milestone) -> float:
@@ -177,12 +197,11 @@ def _sum_told(milestone: Milestone) -> float:
 
 
 def _find_tolerance_px(before: Before, motion_px: float, is_sure: bool, settings: Settings) -> float:
-    """How far the lines may be from where they were expected [px]; ``is_sure``: so much agrees at the right place only.
-    """
+    """How far the lines may be from where they were expected [px]; ``is_sure``: of the place, belief and picture."""
     tolerance_px, most_px = settings.action.min_tolerance_px + motion_px, settings.plan.max_deviation_px
     if is_sure or before.in_doubt:
-        tolerance_px = most_px if before.in_doubt and not before.is_as_put_down else max(most_px, tolerance_px)
-    return tolerance_px if before.is_as_put_down or is_sure else min(tolerance_px, most_px)
+        tolerance_px = most_px if before.in_doubt and not before.stands else max(most_px, tolerance_px)
+    return tolerance_px if before.stands or is_sure else min(tolerance_px, most_px)
 
 
 def judge_place(w: Weighed, settings: Settings) -> Verdict:
@@ -191,10 +210,12 @@ def judge_place(w: Weighed, settings: Settings) -> Verdict:
     least = settings.verification.min_matched_lines
     if w.segments.contrast < settings.plan.min_contrast:
         return Verdict("not testable", f"the frame is dark (contrast {w.segments.contrast:.1f} of 255)", *odds)
+    others = f"; {w.patterned} more in a pattern" * (w.patterned > 0)
     if w.expected < least:
-        return Verdict("not testable", f"{a.visible} lines are in this view, and fewer than {least} do not tell", *odds)
+        few = f"{a.visible} lines are in this view, and fewer than {least} do not tell{others}"
+        return Verdict("not testable", few, *odds)
     colours = f" and {round(faces.agreeing * faces.count)} of {faces.count} faces' colours" * faces.is_testable
-    found = f"{a.matched} of {a.visible} lines, {w.lines.coverage:.0%} of their length,{colours} accounted for"
+    found = f"{a.matched} of {a.visible} lines, {w.lines.coverage:.0%} of their length,{colours} accounted for{others}"
     if w.p_false >= POSE_CONFIDENCE.refute:
         odds = w.p_false, POSE_CONFIDENCE.refute
         if not w.is_camera_known:  # a place where the camera's own error hides what agrees

@@ -31,7 +31,8 @@ from generated_boards import (
     reasons,
     to_world,
 )
-from knowledge_sources.action.dead_reckoner import MIN_CLAIMED_PART, UNSEEN, DeadReckoner
+from knowledge_sources.action.dead_reckoner import MIN_CLAIMED_PART, DeadReckoner
+from knowledge_sources.place_believed import PLACED_BY
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand, PictureRequest
@@ -191,7 +192,7 @@ def test_the_stretch_of_the_drift_grows_by_the_motion(
 
 
 @settings(max_examples=40)
-@given(poses, turns, st.floats(0.1, 0.6), st.sampled_from((*UNSEEN, "tracks", "milestone")), st.booleans())
+@given(poses, turns, st.floats(0.1, 0.6), st.sampled_from((*PLACED_BY, "tracks", "milestone")), st.booleans())
 def test_the_way_goes_on_unless_the_belief_was_not_by_what_was_seen(
     pose: Pose2, turn: float, move: float, basis: str, has_way: bool
 ) -> None:
@@ -199,7 +200,7 @@ def test_the_way_goes_on_unless_the_belief_was_not_by_what_was_seen(
     old = begin_travel(Pose2(-5.0, 1.0, 0.0), SURE, 0.3, 0.2).after_motion(Pose2(0.0, 0.0, here.heading_rad), Pose2(
         math.cos(here.heading_rad), math.sin(here.heading_rad), here.heading_rad), 0.01)
     told = reckon(pose, turn, move, basis=basis, travel=old if has_way else None)
-    effect, is_new = effect_on(told.effects, Travel), not has_way or basis in UNSEEN
+    effect, is_new = effect_on(told.effects, Travel), not has_way or basis in PLACED_BY
     way, came = effect.value, told.moved.world_from_robot(house()).position - here.position
     begun_m = (0.0, 0.0) if is_new else (old.x_m, old.y_m)
     assert np.allclose((way.x_m, way.y_m), np.add(begun_m, came))

@@ -131,7 +131,7 @@ def test_what_is_asked_before_a_camera_is_taken_for_knocked(
 ) -> None:
     """The belief is loosened as a prior of lines, its heading as the camera's yaw is open; both sides of each bound."""
     asked: dict[str, Any] = {}
-    match, other = (SimpleNamespace(pairs=np.zeros((0, 2), np.int64), e_match=error, coverage=np.zeros(0))
+    match, other = (SimpleNamespace(pairs=np.zeros((0, 2), np.int64), e_match=error, coverage=0.0)
                     for error in (1.0, 2.0))
     monkeypatch.setattr(matcher, "rate_match", lambda *given: asked.update(rate=given) or CameraMatch(  # type: ignore[arg-type]
         match, sharp, chi2))

@@ -55,7 +55,7 @@ from rebuilt_board import copy_of
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 from world_models.camera import YAW
-from world_models.entries.location import Hypothesis, diagonal
+from world_models.entries.location import Hypothesis, Travel, diagonal
 from world_models.entries.percepts import Segments, Track, Tracks
 from world_models.entries.task import Certificate, Milestone, MilestoneVerdict
 from world_models.frames import Pose2
@@ -73,6 +73,7 @@ def weigh(**changed: Any) -> Any:
     agreement = SimpleNamespace(matched=matched, visible=20, chance=0.2)
     plain = {
         "segments": Segments("CameraPicture-1", "Milestone-1", NO_LINES, np.zeros(0), contrast), "expected": 20,
+        "patterned": changed.pop("patterned", 0),
         "lines": SimpleNamespace(agreement=agreement, coverage=0.9), "faces": changed.pop("faces", NO_FACES),
         "p_false": 0.5 * POSE_CONFIDENCE.accept, "p_wrong": 0.1 * POSE_CONFIDENCE.accept,
         "most_p_wrong": POSE_CONFIDENCE.accept, "shift_px": 3.0, "tolerance_px": 10.0,
@@ -322,7 +323,7 @@ def test_what_it_writes_follows_from_the_verdict(judged: list[Judged], in_doubt:
             board.apply([Post(Discrepancy(Level.PLAN, "by a law", 9.0, (0.0, 30.0), "px"))], author="test", cycle=10**6)
         case, weighed, effects = judge_on(Judged(board, one.trigger))
         said = effect_on(effects, Certificate)
-        followed = {entry.id for entry in find_followed(board.view, DEFAULT.action)}
+        followed = {entry.id for entry in (*find_followed(board.view, DEFAULT.action), *board.view.all(Travel))}
         assert reasons(said) == {case.fix.id, case.milestone.id, *followed}
         assert (said.value.milestone, said.value.fix) == (case.milestone.id, case.fix.id)
         off = case.fix.value.world_from_robot.minus(case.belief.value.world_from_robot(weighed.robot.world))
@@ -378,19 +379,19 @@ def test_the_deviation_is_measured_where_the_place_is_known_or_is_beyond_the_win
 
 
 @pytest.mark.parametrize("in_doubt", [False, True])
-@pytest.mark.parametrize("as_put_down", [False, True])
+@pytest.mark.parametrize("stands", [False, True])
 @pytest.mark.parametrize("is_sure", [False, True])
 @pytest.mark.parametrize("motion_px", [1.0, 1000.0])
 def test_how_far_the_lines_may_be_by_all_that_it_depends_on(
-    in_doubt: bool, as_put_down: bool, is_sure: bool, motion_px: float
+    in_doubt: bool, stands: bool, is_sure: bool, motion_px: float
 ) -> None:
     """What the wheels can do, as it was put down, or the matcher's window: at most that, or for what is sure at least.
     """
-    before: Any = SimpleNamespace(in_doubt=in_doubt, is_as_put_down=as_put_down)
+    before: Any = SimpleNamespace(in_doubt=in_doubt, stands=stands)
     window_px, wheels_px = PLAN.max_deviation_px, DEFAULT.action.min_tolerance_px + motion_px
     wanted = {(False, False): min(wheels_px, window_px), (False, True): max(wheels_px, window_px)}.get(
         (in_doubt, is_sure), window_px)
-    if as_put_down:
+    if stands:
         wanted = max(wheels_px, window_px) if in_doubt or is_sure else wheels_px
     assert _find_tolerance_px(before, motion_px, is_sure, DEFAULT) == pytest.approx(wanted)
 
