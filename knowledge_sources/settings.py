@@ -203,7 +203,7 @@ class LocalizationSettings:
         40.0, "1", "Log likelihood from which segments need no explanation: the model lacks what is on full shelves.",
         "engineering judgement, checked with harvey experiment kidnap")
     sure_matched_fraction: float = setting(
-        0.75, "1", "Part of the predicted lines from which segments need no explanation.",
+        0.75, "1", "Part of the predicted lines from which, at that likelihood, segments need no explanation.",
         "engineering judgement, checked with harvey experiment kidnap")
     min_log_likelihood: float = setting(
         2.0, "1", "Smallest log likelihood of a hypothesis that is kept.",

@@ -114,19 +114,20 @@ def _build_shape_reader() -> Callable[[Any, bool], ElementShape]:
     """A function for the shape of an element; with ``roughly`` also from its bounding box or its lines on the plan."""
     import ifcopenshell.geom
 
-    geometry: Any = ifcopenshell.geom
+    library: Any = ifcopenshell  # its log has no types
+    geometry = library.geom
     settings, rough = geometry.settings(), geometry.settings()
     rough.set("keep-bounding-boxes", True)
-    rough.set("dimensionality", ifcopenshell.ifcopenshell_wrapper.CURVES_SURFACES_AND_SOLIDS)
+    rough.set("dimensionality", library.ifcopenshell_wrapper.CURVES_SURFACES_AND_SOLIDS)
 
     def shape(element: Any, roughly: bool) -> ElementShape:
-        ifcopenshell.get_log()  # empties it
+        library.get_log()  # empties it
         try:
             made = geometry.create_shape(rough if roughly else settings, element)
         except RuntimeError as error:
             if not getattr(element, "Representation", None):
                 raise ValueError("the file gives it no shape") from None
-            reason = _find_reason(ifcopenshell.get_log()) or first_line(error)
+            reason = _find_reason(library.get_log()) or first_line(error)
             raise ValueError(f"the file gives it a shape that cannot be read: {reason}") from None
         points = np.array(made.geometry.verts, float).reshape(-1, 3)
         frame = np.array(made.transformation.matrix, float).reshape(4, 4).T[:3]

@@ -262,11 +262,13 @@ class PoseLikelihood:
         """Whether the pose can be accepted.
 
         Enough lines must be matched, in every view, and the segments be explained, or else the log likelihood be so
-        large that the model may lack much of what is seen.
+        large that the model may lack much of what is seen, as bricks and planks: the larger it is, the more lines may
+        be missing.
         """
         fraction = self.matched / max(self.visible, 1)
-        is_sure = (self.log_likelihood >= settings.sure_log_likelihood
-                   and self.matched >= settings.sure_matched_fraction * self.visible)
+        enough = settings.sure_log_likelihood
+        is_sure = (self.log_likelihood >= enough
+                   and fraction >= settings.sure_matched_fraction * enough / self.log_likelihood)
         is_explained = self.explained >= max(settings.min_explained_fraction, settings.min_fraction_sum - fraction)
         return (self.matched >= settings.min_matched_lines
                 and self.matched >= settings.min_matched_fraction * self.visible

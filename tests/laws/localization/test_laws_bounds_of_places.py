@@ -94,10 +94,14 @@ def test_each_part_of_the_evidence_must_be_enough() -> None:
          {"explained": max(S.min_explained_fraction, S.min_fraction_sum - 0.9) - SMALL}),
         ({"explained": 0.0, "log_likelihood": S.sure_log_likelihood + SMALL},
          {"explained": 0.0, "log_likelihood": S.sure_log_likelihood - SMALL}),
+        *(({"explained": 0.0, "log_likelihood": more * S.sure_log_likelihood, "visible": visible, "matched": least},
+           {"explained": 0.0, "log_likelihood": more * S.sure_log_likelihood, "visible": visible, "matched": least - 1})
+          for more in (1.0, 1.1, 1.2)  # the more evidence, the more may be missing
+          for least in (int(np.ceil(S.sure_matched_fraction / more * visible)),)),
         ({"explained": 0.0, "log_likelihood": 1e3, "visible": visible,
-          "matched": int(np.ceil(S.sure_matched_fraction * visible))},
+          "matched": int(np.ceil(S.min_matched_fraction * visible))},
          {"explained": 0.0, "log_likelihood": 1e3, "visible": visible,
-          "matched": int(np.ceil(S.sure_matched_fraction * visible)) - 1}),
+          "matched": int(np.ceil(S.min_matched_fraction * visible)) - 1}),
     ):
         assert is_like(above) and not is_like(below), (above, below)
 

@@ -97,4 +97,4 @@ def test_where_it_cannot_be_written_is_one_error(run: RunDirectory, capsys: pyte
         assert main(["export", str(run.path), kind, str(run.journal)]) == 2
         assert f"{kind} {run.journal}: expected a directory to write to" in capsys.readouterr().err
     assert main(["export", str(run.path)]) == 2
-    assert "expected --csv DIR, --parquet DIR or --tum DIR" in capsys.readouterr().err
+    assert "expected --csv DIR, --parquet DIR" in capsys.readouterr().err
