@@ -155,7 +155,7 @@ def test_a_command_that_goes_on_says_where_it_is_and_ends_at_ctrl_c(command: str
     prepare(command, here)
     process = start(command, here)
     try:
-        said = read_until(process, r"http://|/dev/pts|\.html")
+        said = read_until(process, r"http://|/dev/pts|tcp/|\.html")
         process.send_signal(signal.SIGINT)
         more, _ = process.communicate(timeout=60)
     finally:

@@ -49,7 +49,7 @@ class RobotServer:
 
     def __init__(self, served: Served, address: str) -> None:
         """Listen as a router. Raises BadInput where that cannot be."""
-        self._served = served
+        self._served, self._address = served, address
         self.robot = RobotEmulator(served.ground, time.time() - served.ground.time_s)
         config = zenoh.Config()
         config.insert_json5("mode", '"router"')
@@ -81,15 +81,16 @@ class RobotServer:
             self._declared.append(self._session.declare_subscriber(f"0/cmd_vel/{kind}/*", self._hearing(key)))
 
     def serve(self, until: Callable[[], bool]) -> None:
-        """Until told to stop or interrupted."""
+        """Until told to stop or interrupted; prints where it is."""
         pictures = threading.Thread(target=self._picture_loop, name="camera", daemon=True)
         body = self._served.body
-        if self._served.mount is not None:
-            self._publish("tf_static", write_mount(self.robot.time_s, self._served.mount))
-        if body is not None:
-            pictures.start()
-        then = time.monotonic()
-        try:
+        try:  # from the first word on: an open session keeps the process from ending
+            print(f"an emulated ros2 base is at {self._address}; Ctrl-C ends it", flush=True)
+            if self._served.mount is not None:
+                self._publish("tf_static", write_mount(self.robot.time_s, self._served.mount))
+            if body is not None:
+                pictures.start()
+            then = time.monotonic()
             while not until():
                 time.sleep(0.004)
                 now = time.monotonic()
@@ -109,7 +110,7 @@ class RobotServer:
             print("the base is gone", file=sys.stderr)
         finally:
             self._over.set()
-            if body is not None:
+            if pictures.is_alive():
                 pictures.join(2.0)
             close: Callable[[], None] = self._session.close
             close()
@@ -153,13 +154,12 @@ class RobotServer:
 
 
 def serve(served: Served) -> None:
-    """Serve a robot until it is over; prints where. Raises BadInput."""
+    """Serve a robot until it is over. Raises BadInput."""
     address = served.at or f"tcp/127.0.0.1:{_free_port()}"
     body: SimulatedBody | None = served.body
     if body is not None:
         body.picture()  # the renderer is compiled before anybody waits for a picture
     server = RobotServer(served, address)
-    print(f"an emulated ros2 base is at {address}; Ctrl-C ends it", flush=True)
     server.serve(served.until)
 
 
