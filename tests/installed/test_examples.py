@@ -18,6 +18,7 @@ SAYS = {
     "build_a_world": "reached, ",
     "compare_seeds": "drawn in",
     "hearsay": "heard: go to the kitchen\n",
+    "own_simulator": "mm from the goal",
     "read_a_run": "the belief was off by",
     "recorded_model": "decided again without the model: the same",
     "revise_a_frame": "reached; replayed the same",
