@@ -37,7 +37,7 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--speed", metavar="X", type=_factor, default=1.0,
                         help="run X times as fast as real time, watchdog and all (1)")
     parser.add_argument("--at", metavar="ADDRESS", help="with ros2: where its Zenoh router listens, as"
-                        " tcp/127.0.0.1:7447; else on any free port")
+                        " tcp/127.0.0.1:7447, or the robot's file of who drives it; else on any free port")
     parser.add_argument("--trace", action="store_true", help="print the traffic, and where the robot is")
 
 

@@ -28,6 +28,8 @@ from knowledge_sources.goal.interpreter import Interpreter
 from knowledge_sources.goal.localizer import Localizer
 from knowledge_sources.goal.panorama_builder import PanoramaBuilder
 from knowledge_sources.goal.pose_adopter import PoseAdopter
+from knowledge_sources.plan.alias_monitor import AliasMonitor
+from knowledge_sources.plan.camera_calibrator import CameraCalibrator
 from knowledge_sources.plan.line_finder import LineFinder
 from knowledge_sources.plan.matcher import Matcher
 from knowledge_sources.plan.med_r_and_t import MedRAndT
@@ -45,17 +47,17 @@ from world_models.frames import Pose2
 from world_models.plugins import GUESTS_GROUP, list_plugins
 from world_models.robot import RobotModel
 
-SEATED = (Interpreter, LineFinder, Matcher, MedRAndT, MilestoneJudge, PlanAdjuster, PanoramaBuilder, Localizer,
-          PoseAdopter)
+SEATED = (Interpreter, LineFinder, Matcher, MedRAndT, MilestoneJudge, CameraCalibrator, AliasMonitor, PlanAdjuster,
+          PanoramaBuilder, Localizer, PoseAdopter)
 """The sources of a mission that are wanted here too."""
 GUESTS = ("claim_reckoner", "view_expecter", "loss_declarer", "place_confirmer")
 AUTHOR = "onlooker"
-EVERY_S = 0.5
-"""Pictures are checked no more often, by their own time [s]."""
+EVERY_S = 0.09
+"""Pictures are checked no more often, by their own time [s]: ten a second."""
+AGAIN_S = 0.5
+"""After one that did not certify the place, the next is so much later: who walks by is out of it by then [s]."""
 APART_M, APART_RAD = 0.3, math.radians(20.0)
 """A lost robot's looks are at least so far apart."""
-FLOOR_SIGMA_M, FLOOR_SIGMA_RAD = 0.015, math.radians(0.3)
-"""What a picture on the move leaves open beside its lines: stamps, blur, a model that is not exact."""
 STANDING_M, STANDING_RAD = 0.02, math.radians(1.0)
 """A robot that has not moved so far since it was certified is not looked for again."""
 STILL_M, STILL_RAD = 2e-4, 2e-4
@@ -150,7 +152,7 @@ class Onlooker:
         if self.messages.is_certified and math.hypot(self._moved.x_m, self._moved.y_m) < STANDING_M and (
                 abs(self._moved.heading_rad) < STANDING_RAD):
             return False  # the same picture again tells nothing
-        return time_s - self._last_s >= EVERY_S
+        return time_s - self._last_s >= (EVERY_S if self.messages.is_certified else AGAIN_S)
 
     def look(self, jpeg: bytes, time_s: float) -> None:
         """A picture, taken where the wheels have counted up to now [s, of the run]."""
@@ -171,7 +173,6 @@ class Onlooker:
     def tell_pose(self) -> None:
         """Tell where the robot is and, where that is certified, how its odometry lies in the map."""
         pose, covariance = self.belief()
-        covariance = covariance + np.diag([FLOOR_SIGMA_M**2, FLOOR_SIGMA_M**2, FLOOR_SIGMA_RAD**2])
         self._tell([self.messages.pose(pose, covariance)])
         if self.messages.is_certified:
             self._tell([self.messages.transform(pose, self.messages.odometry)])

@@ -176,7 +176,7 @@ class RunMessages:
         if doubt.level is not Level.GOAL:
             return
         was_lost, self.lost = self.lost, doubt.what if doubt.is_open else ""
-        self.is_certified = not self.lost and (bool(was_lost) or self.is_certified)  # found: its looks are the evidence
+        self.is_certified = self.is_certified and not self.lost  # found again: until the next picture vouches for it
         self._reason = "found again" if was_lost and not self.lost else self._reason
         yield self.diagnosis()
 

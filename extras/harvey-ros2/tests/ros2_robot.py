@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -44,19 +45,35 @@ class Emulated:
                 self.places.append((float(found[1]), float(found[2])))
 
 
+def free_address() -> str:
+    """Where a Zenoh router of this computer may listen."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+
+
 @contextmanager
-def emulated(folder: Path, *options: str, scenario: str = "forty-foot-hallway") -> Iterator[Emulated]:
-    """A robot where a scenario begins, and ``mission.toml`` and ``robot.toml`` in a folder."""
-    command = [sys.executable, "-m", "harvey.cli", "emulate", "ros2", "--scenario", scenario, "--trace",
-               "--calibration", str(folder / "camera.toml"), *options]
+def emulated(
+    folder: Path, *, middleware: str = 'router = "{address}"', scenario: str = "forty-foot-hallway", at: str = "",
+    before: Sequence[str] = (),
+) -> Iterator[Emulated]:
+    """A robot where a scenario begins, and ``mission.toml`` and ``robot.toml`` in a folder.
+
+    Args:
+        middleware: lines of ``robot.toml``, which the robot and who drives it read.
+        at: the address of its router; else any free one.
+        before: words before the command, as ``ip netns exec``.
+    """
+    address = at or free_address()
+    (folder / "robot.toml").write_text(middleware.format(address=address) + '\n[topics]\nhazards = "hazards"\n')
+    (folder / "mission.toml").write_text(MISSION.format(robot=folder / "robot.toml"))
+    command = [*before, sys.executable, "-m", "harvey.cli", "emulate", "ros2", "--scenario", scenario, "--trace",
+               "--calibration", str(folder / "camera.toml"), "--at", str(folder / "robot.toml")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, bufsize=1) as process:
         assert process.stdout is not None
         first = process.stdout.readline()
-        found = re.search(r"tcp/\S+(?=;)", first)
-        assert found is not None, first
-        (folder / "robot.toml").write_text(f'router = "{found[0]}"\n[topics]\nhazards = "hazards"\n')
-        (folder / "mission.toml").write_text(MISSION.format(robot=folder / "robot.toml"))
-        robot = Emulated(process, found[0], folder / "mission.toml")
+        assert "Ctrl-C ends it" in first, first
+        robot = Emulated(process, address, folder / "mission.toml")
         follower = threading.Thread(target=robot.follow, daemon=True)
         follower.start()
         try:

@@ -35,10 +35,13 @@ def test_a_mission_through_messages_is_the_same_each_time_and_its_replay_too(tmp
     assert main(["replay", str(tmp_path / "one")]) == 0
 
 
-def test_a_mission_over_zenoh_in_which_the_robots_process_stands_still_for_a_while(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("middleware", ['router = "{address}"', 'middleware = "cyclonedds"\ndomain = 79'])
+def test_a_mission_in_which_the_robots_process_stands_still_for_a_while(
+    middleware: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with emulated(tmp_path) as robot:
+    if "cyclonedds" in middleware:
+        pytest.importorskip("cyclonedds")
+    with emulated(tmp_path, middleware=middleware) as robot:
         assert main(["drive", str(robot.mission), "--dry-run"]) == 0
         assert "FAILED" not in capsys.readouterr().out and not (tmp_path / "run").exists()
 
@@ -89,3 +92,10 @@ def test_what_is_wrong_with_a_robots_file_or_its_network_is_one_line(
         lines = [line for line in capsys.readouterr().out.splitlines()
                  if line.startswith(("FAILED  base", "FAILED  cam"))]
         assert len(lines) == 2 and all(said in line for line in lines), (lines, said)
+    (tmp_path / "loud.toml").write_text('middleware = "smoke signals"\n')
+    for where, said in (
+        (tmp_path / "none.toml", "expected a readable file"), ("tcp/nowhere", "a router can listen"),
+        (tmp_path / "loud.toml", "expected middleware = zenoh or cyclonedds"),
+    ):
+        assert main(["emulate", "ros2", "--at", str(where)]) == 2
+        assert said in capsys.readouterr().err
