@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import threading
 import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from ros2_robot import GOAL_M, emulated
+from ros2_network import Network, relayed, spaced
+from ros2_robot import GOAL_M, Emulated, emulated
 
 from harvey.cli import main
 from harvey.simulation.simulated_run import run_mission
+from harvey_ros2.robot_emulator import WATCHDOG_S
 from harvey_ros2.robot_file import DriveSettings, RobotFile, read_robot
-from sim.scenario import load_scenario
+from sim.scenario import SCENARIOS, load_scenario
 from sim.stage import build_stage
 
 ROOT = Path(__file__).parents[3]
@@ -64,6 +69,80 @@ def test_a_mission_in_which_the_robots_process_stands_still_for_a_while(
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert result["outcome"] == "reached"
     assert main(["replay", str(tmp_path / "run")]) == 0
+
+
+@pytest.mark.parametrize("way", [relayed, spaced])
+def test_where_the_network_is_cut_the_robot_stands_within_its_watchdogs_time_and_goes_on_when_it_is_mended(
+    way: Callable[[], AbstractContextManager[Network | None]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with way() as network:
+        if network is None:
+            pytest.skip("expected the right to make a network namespace")
+        with emulated(tmp_path, at=network.robot, before=network.before) as robot:
+            told = tmp_path / "robot.toml"
+            told.write_text(told.read_text().replace(network.robot, network.us))
+            seen: dict[str, tuple[float, float]] = {}
+
+            def cut() -> None:
+                seen["cut"] = wait_for_place(robot, 4 * 0.3048 + 0.6)
+                network.cut()
+                time.sleep(2.0)
+                seen["stood"] = robot.places[-1]
+                time.sleep(2.0)
+                seen["stands"] = robot.places[-1]
+                network.mend()
+
+            cutting = threading.Thread(target=cut, daemon=True)
+            cutting.start()
+            assert main(["drive", str(robot.mission), "--out", str(tmp_path / "run")]) == 0
+            cutting.join(1.0)
+            time.sleep(1.5)
+            x, y = robot.places[-1]
+    assert seen["stood"] == seen["stands"]
+    assert math.dist(seen["cut"], seen["stood"]) < 0.3 * (WATCHDOG_S + 0.2)
+    assert abs(x - GOAL_M) < INCH_M and abs(y - 4 * 0.3048) < INCH_M
+    err = capsys.readouterr().err
+    assert "base: link lost" in err and "base: link lost: over" in err
+    assert main(["replay", str(tmp_path / "run")]) == 0
+
+
+def test_a_robots_process_that_is_killed_and_begins_again_where_it_stood_goes_on_when_it_is_told_to(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with ExitStack() as stack:
+        first = stack.enter_context(emulated(tmp_path))
+        second: list[Emulated] = []
+
+        def restart() -> None:
+            x, y = wait_for_place(first, 4 * 0.3048 + 0.6)
+            first.process.kill()
+            there = f"(hallway ({x / 0.3048:.5f},{y / 0.3048:.5f},0))"
+            scenario = (SCENARIOS / "forty-foot-hallway.toml").read_text().replace("(hallway (4,4,0))", there)
+            (tmp_path / "again.toml").write_text(scenario.replace("put_down_sigma_in = 0.1", "put_down_sigma_in = 0.0"))
+            second.append(stack.enter_context(
+                emulated(tmp_path, at=first.address, scenario=str(tmp_path / "again.toml"))))
+
+        restarting = threading.Thread(target=restart, daemon=True)
+        restarting.start()
+        code = main(["drive", str(first.mission), "--out", str(tmp_path / "run")])
+        restarting.join(1.0)
+        time.sleep(1.5)
+        x, y = second[0].places[-1]
+    err = capsys.readouterr().err
+    assert "base: link lost" in err and "base: link lost: over" in err
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert code == 0 and result["outcome"] == "reached"
+    assert abs(x - GOAL_M) < INCH_M and abs(y - 4 * 0.3048) < INCH_M
+    assert main(["replay", str(tmp_path / "run")]) == 0
+
+
+def wait_for_place(robot: Emulated, x_m: float) -> tuple[float, float]:
+    """The first place that it tells beyond so far along the hallway."""
+    while True:
+        for x, y in robot.places[-1:]:
+            if x > x_m:
+                return x, y
+        time.sleep(0.002)
 
 
 def test_the_documented_robots_file_is_read_and_has_every_default() -> None:
