@@ -74,7 +74,7 @@ class RosNode:
         self._picture: Callable[[Heard], None] | None = None
         self._is_looking = False
         self._clock: Heard | None = None
-        for key in ("odom", "cmd_vel", "hazards"):
+        for key in ("odom", "cmd_vel", "hazards", "scan"):
             if getattr(robot.topics, key):
                 self._middleware.subscribe(robot.topic(key), self._taking(key))
         if robot.sim_time:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +16,7 @@ from world_models.files.toml.settings_reader import read_settings
 from world_models.files.toml.source import Source, WorldError
 from world_models.units import Bounded, bounded
 
+SCAN = "sensor_msgs/msg/LaserScan"
 PEERS = "peers"
 """The router of who needs none."""
 NAME = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
@@ -31,6 +33,7 @@ class TopicNames:
         picture: its camera's pictures, compressed where the name ends in ``/compressed``.
         camera_info: calibration of the camera.
         hazards: of a Create 3: its bumper; not given where there is none.
+        scan: of a laser scanner (LaserScan), where there is one.
         tf_static: transforms that do not change, as the camera's mount.
     """
 
@@ -39,12 +42,13 @@ class TopicNames:
     picture: str = "camera/image_raw/compressed"
     camera_info: str = "camera/camera_info"
     hazards: str = ""
+    scan: str = ""
     tf_static: str = "/tf_static"
 
     def __post_init__(self) -> None:
         for key in self.__slots__:
             name = getattr(self, key)
-            if not NAME.fullmatch(name) and (name or key not in ("hazards",)):
+            if not NAME.fullmatch(name) and (name or key not in ("hazards", "scan")):
                 raise ValueError(f"expected {key} = the name of a topic, as camera/image_raw, got {name!r}")
 
 
@@ -63,6 +67,20 @@ class DriveSettings(Bounded):
     turn_rad_per_s: float = bounded(0.7, 0.05, 3.0)
     fresh_s: float = bounded(0.4, 0.05, 5.0)
     pictures_s: float = bounded(1.5, 0.1, 30.0)
+
+
+@dataclass(frozen=True, slots=True)
+class ScanMount(Bounded):
+    """Where a laser scanner is on the robot.
+
+    Attributes:
+        forward_m, left_m: from the axis that the robot turns about.
+        heading_rad: where its angle 0 faces, from the robot's heading, counter-clockwise.
+    """
+
+    forward_m: float = bounded(0.0, -2.0, 2.0)
+    left_m: float = bounded(0.0, -2.0, 2.0)
+    heading_rad: float = bounded(0.0, -math.pi, math.pi)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +115,7 @@ class RobotFile(Bounded):
     node: str = "harvey"
     topics: TopicNames = field(default_factory=TopicNames)
     drive: DriveSettings = field(default_factory=DriveSettings)
+    scan: ScanMount = field(default_factory=ScanMount)
     frames: FrameNames = field(default_factory=FrameNames)
 
     def __post_init__(self) -> None:
@@ -119,7 +138,7 @@ class RobotFile(Bounded):
             "cmd_vel": "geometry_msgs/msg/TwistStamped" if self.drive.stamped else "geometry_msgs/msg/Twist",
             "odom": "nav_msgs/msg/Odometry",
             "picture": f"sensor_msgs/msg/{'CompressedImage' if name.endswith('/compressed') else 'Image'}",
-            "camera_info": "sensor_msgs/msg/CameraInfo", "hazards": HAZARDS,
+            "camera_info": "sensor_msgs/msg/CameraInfo", "hazards": HAZARDS, "scan": SCAN,
             "tf_static": "tf2_msgs/msg/TFMessage",
         }
         delivery = {"cmd_vel": Delivery(), "tf_static": Delivery(kept=True, depth=100)}.get(key, SENSOR)

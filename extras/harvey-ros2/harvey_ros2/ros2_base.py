@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from blackboard.journal import Sink
 from harvey.hardware.drivers.base_driver import Base, BaseFault, BaseKind, BytePipe, LineDriver
 from harvey.runner.teller import Tell
+from harvey_ros2.laser_scan import read_scan
 from harvey_ros2.messages import MessageError, stamp
 from harvey_ros2.node import RobotMessages, RosNode, open_node
 from harvey_ros2.odometry import Counted, OdometryFault, OdometryReader
 from harvey_ros2.pipe import PipeMessages
-from harvey_ros2.robot_file import DriveSettings, RobotFile
+from harvey_ros2.robot_file import SCAN, DriveSettings, RobotFile, ScanMount
 from harvey_ros2.ros2_company import RosCompany
 from world_models.building.world import World
 from world_models.entries.body import MotionReport, MotorCommand, Odometry
@@ -41,6 +43,8 @@ BUMP_SIGMA_RAD = math.radians(25.0)
 BUMPS = {"bump_left": 75.0, "bump_front_left": 35.0, "bump_front_center": 0.0, "bump_front_right": -35.0,
          "bump_right": -75.0}
 """Where the segments of a Create 3's bumper are [degrees], by the frames that it names."""
+SCAN_S = 0.5
+"""So long a scan is waited for [s]."""
 OTHERS_S = 1.0
 """Who else drove so lately may still [s]."""
 
@@ -48,15 +52,16 @@ OTHERS_S = 1.0
 class Ros2Base(LineDriver):
     """A base over ROS 2."""
 
-    def __init__(self, messages: RobotMessages, settings: DriveSettings) -> None:
+    def __init__(self, messages: RobotMessages, settings: DriveSettings, scanner: ScanMount | None = None) -> None:
+        """``scanner``: where its laser scanner is; None where it has none."""
         super().__init__(messages)
-        self._messages, self._settings = messages, settings
+        self._messages, self._settings, self._scanner = messages, settings, scanner
         self._reader = OdometryReader(messages.types)
         self._newest: Counted | None = None
         self._other_s = -math.inf
         self._said_s = -math.inf
         self._bump: tuple[float, float] | None = None
-        self._scan: Any = None
+        self._ranges: Ranges | None = None
 
     def _carried_out(self, command: MotorCommand) -> MotionReport:
         self._forget_what_waits()
@@ -138,7 +143,11 @@ class Ros2Base(LineDriver):
         return self._wait_for_odometry().odometry
 
     def _read_ranges(self) -> Ranges | None:
-        return None
+        """The next scan that comes whole; None where none comes in time."""
+        self._ranges, ends_s = None, self._messages.now() + SCAN_S
+        while self._scanner is not None and self._ranges is None and (left_s := ends_s - self._messages.now()) > 0.0:
+            self._next_odometry(min(left_s, SAY_S))
+        return self._ranges
 
     def _after_reopening(self) -> None:
         self._reader.forget()
@@ -172,6 +181,8 @@ class Ros2Base(LineDriver):
                 self._other_s = message.came_s
             elif key == "hazards":
                 self._note_hazards(message.cdr)
+            elif key == "scan" and self._scanner is not None:
+                self._note_scan(message.cdr, self._scanner)
         return None
 
     def _forget_what_waits(self) -> None:
@@ -189,6 +200,10 @@ class Ros2Base(LineDriver):
         bumps = [BUMPS.get(hazard.header.frame_id, 0.0) for hazard in found.detections if hazard.type == 1]
         if bumps:
             self._bump = math.radians(sum(bumps) / len(bumps)), BUMP_SIGMA_RAD
+
+    def _note_scan(self, cdr: bytes, scanner: ScanMount) -> None:
+        with suppress(MessageError):
+            self._ranges = read_scan(self._messages.types.decode(cdr, SCAN), scanner, self._messages.now())
 
     def _touch(self, kind: _Turning | _Moving) -> None:
         bump, self._bump = self._bump, None
@@ -236,7 +251,7 @@ class AccompaniedRos2Base(Ros2Base):
     """The same on a network, where others see what the robot believes and may send it elsewhere."""
 
     def __init__(self, node: RosNode) -> None:
-        super().__init__(node, node.robot.drive)
+        super().__init__(node, node.robot.drive, node.robot.scan if node.robot.topics.scan else None)
         self._node = node
 
     def accompany(self, world: World, robot: RobotModel) -> tuple[Sink, Tell]:

@@ -11,7 +11,7 @@ from typing import Any
 from harvey_ros2.messages import message_types
 from harvey_ros2.middleware import Heard
 from harvey_ros2.robot_emulator import RobotEmulator
-from harvey_ros2.robot_file import DriveSettings
+from harvey_ros2.robot_file import DriveSettings, ScanMount
 from harvey_ros2.ros2_base import Ros2Base
 from sim.emulators.emulator import IdealGround
 
@@ -49,8 +49,8 @@ class Bench:
         self.time_s, self.messages = 0.0, 0
         self.delivered_s = 0.0
 
-    def driver(self, **settings: Any) -> Ros2Base:
-        return Ros2Base(self, DriveSettings(**settings))
+    def driver(self, scanner: ScanMount | None = None, **settings: Any) -> Ros2Base:
+        return Ros2Base(self, DriveSettings(**settings), scanner)
 
     def send(self, key: str, message: Any) -> None:
         twist = getattr(message, "twist", message)
