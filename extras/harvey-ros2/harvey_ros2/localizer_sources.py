@@ -5,9 +5,12 @@ They sit only at a board whose run names them: no other run has them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from blackboard.board import View
 from blackboard.change import Change, Posted, Revised, Watch
@@ -17,13 +20,16 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import HELD, LOST, NO_MILESTONE, NOT_LOST, Belief
 from knowledge_sources.looking import find_robot_and_pose
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
 from knowledge_sources.methods.verification.view_quality import list_seen_locales, predict_milestone
+from knowledge_sources.place_believed import PLACED_BY
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_frames
+from knowledge_sources.questions import find_camera, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.while_lost import find_panorama
+from world_models.camera import YAW
 from world_models.entries.body import CameraPicture, MotionReport
-from world_models.entries.location import Hypothesis, PlaceSearch
+from world_models.entries.location import Hypothesis, PlaceSearch, Travel, begin_travel
 from world_models.entries.obstacle import Obstruction
 from world_models.entries.task import Certificate, Milestone
 
@@ -50,12 +56,15 @@ class ReportCase(NamedTuple):
 
 
 class ClaimReckoner(RobotKnowledgeSource):
-    """Moves the belief by what the wheels of a robot report that somebody else drives."""
+    """Moves the belief by what the wheels of a robot report that somebody else drives, and keeps the way it came.
+
+    The heading is the camera's less a yaw that is not exactly known: by that, too, the robot may have come aside.
+    """
 
     level, priority = Level.ACTION, Priority.ENTER
     on = (Watch(MotionReport, (Posted,)),)
     needs = (HELD,)
-    writes = (Hypothesis,)
+    writes = (Hypothesis, Travel)
 
     def bind(self, view: View, trigger: Change) -> ReportCase:
         return ReportCase(trigger.entry, HELD.of(view))
@@ -67,8 +76,17 @@ class ClaimReckoner(RobotKnowledgeSource):
             held.pose, held.covariance, report.turn_rad, report.move_m)
         there = world.locale_at([*pose.position, world.floor_m(held.locale)])
         locale = there if there and world.is_room(there) else held.locale
+        camera, travel = find_camera(view), view.latest(Travel)
+        yaw_variance = float(compute_camera_covariance(camera, self._settings.camera_state)[YAW, YAW])
+        aside = np.array([held.pose.y_m - pose.y_m, pose.x_m - held.pose.x_m, 0.0])
+        covariance = covariance + np.outer(aside, aside) * yaw_variance
         moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=told.id)
         yield Revise(held.entry, moved, (told, held.entry))
+        way = (begin_travel(held.pose, held.covariance, camera.mount.yaw_rad, yaw_variance)
+               if travel is None or held.value.basis in PLACED_BY else travel.value)
+        slip_m = held.robot.actuator.skitter_m * min(1.0, abs(report.turn_rad) / (math.pi / 2.0))
+        way = way.after_motion(held.pose, pose, slip_m)
+        yield Post(way, (told,)) if travel is None else Revise(travel, way, (told, travel))
 
 
 class ViewCase(NamedTuple):

@@ -23,11 +23,14 @@ from harvey.errors import BadInput
 from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.wiring import KNOWLEDGE_SOURCES
 from harvey_ros2.run_messages import KINDS, RunMessages, TimedMessage
+from knowledge_sources.action.travel_breaker import TravelBreaker
+from knowledge_sources.action.yaw_calibrator import YawCalibrator
 from knowledge_sources.conditions import HELD, LOST
 from knowledge_sources.goal.interpreter import Interpreter
 from knowledge_sources.goal.localizer import Localizer
 from knowledge_sources.goal.panorama_builder import PanoramaBuilder
 from knowledge_sources.goal.pose_adopter import PoseAdopter
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
 from knowledge_sources.plan.alias_monitor import AliasMonitor
 from knowledge_sources.plan.camera_calibrator import CameraCalibrator
 from knowledge_sources.plan.line_finder import LineFinder
@@ -35,9 +38,12 @@ from knowledge_sources.plan.matcher import Matcher
 from knowledge_sources.plan.med_r_and_t import MedRAndT
 from knowledge_sources.plan.milestone_judge import MilestoneJudge
 from knowledge_sources.plan.plan_adjuster import PlanAdjuster
+from knowledge_sources.questions import find_camera
+from knowledge_sources.settings import DEFAULT
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import RunRecorder
+from world_models.camera import YAW
 from world_models.commands import check_command
 from world_models.entries.body import CameraPicture, MotionReport
 from world_models.entries.location import diagonal
@@ -48,7 +54,7 @@ from world_models.plugins import GUESTS_GROUP, list_plugins
 from world_models.robot import RobotModel
 
 SEATED = (Interpreter, LineFinder, Matcher, MedRAndT, MilestoneJudge, CameraCalibrator, AliasMonitor, PlanAdjuster,
-          PanoramaBuilder, Localizer, PoseAdopter)
+          YawCalibrator, TravelBreaker, PanoramaBuilder, Localizer, PoseAdopter)
 """The sources of a mission that are wanted here too."""
 GUESTS = ("claim_reckoner", "view_expecter", "loss_declarer", "place_confirmer")
 AUTHOR = "onlooker"
@@ -133,11 +139,18 @@ class Onlooker:
         return LOST.find(self.scheduler.view) is not None
 
     def belief(self) -> tuple[Pose2, NDArray[np.float64]]:
-        """Where the robot is believed to be, with all motion so far, and the covariance (3, 3) of the last report."""
-        held = HELD.of(self.scheduler.view)
+        """Where the robot is believed to be, with all motion so far, and the covariance (3, 3) of the last report.
+
+        The belief is of where the camera looks; what is told is where the robot faces, less sure by the camera's yaw.
+        """
+        view = self.scheduler.view
+        held, camera = HELD.of(view), find_camera(view)
         turn, move = self._agent.robot.actuator, self._moved
         forward = Pose2(move.x_m * turn.reach, move.y_m * turn.reach, move.heading_rad)
-        return held.pose @ forward, held.covariance
+        yaw_variance = compute_camera_covariance(camera, DEFAULT.camera_state)[YAW, YAW]
+        heading, arm_m = held.pose.heading_rad, camera.mount.forward_m
+        turned = np.array([arm_m * math.sin(heading), -arm_m * math.cos(heading), 1.0])  # about the camera
+        return held.pose @ forward, held.covariance + yaw_variance * np.outer(turned, turned)
 
     def move(self, step: Pose2) -> None:
         """The wheels counted a motion: a pose in the frame of the one before."""
@@ -220,4 +233,4 @@ class Onlooker:
         for change in (*decision.observed, *decision.made):
             value: Any = change.entry.value
             if isinstance(value, KINDS):
-                self._tell(self.messages.take(value))
+                self._tell(list(self.messages.take(value)))  # what is certified comes of it, whoever hears

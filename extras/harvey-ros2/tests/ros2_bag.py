@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from sim.emulators.emulator import SimulatedGround
 from sim.faults.fault import Fault
 from sim.scenario import load_scenario
 from sim.stage import build_stage
+from world_models.camera import CameraMount
 from world_models.frames import Pose2, wrap_angle
 
 TYPES = message_types("jazzy")
@@ -27,8 +28,12 @@ Truth = list[tuple[float, Pose2]]
 def drive_bag(
     folder: Path, way: Sequence[tuple[float, float]], *, seed: int = 0, scenario: str = "forty-foot-hallway",
     faults: tuple[Fault, ...] = (), storage: StoragePlugin = StoragePlugin.MCAP,
+    mounted: Callable[[CameraMount], CameraMount] = lambda mount: mount,
 ) -> Truth:
-    """Drive along points [m, world] by pure pursuit on the truth, and record a bag; returns (time, true pose)s."""
+    """Drive along points [m, world] by pure pursuit on the truth, and record a bag; returns (time, true pose)s.
+
+    ``mounted``: what the bag says of the camera's mounting, by what is true.
+    """
     stage = build_stage(replace(load_scenario(scenario), faults=faults))
     body, camera = stage.body(seed), stage.scenario.camera
     robot = RobotEmulator(SimulatedGround(body), epoch_s=1000.0)
@@ -41,7 +46,7 @@ def drive_bag(
         def record(name: str, cdr: bytes) -> None:
             writer.write(out[name], round(robot.time_s * 1e9), cdr)
 
-        record("tf_static", write_mount(robot.time_s, camera.mount))
+        record("tf_static", write_mount(robot.time_s, mounted(camera.mount)))
         due_s, points = 0.0, list(way)
         while points and len(truth) < 3000:
             here = body.truth.world_from_robot

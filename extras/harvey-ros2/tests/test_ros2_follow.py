@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from argparse import Namespace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
 from harvey_ros2.run_messages import RunMessages, TimedMessage
 from sim.faults.built_in_faults import Kidnap
 from world_models.camera import CameraMount
+from world_models.entries.robot_state import CameraState
 from world_models.files.toml.mission import named_file
 from world_models.files.toml.source import WORLDS
 from world_models.frames import Pose, Pose2, wrap_angle
@@ -116,6 +118,21 @@ def test_without_a_first_guess_it_begins_lost_and_the_command_says_so(
     assert "it knows where it is" in captured.out and "lost 1 times" in captured.out
     told, _ = follow(tmp_path / "bag", FirstGuess("(hallway (1,1,0))", sigma_m=None))
     assert check_poses(told, truth, truth[0][0]) >= 3
+
+
+def test_a_camera_that_is_mounted_otherwise_than_the_recording_says_is_learnt_on_the_way(tmp_path: Path) -> None:
+    def mounted(mount: CameraMount) -> CameraMount:
+        return replace(mount, tilt_rad=mount.tilt_rad + math.radians(1.0), yaw_rad=mount.yaw_rad + math.radians(1.0),
+                       height_m=mount.height_m + 0.02)
+
+    truth = drive_bag(tmp_path / "bag", WAY[:2], mounted=mounted)
+    told, onlooker = follow(tmp_path / "bag", FirstGuess(START))
+    assert check_poses(told, truth, truth[0][0]) > 100
+    last = next(item for item in reversed(told) if item.topic == "harvey/pose")
+    assert math.sqrt(last.message.pose.covariance[35]) < math.radians(0.6)
+    learnt = onlooker.scheduler.view.latest(CameraState)
+    assert learnt is not None
+    assert abs(learnt.value.mount.tilt_rad) < math.radians(0.1) and abs(learnt.value.mount.height_m - 1.0) < 0.005
 
 
 def test_a_pose_comes_from_between_two_readings_of_the_odometry() -> None:
