@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import sys
 import time
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("bag", metavar="BAG", help="a bag of ROS 2: its folder, or an .mcap file; or a robot that goes"
-                        " on, as ros2:robot.toml")
+    parser.add_argument("bag", metavar="BAG", help="a bag of ROS 2: its folder, or an .mcap file; a video, or a folder"
+                        " of pictures, without odometry; or a robot that goes on, as ros2:robot.toml")
     parser.add_argument("--world", metavar="FILE", required=True,
                         help="the building: a world file, or the name of one that comes with Harvey")
     parser.add_argument("--start", metavar="PLACE", help='where it was first, in feet, as "(hallway (4,4,0))";'
@@ -42,11 +43,14 @@ def _arguments(parser: ArgumentParser) -> None:
                         help="of a bag that does not say its types: humble, jazzy, kilted (jazzy)")
     parser.add_argument("--reach", metavar="X", type=float, default=1.0,
                         help="what the tape says of what the wheels claim (1)")
+    parser.add_argument("--rate", metavar="HZ", type=float, default=0.0,
+                        help="pictures a second of a folder of pictures, or of a video that does not say it rightly")
     parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/BAG-follow)")
 
 
 def _run(args: Namespace) -> int:
     from harvey_ros2.bag_reader import Bag
+    from harvey_ros2.film_reader import is_film
     from harvey_ros2.messages import message_types
     from harvey_ros2.onlooker import Onlooker, build_onlooker_head
     from harvey_ros2.run_messages import RunMessages
@@ -55,41 +59,66 @@ def _run(args: Namespace) -> int:
 
     if args.bag.startswith("ros2:"):
         return _run_live(args)
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a video is said by us
     path = Path(args.bag)
     world = named_file(args.world, WORLDS, Path())
     if args.distro not in ("humble", "jazzy", "kilted"):
         raise BadInput(f"--distro: expected humble, jazzy or kilted, got {args.distro!r}")
     out = check_vacant(Path(args.out) if args.out else RUNS / f"{path.stem}-follow")
+    if is_film(path):
+        return _run_film(args, path, world, out)
     with Bag(path, odometry=args.odom, picture=args.picture, distro=args.distro) as bag:
         known, robot = build_robot(bag, world, args)
         guess, events = _guess(args, known), _Events()
         messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
         onlooker = Onlooker(build_onlooker_head(path.stem, world, robot, guess), out, events.hear, messages=messages)
         took_s = follow_bag(bag.items(), onlooker)
-        why = f"the recording ends; {'lost' if onlooker.is_lost else 'it knows where it is'}"
-        onlooker.close(why)
+    return _end(onlooker, events, took_s, path, out)
+
+
+def _end(onlooker: Onlooker, events: _Events, took_s: list[float], path: Path, out: Path) -> int:
+    why = f"the recording ends; {'lost' if onlooker.is_lost else 'it knows where it is'}"
+    onlooker.close(why)
     print(f"{why}: {onlooker.pictures} pictures checked, {events.certified} certified, lost {events.lost} times\n"
           f"{_tell_times(took_s)}\n\nopen it with    harvey view {out}\nhave it told    harvey story {out}\n"
           f"for others      harvey export {out} --mcap {path.stem}.mcap")
     return 1 if onlooker.is_lost else 0
 
 
+def _run_film(args: Namespace, path: Path, world: Path, out: Path) -> int:
+    from harvey_ros2.film_reader import Film
+    from harvey_ros2.messages import message_types
+    from harvey_ros2.onlooker import Onlooker, build_onlooker_head
+    from harvey_ros2.run_messages import RunMessages
+
+    film = Film(path, args.rate)
+    known, robot = build_robot(None, world, args)
+    film.check_size(robot.lens)
+    guess, events = _guess(args, known), _Events()
+    messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
+    onlooker = Onlooker(build_onlooker_head(path.stem, world, robot, guess), out, events.hear, messages=messages,
+                        counts=False)
+    return _end(onlooker, events, follow_film(film.items(), onlooker), path, out)
+
+
+def follow_film(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
+    """Show pictures without odometry to an onlooker; returns how long each took [s]."""
+    took_s: list[float] = []
+    for item in items:
+        if onlooker.wants(item.time_s):
+            then = time.perf_counter()
+            onlooker.look(item.jpeg, item.time_s)
+            took_s.append(time.perf_counter() - then)
+    return took_s
+
+
 def _run_live(args: Namespace) -> int:
     from harvey_ros2.live_robot import follow_robot
-    from logs.run_head import load_known_world
-    from world_models.actuator import ActuatorModel
-    from world_models.files.toml.camera_file import load_camera
     from world_models.files.toml.mission import named_file
     from world_models.files.toml.source import WORLDS
-    from world_models.robot import RobotModel
 
-    if not args.calibration:
-        raise BadInput("--calibration: expected a camera file with a [mount] for a robot that goes on, got none")
     world = named_file(args.world, WORLDS, Path())
-    known, (camera, mount, deviation) = load_known_world(world), load_camera(Path(args.calibration))
-    if mount is None:
-        raise BadInput(f"{args.calibration}: expected a [mount], got none")
-    robot = RobotModel(known, camera, mount, ActuatorModel(reach=args.reach), deviation=deviation)
+    known, robot = build_robot(None, world, args)
     out = check_vacant(Path(args.out) if args.out else RUNS / "robot-follow")
     events = _Events()
     is_lost = follow_robot(args.bag.partition(":")[2], world, known, robot, _guess(args, known), out, events.hear)
@@ -140,8 +169,8 @@ def pair_with_odometry(items: Iterable[BagItem]) -> Iterator[tuple[float, Pose2,
         before = after
 
 
-def build_robot(bag: Bag, world: Path, args: Namespace) -> tuple[World, RobotModel]:
-    """The building, and the robot by the bag and the options. Raises BadInput and WorldError."""
+def build_robot(bag: Bag | None, world: Path, args: Namespace) -> tuple[World, RobotModel]:
+    """The building, and the robot by the options and the bag, if there is one. Raises BadInput and WorldError."""
     from logs.run_head import load_known_world
     from world_models.actuator import ActuatorModel
     from world_models.camera import NOT_STATED
@@ -155,10 +184,14 @@ def build_robot(bag: Bag, world: Path, args: Namespace) -> tuple[World, RobotMod
     deviation = NOT_STATED
     if args.calibration:
         camera, mount, deviation = load_camera(Path(args.calibration))
+    elif bag is None:
+        raise BadInput(f"--calibration: expected a camera file with a [mount] for {args.bag}, got none")
     else:
         camera, mount = bag.find_camera(args.base)
+    if mount is None and bag is None:
+        raise BadInput(f"{args.calibration}: expected a [mount], got none")
     if mount is None:
-        raise BadInput(f"{bag.path}: expected tf_static to lead from {args.base} to the camera, or --calibration with "
+        raise BadInput(f"{args.bag}: expected tf_static to lead from {args.base} to the camera, or --calibration with "
                        "a [mount]")
     try:
         actuator = ActuatorModel(reach=args.reach)
@@ -216,6 +249,7 @@ COMMAND = CliCommand(
     "follow", "a recording of a robot that somebody else drove: where it was, certified, or lost",
     (
         ('harvey follow bag --world research_center --start "(hallway (4,4,0))"', "a bag of ROS 2, and where it began"),
+        ("harvey follow drive.mp4 --world house.toml --calibration camera.toml", "a video, without odometry"),
         ("harvey follow ros2:robot.toml --world house.toml --calibration camera.toml", "a robot that Nav2 drives"),
         ("harvey follow drive.mcap --world house.toml --calibration camera.toml", "it begins lost, and finds itself"),
     ),
@@ -223,6 +257,7 @@ COMMAND = CliCommand(
     "Odometry and pictures of the bag come to the same board as in a mission; what drives is left out. A pose is\n"
     "certain only where a certificate vouches for it. A robot that goes on gets the transform from map to odometry as\n"
     "long as that is so; rviz's 2D Pose Estimate begins anew; Ctrl-C ends it. The run is kept, with its journal:\n"
-    "harvey replay, why and story work as for a mission. Exit code 0: in the end it knows where the robot is; 1: it\n"
-    "is lost; 2: bad input.",
+    "harvey replay, why and story work as for a mission. A video has no odometry: from one picture to the next the\n"
+    "robot may have gone anywhere at about half a metre a second; once lost it is seldom found. Exit code 0: in the\n"
+    "end it knows where the robot is; 1: it is lost; 2: bad input.",
 )

@@ -43,6 +43,15 @@ MOST_GLIMPSES = 8
 """After so many looks that did not tell the place, the search begins anew: the robot has gone on meanwhile."""
 
 
+UNCOUNTED_M_PER_S, UNCOUNTED_RAD_PER_S = 0.5, 0.8
+"""How fast a robot is taken to move, one standard deviation, that tells nothing of its wheels."""
+
+
+def is_uncounted(report: MotionReport) -> bool:
+    """Whether a report says only that time passed: it stands for the odometry of a robot that has none."""
+    return report.turn_rad == report.move_m == 0.0
+
+
 def contradicts(verdict: Certificate) -> bool:
     """Whether a picture in which much should be seen speaks against the place, be the camera well known or not."""
     return verdict.verdict == "refuted" or (verdict.p_wrong >= MIN_P_WRONG and verdict.expected >= MIN_EXPECTED)
@@ -74,6 +83,9 @@ class ClaimReckoner(RobotKnowledgeSource):
         report, world = told.value, held.robot.world
         pose, covariance = held.robot.actuator.propagate_move(
             held.pose, held.covariance, report.turn_rad, report.move_m)
+        if is_uncounted(report):
+            gone = report.duration_s * np.array([UNCOUNTED_M_PER_S, UNCOUNTED_M_PER_S, UNCOUNTED_RAD_PER_S])
+            covariance = covariance + np.diag(gone**2)
         there = world.locale_at([*pose.position, world.floor_m(held.locale)])
         locale = there if there and world.is_room(there) else held.locale
         camera, travel = find_camera(view), view.latest(Travel)
@@ -82,6 +94,8 @@ class ClaimReckoner(RobotKnowledgeSource):
         covariance = covariance + np.outer(aside, aside) * yaw_variance
         moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=told.id)
         yield Revise(held.entry, moved, (told, held.entry))
+        if is_uncounted(report):
+            return
         way = (begin_travel(held.pose, held.covariance, camera.mount.yaw_rad, yaw_variance)
                if travel is None or held.value.basis in PLACED_BY else travel.value)
         slip_m = held.robot.actuator.skitter_m * min(1.0, abs(report.turn_rad) / (math.pi / 2.0))
@@ -122,7 +136,8 @@ class LossDeclarer(RobotKnowledgeSource):
     """Declares a robot lost that somebody else drives: contradicted twice, or hardly known any more where it is.
 
     One picture that contradicts the place may be of somebody who walks by: what it leaves open at the plan level ends
-    with the next one. Where a search has not told the place in so many looks, it begins anew.
+    with the next one. Where a search has not told the place in so many looks, it begins anew: after one where nothing
+    is known of the way from one look to the next.
     """
 
     level, priority = Level.PLAN, Priority.ENTER
@@ -138,8 +153,9 @@ class LossDeclarer(RobotKnowledgeSource):
     def bind(self, view: View, trigger: Change) -> Entry[Any] | None:
         value, doubt = trigger.entry.value, LOST.find(view)
         if isinstance(value, PlaceSearch):
-            panorama = None if doubt is None else find_panorama(view, doubt)
-            return None if panorama is None or len(panorama.value.glimpses) < MOST_GLIMPSES else trigger.entry
+            panorama, report = None if doubt is None else find_panorama(view, doubt), view.latest(MotionReport)
+            most = 1 if report is not None and is_uncounted(report.value) else MOST_GLIMPSES
+            return None if panorama is None or len(panorama.value.glimpses) < most else trigger.entry
         if isinstance(value, Certificate):
             last = view.all(Certificate)[-CONTRADICTED:]
             if len(last) < CONTRADICTED or not all(contradicts(one.value) for one in last):

@@ -62,6 +62,8 @@ EVERY_S = 0.09
 """Pictures are checked no more often, by their own time [s]: ten a second."""
 AGAIN_S = 0.5
 """After one that did not certify the place, the next is so much later: who walks by is out of it by then [s]."""
+UNCOUNTED_S = 2.0
+"""A lost robot without odometry looks so seldom: each look is searched by itself, which takes seconds [s]."""
 APART_M, APART_RAD = 0.3, math.radians(20.0)
 """A lost robot's looks are at least so far apart."""
 STANDING_M, STANDING_RAD = 0.02, math.radians(1.0)
@@ -116,11 +118,16 @@ class Onlooker:
 
     def __init__(
         self, head: RunHead, out: Path | None = None, tell: Callable[[Iterable[TimedMessage]], None] = lambda _: None,
-        *, messages: RunMessages,
+        *, messages: RunMessages, counts: bool = True,
     ) -> None:
-        """Begin it; ``tell`` gets the messages for others as they come about. Raises BadInput and OSError."""
+        """Begin it. Raises BadInput and OSError.
+
+        Args:
+            tell: gets the messages for others as they come about.
+            counts: whether the wheels tell what they counted; else only pictures come.
+        """
         self._agent: Agent = build_agent(head)
-        self.messages, self._tell = messages, tell
+        self.messages, self._tell, self._counts = messages, tell, counts
         self._files = None if out is None else RunDirectory(out)
         self._recorder = RunRecorder(self._files, head, self._agent.world, self._agent.robot)
         port = self._recorder.record_port(WorldPort(self._agent.store))
@@ -158,6 +165,8 @@ class Onlooker:
 
     def wants(self, time_s: float) -> bool:
         """Whether a picture of this time is of use now."""
+        if not self._counts:
+            return time_s - self._last_s >= (UNCOUNTED_S if self.is_lost else EVERY_S)
         if self.is_lost:
             there = self._glimpsed if not math.isfinite(self._glimpsed.x_m) else self._glimpsed @ self._moved
             return not math.isfinite(there.x_m) or math.hypot(there.x_m, there.y_m) >= APART_M or (
@@ -187,7 +196,7 @@ class Onlooker:
         """Tell where the robot is and, where that is certified, how its odometry lies in the map."""
         pose, covariance = self.belief()
         self._tell([self.messages.pose(pose, covariance)])
-        if self.messages.is_certified:
+        if self.messages.is_certified and self._counts:
             self._tell([self.messages.transform(pose, self.messages.odometry)])
 
     def close(self, why: str) -> None:
@@ -215,6 +224,8 @@ class Onlooker:
             moved = replace(moved, heading_rad=math.remainder(moved.heading_rad - first, math.tau))
         if abs(moved.heading_rad) > STILL_RAD:
             parts.append((moved.heading_rad, 0.0))
+        if not self._counts and took_s > 0.0:
+            parts.append((0.0, 0.0))
         for turn, move in parts:
             if math.isfinite(self._glimpsed.x_m):
                 self._glimpsed = self._glimpsed @ Pose2(0.0, 0.0, turn) @ Pose2(move, 0.0, 0.0)

@@ -8,10 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from harvey_ros2.messages import message_types
 from harvey_ros2.robot_emulator import RobotEmulator, write_camera_info, write_mount, write_picture
+from harvey_ros2.run_messages import TimedMessage
 from sim.emulators.emulator import SimulatedGround
 from sim.faults.fault import Fault
 from sim.scenario import load_scenario
@@ -64,6 +66,21 @@ def drive_bag(
                 record("camera/image_raw/compressed", write_picture(robot.time_s, body.picture()))
                 record("camera/camera_info", write_camera_info(robot.time_s, camera.camera))
     return truth
+
+
+def check_poses(told: list[TimedMessage], truth: Truth, began_s: float) -> int:
+    """Each certain pose is within three standard deviations of the truth; returns how many there are."""
+    times, certain = np.array([time_s for time_s, _ in truth]), 0
+    for item in told:
+        if item.topic != "harvey/pose" or item.message.pose.covariance[0] >= 1e6:
+            continue
+        certain += 1
+        there = truth[int(np.argmin(np.abs(times - began_s - item.time_s)))][1]
+        at, turn, c = item.message.pose.pose.position, item.message.pose.pose.orientation, item.message.pose.covariance
+        off = np.array([at.x - there.x_m, at.y - there.y_m])
+        assert off @ np.linalg.solve(np.array([[c[0], c[1]], [c[6], c[7]]]), off) < 11.8, (item.time_s, off)
+        assert abs(wrap_angle(2.0 * math.atan2(turn.z, turn.w) - there.heading_rad)) < 3.0 * math.sqrt(c[35])
+    return certain
 
 
 def _pursue(here: Pose2, points: list[tuple[float, float]]) -> tuple[float, float]:

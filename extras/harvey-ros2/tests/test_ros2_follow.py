@@ -9,11 +9,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ros2_bag import START, Truth, drive_bag
+from ros2_bag import START, Truth, check_poses, drive_bag
 from rosbags.rosbag2 import StoragePlugin
 
 from harvey.cli import main
@@ -45,21 +44,6 @@ def follow(bag: Path, guess: FirstGuess, out: Path | None = None) -> tuple[list[
         follow_bag(recording.items(), onlooker)
         onlooker.close("the recording ends")
     return told, onlooker
-
-
-def check_poses(told: list[TimedMessage], truth: Truth, began_s: float) -> int:
-    """Each certain pose is within three standard deviations of the truth; returns how many there are."""
-    times, certain = np.array([time_s for time_s, _ in truth]), 0
-    for item in told:
-        if item.topic != "harvey/pose" or item.message.pose.covariance[0] >= 1e6:
-            continue
-        certain += 1
-        there = truth[int(np.argmin(np.abs(times - began_s - item.time_s)))][1]
-        at, turn, c = item.message.pose.pose.position, item.message.pose.pose.orientation, item.message.pose.covariance
-        off = np.array([at.x - there.x_m, at.y - there.y_m])
-        assert off @ np.linalg.solve(np.array([[c[0], c[1]], [c[6], c[7]]]), off) < 11.8, (item.time_s, off)
-        assert abs(wrap_angle(2.0 * math.atan2(turn.z, turn.w) - there.heading_rad)) < 3.0 * math.sqrt(c[35])
-    return certain
 
 
 def list_states(told: list[TimedMessage]) -> list[tuple[float, str]]:

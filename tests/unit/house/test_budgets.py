@@ -21,7 +21,7 @@ LINES = {
     "harvey": 11_192,
     "experiments": 11_212,
     "tests": 45_300,
-    "extras": 21_800,
+    "extras": 22_100,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}

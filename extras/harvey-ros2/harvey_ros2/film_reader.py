@@ -1,0 +1,86 @@
+"""Pictures without odometry: a video, or a folder of pictures in the order of their names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from harvey.errors import BadInput
+from harvey.hardware.drivers.capture import CapturedPicture, picture_of
+from harvey_ros2.bag_reader import BagItem
+from world_models.camera import Camera
+
+VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg")
+PICTURES = (".jpg", ".jpeg", ".png")
+MOST_HZ = 1000.0
+
+
+def is_film(path: Path) -> bool:
+    """Whether this is a video by its name, or a folder with pictures that is no bag."""
+    return path.suffix.lower() in VIDEOS if not path.is_dir() else (
+        not (path / "metadata.yaml").exists() and bool(_list_pictures(path)))
+
+
+class Film:
+    """Pictures, so many a second."""
+
+    def __init__(self, path: Path, rate_hz: float = 0.0) -> None:
+        """``rate_hz``: pictures a second; 0 for what the video says. Raises BadInput."""
+        self._path = path
+        if path.is_dir():
+            said_hz = 0.0
+        else:
+            video = cv2.VideoCapture(str(path))
+            said_hz = video.get(cv2.CAP_PROP_FPS) if video.isOpened() else -1.0
+            video.release()
+            if said_hz < 0.0:
+                raise BadInput(f"{path}: expected a video, got a file that is none, or none at all")
+        self._rate_hz = rate_hz or said_hz
+        if not 0.0 < self._rate_hz <= MOST_HZ:
+            raise BadInput(f"--rate: expected how many pictures a second {path} has, above 0 up to {MOST_HZ:g}, got "
+                           f"{self._rate_hz:g}")
+
+    def check_size(self, camera: Camera) -> None:
+        """Raises BadInput where the first picture is not of the camera's size, or there is none."""
+        first = next(self._read(), None)
+        if first is None:
+            raise BadInput(f"{self._path}: expected pictures, got none that is whole")
+        if first[1].size != (camera.width, camera.height):
+            wide, high = first[1].size
+            raise BadInput(f"{self._path}: expected pictures of {camera.width} x {camera.height} px, as --calibration "
+                           f"says, got {wide} x {high}")
+
+    def items(self) -> Iterator[BagItem]:
+        """Each picture with its time from the first; those that are not whole, or of another size, are left out."""
+        size = None
+        for number, picture in self._read():
+            size = size or picture.size
+            if picture.size == size:
+                yield BagItem(number / self._rate_hz, jpeg=picture.jpeg)
+
+    def _read(self) -> Iterator[tuple[int, CapturedPicture]]:
+        for number, retrieved in enumerate(self._retrieve()):
+            picture = None if retrieved is None else picture_of(retrieved)
+            if picture is not None:
+                yield number, picture
+
+    def _retrieve(self) -> Iterator[np.ndarray | None]:
+        """JPEG bytes or pixels of each; None for one that cannot be read."""
+        if self._path.is_dir():
+            for path in _list_pictures(self._path):
+                is_jpeg = path.suffix.lower() != ".png"
+                yield np.frombuffer(path.read_bytes(), np.uint8) if is_jpeg else cv2.imread(str(path))
+            return
+        video = cv2.VideoCapture(str(self._path))
+        try:
+            while (read := video.read())[0]:
+                yield read[1]
+        finally:
+            video.release()
+
+
+def _list_pictures(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.suffix.lower() in PICTURES and path.is_file())
