@@ -132,7 +132,7 @@ def test_what_cannot_be_followed_is_one_line(
         ((tmp_path / "bad.mp4", *given), "expected a video"),
         ((tmp_path / "none.mp4", *given), "expected a video"),
         ((tmp_path / "broken", "--rate", "5", *given), "expected pictures, got none that is whole"),
-        ((pictures, "--rate", "5", "--world", "research_center"), "--calibration: expected a camera file with a [mount]"),
+        ((pictures, "--rate", "5", "--world", "research_center"), "expected a camera file with a [mount]"),
         ((pictures, "--rate", "5", *given[:3], str(small), *given[4:]), "expected pictures of 500 x 512 px"),
         ((pictures, "--rate", "5", "--world", "atlantis", *given[2:]), "atlantis"),
     ):
