@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -97,11 +98,20 @@ class ModelFloor:
         kinds: (rows, columns) which of ``colours`` the floor there has; -1: no floor.
         colours: (k, 3) shaded, 0..1; NaN: unknown.
         is_plain: (rows, columns) floor, and no other part of the model is near enough to be taken for it.
+        ranges_m: (rows, columns) how far away along the floor what the model has is; infinite where it has nothing.
+        standing_m: (rows, columns) the same of the nearest that is no floor and near enough to be seen there.
     """
 
     kinds: Ints
     colours: Floats
     is_plain: NDArray[np.bool_]
+    ranges_m: NDArray[np.float32]
+    standing_m: NDArray[np.float32]
+
+    @property
+    def is_unknown(self) -> NDArray[np.bool_]:
+        """(rows, columns) plain floor of a colour that is not known."""
+        return np.asarray(self.is_plain & np.append(np.isnan(self.colours).any(axis=1), False)[self.kinds])
 
     def behind(self, hidden: NDArray[np.bool_]) -> ModelFloor:
         """The same where something before the camera hides some pixels (rows, columns): these show no floor."""
@@ -133,24 +143,38 @@ def predict_model_floor(
         robot.world, camera_from_world, np.ascontiguousarray(rays), bounds, window, columns, 1)
     if not len(colours):
         nothing = np.full(grid.shape, -1)
-        return ModelFloor(nothing, np.zeros((0, 3)), nothing >= 0)
+        nowhere = np.full(grid.shape, np.inf, np.float32)
+        return ModelFloor(nothing, np.zeros((0, 3)), nothing >= 0, nowhere, nowhere)
     world_from_camera = camera_from_world.inverse()
     met = np.isfinite(depth)
     heights = np.full(len(rays), np.inf)
     heights[met] = world_from_camera.apply(rays[met] * depth[met, None])[:, 2] - floor_m
     is_floor = met & (normals[surface, 2] > MIN_UP) & (np.abs(heights) <= rolled_over_m)
     keys, kind_of = _find_kinds(colours)
-    kinds = np.where(is_floor, kind_of[surface], -1).reshape(-1, columns)
-    kinds = np.repeat(np.repeat(kinds, STEP, axis=0), STEP, axis=1)[: shape[0], : shape[1]]
-    depths = np.where(is_floor, np.inf, depth).reshape(-1, columns)
-    depths = np.repeat(np.repeat(depths, STEP, axis=0), STEP, axis=1)[: shape[0], : shape[1]]
-    is_plain = _find_plain(kinds, margin_px)
+    kinds = _spread(np.where(is_floor, kind_of[surface], -1), columns, shape)
+    depths = _spread(np.where(is_floor, np.inf, depth), columns, shape)
+    away = np.full(len(rays), np.inf, np.float32)
+    away[met] = np.linalg.norm(world_from_camera.apply(rays[met] * depth[met, None])[:, :2]
+                               - world_from_camera.translation[:2], axis=1)
+    ranges_m = _spread(away, columns, shape)
+    upright_m = np.where(np.isfinite(depths), ranges_m, np.float32(np.inf))
+    is_plain, standing_m = _find_plain(kinds, margin_px), _find_least(upright_m, margin_px)
     for least_m, most_m in DEPTHS_M:
         near = ((depths > least_m) & (depths <= most_m)).astype(np.uint8)
         if aside_px_m > 0.0 and near.any():
             half = int(np.ceil((margin_px + aside_px_m / max(least_m, MIN_DEPTH_M)) / STEP_PX))
-            is_plain &= cv2.dilate(near, np.ones((1, 2 * half + 1), np.uint8)) == 0
-    return ModelFloor(kinds[:, aside:-aside], keys, is_plain[:, aside:-aside])
+            beside = np.ones((1, 2 * half + 1), np.uint8)
+            is_plain &= cv2.dilate(near, beside) == 0
+            own_m = np.where(near > 0, upright_m, np.float32(np.inf))
+            standing_m = np.minimum(standing_m, cv2.erode(own_m, beside))
+    inner = np.s_[:, aside:-aside]
+    return ModelFloor(kinds[inner], keys, is_plain[inner], ranges_m[inner], standing_m[inner])
+
+
+def _spread(values: NDArray[Any], columns: int, shape: tuple[int, int]) -> NDArray[Any]:
+    """(rows, columns) of values (n,) of the rays that are cast."""
+    cast = values.reshape(-1, columns)
+    return np.repeat(np.repeat(cast, STEP, axis=0), STEP, axis=1)[: shape[0], : shape[1]]
 
 
 def _find_kinds(colours: Floats) -> tuple[Floats, Ints]:
@@ -173,9 +197,18 @@ def _widen(pixels: Floats, count: int) -> Floats:
 
 def _find_plain(kinds: Ints, margin_px: float) -> NDArray[np.bool_]:
     """Pixels round which all have the same kind of floor; above and below the picture it goes on."""
-    half = int(np.ceil(margin_px / STEP_PX)) + STEP // 2
-    mask = np.ones((2 * half + 1, 2 * half + 1), np.uint8)
+    mask = _square(margin_px)
     values = (kinds + 1).astype(np.float32)
     low = cv2.erode(values, mask, borderType=cv2.BORDER_REPLICATE)
     high = cv2.dilate(values, mask, borderType=cv2.BORDER_REPLICATE)
     return np.asarray((low == high) & (kinds >= 0))
+
+
+def _find_least(values: NDArray[np.float32], margin_px: float) -> NDArray[np.float32]:
+    """The least of values (rows, columns) round each pixel."""
+    return np.asarray(cv2.erode(values, _square(margin_px), borderType=cv2.BORDER_REPLICATE), np.float32)
+
+
+def _square(margin_px: float) -> NDArray[np.uint8]:
+    side = 2 * (int(np.ceil(margin_px / STEP_PX)) + STEP // 2) + 1
+    return np.ones((side, side), np.uint8)

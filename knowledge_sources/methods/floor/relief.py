@@ -56,6 +56,10 @@ MIN_AGREEING = 0.6
 TYPICAL_M, MAX_UNSURE_PX = 2.0, 1.5
 """Floor at that distance must not be more unsure in the earlier picture, reduced, by the motion that is left open."""
 NEAR_SHIFTS = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
+MODEL_GAP_M = 0.35
+"""What stands nearer than anything of the model by less than this may be that."""
+MAX_HIDING_M = 0.2
+"""What the model had before something, in the earlier picture, by more than this hid it."""
 MIN_ALONG = 0.25
 """Least share of a patch's texture along the way on which what stands has moved: along a line nothing is told."""
 OUTSIDE = -1e4
@@ -77,6 +81,29 @@ class TwoPictures(NamedTuple):
 
         None where the earlier picture looked the other way. All of one depth is in a plane level with the floor.
         """
+        seen = self._find_plane(depth)
+        rows, columns = self.grid.shape
+        corners = np.array([[0, 0, 1], [columns - 1, 0, 1], [columns - 1, rows - 1, 1], [0, rows - 1, 1]])
+        if (corners @ seen[2] <= NEAR_PLANE_M * np.maximum(corners @ self.grid.floor_from_pixels[2], 0.0)).any():
+            return None  # beyond the horizon, where a rolled camera may see, the factor is not above 0
+        return seen
+
+    def find_places(self, depths: Floats) -> tuple[NDArray[np.float32], Floats]:
+        """Where (rows, columns, 2) in the earlier picture what is so many times as far away as the floor was, and how
+        far (rows, columns) it was from the camera, along the floor; NaN for what was behind it.
+        """
+        at_eye, on_floor = self._find_plane(0.0), self._find_plane(1.0)
+        pixels = cv2.convertPointsToHomogeneous(_list_pixels(*self.grid.shape).reshape(-1, 2))[:, 0]
+        depth = depths.reshape(-1, 1)
+        seen = pixels @ at_eye.T + depth * (pixels @ (on_floor - at_eye).T)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            places = np.where(seen[:, 2:] > 0.0, seen[:, :2] / seen[:, 2:], np.nan)
+        eye = self.grid.eye_robot
+        points = eye + depths[..., None] * (self.grid.points_robot - eye)
+        away = np.linalg.norm(self.earlier_from_now.apply(points.reshape(-1, 2)) - eye, axis=1)
+        return places.reshape(*depths.shape, 2).astype(np.float32), away.reshape(depths.shape)
+
+    def _find_plane(self, depth: float) -> Floats:
         then, camera = self.earlier_from_now, self.mount.camera_from_robot
         c, s = math.cos(then.heading_rad), math.sin(then.heading_rad)
         turn = np.array([[c, -s], [s, c]])
@@ -85,14 +112,34 @@ class TwoPictures(NamedTuple):
         there = np.column_stack([depth * camera.rotation[:, :2] @ turn,
                                  camera.rotation @ np.append(moved, height_m) + camera.translation])
         seen = there @ self.grid.floor_from_pixels
-        rows, columns = self.grid.shape
-        corners = np.array([[0, 0, 1], [columns - 1, 0, 1], [columns - 1, rows - 1, 1], [0, rows - 1, 1]])
-        if (corners @ seen[2] <= NEAR_PLANE_M * np.maximum(corners @ self.grid.floor_from_pixels[2], 0.0)).any():
-            return None  # beyond the horizon, where a rolled camera may see, the factor is not above 0
         lens = self.camera.matrix
         lens[:2] /= STEP_PX
         lens[:2, 2] += 0.5 / STEP_PX - 0.5
         return np.asarray(lens @ seen)
+
+
+class Modelled(NamedTuple):
+    """What the model has in the pixels of two pictures, all (rows, columns), away along the floor [m].
+
+    Attributes:
+        ranges_m: how far it is, floor or not; standing_m: how far the nearest is at least that is no floor; infinite
+            without any.
+        standing_then_m: the same as ``standing_m``, of the earlier picture.
+    """
+
+    ranges_m: NDArray[np.float32]
+    standing_m: NDArray[np.float32]
+    standing_then_m: NDArray[np.float32]
+
+    def was_hidden(self, both: TwoPictures) -> NDArray[np.bool_]:
+        """What the earlier picture does not show: something else of the model was before it, or it was beside that."""
+        places, away_m = both.find_places(np.minimum(self.ranges_m / both.grid.ranges_m, 1.0))
+        rows, columns = self.standing_then_m.shape
+        x, y = np.moveaxis(np.nan_to_num(np.rint(places), nan=-1.0), -1, 0).astype(int)
+        y = y - both.grid.top
+        is_in = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
+        before_m = self.standing_then_m[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)]
+        return np.asarray(~is_in | (before_m < away_m - MAX_HIDING_M))
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +147,8 @@ class Relief:
     """What an earlier picture tells of the pixels of a grid.
 
     Attributes:
-        kinds: (rows, columns) UNTOLD, FLAT (on the floor, or mirrored in it), STANDING, or FIXED (on the lens).
+        kinds: (rows, columns) UNTOLD, FLAT (on the floor, or mirrored in it, or of the model), STANDING, or FIXED (on
+            the lens).
         parts: (rows, columns) how far what stands is, as a part of the distance of the floor that it hides; above 1
             what is mirrored in the floor; else 1.
         gains_px: (rows, columns) what is at a part p of that distance was ``gain * (1 / p - 1)`` from where the floor
@@ -117,6 +165,17 @@ class Relief:
         kinds = np.where((self.kinds == STANDING) & near, UNTOLD, self.kinds).astype(np.uint8)
         return replace(self, kinds=kinds)
 
+    def agreeing(self, other: Relief, asked: NDArray[np.bool_]) -> Relief:
+        """The same without what stands, where it is asked (rows, columns), that another relief of the same picture does
+        not tell to stand about there, and about as far away: by chance a texture is like itself in one of them.
+        """
+        around = np.ones((REACH - 2 * HALF + 2, REACH - 2 * HALF + 2), np.uint8)
+        agreed = np.zeros(self.kinds.shape, bool)
+        for near, part, far in zip((1.0, *PARTS), PARTS, (*PARTS[1:], 0.0), strict=False):
+            there = (other.kinds == STANDING) & (other.parts <= np.float32(near)) & (other.parts >= np.float32(far))
+            agreed |= (self.parts == np.float32(part)) & (cv2.dilate(there.astype(np.uint8), around) > 0)
+        return replace(self, kinds=np.where((self.kinds == STANDING) & asked & ~agreed, UNTOLD, self.kinds))
+
     def tells_of(self, parts: Floats) -> NDArray[np.bool_]:
         """Where what is at such parts (rows, columns) of the distance is told from the floor, if there is texture; and
         from what is mirrored in it, where that is seen.
@@ -126,13 +185,15 @@ class Relief:
 
 
 def find_relief(
-    both: TwoPictures, is_floor: NDArray[np.bool_], sigma_m: float = 0.0, sigma_rad: float = 0.0
+    both: TwoPictures, is_floor: NDArray[np.bool_], sigma_m: float = 0.0, sigma_rad: float = 0.0,
+    modelled: Modelled | None = None,
 ) -> Relief | None:
     """The relief of a picture; None where the earlier one looked the other way, or the motion between is not known.
 
     Args:
         is_floor: (rows, columns) where the floor is most likely: by it the two are aligned.
         sigma_m, sigma_rad: standard deviations of the motion between the two.
+        modelled: by it what stands is told from what of the model stands there; without, all of it stands.
     """
     aligned = _align(both, is_floor, np.array([sigma_m, sigma_m, sigma_rad]))
     if aligned is None:
@@ -158,6 +219,10 @@ def find_relief(
             depths[alike > lying] = depth
             lying = np.maximum(lying, alike)
         else:
+            if modelled is not None:
+                is_modelled = depth * both.grid.ranges_m >= modelled.standing_m - MODEL_GAP_M
+                lying = np.where(is_modelled, np.maximum(lying, alike), lying)
+                alike[is_modelled] = -1.0
             is_best = alike > standing
             standing[is_best], parts[is_best] = alike[is_best], depth
     asked = sweep.tells & is_floor & (lying > -1.0)
@@ -171,6 +236,8 @@ def find_relief(
                              (FIXED, fixed, np.maximum(lying, standing))):
         kinds[sweep.tells & (own >= MIN_ALIKE) & (own - other >= MIN_LEAD)] = kind
     kinds[(kinds == STANDING) & (sweep.measure_texture_along(away) < MIN_ALONG)] = UNTOLD
+    if modelled is not None:
+        kinds[(kinds == STANDING) & modelled.was_hidden(both)] = UNTOLD
     is_mirrored = (kinds == FLAT) & (lying - on_floor >= MIN_LEAD)
     parts = np.where(kinds == STANDING, parts, np.where(is_mirrored, depths, np.float32(1.0)))
     return Relief(kinds, parts, gains)

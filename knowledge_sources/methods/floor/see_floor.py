@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 import cv2
@@ -30,7 +29,7 @@ from knowledge_sources.methods.floor.model_floor import (
     build_floor_grid,
     predict_model_floor,
 )
-from knowledge_sources.methods.floor.relief import Relief, TwoPictures, find_relief
+from knowledge_sources.methods.floor.relief import STANDING, Modelled, Relief, TwoPictures, find_relief
 from knowledge_sources.methods.floor.seen_floor import MAX_HIDDEN_M
 from knowledge_sources.methods.floor.standing_regions import (
     StandingRegion,
@@ -134,10 +133,17 @@ def see_free_floor(
         model = model.behind(robot.camera.obstruction.covers(grid.pixels, MODEL_MARGIN_PX))
     unlike, tells, light = find_unlike(picture[grid.top:], model, known, last_light)
     unlike &= s.use_appearance
-    compare = partial(_find_relief, robot, grid, model.is_plain, unlike, picture)
+    compare = _Comparison(robot, grid, model, unlike, picture, floor_m)
     alike = [seen for seen in earlier if abs(wrap_angle(seen.since.moved.heading_rad)) <= MAX_TURNED_RAD]
     relief = compare(alike[0]) if s.use_parallax and alike else None
-    regions = find_regions(unlike, tells, grid, relief)
+    asked = tells
+    if relief is not None and model.is_unknown.any():  # the motion alone tells what stands there
+        by_motion = model.is_unknown | ~model.is_plain
+        again = compare(alike[1]) if len(alike) > 1 and (by_motion & (relief.kinds == STANDING)).any() else None
+        relief = relief if again is None else relief.agreeing(again, by_motion)
+        asked = tells | by_motion
+        tells = tells | model.is_unknown & relief.tells_of(np.full(grid.shape, _told_part(grid)))
+    regions = find_regions(unlike, asked, grid, relief)
     reliefs = [] if relief is None else [relief]
     if reliefs and len(alike) > 1 and any(not (region.mask & unlike).any() for region in regions):
         again = compare(alike[1])  # what looks like the floor is compared with one more picture
@@ -154,16 +160,31 @@ def see_free_floor(
         told_m=_measure_told_m(grid, relief)), learnt
 
 
-def _find_relief(
-    robot: RobotModel, grid: FloorGrid, is_plain: NDArray[np.bool_], unlike: NDArray[np.bool_],
-    picture: NDArray[np.uint8], then: Seen,
-) -> Relief | None:
-    """By an earlier picture."""
-    before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)
-    now, earlier_grey = (np.asarray(image.astype(np.float32) @ GREY, np.float32) for image in (picture, before))
-    both = TwoPictures(grid, now, earlier_grey, then.since.moved, robot.camera, robot.mount)
-    relief = find_relief(both, is_plain & ~unlike, then.since.sigma_m, then.since.sigma_rad)
-    return None if relief is None else relief.beside(~is_plain)
+class _Comparison:
+    """Compares a picture with earlier ones."""
+
+    def __init__(self, robot: RobotModel, grid: FloorGrid, model: ModelFloor, unlike: NDArray[np.bool_],
+                 picture: NDArray[np.uint8], floor_m: float) -> None:
+        self._robot, self._grid, self._model, self._picture, self._floor_m = robot, grid, model, picture, floor_m
+        self._is_floor, self._found = model.is_plain & ~unlike, dict[int, Relief | None]()
+
+    def __call__(self, then: Seen) -> Relief | None:
+        """The relief by an earlier picture; compared once with each."""
+        if id(then) not in self._found:
+            self._found[id(then)] = self._compare(then)
+        return self._found[id(then)]
+
+    def _compare(self, then: Seen) -> Relief | None:
+        robot, grid, model, since = self._robot, self._grid, self._model, then.since
+        before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)
+        now, earlier = (np.asarray(image.astype(np.float32) @ GREY, np.float32) for image in (self._picture, before))
+        both = TwoPictures(grid, now, earlier, since.moved, robot.camera, robot.mount)
+        modelled = None
+        if model.is_unknown.any():
+            old = predict_model_floor(robot, then.pose, grid, self._floor_m, MAX_ROLLED_OVER_M, MODEL_MARGIN_PX)
+            modelled = Modelled(model.ranges_m, model.standing_m, old.standing_m)
+        relief = find_relief(both, self._is_floor, since.sigma_m, since.sigma_rad, modelled)
+        return relief if relief is None or modelled is not None else relief.beside(~model.is_plain)
 
 
 def find_unlike(
@@ -327,9 +348,14 @@ def _measure_told_m(grid: FloorGrid, relief: Relief | None) -> tuple[float, ...]
     """Up to where the earlier picture tells, in each direction, of something of that height."""
     if relief is None:
         return ()
-    part = max(0.0, 1.0 - TOLD_HEIGHT_M / grid.camera_height_m)
+    part = _told_part(grid)
     tells_m = np.where(relief.tells_of(np.full(grid.shape, part)), part * grid.ranges_m, 0.0).max(axis=0)
     return _round(np.minimum(SIGHT_M, _Groups(grid.shape[1]).least(tells_m)))
+
+
+def _told_part(grid: FloorGrid) -> float:
+    """How far what is TOLD_HEIGHT_M high is, as a part of the distance of the floor that it hides."""
+    return max(0.0, 1.0 - TOLD_HEIGHT_M / grid.camera_height_m)
 
 
 def _first(mask: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -15,6 +15,8 @@ from knowledge_sources.methods.floor.see_floor import find_unlike
 
 FLOOR = np.array([110.0, 104.0, 98.0])
 SHAPE = (90, 160)
+NOWHERE = np.full(SHAPE, np.inf, np.float32)
+MODEL = ModelFloor(np.zeros(SHAPE, np.int64), FLOOR[None] / 255.0, np.ones(SHAPE, bool), NOWHERE, NOWHERE)
 
 
 def shaded(gain: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -43,7 +45,7 @@ def test_what_darkens_little_by_little_is_floor_and_a_thing_in_it_is_not(
 def test_a_tinted_picture_has_floor_and_a_thing_on_it(red: float, blue: float, gain: float) -> None:
     picture = np.clip(shaded(np.full(SHAPE, gain)) * (red, 1.0, blue), 0.0, 255.0)
     picture[40:60, 70:95] = np.clip(picture[40:60, 70:95] * (0.45, 0.3, 0.3), 0.0, 255.0)
-    model = ModelFloor(np.zeros(SHAPE, np.int64), FLOOR[None] / 255.0, np.ones(SHAPE, bool))
+    model = MODEL
     unlike, tells, _ = find_unlike(picture.astype(np.uint8), model, None)
     if gain * 110.0 * max(red, 1.0, blue) < 250.0 and tells.any():
         assert unlike[43:57, 73:92].mean() > 0.95
@@ -55,7 +57,7 @@ def test_a_tinted_picture_has_floor_and_a_thing_on_it(red: float, blue: float, g
 def test_a_thing_that_fills_the_picture_at_once_is_not_the_floor_in_other_light(
     width: int, red: float, blue: float
 ) -> None:
-    model = ModelFloor(np.zeros(SHAPE, np.int64), FLOOR[None] / 255.0, np.ones(SHAPE, bool))
+    model = MODEL
     picture = shaded(np.ones(SHAPE))
     _, _, light = find_unlike(picture.astype(np.uint8), model, None)
     assert light is not None and np.allclose(light, 0.0, atol=0.1)
@@ -68,7 +70,7 @@ def test_a_thing_that_fills_the_picture_at_once_is_not_the_floor_in_other_light(
 @settings(deadline=None, max_examples=10)
 @given(st.floats(0.8, 1.25), st.floats(0.8, 1.25))
 def test_white_balance_that_changes_little_by_little_is_followed(red: float, blue: float) -> None:
-    model = ModelFloor(np.zeros(SHAPE, np.int64), FLOOR[None] / 255.0, np.ones(SHAPE, bool))
+    model = MODEL
     light = None
     for part in np.linspace(0.0, 1.0, 12):
         gains = (red**part, 1.0, blue**part)
@@ -84,7 +86,7 @@ def test_what_hides_most_of_the_picture_is_not_taken_for_the_floor(left: int, ab
     hidden = np.zeros(SHAPE, bool)
     hidden[above:, left:] = True
     picture[hidden] = 104.0 * gain
-    model = ModelFloor(np.zeros(SHAPE, np.int64), FLOOR[None] / 255.0, np.ones(SHAPE, bool)).behind(hidden)
+    model = MODEL.behind(hidden)
     unlike, tells, _ = find_unlike(picture.astype(np.uint8), model, None)
     assert not tells[hidden].any() and tells[~hidden].all()
     assert unlike[:, : left - 2].mean() < 0.02

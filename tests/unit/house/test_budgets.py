@@ -15,12 +15,12 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 10_190,
-    "knowledge_sources": 22_690,
+    "knowledge_sources": 22_815,
     "sim": 5_935,
     "logs": 7_756,
     "harvey": 11_192,
     "experiments": 11_212,
-    "tests": 45_300,
+    "tests": 45_520,
     "extras": 22_100,
 }
 """Of Python files, at most."""
