@@ -40,11 +40,14 @@ def test_a_mission_through_messages_is_the_same_each_time_and_its_replay_too(tmp
     assert main(["replay", str(tmp_path / "one")]) == 0
 
 
-@pytest.mark.parametrize("middleware", ['router = "{address}"', 'middleware = "cyclonedds"\ndomain = 79'])
+ZENOH, DDS = 'router = "{address}"', 'middleware = "cyclonedds"\ndomain = 79'
+
+
+@pytest.mark.parametrize("middleware", [ZENOH, DDS])
 def test_a_mission_in_which_the_robots_process_stands_still_for_a_while(
     middleware: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    if "cyclonedds" in middleware:
+    if middleware is DDS:
         pytest.importorskip("cyclonedds")
     with emulated(tmp_path, middleware=middleware) as robot:
         assert main(["drive", str(robot.mission), "--dry-run"]) == 0
@@ -106,11 +109,14 @@ def test_where_the_network_is_cut_the_robot_stands_within_its_watchdogs_time_and
     assert main(["replay", str(tmp_path / "run")]) == 0
 
 
+@pytest.mark.parametrize("middleware", [ZENOH, DDS])
 def test_a_robots_process_that_is_killed_and_begins_again_where_it_stood_goes_on_when_it_is_told_to(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    middleware: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    if middleware is DDS:
+        pytest.importorskip("cyclonedds")
     with ExitStack() as stack:
-        first = stack.enter_context(emulated(tmp_path))
+        first = stack.enter_context(emulated(tmp_path, middleware=middleware))
         second: list[Emulated] = []
 
         def restart() -> None:
@@ -120,7 +126,7 @@ def test_a_robots_process_that_is_killed_and_begins_again_where_it_stood_goes_on
             scenario = (SCENARIOS / "forty-foot-hallway.toml").read_text().replace("(hallway (4,4,0))", there)
             (tmp_path / "again.toml").write_text(scenario.replace("put_down_sigma_in = 0.1", "put_down_sigma_in = 0.0"))
             second.append(stack.enter_context(
-                emulated(tmp_path, at=first.address, scenario=str(tmp_path / "again.toml"))))
+                emulated(tmp_path, middleware=middleware, at=first.address, scenario=str(tmp_path / "again.toml"))))
 
         restarting = threading.Thread(target=restart, daemon=True)
         restarting.start()
