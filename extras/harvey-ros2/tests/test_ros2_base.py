@@ -304,3 +304,18 @@ def test_the_emulators_writer_aligns_as_cdr_does() -> None:
                           format="jpeg", data=b"abc")
     assert CdrWriter().header(3.0, "c").text("jpeg").blob(b"abc").message == TYPES.encode(message)
     assert plain(TYPES.decode(write_picture(3.0, b"abc"), "sensor_msgs/msg/CompressedImage"))["format"] == "jpeg"
+
+
+def test_the_emulators_own_definitions_are_those_of_ros_2() -> None:
+    pytest.importorskip("cyclonedds")
+    from harvey_ros2.dds_middleware import build_idl_class
+    from harvey_ros2.robot_on_dds import COMMANDS, TOPICS, build_types
+
+    def describe(kind: Any) -> Any:
+        kind.__idl__.populate()
+        return kind.__idl__.get_type_info()
+
+    ours = {kind: describe(build_types()[kind]) for kind in (*TOPICS.values(), *COMMANDS.values())}
+    theirs = {name.split("/")[-1]: describe(build_idl_class(TYPES, name)) for name in TYPES.store.fielddefs
+              if "/msg/" in name and name.split("/")[-1] in ours}
+    assert ours == theirs and ours["Twist"] != ours["Clock"]
