@@ -53,6 +53,8 @@ PATCH = 10.0
 """So many neighbouring pixels tell as much as one that tells on its own."""
 MIN_AGREEING = 0.6
 """Least part of the floor with texture that must agree; else the motion is not known, and nothing is told."""
+MIN_BESIDE_THINGS = 0.3
+"""The same where what seems to stand is not counted."""
 TYPICAL_M, MAX_UNSURE_PX = 2.0, 1.5
 """Floor at that distance must not be more unsure in the earlier picture, reduced, by the motion that is left open."""
 NEAR_SHIFTS = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
@@ -166,11 +168,12 @@ class Relief:
         return replace(self, kinds=kinds)
 
     def agreeing(self, other: Relief, asked: NDArray[np.bool_]) -> Relief:
-        """The same without what stands, where it is asked (rows, columns), that another relief of the same picture does
-        not tell to stand about there, and about as far away: by chance a texture is like itself in one of them.
+        """The same without what stands, where that is asked (rows, columns), if another relief of the same picture does
+        not tell it to stand about there and about as far away: by chance a texture is like itself. What lay beside the
+        other's earlier picture is kept.
         """
         around = np.ones((REACH - 2 * HALF + 2, REACH - 2 * HALF + 2), np.uint8)
-        agreed = np.zeros(self.kinds.shape, bool)
+        agreed = other.gains_px == 0.0
         for near, part, far in zip((1.0, *PARTS), PARTS, (*PARTS[1:], 0.0), strict=False):
             there = (other.kinds == STANDING) & (other.parts <= np.float32(near)) & (other.parts >= np.float32(far))
             agreed |= (self.parts == np.float32(part)) & (cv2.dilate(there.astype(np.uint8), around) > 0)
@@ -226,7 +229,11 @@ def find_relief(
             is_best = alike > standing
             standing[is_best], parts[is_best] = alike[is_best], depth
     asked = sweep.tells & is_floor & (lying > -1.0)
-    if np.count_nonzero(lying[asked] >= MIN_ALIKE) < MIN_AGREEING * np.count_nonzero(asked):
+    agreeing, least = np.count_nonzero(lying[asked] >= MIN_ALIKE), MIN_AGREEING * np.count_nonzero(asked)
+    if modelled is not None:  # things are not known by their looks, and may fill most of the picture
+        stands = (standing >= MIN_ALIKE) & (standing - lying >= MIN_LEAD)
+        least = max(MIN_AGREEING * np.count_nonzero(asked & ~stands), MIN_BESIDE_THINGS * np.count_nonzero(asked))
+    if agreeing < least:
         return None
     still = _shifted(np.eye(3), np.array([0.0, both.grid.top]))
     fixed = sweep.compare(still)

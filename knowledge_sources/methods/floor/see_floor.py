@@ -34,6 +34,7 @@ from knowledge_sources.methods.floor.seen_floor import MAX_HIDDEN_M
 from knowledge_sources.methods.floor.standing_regions import (
     StandingRegion,
     compute_parallax_odds,
+    drop_specks,
     find_footprint,
     find_regions,
     is_on_the_lens,
@@ -139,10 +140,15 @@ def see_free_floor(
     asked = tells
     if relief is not None and model.is_unknown.any():  # the motion alone tells what stands there
         by_motion = model.is_unknown | ~model.is_plain
-        again = compare(alike[1]) if len(alike) > 1 and (by_motion & (relief.kinds == STANDING)).any() else None
-        relief = relief if again is None else relief.agreeing(again, by_motion)
-        asked = tells | by_motion
-        tells = tells | model.is_unknown & relief.tells_of(np.full(grid.shape, _told_part(grid)))
+        elsewhere = [seen for seen in alike if seen.pose.distance_to(alike[0].pose) >= FLOOR_VIEW_DISTANCE_M]
+        again = compare(elsewhere[0]) if elsewhere and (by_motion & (relief.kinds == STANDING)).any() else None
+        told = model.is_unknown & relief.tells_of(np.full(grid.shape, _told_part(grid)))
+        if again is not None:
+            sure = relief.agreeing(again, by_motion)
+            doubtful = drop_specks((relief.kinds == STANDING) & (sure.kinds != STANDING))
+            told &= grid.ranges_m < np.where(doubtful, relief.parts * grid.ranges_m, np.inf).min(axis=0)
+            relief = sure
+        asked, tells = tells | by_motion, tells | told
     regions = find_regions(unlike, asked, grid, relief)
     reliefs = [] if relief is None else [relief]
     if reliefs and len(alike) > 1 and any(not (region.mask & unlike).any() for region in regions):

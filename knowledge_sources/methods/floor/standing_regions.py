@@ -68,7 +68,7 @@ def find_regions(
     parts, kinds = np.ones(grid.shape, np.float32), np.full(grid.shape, UNTOLD)
     if relief is not None:
         kinds = relief.kinds
-        parts = np.where(_drop_specks((relief.kinds == STANDING) & tells), relief.parts, parts)
+        parts = np.where(drop_specks((relief.kinds == STANDING) & tells), relief.parts, parts)
         seen |= parts < 1.0
     near = cv2.dilate(seen.astype(np.uint8), np.ones((3, 3), np.uint8))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(near, connectivity=8)
@@ -171,7 +171,7 @@ def _find_feet(
     return is_foot & (ranges <= nearest + MAX_THING_DEPTH_M) if cut.any() else is_foot
 
 
-def _drop_specks(standing: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def drop_specks(standing: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Without what is too small: by chance some patch is like another."""
     count, labels = cv2.connectedComponents(_widen(standing).astype(np.uint8), connectivity=8)
     sizes = np.bincount(labels[standing], minlength=count)

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 10_190,
-    "knowledge_sources": 22_815,
+    "knowledge_sources": 22_826,
     "sim": 5_935,
     "logs": 7_756,
     "harvey": 11_192,
