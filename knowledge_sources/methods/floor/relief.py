@@ -167,13 +167,14 @@ class Relief:
         kinds = np.where((self.kinds == STANDING) & near, UNTOLD, self.kinds).astype(np.uint8)
         return replace(self, kinds=kinds)
 
-    def agreeing(self, other: Relief, asked: NDArray[np.bool_]) -> Relief:
-        """The same without what stands, where that is asked (rows, columns), if another relief of the same picture does
-        not tell it to stand about there and about as far away: by chance a texture is like itself. What lay beside the
-        other's earlier picture is kept.
+    def agreeing(self, other: Relief | None, asked: NDArray[np.bool_]) -> Relief:
+        """The same without what stands, where that is asked (rows, columns), unless another relief of the same picture
+        tells it to stand about there and about as far away: by chance a texture is like itself. None: there is none.
         """
+        if other is None:
+            return replace(self, kinds=np.where((self.kinds == STANDING) & asked, UNTOLD, self.kinds))
         around = np.ones((REACH - 2 * HALF + 2, REACH - 2 * HALF + 2), np.uint8)
-        agreed = other.gains_px == 0.0
+        agreed = np.zeros(self.kinds.shape, bool)
         for near, part, far in zip((1.0, *PARTS), PARTS, (*PARTS[1:], 0.0), strict=False):
             there = (other.kinds == STANDING) & (other.parts <= np.float32(near)) & (other.parts >= np.float32(far))
             agreed |= (self.parts == np.float32(part)) & (cv2.dilate(there.astype(np.uint8), around) > 0)

@@ -143,11 +143,10 @@ def see_free_floor(
         elsewhere = [seen for seen in alike if seen.pose.distance_to(alike[0].pose) >= FLOOR_VIEW_DISTANCE_M]
         again = compare(elsewhere[0]) if elsewhere and (by_motion & (relief.kinds == STANDING)).any() else None
         told = model.is_unknown & relief.tells_of(np.full(grid.shape, _told_part(grid)))
-        if again is not None:
-            sure = relief.agreeing(again, by_motion)
-            doubtful = drop_specks((relief.kinds == STANDING) & (sure.kinds != STANDING))
-            told &= grid.ranges_m < np.where(doubtful, relief.parts * grid.ranges_m, np.inf).min(axis=0)
-            relief = sure
+        sure = relief.agreeing(again, by_motion)
+        doubtful = drop_specks((relief.kinds == STANDING) & (sure.kinds != STANDING))
+        told &= grid.ranges_m < np.where(doubtful, relief.parts * grid.ranges_m, np.inf).min(axis=0)
+        relief = sure
         asked, tells = tells | by_motion, tells | told
     regions = find_regions(unlike, asked, grid, relief)
     reliefs = [] if relief is None else [relief]

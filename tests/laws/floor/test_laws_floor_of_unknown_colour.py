@@ -204,16 +204,14 @@ def test_what_an_empty_room_has_was_not_hidden_where_it_was_in_the_picture(
 @settings(max_examples=30, deadline=None)
 @given(SEEDS)
 def test_only_what_two_reliefs_tell_alike_stands_where_that_is_asked(seed: int) -> None:
-    """What lay beside one of the pictures is not asked of it."""
     rng = np.random.default_rng(seed)
-    kinds, inside = rng.choice([FLAT, STANDING], (20, 30)).astype(np.uint8), np.ones((20, 30), np.float32)
+    kinds, gains = rng.choice([FLAT, STANDING], (20, 30)).astype(np.uint8), np.ones((20, 30), np.float32)
     asked: NDArray[np.bool_] = rng.random(kinds.shape) < 0.5
     near, far = np.full(kinds.shape, 0.93, np.float32), np.full(kinds.shape, 0.41, np.float32)
-    one, beside = Relief(kinds, near, inside), Relief(np.full_like(kinds, UNTOLD), near, 0.0 * inside)
-    for other in (one, beside):
-        np.testing.assert_array_equal(one.agreeing(other, asked).kinds, kinds)
-    for kind in (FLAT, STANDING, UNTOLD):
-        left = one.agreeing(Relief(np.full_like(kinds, kind), far, inside), asked).kinds
+    one = Relief(kinds, near, gains)
+    np.testing.assert_array_equal(one.agreeing(one, asked).kinds, kinds)
+    for other in (None, *(Relief(np.full_like(kinds, kind), far, gains) for kind in (FLAT, STANDING, UNTOLD))):
+        left = one.agreeing(other, asked).kinds
         assert not (left[asked] == STANDING).any()
         np.testing.assert_array_equal(left[~asked], kinds[~asked])
         np.testing.assert_array_equal(left == FLAT, kinds == FLAT)
