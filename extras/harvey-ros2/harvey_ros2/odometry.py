@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from harvey_ros2.messages import MessageError, MessageTypes, seconds
 from harvey_ros2.middleware import Heard
 from world_models.entries.body import Odometry
-from world_models.frames import wrap_angle
+from world_models.frames import Pose2, wrap_angle
 
 JUMP_S = 2.0
 """A clock that goes back by more, or ahead by so much more than time passed, has jumped; less is out of order [s]."""
@@ -59,11 +59,15 @@ class OdometryReader:
     def __init__(self, types: MessageTypes) -> None:
         self._types = types
         self._last: Counted | None = None
-        self._sender = ""
+        self._newest: Counted | None = None
+        self._sender, self._begin = "", Pose2(0.0, 0.0, 0.0)
         self.passed_over: Counter[str] = Counter()
 
     def read(self, heard: Heard) -> Counted | None:
-        """A reading; None where the message is passed over. Raises OdometryFault."""
+        """A reading; None where the message is passed over. Raises OdometryFault.
+
+        A robot's process that began again counts from nothing: what it counts goes on from where the last one ended.
+        """
         try:
             found = _read(self._types.decode(heard.cdr, "nav_msgs/msg/Odometry"), heard.came_s)
         except MessageError:
@@ -71,25 +75,30 @@ class OdometryReader:
         if found is None:
             self.passed_over["garbled"] += 1
             return None
-        last, self_sender = self._last, self._sender
+        last, newest, is_other = self._last, self._newest, heard.sender != self._sender
+        if newest is not None and is_other and heard.came_s - newest.came_s >= SENDER_S:
+            self._begin = _pose(newest.odometry) @ _pose(found.odometry).inverse()
+            last = None
+        found = replace(found, odometry=_moved(self._begin, found.odometry))
         if last is None:
-            self._last, self._sender = found, heard.sender
+            self._last = self._newest = found
+            self._sender = heard.sender
             return found
-        if heard.sender != self_sender and heard.came_s - last.came_s < SENDER_S:
+        if is_other:
             raise OdometryFault("two publish its odometry")
-        return self._compare(last, found, heard.sender)
+        return self._compare(last, found)
 
     def forget(self) -> None:
         """Begin anew with the next message."""
         self._last = None
 
-    def _compare(self, last: Counted, found: Counted, sender: str) -> Counted | None:
+    def _compare(self, last: Counted, found: Counted) -> Counted | None:
         later_s = found.odometry.time_s - last.odometry.time_s
         passed_s = found.came_s - last.came_s
-        if -JUMP_S <= later_s <= 0.0 and sender == self._sender:
+        if -JUMP_S <= later_s <= 0.0:
             self.passed_over["doubled" if later_s == 0.0 else "out of order"] += 1
             return None
-        self._last, self._sender = found, sender
+        self._last = self._newest = found
         if later_s < 0.0:
             raise OdometryFault(f"its clock went back by {-later_s:.1f} s")
         if later_s > JUMP_S + HASTE * passed_s:
@@ -100,6 +109,15 @@ class OdometryReader:
         if away_m > most[0] or turned > most[1]:
             raise OdometryFault(f"its odometry jumped by {away_m:.2f} m and {math.degrees(turned):.0f} degrees")
         return found
+
+
+def _pose(there: Odometry) -> Pose2:
+    return Pose2(there.x_m, there.y_m, there.heading_rad)
+
+
+def _moved(begin: Pose2, there: Odometry) -> Odometry:
+    at = begin @ _pose(there)
+    return replace(there, x_m=at.x_m, y_m=at.y_m, heading_rad=at.heading_rad)
 
 
 def _read(message: Any, came_s: float) -> Counted | None:

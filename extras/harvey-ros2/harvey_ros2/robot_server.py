@@ -5,6 +5,7 @@ No code of the driver.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import socket
 import struct
@@ -147,7 +148,8 @@ class ZenohNetwork:
     def publish(self, name: str, cdr: bytes) -> None:
         """Send a message."""
         self._numbers += 1
-        attached = struct.pack("<qqB16s", self._numbers, time.time_ns(), 16, f"emulated {name}"[:16].encode())
+        sender = hashlib.blake2b(f"{self._session.zid()} {name}".encode(), digest_size=16).digest()
+        attached = struct.pack("<qqB16s", self._numbers, time.time_ns(), 16, sender)
         self._publishers[name].put(cdr, attachment=attached)
 
     def listen(self, hear: Hear) -> None:

@@ -15,7 +15,9 @@ from ros2_bench import TICK_S, Bench, deliver
 from ros2_values import plain
 
 from harvey.hardware.drivers.base_driver import BaseFault
-from harvey_ros2.messages import message_types
+from harvey_ros2.messages import message_types, stamp
+from harvey_ros2.middleware import Heard
+from harvey_ros2.odometry import OdometryFault, OdometryReader
 from harvey_ros2.robot_emulator import (
     CdrWriter,
     RobotEmulator,
@@ -199,6 +201,26 @@ def test_a_stop_from_another_thread_ends_a_move() -> None:
         driver.move(2.0)
     stops[0].join(5.0)
     assert bench.ground.moved_m < 0.35 and not bench.robot.moving
+
+
+def test_a_process_that_begins_again_counts_on_from_where_the_last_one_ended() -> None:
+    reader = OdometryReader(TYPES)
+
+    def read(x_m: float, heading_rad: float, time_s: float, sender: str) -> Any:
+        spin = {"z": math.sin(heading_rad / 2.0), "w": math.cos(heading_rad / 2.0)}
+        message = TYPES.build("nav_msgs/msg/Odometry", header={"stamp": stamp(time_s)},
+                              pose={"pose": {"position": {"x": x_m}, "orientation": spin}})
+        found = reader.read(Heard(TYPES.encode(message), sender, time_s))
+        return found and (found.odometry.x_m, found.odometry.y_m, found.odometry.heading_rad)
+
+    assert read(2.0, math.pi / 2.0, 100.0, "first") == pytest.approx((2.0, 0.0, math.pi / 2.0))
+    with pytest.raises(OdometryFault, match="two publish"):
+        read(0.0, 0.0, 100.2, "second")
+    reader.forget()
+    assert read(0.0, 0.0, 103.0, "second") == pytest.approx((2.0, 0.0, math.pi / 2.0))
+    assert read(0.1, 0.0, 103.1, "second") == pytest.approx((2.0, 0.1, math.pi / 2.0))
+    reader.forget()  # the line was lost, and is there again: the same process goes on counting
+    assert read(0.4, 0.0, 109.0, "second") == pytest.approx((2.0, 0.4, math.pi / 2.0))
 
 
 CHAOS = 200_000

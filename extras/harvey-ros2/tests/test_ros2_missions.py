@@ -137,7 +137,7 @@ def test_a_robots_process_that_is_killed_and_begins_again_where_it_stood_goes_on
     err = capsys.readouterr().err
     assert "base: link lost" in err and "base: link lost: over" in err
     result = json.loads((tmp_path / "run" / "result.json").read_text())
-    assert code == 0 and result["outcome"] == "reached"
+    assert code == 0 and result["outcome"] == "reached" and result["relocalizations"] == 0
     assert abs(x - GOAL_M) < INCH_M and abs(y - 4 * 0.3048) < INCH_M
     assert main(["replay", str(tmp_path / "run")]) == 0
 
