@@ -21,7 +21,7 @@ LINES = {
     "harvey": 11_192,
     "experiments": 11_212,
     "tests": 45_520,
-    "extras": 22_150,
+    "extras": 22_200,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}
