@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -31,6 +32,12 @@ from world_models.files.world_files import read_world
 FLOOR_TEXTURES: Mapping[str, float] = {"plain": 1.0, "speckle": 0.3, "carpet": 0.1, "tiles": 1.0, "wood": 0.3}
 """Textures of drawn floors, with the size of their cells [ft]."""
 DRAWN_FLOOR = "drawn-floor"
+SURFACES: Mapping[str, tuple[float, float]] = {
+    "plain": (1.0, 1.0), "speckle": (0.15, 0.4), "carpet": (0.1, 0.3), "wood": (0.2, 0.8), "brick": (0.4, 1.2),
+    "tiles": (0.4, 2.5), "stripes": (0.5, 2.0), "poster": (1.0, 3.0)}
+"""Textures of surfaces that no plan tells of, with the least and the largest size of their cells [ft]."""
+NOT_DRAWN = "unknown"
+"""The finish of all that a plan says nothing of."""
 
 
 def draw_colour(rng: np.random.Generator) -> list[float]:
@@ -92,12 +99,57 @@ class Floor:
                 locale["floor"] = DRAWN_FLOOR
         return replace(self, text=as_toml(data))
 
+    @property
+    def plan(self) -> Floor:
+        """The same as a floor plan has it: no colours, no baseboards and no mouldings."""
+        data = _without_trim(self.text)
+        data["finishes"] = {name: {"colour": NOT_DRAWN} for name in data["finishes"]}
+        return replace(self, text=as_toml(data))
+
+    @property
+    def grey(self) -> Floor:
+        """The same with doors that are alike and surfaces in one grey: what of it a plan can tell apart."""
+        data = _without_trim(self.text)
+        boxes = [box for part in data["parts"].values() for box in part]
+        parts = {box[key] for box in boxes for key in ("finish", "rim") if key in box}
+        data["finishes"] = {name: finish if name in parts else {"colour": [0.6, 0.6, 0.6]}
+                            for name, finish in data["finishes"].items()}
+        data["doors"] = {name: {key: value for key, value in door.items() if key not in ("frame", "leaf")}
+                         for name, door in data["doors"].items()}
+        return replace(self, text=as_toml(data))
+
+    def textured(self, rng: np.random.Generator) -> Floor:
+        """The same with tiles, bricks, planks and the like on walls, floors and ceilings, as they are drawn.
+
+        Half of the ceilings are of the walls' finish, so that no edge is seen between them.
+        """
+        data = _without_trim(self.text)
+        for name, locale in data["locales"].items():
+            if "size" not in locale:
+                continue
+            for part in ("walls", "floor", "ceiling"):
+                texture = str(rng.choice(list(SURFACES)))
+                data["finishes"][finish := f"{part}-of-{name}"] = {
+                    "colour": draw_colour(rng), "texture": texture, "scale": round(rng.uniform(*SURFACES[texture]), 2)}
+                locale[part] = finish
+            if rng.random() < 0.5:
+                locale["ceiling"] = locale["walls"]
+        return replace(self, text=as_toml(data))
+
     def write(self, folder: Path) -> tuple[Path, Path]:
         """Write the files of the model and of the details, for scenarios."""
         world, details = folder / f"floor-{self.seed}.toml", folder / f"floor-{self.seed}-details.toml"
         world.write_text(self.text, "utf-8")
         details.write_text(self.details, "utf-8")
         return world, details
+
+
+def _without_trim(text: str) -> dict[str, Any]:
+    data = tomllib.loads(text)
+    for table in (data["defaults"], *data["locales"].values()):
+        for name in ("baseboard", "moulding"):
+            table.pop(name, None)
+    return data
 
 
 def generated_floor(

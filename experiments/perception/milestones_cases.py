@@ -94,28 +94,40 @@ class Case:
         return self.kind == "another floor"
 
 
+def has_identical_doors(seed: int) -> bool:
+    """Whether a floor has, without being symmetric."""
+    return seed % 5 == 4
+
+
 @lru_cache(maxsize=2)
-def get_site(seed: int) -> Site:
-    """Get the floor of a seed: every fifth is symmetric, every other fifth has identical doors."""
-    symmetric, repeated = seed % 5 == 3, seed % 5 in (3, 4)
-    floor = generated_floor(seed, ROOMS, symmetric=symmetric, repeated=repeated)
+def get_site(seed: int, textured: bool = False) -> Site:
+    """Get the floor of a seed: every fifth is symmetric, every other fifth has identical doors.
+
+    ``textured``: walls, floors and ceilings have tiles, bricks and planks, of which and of all colours the model says
+    nothing.
+    """
+    symmetric, repeated = seed % 5 == 3, seed % 5 == 3 or has_identical_doors(seed)
+    known = built = generated_floor(seed, ROOMS, symmetric=symmetric, repeated=repeated)
+    bare = known.world
+    if textured:
+        known, built, bare = known.plan, known.textured(np.random.default_rng([seed, 2])), known.grey.world
     settings = CameraSettings()
-    robot = RobotModel(floor.world, settings.camera, settings.mount, ActuatorModel())
-    whole = SimulatedBuilding.of_faces(floor.building.faces)
-    lacking = SimulatedBuilding.of_faces(floor.altered(MISSING_SHARE).faces)
-    return Site(floor, robot, SimulatedBuilding.of_faces(floor.world.faces), (whole, lacking), symmetric)
+    robot = RobotModel(known.world, settings.camera, settings.mount, ActuatorModel())
+    buildings = (SimulatedBuilding.of_faces(built.building.faces),
+                 SimulatedBuilding.of_faces(built.altered(MISSING_SHARE).faces))
+    return Site(known, robot, SimulatedBuilding.of_faces(bare.faces), buildings, symmetric)
 
 
-def generate_cases(floor_seed: int, first: int, count: int) -> Iterator[Case]:
+def generate_cases(floor_seed: int, first: int, count: int, textured: bool = False) -> Iterator[Case]:
     """Generate cases ``first``, ``first + 1``, ... of a floor; each is determined by its number."""
     for number in range(first, first + count):
         rng = np.random.default_rng([floor_seed, number])
         kind = str(rng.choice(KINDS, p=SHARES))
-        yield _generate_case(floor_seed, kind, rng)
+        yield _generate_case(floor_seed, textured, kind, rng)
 
 
-def _generate_case(floor_seed: int, kind: str, rng: np.random.Generator) -> Case:
-    here = get_site(floor_seed)
+def _generate_case(floor_seed: int, textured: bool, kind: str, rng: np.random.Generator) -> Case:
+    here = get_site(floor_seed, textured)
     for _ in range(MAX_TRIES):
         believed, other = _draw_places(here, kind, rng)
         if believed is None or (other is None and kind != "another floor"):
@@ -126,7 +138,7 @@ def _generate_case(floor_seed: int, kind: str, rng: np.random.Generator) -> Case
         believed = Pose2(believed.x_m, believed.y_m, heading)
         there, building = here, int(rng.integers(2))
         if kind == "another floor":
-            there = get_site(floor_seed + 1)
+            there = get_site(floor_seed + 1, textured)
             other = _find_similar(here, there, believed, rng)
         else:
             assert other is not None

@@ -289,7 +289,8 @@ def compute_pose_likelihood(
         then = view.pose_then(world_from_now)
         lines = predict_lines(robot, then, settings.verification).lines_world
         projected = _project(robot, lines, [then, *_displace(then)])
-        agreement = compute_agreement(projected[0], view.segments_px, projected[1:], settings.verification)
+        agreement = compute_agreement(
+            projected[0], view.segments_px, projected[1:], settings.verification.line_tolerance_px)
         visible, matched = visible + agreement.visible, matched + agreement.matched
         terms.append(compute_log_ratio(agreement.matched, agreement.visible, agreement.chance))
         if agreement.visible >= MIN_VIEW_LINES:

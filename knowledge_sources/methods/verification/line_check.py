@@ -30,6 +30,7 @@ MIN_LINE_CONTRAST = 0.05  # smallest contrast of a model line that is predicted,
 MAX_LINE_DISTANCE_M = 15.0  # largest distance of a model line that is predicted
 CELLS_PER_LINE = 24  # cells into which a line is cut to measure how much of it is covered
 MIN_COVERED_FRACTION = 0.5  # covered part from which a line is matched
+SHARP_TOLERANCE_PX = 1.0  # distance within which a line is matched sharply, as it is at the right pose
 TEST_COUNT = 1e3
 """Resolvable poses within the matcher's reach: the number of tests of the a-contrario count (Desolneux, Moisan and
 Morel 2008, ch. 3)."""
@@ -85,7 +86,8 @@ class Agreement:
 
 
 def compute_agreement(
-    lines_px: Floats, segments_px: Floats, displaced_px: Floats, settings: VerificationSettings = DEFAULT.verification
+    lines_px: Floats, segments_px: Floats, displaced_px: Floats,
+    tolerance_px: float = DEFAULT.verification.line_tolerance_px,
 ) -> Agreement:
     """Compute how well projected lines agree with segments, and how well they would by chance.
 
@@ -93,8 +95,9 @@ def compute_agreement(
         lines_px: (m, 2, 2) projected at the pose, NaN where not in view.
         segments_px: (k, 2, 2) found in the picture.
         displaced_px: (p, m, 2, 2) the same lines projected at p wrong poses nearby.
+        tolerance_px: how far a segment may lie from the line that it covers.
     """
-    tolerances = settings.line_tolerance_px, LINE_TOLERANCE_RAD
+    tolerances = tolerance_px, LINE_TOLERANCE_RAD
     coverage = compute_coverage(lines_px, segments_px, *tolerances)
     displaced = compute_coverage(displaced_px.reshape(-1, 2, 2), segments_px, *tolerances)
     displaced = displaced.reshape(displaced_px.shape[:2])
@@ -195,11 +198,13 @@ class LineCheck:
 
     Attributes:
         agreement: which lines are matched, and how many would be by chance.
+        sharp: the same within a pixel.
         coverage: covered part of their length in view, 0..1.
         projected_px: (m, 2, 2) the lines at this pose, NaN where not in view.
     """
 
     agreement: Agreement
+    sharp: Agreement
     coverage: float
     projected_px: Floats
 
@@ -223,9 +228,10 @@ def check_lines(
         projected = np.concatenate([
             _project_displaced(robot, lines_world, errors, segments_px, s, pose_settings) for s in few])
     here, displaced = np.split(projected, [1])
-    agreement = compute_agreement(here[0], segments_px, displaced, settings)
+    agreement, sharp = (compute_agreement(here[0], segments_px, displaced, tolerance_px)
+                        for tolerance_px in (settings.line_tolerance_px, SHARP_TOLERANCE_PX))
     lengths = np.linalg.norm(here[0, :, 1] - here[0, :, 0], axis=1)
-    return LineCheck(agreement, agreement.covered_length(lengths), here[0])
+    return LineCheck(agreement, sharp, agreement.covered_length(lengths), here[0])
 
 
 def project_lines(robot: RobotModel, lines_world: Floats, world_from_robot: Pose2) -> Floats:

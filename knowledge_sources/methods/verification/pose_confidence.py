@@ -1,12 +1,14 @@
 """The evidence for a pose, and the probability that the pose is wrong, by logistic regression.
 
-The evidence is eight numbers, each of which is better the larger it is. A covariance looks the same in the wrong
+The evidence is five numbers, each of which is better the larger it is. A covariance looks the same in the wrong
 corridor; these numbers do not. They follow from sets of lines, segments and faces, so their order does not matter.
+Lines count where they are found within a pixel: at the right pose they are, and in rooms of bricks and tiles that tells
+them from the lines that the model does not have.
 
 The log odds of a right pose are a sum of the evidence, each part with a weight that is never negative: more evidence
 never makes a pose less certain. The weights in ``verification_weights.toml`` were fitted on rendered pictures of
-generated floors (``harvey experiment milestones-calibrate``) with a prior of one half; a mission is at a wrong place
-less often, so that the probability is not too small.
+generated floors, half of them textured as no model says (``harvey experiment milestones-calibrate``), with a prior of
+one half; a mission is at a wrong place less often, so that the probability is not too small.
 """
 
 from __future__ import annotations
@@ -24,20 +26,17 @@ from knowledge_sources.methods.belief.places import compute_chi2
 from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from knowledge_sources.methods.verification.color_check import ColorCheck
 from knowledge_sources.methods.verification.line_check import (
-    LINE_TOLERANCE_RAD,
     MAX_LINE_WEIGHT_PX,
     LineCheck,
-    compute_coverage,
 )
 from knowledge_sources.settings import DEFAULT, VerificationSettings
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
-SHARP_TOLERANCE_PX = 1.0  # distance within which a covered line is sharp; chance spreads over the whole tolerance
-PROBE_TURN_RAD = 0.4  # turn that is weighed like one metre of motion in the weakest direction of the evidence
-MAX_LINE_MOTION_PX = 400.0  # motion of a line in the picture, by one metre, from which it weighs no more
 MAX_BELIEF_SIGMAS = 6.0  # mahalanobis distance from the belief from which a pose gets no credit for being near it
-MIN_P_FALSE = 1e-12  # probability of chance agreement that counts as certainty
+MIN_P_FALSE = 1e-40  # probability of chance agreement that counts as certainty
+LEAST_P_FALSE = 1e-4  # smallest probability of a wrong pose that is told: of less the cases of the fit say nothing
+P_REPAINTED = 0.05  # probability that faces lost the model's colors, which then speak neither for a pose nor against it
 
 NEAR_M = 0.1
 """Lines with an end nearer to the camera than this have no defined motion in the picture."""
@@ -48,22 +47,15 @@ class PoseEvidence:
     """What supports a pose; :mod:`knowledge_sources.methods.verification.pose_confidence` weighs it.
 
     Attributes:
-        coverage: covered part of the lines' length in view.
-        weakest_coverage: the same, lines weighted by their motion in the picture along the least constrained of five
-            directions of pose error.
-        sharpness: part of the covered length that is covered within a pixel.
-        significance: how improbable such agreement is by chance, on a log scale: 0 (p = 1) to 1 (p = 1e-12).
-        line_count: log2(1 + n) of the n matched lines.
+        coverage: part of the lines' length in view that is covered within a pixel.
+        significance: how improbable such agreement is by chance, on a log scale: 0 (p = 1) to 1 (p = 1e-40).
         proximity: 1 at the belief, 0 from a Mahalanobis distance of 6.
         color_agreement: part of the faces with the model's color, beyond chance; 0 where colors are not testable.
-        color_count: log2(1 + n) of the n compared faces; 0 where colors are not testable.
+        color_count: number of compared faces; 0 where colors are not testable. It is not weighed.
     """
 
     coverage: float
-    weakest_coverage: float
-    sharpness: float
     significance: float
-    line_count: float
     proximity: float
     color_agreement: float
     color_count: float
@@ -78,36 +70,27 @@ EVIDENCE_NAMES = tuple(field.name for field in fields(PoseEvidence))
 
 
 def compute_evidence(
-    robot: RobotModel, lines_world: Floats, segments_px: Floats, pose: Pose2, covariance: Floats, belief: Pose2,
-    belief_covariance: Floats, lines: LineCheck, colors: ColorCheck,
+    robot: RobotModel, lines_world: Floats, pose: Pose2, covariance: Floats, belief: Pose2, belief_covariance: Floats,
+    lines: LineCheck, colors: ColorCheck,
 ) -> PoseEvidence:
     """Compute the evidence for a pose.
 
     Args:
         lines_world: (m, 2, 3) predicted lines [m, world].
-        segments_px: (k, 2, 2) found in the picture.
         pose, covariance: the pose in question, world; (3, 3) over (x, y, heading).
         belief, belief_covariance: the pose that was believed before, in the same form.
         lines, colors: the checks of the picture at the pose.
     """
-    agreement, projected = lines.agreement, lines.projected_px
-    covered = np.nan_to_num(agreement.coverage)
+    covered, projected = np.nan_to_num(lines.sharp.coverage), lines.projected_px
     span = np.linalg.norm(projected[:, 1] - projected[:, 0], axis=1)
     length = np.minimum(np.nan_to_num(span), MAX_LINE_WEIGHT_PX)
-    sharp = np.nan_to_num(compute_coverage(
-        projected, segments_px, SHARP_TOLERANCE_PX, LINE_TOLERANCE_RAD))
-    directions = _error_directions(PROBE_TURN_RAD)
-    motion = length[:, None] * _compute_motion(robot, lines_world, pose, directions, MAX_LINE_MOTION_PX)
     sigmas = min(math.sqrt(compute_chi2(pose, belief, covariance + belief_covariance)), MAX_BELIEF_SIGMAS)
     return PoseEvidence(
         coverage=_ratio(length * covered, length),
-        weakest_coverage=min(_ratio(motion[:, k] * covered, motion[:, k]) for k in range(len(directions))),
-        sharpness=_ratio(length * sharp, length * covered),
-        significance=math.log10(max(agreement.p_false, MIN_P_FALSE)) / math.log10(MIN_P_FALSE),
-        line_count=math.log2(1.0 + agreement.matched),
+        significance=math.log10(max(lines.sharp.p_false, MIN_P_FALSE)) / math.log10(MIN_P_FALSE),
         proximity=1.0 - sigmas / MAX_BELIEF_SIGMAS,
         color_agreement=max(colors.agreeing - colors.chance, 0.0) if colors.is_testable else 0.0,
-        color_count=math.log2(1.0 + colors.count) if colors.is_testable else 0.0,
+        color_count=float(colors.count) if colors.is_testable else 0.0,
     )
 
 
@@ -132,23 +115,6 @@ def _ratio(part: Floats, whole: Floats) -> float:
     return float(np.sum(part)) / total if total > 1e-9 else 0.0
 
 
-def _error_directions(turn_rad: float) -> Floats:
-    """(5, 3) pose errors (x, y [m], heading [rad]) in the robot's frame: ahead, left, both diagonals, and a turn."""
-    return np.array([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.7, 0.7, 0.0), (0.7, -0.7, 0.0), (0.0, 0.0, turn_rad)])
-
-
-def _compute_motion(robot: RobotModel, lines_world: Floats, pose: Pose2, directions: Floats, max_px: float) -> Floats:
-    """(m, d) by how much each line moves across itself in the picture for each pose error (d, 3), bounded [px]."""
-    if not len(lines_world):
-        return np.zeros((0, len(directions)))
-    ahead, across = _compute_slopes(robot, lines_world, pose)
-    c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    in_world = directions @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    motion = np.abs(across @ in_world.T).max(axis=1)
-    motion[~ahead] = 0.0
-    return np.asarray(np.minimum(motion, max_px))
-
-
 def _compute_slopes(robot: RobotModel, lines_world: Floats, pose: Pose2) -> tuple[Mask, Floats]:
     """Which lines (m,) lie before the camera, and how their ends (m, 2, 3) move across them by (x, y, heading) [px]."""
     points, pixels, slopes = compute_point_jacobian(
@@ -160,9 +126,8 @@ def _compute_slopes(robot: RobotModel, lines_world: Floats, pose: Pose2) -> tupl
     return np.all(points[:, 2].reshape(-1, 2) > NEAR_M, axis=1), np.asarray(across)
 
 
-PRODUCTS = (("coverage", "sharpness"), ("coverage", "color_agreement"), ("sharpness", "color_agreement"))
-"""Parts of the evidence that are stronger together: their products are terms too."""
-TERMS = (*EVIDENCE_NAMES, *(f"{a}-and-{b}" for a, b in PRODUCTS))
+TERMS = ("coverage", "coverage-and-significance", "proximity", "color_agreement", "coverage-and-color_agreement")
+"""What is weighed: parts of the evidence, and products of parts that are stronger together."""
 WEIGHTS_FILE = Path(__file__).with_name("verification_weights.toml")
 
 
@@ -207,12 +172,15 @@ class PoseConfidence:
     def p_false(self, evidence: PoseEvidence) -> float:
         """Compute the probability that the pose is wrong.
 
-        Colors that agree raise trust; colors that do not say that walls were painted, not that the robot is elsewhere:
-        so a pose is never less certain than by its lines alone.
+        Colors that disagree may have been painted over since the model was made: so they speak against a pose that its
+        lines support only by :data:`P_REPAINTED`.
         """
         values = evidence.values[None]
         by_lines = float(self.lines_only.p_false(values)[0])
-        return min(by_lines, float(self.lines_and_colors.p_false(values)[0])) if evidence.color_count else by_lines
+        if not evidence.color_count:
+            return max(by_lines, LEAST_P_FALSE)
+        repainted = by_lines / (by_lines + P_REPAINTED * (1.0 - by_lines))
+        return max(min(repainted, float(self.lines_and_colors.p_false(values)[0])), LEAST_P_FALSE)
 
     @staticmethod
     def from_table(table: dict[str, Any]) -> PoseConfidence:
@@ -224,9 +192,9 @@ class PoseConfidence:
 
 def compute_terms(evidence: Floats) -> Floats:
     """Compute the terms (n, t) of evidence (n, k), none negative, so that each term grows with each part."""
-    at = {name: number for number, name in enumerate(EVIDENCE_NAMES)}
-    products = [evidence[:, at[a]] * evidence[:, at[b]] for a, b in PRODUCTS]
-    return np.column_stack([evidence, *products])
+    coverage, significance, proximity, color_agreement, _ = evidence.T
+    return np.column_stack(
+        [coverage, coverage * significance, proximity, color_agreement, coverage * color_agreement])
 
 
 POSE_CONFIDENCE = PoseConfidence.from_table(tomllib.loads(WEIGHTS_FILE.read_text("utf-8")))

@@ -23,6 +23,7 @@ from knowledge_sources.methods.verification.line_check import (
 )
 from knowledge_sources.methods.verification.pose_confidence import (
     POSE_CONFIDENCE,
+    PoseEvidence,
     compute_evidence,
     compute_motion_tolerance_px,
 )
@@ -74,6 +75,7 @@ class Weighed:
         expected: number of lines that should be seen, and tell of the place.
         patterned: number of those that lie in a pattern which the model does not have, and tell nothing.
         lines: how they agree with the segments; faces: how the faces' colours agree.
+        evidence: what of that supports the pose.
         p_false: probability that the pose is wrong, by lines and colours.
         p_wrong: the same with what was believed before, and with the looks in other directions.
         most_p_wrong: how much of that is accepted; where no other look is left, as much as is believed.
@@ -95,6 +97,7 @@ class Weighed:
     patterned: int
     lines: LineCheck
     faces: ColorCheck
+    evidence: PoseEvidence
     p_false: float
     p_wrong: float
     most_p_wrong: float
@@ -147,8 +150,8 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     plain_px = agreed.projected_px if not milestone.displacement_modes else check_lines(
         robot, lines, segments_px, pose, s.verification).projected_px
     faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors, s)
-    p_false = POSE_CONFIDENCE.p_false(compute_evidence(
-        robot, lines, segments_px, pose, fix.covariance, before.pose, before.covariance, agreed, faces))
+    evidence = compute_evidence(robot, lines, pose, fix.covariance, before.pose, before.covariance, agreed, faces)
+    p_false = POSE_CONFIDENCE.p_false(evidence)
     motion_px = compute_motion_tolerance_px(
         robot, lines, before.pose, before.covariance + fix.covariance, s.verification)
     followed = before.has_followed and motion_px <= s.plan.max_followed_px
@@ -169,6 +172,7 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         patterned=int(np.count_nonzero(~asked)),
         lines=agreed,
         faces=faces,
+        evidence=evidence,
         p_false=p_false,
         p_wrong=p_after,
         most_p_wrong=most,

@@ -30,6 +30,7 @@ from knowledge_sources.methods.verification.pose_confidence import (
 )
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.methods.verification.view_quality import predict_milestone
+from knowledge_sources.settings import DEFAULT
 from sim.render.renderer import Renderer
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
@@ -39,7 +40,7 @@ from world_models.robot import RobotModel
 
 PARTS = st.floats(0.0, 1.0)
 COUNTS = st.floats(1.0, 6.0)
-EVIDENCE = st.builds(PoseEvidence, PARTS, PARTS, PARTS, PARTS, COUNTS, PARTS, PARTS, COUNTS)
+EVIDENCE = st.builds(PoseEvidence, PARTS, PARTS, PARTS, PARTS, COUNTS)
 SPREAD = np.diag([0.01, 0.01, 0.005]) ** 2
 
 
@@ -69,7 +70,7 @@ def _segments(pose: Pose2) -> np.ndarray:
 def _evidence(lines: np.ndarray, segments: np.ndarray, pose: Pose2, faces: ColorCheck = NOT_TESTED) -> PoseEvidence:
     robot = _robot()
     checked = check_lines(robot, lines, segments, pose)
-    return compute_evidence(robot, lines, segments, pose, SPREAD, _place(), SPREAD, checked, faces)
+    return compute_evidence(robot, lines, pose, SPREAD, _place(), SPREAD, checked, faces)
 
 
 @given(EVIDENCE, st.sampled_from(EVIDENCE_NAMES), st.floats(0.0, 0.5))
@@ -100,6 +101,22 @@ def test_the_right_pose_is_more_certain_than_those_around_it() -> None:
     for x, y, turn in ((0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.1), (-0.5, 0.2, 0.05)):
         there = _place() @ Pose2(x, y, turn)
         assert POSE_CONFIDENCE.p_false(_evidence(_lines(), _segments(_place()), there, faces)) > 10.0 * here
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(1.3, 0.9 * DEFAULT.verification.line_tolerance_px))
+def test_only_what_is_found_within_a_pixel_is_evidence(seed: int, off_px: float) -> None:
+    """A segment beside its line, within what the matcher allows, covers it; but a right pose has it nearer."""
+    rng, lines, segments = np.random.default_rng(seed), _lines(), _segments(_place())
+    along = segments[:, 1] - segments[:, 0]
+    aside = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+    beside = segments + (off_px * rng.choice((-1.0, 1.0), len(segments)))[:, None, None] * aside[:, None, :]
+    exact, near = (check_lines(_robot(), lines, found, _place()) for found in (segments, beside))
+    assert near.agreement.matched == exact.agreement.matched == exact.sharp.matched
+    assert near.sharp.matched < 0.5 * exact.sharp.matched  # but for others that lie there by chance
+    values, worse = _evidence(lines, segments, _place()), _evidence(lines, beside, _place())
+    assert worse.coverage < 0.5 * values.coverage
+    assert POSE_CONFIDENCE.p_false(worse) > 100.0 * POSE_CONFIDENCE.p_false(values)
 
 
 def test_the_tolerance_grows_with_the_covariance_of_the_motion() -> None:
@@ -171,7 +188,7 @@ def test_a_pose_is_near_the_belief_by_what_both_leave_open(
     segments = _segments(belief)
     check = check_lines(robot, lines, segments, pose)
     spreads = [np.diag([own, own, 0.5 * own]) ** 2, np.diag([believed, believed, 0.2 * believed]) ** 2]
-    one, other = (compute_evidence(robot, lines, segments, pose, a, belief, b, check, NOT_TESTED).proximity
+    one, other = (compute_evidence(robot, lines, pose, a, belief, b, check, NOT_TESTED).proximity
                   for a, b in (spreads, spreads[::-1]))
     sigmas = math.sqrt(sum(o * o / (spreads[0][k, k] + spreads[1][k, k]) for k, o in enumerate(off)))
     assert one == pytest.approx(other) == pytest.approx(1.0 - min(sigmas, 6.0) / 6.0, abs=1e-6)
