@@ -205,6 +205,9 @@ class LocalizationSettings:
     sure_matched_fraction: float = setting(
         0.75, "1", "Part of the predicted lines from which, at that likelihood, segments need no explanation.",
         "engineering judgement, checked with harvey experiment kidnap")
+    clear_log_likelihood: float = setting(
+        80.0, "1", "Log likelihood from which a single view may show nothing of what should be seen: it may be hidden.",
+        "miniworld's development floors")
     min_log_likelihood: float = setting(
         2.0, "1", "Smallest log likelihood of a hypothesis that is kept.",
         "engineering judgement, checked with harvey experiment kidnap")

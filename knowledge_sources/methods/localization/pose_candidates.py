@@ -23,6 +23,7 @@ from knowledge_sources.methods.arrays import Floats, Floats32, Ints, Mask
 from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.motion.routes import compute_free_space
+from knowledge_sources.methods.verification.line_check import take_distinct
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.building import Building
 from world_models.camera import Camera
@@ -202,7 +203,8 @@ class PictureSearch:
         for view in sorted(views, key=lambda v: -_total_length(v.segments_px)):
             direction = find_level_direction(view.segments_px, robot.camera, mount)
             if direction is not None:
-                maps = tuple(compute_chamfer_maps(v.segments_px, robot.camera) for v in views)
+                maps = tuple(compute_chamfer_maps(take_distinct(v.segments_px, settings.verification), robot.camera)
+                             for v in views)
                 heading = direction + view.now_from_then.heading_rad
                 return PictureSearch(robot, tuple(views), maps, heading)
         return None

@@ -23,6 +23,7 @@ from knowledge_sources.methods.verification.line_check import (
     LINE_TOLERANCE_RAD,
     compute_agreement,
     compute_coverage,
+    find_distinct,
     predict_lines,
 )
 from knowledge_sources.settings import DEFAULT, LocalizationSettings, Settings
@@ -246,7 +247,8 @@ class PoseLikelihood:
     """How well a pose explains all views.
 
     Attributes:
-        visible, matched: numbers of lines that should be in view, over all views, and of those that are found.
+        visible, matched: numbers of lines that should be in view, over all views, and of those that are found; without
+            those in a pattern that the model does not have.
         log_likelihood: logarithm of the likelihood ratio of this pose to one drawn by chance.
         explained: part of the length of long segments that lies on a model line, 0..1.
         weakest_view: smallest matched part of the predicted lines of a view that has enough of them, 0..1.
@@ -263,16 +265,18 @@ class PoseLikelihood:
 
         Enough lines must be matched, in every view, and the segments be explained, or else the log likelihood be so
         large that the model may lack much of what is seen, as bricks and planks: the larger it is, the more lines may
-        be missing.
+        be missing, and in a single view all of them, as what stands before the camera hides them.
         """
         fraction = self.matched / max(self.visible, 1)
         enough = settings.sure_log_likelihood
         is_sure = (self.log_likelihood >= enough
                    and fraction >= settings.sure_matched_fraction * enough / self.log_likelihood)
         is_explained = self.explained >= max(settings.min_explained_fraction, settings.min_fraction_sum - fraction)
+        is_clear = (self.weakest_view >= settings.min_view_fraction
+                    or self.log_likelihood >= settings.clear_log_likelihood)
         return (self.matched >= settings.min_matched_lines
                 and self.matched >= settings.min_matched_fraction * self.visible
-                and self.weakest_view >= settings.min_view_fraction and (is_explained or is_sure))
+                and is_clear and (is_explained or is_sure))
 
     def __str__(self) -> str:
         return (f"{self.matched} of {self.visible} model lines that should be seen from there are in the pictures,"
@@ -289,6 +293,7 @@ def compute_pose_likelihood(
         then = view.pose_then(world_from_now)
         lines = predict_lines(robot, then, settings.verification).lines_world
         projected = _project(robot, lines, [then, *_displace(then)])
+        projected = projected[:, find_distinct(projected[0], view.segments_px, settings.verification)]
         agreement = compute_agreement(
             projected[0], view.segments_px, projected[1:], settings.verification.line_tolerance_px)
         visible, matched = visible + agreement.visible, matched + agreement.matched

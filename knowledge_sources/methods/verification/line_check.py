@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -128,21 +129,35 @@ def find_distinct(
     is measured in the picture itself: by how many of the places beside the line are covered as well, beyond those that
     the other lines cover by the model.
     """
+    expected = lines_px[~np.isnan(lines_px).any(axis=(1, 2))]
+    tolerance_px = settings.line_tolerance_px
+    found, by_model = (_measure_pattern(lines_px, some, tolerance_px) for some in (segments_px, expected))
+    return np.asarray(found - by_model <= MAX_PATTERN_PART)
+
+
+def take_distinct(segments_px: Floats, settings: VerificationSettings = DEFAULT.verification) -> Floats:
+    """The segments (k, 2, 2) of a picture without those of bricks, planks and tiles: beside these lie others."""
+    segments = np.array(segments_px, float, order="C").reshape(-1, 2, 2)
+    return segments[_find_distinct_segments(segments.tobytes(), settings.line_tolerance_px)]
+
+
+@lru_cache(maxsize=32)  # a lost robot searches with the same pictures again and again
+def _find_distinct_segments(segments: bytes, tolerance_px: float) -> Mask:
+    segments_px = np.frombuffer(segments).reshape(-1, 2, 2)
+    return np.asarray(_measure_pattern(segments_px, segments_px, tolerance_px) <= MAX_PATTERN_PART)
+
+
+def _measure_pattern(lines_px: Floats, segments_px: Floats, tolerance_px: float) -> Floats:
+    """(m,) part of the places beside lines (m, 2, 2) at which segments (k, 2, 2) lie."""
     if not len(lines_px):
-        return np.zeros(0, np.bool_)
+        return np.zeros(0)
     along = lines_px[:, 1] - lines_px[:, 0]
     aside = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
     near, far = PATTERN_REACH_PX
     steps = np.arange(near, far + 1e-9, PATTERN_STEP_PX)
     shifts = np.concatenate([-steps, steps])[:, None, None, None] * aside[None, :, None, :]
-    places = (lines_px + shifts).reshape(-1, 2, 2)
-
-    def measure(segments: Floats) -> Floats:
-        covered = compute_coverage(places, segments, settings.line_tolerance_px, LINE_TOLERANCE_RAD)
-        return np.asarray(np.mean(covered.reshape(len(shifts), -1) >= MIN_COVERED_FRACTION, axis=0))
-
-    expected = lines_px[~np.isnan(lines_px).any(axis=(1, 2))]
-    return np.asarray(measure(segments_px) - measure(expected) <= MAX_PATTERN_PART)
+    covered = compute_coverage((lines_px + shifts).reshape(-1, 2, 2), segments_px, tolerance_px, LINE_TOLERANCE_RAD)
+    return np.asarray(np.mean(covered.reshape(len(shifts), -1) >= MIN_COVERED_FRACTION, axis=0))
 
 
 def compute_coverage(lines_px: Floats, segments_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:

@@ -35,7 +35,7 @@ from world_models.robot import RobotModel
 
 MAX_BELIEF_SIGMAS = 6.0  # mahalanobis distance from the belief from which a pose gets no credit for being near it
 MIN_P_FALSE = 1e-40  # probability of chance agreement that counts as certainty
-LEAST_P_FALSE = 1e-4  # smallest probability of a wrong pose that is told: of less the cases of the fit say nothing
+LEAST_P_FALSE = 1e-4  # smallest probability of a wrong place by one picture: of less the cases of the fit say nothing
 P_REPAINTED = 0.05  # probability that faces lost the model's colors, which then speak neither for a pose nor against it
 
 NEAR_M = 0.1
@@ -178,9 +178,9 @@ class PoseConfidence:
         values = evidence.values[None]
         by_lines = float(self.lines_only.p_false(values)[0])
         if not evidence.color_count:
-            return max(by_lines, LEAST_P_FALSE)
+            return by_lines
         repainted = by_lines / (by_lines + P_REPAINTED * (1.0 - by_lines))
-        return max(min(repainted, float(self.lines_and_colors.p_false(values)[0])), LEAST_P_FALSE)
+        return min(repainted, float(self.lines_and_colors.p_false(values)[0]))
 
     @staticmethod
     def from_table(table: dict[str, Any]) -> PoseConfidence:

@@ -22,6 +22,7 @@ from knowledge_sources.methods.verification.line_check import (
     project_lines,
 )
 from knowledge_sources.methods.verification.pose_confidence import (
+    LEAST_P_FALSE,
     POSE_CONFIDENCE,
     PoseEvidence,
     compute_evidence,
@@ -151,7 +152,7 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         robot, lines, segments_px, pose, s.verification).projected_px
     faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors, s)
     evidence = compute_evidence(robot, lines, pose, fix.covariance, before.pose, before.covariance, agreed, faces)
-    p_false = POSE_CONFIDENCE.p_false(evidence)
+    p_false = max(POSE_CONFIDENCE.p_false(evidence), LEAST_P_FALSE)
     motion_px = compute_motion_tolerance_px(
         robot, lines, before.pose, before.covariance + fix.covariance, s.verification)
     followed = before.has_followed and motion_px <= s.plan.max_followed_px

@@ -15,12 +15,12 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 10_190,
-    "knowledge_sources": 22_826,
+    "knowledge_sources": 22_850,
     "sim": 5_935,
     "logs": 7_756,
     "harvey": 11_192,
-    "experiments": 11_212,
-    "tests": 45_520,
+    "experiments": 11_300,
+    "tests": 45_545,
     "extras": 22_200,
 }
 """Of Python files, at most."""
