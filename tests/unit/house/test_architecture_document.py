@@ -71,7 +71,8 @@ def test_every_file_that_is_named_is_there(document: str) -> None:
 def test_every_module_that_is_run_is_there(document: str) -> None:
     text = (ROOT / document).read_text(encoding="utf-8")
     modules, rooms = re.findall(r"python -m ([\w.]+)", text), (ROOT, *ROOT.glob("extras/*"))
-    assert [name for name in modules if not any((room / f"{name.replace('.', '/')}.py").exists() for room in rooms)] == []
+    files = {name: f"{name.replace('.', '/')}.py" for name in modules}
+    assert [name for name, file in files.items() if not any((room / file).exists() for room in rooms)] == []
 
 
 def test_architecture_names_every_folder_of_two_levels() -> None:
