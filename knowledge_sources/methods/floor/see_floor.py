@@ -63,6 +63,8 @@ P_SEEN_ONCE = 0.7  # probability that what does not look like the floor stands o
 P_LIKE_FLOOR = 0.015  # the same of what looks like the floor, and seems to stand up from it
 MIN_UNLIKE_SHARE = 0.2  # of a region of which less than that does not look like the floor, all is said to look like it
 TOLD_HEIGHT_M = 0.3  # what looks like the floor is said to be told where something so high would be
+DOUBT_MARGIN_M = 0.15  # floor so near beside what one earlier picture alone tells to stand is not seen to be free
+MIN_DOUBTFUL_ROWS = 10  # of a column of the picture at half its size, from which that is so
 PART_SIGMA = 0.05  # of the part of the floor's distance at which the earlier picture shows a thing
 
 DRIVEN_HALF_WIDTH_M = 0.25
@@ -145,7 +147,7 @@ def see_free_floor(
         told = model.is_unknown & relief.tells_of(np.full(grid.shape, _told_part(grid)))
         sure = relief.agreeing(again, by_motion)
         doubtful = drop_specks((relief.kinds == STANDING) & (sure.kinds != STANDING))
-        told &= grid.ranges_m < np.where(doubtful, relief.parts * grid.ranges_m, np.inf).min(axis=0)
+        told &= grid.ranges_m < _keep_off(np.where(doubtful, relief.parts * grid.ranges_m, np.inf), robot)
         relief = sure
         asked, tells = tells | by_motion, tells | told
     regions = find_regions(unlike, asked, grid, relief)
@@ -163,6 +165,20 @@ def see_free_floor(
         near_m=scan.near_m, far_m=scan.far_m, ends=scan.ends, sigma_m=scan.sigma_m,
         things=tuple(thing for _, thing in things), seen_s=seen_s, light=light,
         told_m=_measure_told_m(grid, relief)), learnt
+
+
+def _keep_off(doubtful_m: Floats, robot: RobotModel) -> Floats:
+    """(columns,) how far the floor is free where something may stand at these distances (rows, columns), and beside it.
+
+    Beside what is high: a speck, as tiles give some, hides nothing beside it.
+    """
+    nearest_m, high = doubtful_m.min(axis=0), np.count_nonzero(np.isfinite(doubtful_m), axis=0) >= MIN_DOUBTFUL_ROWS
+    free_m = nearest_m.copy()
+    for column in np.flatnonzero(high):
+        wide = math.ceil(DOUBT_MARGIN_M * robot.camera.fx / STEP_PX / nearest_m[column])
+        beside = slice(max(0, column - wide), column + wide + 1)
+        free_m[beside] = np.minimum(free_m[beside], nearest_m[column])
+    return np.asarray(free_m)
 
 
 class _Comparison:
