@@ -78,7 +78,7 @@ class Weighed:
         lines: how they agree with the segments; faces: how the faces' colours agree.
         evidence: what of that supports the pose.
         p_false: probability that the pose is wrong, by lines and colours.
-        p_wrong: the same with what was believed before, and with the looks in other directions.
+        p_by_looks: the same with the looks in other directions; p_wrong: and with what was believed before.
         most_p_wrong: how much of that is accepted; where no other look is left, as much as is believed.
         shift_px: median distance of the lines from where they were expected.
         tolerance_px: the largest that may be.
@@ -100,6 +100,7 @@ class Weighed:
     faces: ColorCheck
     evidence: PoseEvidence
     p_false: float
+    p_by_looks: float
     p_wrong: float
     most_p_wrong: float
     shift_px: float
@@ -161,7 +162,8 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         expected_px = robot.camera.project_segments(lines, robot.camera_from_world(before.pose))[0]
     believed = BelievedPlace(before.pose, before.covariance + fix.covariance,
                              1.0 - _find_prior(before, s.plan, followed=followed))
-    p_after = update(believed.compute_p_wrong(pose), _sum_told(milestone) + to_log_odds(p_false))
+    by_looks = _sum_told(milestone) + to_log_odds(p_false)
+    p_after = update(believed.compute_p_wrong(pose), by_looks)
     most = 1.0 - s.localization.min_p_believed if is_last_look(milestone, s.plan) else POSE_CONFIDENCE.accept
     return Weighed(
         robot=robot,
@@ -175,6 +177,7 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         faces=faces,
         evidence=evidence,
         p_false=p_false,
+        p_by_looks=update(0.5, by_looks),
         p_wrong=p_after,
         most_p_wrong=most,
         shift_px=_median_shift(expected_px, plain_px),
@@ -221,12 +224,12 @@ def judge_place(w: Weighed, settings: Settings) -> Verdict:
         return Verdict("not testable", few, *odds)
     colours = f" and {round(faces.agreeing * faces.count)} of {faces.count} faces' colours" * faces.is_testable
     found = f"{a.matched} of {a.visible} lines, {w.lines.coverage:.0%} of their length,{colours} accounted for{others}"
-    if w.p_false >= POSE_CONFIDENCE.refute:
-        odds = w.p_false, POSE_CONFIDENCE.refute
+    if w.p_by_looks >= POSE_CONFIDENCE.refute:
+        odds = w.p_by_looks, POSE_CONFIDENCE.refute
         if not w.is_camera_known:  # a place where the camera's own error hides what agrees
             return Verdict("not testable", f"{found}: the camera is not known well enough to tell", *odds)
         kind: MilestoneVerdict = "not testable" if w.is_inexact else "refuted"
-        return Verdict(kind, f"{found}: by this picture {tell_odds(*odds)}", *odds)
+        return Verdict(kind, f"{found}: by what was seen {tell_odds(*odds)}", *odds)
     where = f"{found}, {w.shift_px:.1f} px from where expected"
     if w.camera_chi2 > settings.camera_state.max_chi2:
         return Verdict("refuted", f"{where}: only with a camera that is mounted otherwise than it can be", *odds)

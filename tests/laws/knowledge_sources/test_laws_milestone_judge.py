@@ -75,7 +75,7 @@ def weigh(**changed: Any) -> Any:
         "segments": Segments("CameraPicture-1", "Milestone-1", NO_LINES, np.zeros(0), contrast), "expected": 20,
         "patterned": changed.pop("patterned", 0),
         "lines": SimpleNamespace(agreement=agreement, coverage=0.9), "faces": changed.pop("faces", NO_FACES),
-        "p_false": 0.5 * POSE_CONFIDENCE.accept, "p_wrong": 0.1 * POSE_CONFIDENCE.accept,
+        "p_by_looks": 0.5 * POSE_CONFIDENCE.accept, "p_wrong": 0.1 * POSE_CONFIDENCE.accept,
         "most_p_wrong": POSE_CONFIDENCE.accept, "shift_px": 3.0, "tolerance_px": 10.0,
         "is_weak": False, "is_inexact": False, "camera_chi2": 0.0, "is_camera_known": True,
     }
@@ -96,10 +96,10 @@ UNSURE = {"p_wrong": POSE_CONFIDENCE.accept + SMALL}
     ({"matched": FEW}, "verified"),
     ({"matched": FEW - 1}, "not testable"),
     (UNSURE, "not testable"),
-    ({"p_false": REFUTE - SMALL, **UNSURE}, "not testable"),
-    ({"p_false": REFUTE + SMALL, **UNSURE}, "refuted"),
-    ({"p_false": REFUTE + SMALL, **UNSURE, "is_inexact": True}, "not testable"),
-    ({"p_false": REFUTE + SMALL, **UNSURE, "is_camera_known": False}, "not testable"),
+    ({"p_by_looks": REFUTE - SMALL, **UNSURE}, "not testable"),
+    ({"p_by_looks": REFUTE + SMALL, **UNSURE}, "refuted"),
+    ({"p_by_looks": REFUTE + SMALL, **UNSURE, "is_inexact": True}, "not testable"),
+    ({"p_by_looks": REFUTE + SMALL, **UNSURE, "is_camera_known": False}, "not testable"),
     ({"camera_chi2": CHI2 - SMALL}, "verified"),
     ({"camera_chi2": CHI2 + SMALL}, "refuted"),
     ({"shift_px": 10.0 - SMALL}, "verified"),
@@ -115,17 +115,17 @@ def test_the_verdict_just_below_and_just_above_each_bound(changed: dict[str, Any
        st.floats(0.0, 60.0), st.booleans())
 @settings(max_examples=200, deadline=None)
 def test_a_verdict_says_one_count_of_lines_and_the_bound_that_decided(
-    matched: int, p_false: float, p_wrong: float, most: float, shift_px: float, is_inexact: bool
+    matched: int, p_by_looks: float, p_wrong: float, most: float, shift_px: float, is_inexact: bool
 ) -> None:
     """Whatever it is, its reason has the figures of its fields, and no others of their kind."""
-    said = judge_place(weigh(matched=matched, p_false=p_false, p_wrong=p_wrong, most_p_wrong=most, shift_px=shift_px,
-                             is_inexact=is_inexact), DEFAULT)
+    said = judge_place(weigh(matched=matched, p_by_looks=p_by_looks, p_wrong=p_wrong, most_p_wrong=most,
+                             shift_px=shift_px, is_inexact=is_inexact), DEFAULT)
     assert re.findall(r"(\d+) of (\d+) lines", said.reason) == [(str(matched), "20")]
     told = re.findall(r"wrong with a probability of ([^ ]+)%; the limit is ([^ ]+)%", said.reason)
     assert "e+" not in said.reason
     assert not told or [float(percent) for percent in told[0]] == pytest.approx(
         [100.0 * said.p_wrong, 100.0 * said.most_p_wrong], rel=0.05)
-    is_by_odds = said.kind == "verified" or p_false >= REFUTE or p_wrong > most
+    is_by_odds = said.kind == "verified" or p_by_looks >= REFUTE or p_wrong > most
     assert bool(told) is is_by_odds
     if said.kind == "verified" or not is_by_odds:
         assert said.p_wrong <= said.most_p_wrong
