@@ -204,8 +204,7 @@ def predict_p_false(
     projected = projected[np.isfinite(projected).all(axis=(1, 2))]
     lines = check_lines(robot, lines_world, projected, pose, settings)
     colors = predict_color_check(predict_face_colors(robot, pose))
-    return POSE_CONFIDENCE.p_false(compute_evidence(
-        robot, lines_world, pose, covariance, pose, covariance, lines, colors))
+    return POSE_CONFIDENCE.p_false(compute_evidence(pose, covariance, pose, covariance, lines, colors))
 
 
 def find_alias(

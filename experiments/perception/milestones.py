@@ -63,12 +63,10 @@ def run(quick: bool, seed: int) -> Report:
     return report
 
 
-def judge_floors(
-    first_floor: int, floors: int, each: int, folder: Path, textured: Sequence[bool] = (False, True)
-) -> list[JudgedCase]:
-    """Judge the cases of some floors, in order; results that the folder has are not computed again."""
+def judge_floors(first_floor: int, floors: int, each: int, folder: Path) -> list[JudgedCase]:
+    """Judge the cases of some floors, painted and textured, in order; those that the folder has are kept."""
     trials = [Trial(first_floor + k, first, min(BLOCK, each - first), is_textured)
-              for is_textured in textured for k in range(floors) for first in range(0, each, BLOCK)]
+              for is_textured in (False, True) for k in range(floors) for first in range(0, each, BLOCK)]
     results = run_trials(judge_trial, trials, TrialResult, folder, "block")
     return [JudgedCase(**table) for block in results for table in block.judged]
 

@@ -244,4 +244,4 @@ class Onlooker:
         for change in (*decision.observed, *decision.made):
             value: Any = change.entry.value
             if isinstance(value, KINDS):
-                self._tell(list(self.messages.take(value)))  # what is certified comes of it, whoever hears
+                self._tell(list(self.messages.take(value)))  # even where nobody listens: certificates follow from it

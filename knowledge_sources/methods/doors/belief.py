@@ -164,7 +164,7 @@ def explain_picture(
     pose = fix.world_from_robot
     agreed = check_lines(robot, lines.lines_world, segments_px, pose, s)
     faces = check_colors(robot, pose, read_picture(jpeg).quarter, predict_face_colors(robot, pose), settings)
-    weight = compute_evidence(robot, lines.lines_world, pose, fix.covariance, belief, covariance, agreed, faces)
+    weight = compute_evidence(pose, fix.covariance, belief, covariance, agreed, faces)
     return Explanation(pose, fix.covariance, POSE_CONFIDENCE.p_false(weight), agreed.agreement.matched, len(lines))
 
 

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.arrays import Floats, Mask
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief.places import compute_chi2
 from knowledge_sources.methods.pose.planar import compute_point_jacobian
 from knowledge_sources.methods.verification.color_check import ColorCheck
@@ -37,9 +37,6 @@ MAX_BELIEF_SIGMAS = 6.0  # mahalanobis distance from the belief from which a pos
 MIN_P_FALSE = 1e-40  # probability of chance agreement that counts as certainty
 LEAST_P_FALSE = 1e-4  # smallest probability of a wrong place by one picture: of less the cases of the fit say nothing
 P_REPAINTED = 0.05  # probability that faces lost the model's colors, which then speak neither for a pose nor against it
-
-NEAR_M = 0.1
-"""Lines with an end nearer to the camera than this have no defined motion in the picture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,13 +67,11 @@ EVIDENCE_NAMES = tuple(field.name for field in fields(PoseEvidence))
 
 
 def compute_evidence(
-    robot: RobotModel, lines_world: Floats, pose: Pose2, covariance: Floats, belief: Pose2, belief_covariance: Floats,
-    lines: LineCheck, colors: ColorCheck,
+    pose: Pose2, covariance: Floats, belief: Pose2, belief_covariance: Floats, lines: LineCheck, colors: ColorCheck
 ) -> PoseEvidence:
     """Compute the evidence for a pose.
 
     Args:
-        lines_world: (m, 2, 3) predicted lines [m, world].
         pose, covariance: the pose in question, world; (3, 3) over (x, y, heading).
         belief, belief_covariance: the pose that was believed before, in the same form.
         lines, colors: the checks of the picture at the pose.
@@ -104,7 +99,7 @@ def compute_motion_tolerance_px(
     """
     if not len(lines_world):
         return 0.0
-    _, across = _compute_slopes(robot, lines_world, pose)
+    across = _compute_slopes(robot, lines_world, pose)
     middle = across.mean(axis=1)
     sigmas = np.sqrt(np.einsum("nk,kl,nl->n", middle, covariance, middle))
     return settings.motion_tolerance_sigmas * float(np.median(sigmas))
@@ -115,15 +110,14 @@ def _ratio(part: Floats, whole: Floats) -> float:
     return float(np.sum(part)) / total if total > 1e-9 else 0.0
 
 
-def _compute_slopes(robot: RobotModel, lines_world: Floats, pose: Pose2) -> tuple[Mask, Floats]:
-    """Which lines (m,) lie before the camera, and how their ends (m, 2, 3) move across them by (x, y, heading) [px]."""
-    points, pixels, slopes = compute_point_jacobian(
+def _compute_slopes(robot: RobotModel, lines_world: Floats, pose: Pose2) -> Floats:
+    """How the ends of lines move across them by (x, y, heading), (m, 2, 3) [px]."""
+    _, pixels, slopes = compute_point_jacobian(
         lines_world.reshape(-1, 3), robot.camera, pose, robot.mount.camera_from_robot)
     ends = pixels.reshape(-1, 2, 2)
     along = ends[:, 1] - ends[:, 0]
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
-    across = np.einsum("nj,nejk->nek", normal, slopes.reshape(-1, 2, 2, 3))
-    return np.all(points[:, 2].reshape(-1, 2) > NEAR_M, axis=1), np.asarray(across)
+    return np.asarray(np.einsum("nj,nejk->nek", normal, slopes.reshape(-1, 2, 2, 3)))
 
 
 TERMS = ("coverage", "coverage-and-significance", "proximity", "color_agreement", "coverage-and-color_agreement")

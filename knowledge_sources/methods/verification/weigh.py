@@ -152,7 +152,7 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     plain_px = agreed.projected_px if not milestone.displacement_modes else check_lines(
         robot, lines, segments_px, pose, s.verification).projected_px
     faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors, s)
-    evidence = compute_evidence(robot, lines, pose, fix.covariance, before.pose, before.covariance, agreed, faces)
+    evidence = compute_evidence(pose, fix.covariance, before.pose, before.covariance, agreed, faces)
     p_false = max(POSE_CONFIDENCE.p_false(evidence), LEAST_P_FALSE)
     motion_px = compute_motion_tolerance_px(
         robot, lines, before.pose, before.covariance + fix.covariance, s.verification)

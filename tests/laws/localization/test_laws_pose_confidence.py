@@ -70,7 +70,7 @@ def _segments(pose: Pose2) -> np.ndarray:
 def _evidence(lines: np.ndarray, segments: np.ndarray, pose: Pose2, faces: ColorCheck = NOT_TESTED) -> PoseEvidence:
     robot = _robot()
     checked = check_lines(robot, lines, segments, pose)
-    return compute_evidence(robot, lines, pose, SPREAD, _place(), SPREAD, checked, faces)
+    return compute_evidence(pose, SPREAD, _place(), SPREAD, checked, faces)
 
 
 @given(EVIDENCE, st.sampled_from(EVIDENCE_NAMES), st.floats(0.0, 0.5))
@@ -188,7 +188,7 @@ def test_a_pose_is_near_the_belief_by_what_both_leave_open(
     segments = _segments(belief)
     check = check_lines(robot, lines, segments, pose)
     spreads = [np.diag([own, own, 0.5 * own]) ** 2, np.diag([believed, believed, 0.2 * believed]) ** 2]
-    one, other = (compute_evidence(robot, lines, pose, a, belief, b, check, NOT_TESTED).proximity
+    one, other = (compute_evidence(pose, a, belief, b, check, NOT_TESTED).proximity
                   for a, b in (spreads, spreads[::-1]))
     sigmas = math.sqrt(sum(o * o / (spreads[0][k, k] + spreads[1][k, k]) for k, o in enumerate(off)))
     assert one == pytest.approx(other) == pytest.approx(1.0 - min(sigmas, 6.0) / 6.0, abs=1e-6)
