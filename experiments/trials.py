@@ -75,6 +75,11 @@ def at_least(found: int, of: int) -> float:
     return 1.0 - at_most(of - found, of)
 
 
+def is_surely_within(found: int, of: int, low: float, high: float) -> bool:
+    """Whether a rate lies from ``low`` to ``high`` with both of its bounds: what chance alone explains does not do."""
+    return low <= at_least(found, of) and at_most(found, of) <= high
+
+
 def _check(found: int, of: int) -> None:
     if not 0 <= found <= of:
         raise ValueError(f"expected 0 to {of} of {of}, got {found}")
