@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -131,7 +131,8 @@ def write_inexact_mission(
 ) -> Path:
     """Write a scenario from one room of a generated floor to another, with the floor's files; returns its path.
 
-    Start and goal do not depend on how far the walls are displaced as long as there is a way.
+    Start and goal do not depend on how far the walls are displaced as long as there is a way, in truth and by the
+    model: nobody sends a robot to where a table stands on the plan.
 
     Args:
         truth: how inexact the model is; its seed is replaced by ``seed``.
@@ -145,19 +146,20 @@ def write_inexact_mission(
     world, details = floor.write(folder)
     if stated_m:
         world.write_text(f"sigma_cm = {100.0 * stated_m:g}\n{world.read_text('utf-8')}", "utf-8")
-    table = (f"\n[truth.inexact]\nsigma_m = {truth.sigma_m:g}\nmissing = {truth.missing:g}\nextra = {truth.extra:g}\n"
-             f"seed = {seed}\n") if truth.sigma_m or truth.missing or truth.extra else ""
+    told = {key: value for key, value in asdict(truth).items() if key != "seed" and value}
+    table = "\n".join(["\n[truth.inexact]", *(f"{key} = {value:g}" for key, value in told.items()), f"seed = {seed}\n"]
+                      ) if told else ""
     for _ in range(MAX_DRAWS):
         ends = draw_ends(floor, draw_rooms(floor, rng), rng)
         text = format_mission(f"A generated floor, inexact by {100.0 * truth.sigma_m:g} cm.", (world, details), ends,
-                              draw_heading_deg(rng)) + table + more
+                              draw_heading_deg(rng))
         try:
-            stage = build_stage(parse_scenario(text, "inexact", folder))
+            stages = [build_stage(parse_scenario(text + of, "inexact", folder)) for of in dict.fromkeys(("", table))]
         except ValueError:
             continue
-        if is_drivable(stage.building.obstacles, stage.start_world, stage.goal_world):
+        if all(is_drivable(s.building.obstacles, s.start_world, s.goal_world) for s in stages):
             path = folder / f"inexact-{seed}.toml"
-            path.write_text(text, "utf-8")
+            path.write_text(text + table + more, "utf-8")
             return path
     raise ValueError(f"expected a mission on floor {seed}, got none in {MAX_DRAWS} draws")
 

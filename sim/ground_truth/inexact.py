@@ -37,6 +37,8 @@ PARALLEL = 0.999
 """Cosine between the normals of walls that lie in one plane."""
 SAME_PLANE_M = 0.02
 """Walls of one room that lie in one plane to this are pieces of one wall [m]."""
+MIN_LONG_M = 5.0
+"""A corridor's walls of this length are beside those who walk along it [m]."""
 MARGIN_M, NEAR_DOOR_M, OUTSIDE_M = 0.3, 0.05, 0.15
 """Extra things are so far from the ends of their wall and from doors, and reach so far out of their room [m]."""
 
@@ -49,12 +51,16 @@ class TrueInexact(Bounded):
         sigma_m: standard deviation of each displacement.
         missing: share of the model's things that are not there.
         extra: number of things that are there and not in the model, as a share of the model's things.
+        door_m: by how much each door is beside its place besides, to either side.
+        corridor_m: by how much each hallway is wider, half of it on either side.
         seed: of the random numbers.
     """
 
     sigma_m: float = bounded(0.0, 0.0, 0.3)
     missing: float = bounded(0.0, 0.0, 1.0)
     extra: float = bounded(0.0, 0.0, 1.0)
+    door_m: float = bounded(0.0, 0.0, 0.3)
+    corridor_m: float = bounded(0.0, 0.0, 0.5)
     seed: int = bounded(0, 0, 2**31)
 
 
@@ -81,9 +87,9 @@ class TrueBuilding:
 def displace(spec: WorldSpec, truth: TrueInexact) -> TrueBuilding:
     """The model with all its displacements, the same for the same arguments."""
     walls_rng, doors_rng, things_rng, lots_rng = np.random.default_rng([truth.seed, 11]).spawn(4)
-    walls_m = _draw_walls(spec, truth.sigma_m, walls_rng)
+    walls_m = _draw_walls(spec, truth.sigma_m, 0.5 * truth.corridor_m, walls_rng)
     moved = _move_walls(spec, walls_m)
-    moved, doors_m = _move_doors(spec, moved, truth.sigma_m, doors_rng)
+    moved, doors_m = _move_doors(spec, moved, truth, doors_rng)
     things = [_move_thing(thing, spec.locales[thing.locale], moved.locales[thing.locale], truth.sigma_m, things_rng)
               for thing in spec.things]
     is_missing = lots_rng.random(len(things)) < truth.missing
@@ -107,9 +113,12 @@ def _draw(rng: np.random.Generator, sigma_m: float, size: int = 1) -> Floats:
 # -- walls -----------------------------------------------------------------------------------------------------------
 
 
-def _draw_walls(spec: WorldSpec, sigma_m: float, rng: np.random.Generator) -> dict[tuple[str, str], float]:
-    """The displacement of each wall (locale, wall) into its room [m]."""
+def _draw_walls(
+    spec: WorldSpec, sigma_m: float, outward_m: float, rng: np.random.Generator
+) -> dict[tuple[str, str], float]:
+    """The displacement of each wall (locale, wall) into its room [m]; ``outward_m``: of a corridor's long walls."""
     names, starts, ends, inward = _list_walls(spec)
+    lengths = np.linalg.norm(ends - starts, axis=1)
     graph = nx.Graph()
     graph.add_nodes_from(range(len(names)))
     for i in range(len(names)):
@@ -118,6 +127,8 @@ def _draw_walls(spec: WorldSpec, sigma_m: float, rng: np.random.Generator) -> di
     for group in nx.connected_components(graph):
         first = min(group)
         by_m = float(_draw(rng, sigma_m)[0])
+        long = [i for i in group if spec.locales[names[i][0]].kind == "hallway" and lengths[i] >= MIN_LONG_M]
+        by_m -= outward_m * float(np.sign(inward[long[0]] @ inward[first])) if long else 0.0
         found.update({names[i]: by_m * float(np.sign(inward[i] @ inward[first])) for i in group})
     return {name: found[name] for name in names}
 
@@ -179,10 +190,12 @@ def _move_sides(outline: Floats, inward_m: Floats) -> Floats:
 
 
 def _move_doors(
-    spec: WorldSpec, moved: WorldSpec, sigma_m: float, rng: np.random.Generator
+    spec: WorldSpec, moved: WorldSpec, truth: TrueInexact, rng: np.random.Generator
 ) -> tuple[WorldSpec, dict[str, float]]:
     """Doors along their walls; one that does not fit there is displaced by less."""
-    by_m = dict(zip((door.name for door in spec.doors), _draw(rng, sigma_m, len(spec.doors)).tolist(), strict=True))
+    drawn = _draw(rng, 1.0, len(spec.doors))
+    offs_m = truth.sigma_m * drawn + truth.door_m * np.sign(drawn)
+    by_m = dict(zip((door.name for door in spec.doors), offs_m.tolist(), strict=True))
     known = _count_faults(spec)
     for _ in range(MAX_SMALLER):
         tried = replace(moved, doors=tuple(_move_door(door, spec, moved, by_m[door.name]) for door in spec.doors))

@@ -2,8 +2,9 @@
 
 A world file may state a standard deviation (``sigma_cm``) for all of it, a locale, a door or a thing. What is built
 together is wrong together, so the errors are not one a line but one a *mode*: a wall is displaced along its normal with
-all that is on it; a door along its wall; a thing along and up its wall, or on the floor in both directions. The modes
-are independent and normal. Without a stated deviation the model counts as exact, and there are none.
+all that is on it, the two sides of a wall with a door as one; a door along its wall, with the ends that it cuts the
+wall's lines to; a thing along and up its wall, or on the floor in both directions. The modes are independent and
+normal. Without a stated deviation the model counts as exact, and there are none.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:  # an explanation reads journals, and needs no building
     from world_models.building.building import Building
     from world_models.building.geometry.landmarks import Landmark
+    from world_models.building.locales import Doorway
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +29,8 @@ WALL_DEPTH_M = 0.15
 """What lies no further than this from the plane of a wall is on it [m]."""
 MIN_LIFT_M = 0.3
 """Things on a wall that begin lower stand on the floor: their height is known [m]."""
+JAMB_M = 0.2
+"""What of a wall lies whole within this of a jamb ends at the door, and is displaced with it [m]."""
 MAX_MARKS = 4096
 """Landmarks whose modes are kept."""
 
@@ -105,32 +109,55 @@ def _find_modes(building: Building, mark: Landmark) -> Mapping[str, Floats]:
 
 def _compute_modes(building: Building, mark: Landmark) -> dict[str, Floats]:
     own_m, walls_m = find_sigma_m(building, mark.locale, mark.name), find_sigma_m(building, mark.locale)
-    names, origins, inward = _list_walls(building, mark.locale)
-    lines = mark.lines_world
+    walls, origins, inward = _list_walls(building, mark.locale)
+    lines, doors = mark.lines_world, {door.name: door for door in building.doorways_of(mark.locale)}
     flat = lines[..., :2]
     off_m = np.einsum("nei,wi->wne", flat, inward) - np.sum(origins * inward, axis=1)[:, None, None]
     if mark.kind == "wall":
         near = np.abs(off_m).max(axis=2) <= WALL_DEPTH_M
-        return {names[w]: walls_m * near[w][:, None] * _level(inward[w]) for w in np.flatnonzero(near.any(axis=1))}
+        found = {walls[w][0]: walls_m * near[w][:, None] * walls[w][1] for w in np.flatnonzero(near.any(axis=1))}
+        for door in doors.values():
+            jambs = door.threshold_of(mark.locale)
+            cut = np.linalg.norm(flat[:, None] - jambs[:, None], axis=3).max(axis=2).min(axis=1) <= JAMB_M
+            if np.any(cut):
+                door_m = find_sigma_m(building, mark.locale, door.name)
+                found[f"{door.name} along"] = door_m * cut[:, None] * _find_along(door)
+        return found
     thing = next((t for t in building.things_of(mark.locale) if t.name == mark.name), None)
     if thing is not None and thing.protrusion_m is None:
         return {f"{mark.name} {axis}": own_m * _same(lines, direction)
                 for axis, direction in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)))}
     wall = int(np.argmin(np.abs(off_m).mean(axis=(1, 2)) + 10.0 * _miss_wall(flat, origins, inward)))
-    along = (inward[wall, 1], -inward[wall, 0], 0.0)
-    found = {names[wall]: walls_m * _same(lines, tuple(_level(inward[wall]))),
-             f"{mark.name} along": own_m * _same(lines, along)}
+    along = _find_along(doors[mark.name]) if mark.name in doors else (inward[wall, 1], -inward[wall, 0], 0.0)
+    found = {walls[wall][0]: walls_m * _same(lines, walls[wall][1]), f"{mark.name} along": own_m * _same(lines, along)}
     if thing is not None and thing.low_m >= MIN_LIFT_M:
         found[f"{mark.name} up"] = own_m * _same(lines, (0.0, 0.0, 1.0))
     return found
 
 
-def _list_walls(building: Building, locale: str) -> tuple[list[str], Floats, Floats]:
-    """Names, starts (w, 2) and unit normals into the room (w, 2) of the walls of a room [m, world]."""
-    outline = building.outline(locale)
+def _list_walls(building: Building, locale: str) -> tuple[list[tuple[str, Floats]], Floats, Floats]:
+    """Mode and its direction (3,) of each wall of a room, starts (w, 2) and unit normals into it (w, 2) [m, world].
+
+    The two sides of a wall with a door are one, named after the longer side.
+    """
+    origins, inward, lengths = _measure_walls(building.outline(locale))
+    walls = [(f"{locale} wall {i}", _level(inward[i])) for i in range(len(origins))]
+    for door in building.doorways_of(locale):
+        other = door.other(locale)
+        theirs, into, long = _measure_walls(building.outline(other))
+        i, k = (int(np.argmin(np.abs(np.sum((door.threshold_of(room).mean(axis=0) - starts) * normals, axis=1))
+                              + 10.0 * _miss_wall(door.threshold_of(room), starts, normals)))
+                for room, starts, normals in ((locale, origins, inward), (other, theirs, into)))
+        if (long[k], other) > (lengths[i], locale):
+            walls[i] = f"{other} wall {k}", _level(into[k])
+    return walls, origins, inward
+
+
+def _measure_walls(outline: Floats) -> tuple[Floats, Floats, Floats]:
+    """Starts (w, 2), unit normals into the room (w, 2) and lengths (w,) of the walls of an outline [m, world]."""
     along = np.roll(outline, -1, axis=0) - outline
-    normals = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
-    return [f"{locale} wall {i}" for i in range(len(outline))], outline, normals
+    lengths = np.linalg.norm(along, axis=1)
+    return outline, np.column_stack([-along[:, 1], along[:, 0]]) / lengths[:, None], lengths
 
 
 def _miss_wall(points: Floats, origins: Floats, inward: Floats) -> Floats:
@@ -141,10 +168,16 @@ def _miss_wall(points: Floats, origins: Floats, inward: Floats) -> Floats:
     return np.asarray(np.maximum(0.0, np.maximum(-at, at - lengths)))
 
 
+def _find_along(door: Doorway) -> Floats:
+    """(3,) unit direction along the wall of a door [world]; the same from both its sides."""
+    ahead = door.outward_from(door.between[0])
+    return np.array([ahead[1], -ahead[0], 0.0])
+
+
 def _level(direction: Floats) -> Floats:
     return np.array([direction[0], direction[1], 0.0])
 
 
-def _same(lines: Floats, direction: tuple[float, ...]) -> Floats:
+def _same(lines: Floats, direction: tuple[float, ...] | Floats) -> Floats:
     """(n, 3) one displacement for all lines."""
     return np.tile(np.array(direction, float), (len(lines), 1))

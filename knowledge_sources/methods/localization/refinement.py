@@ -21,9 +21,13 @@ from knowledge_sources.methods.pose.planar import to_pose2
 from knowledge_sources.methods.verification.line_check import (
     DISPLACEMENT_M,
     LINE_TOLERANCE_RAD,
+    check_lines,
     compute_agreement,
     compute_coverage,
+    compute_log_ratio,
     find_distinct,
+    find_errors,
+    list_names,
     predict_lines,
 )
 from knowledge_sources.settings import DEFAULT, LocalizationSettings, Settings
@@ -44,9 +48,6 @@ KNOWN_TURN_RAD = math.radians(0.5)  # standard deviation of a turn up to which i
 TURN_SEARCH_SIGMAS = 2.5  # reach of the search for an uncertain turn, in standard deviations
 MAX_VIEW_SURPRISE = 11.3
 """Largest squared normalized error of a view by the others, with which they still agree; three unknowns, 99 %."""
-DETECTION_RATE = 0.85  # probability that a predicted line is found at the right pose: others are hidden or too faint
-CERTAINTY_BOUNDS = 0.04, 0.6  # of the chance of a match, as a line counts for or against a pose
-LINE_INDEPENDENCE = 0.5  # weight of a line: lines of one thing are seen or missed together (tempered likelihood)
 MIN_VIEW_LINES = 8  # fewest predicted lines by which a single view counts
 MIN_EXPLAINED_LENGTH_PX = 25.0  # shortest segment that should be explained by the model
 EXPLAINED_TOLERANCE_PX = 3.0  # distance of a segment from the model line that explains it
@@ -286,16 +287,22 @@ class PoseLikelihood:
 def compute_pose_likelihood(
     robot: RobotModel, views: Sequence[CameraView], world_from_now: Pose2, settings: Settings = DEFAULT
 ) -> PoseLikelihood:
-    """Compute the likelihood of the robot's pose now by all views."""
+    """Compute the likelihood of the robot's pose now by all views; lines of an inexact model are displaced as they fit.
+    """
     visible = matched = 0
     terms, weakest, lengths, explained = [0.0], 1.0, 0.0, 0.0
     for view in views:
         then = view.pose_then(world_from_now)
-        lines = predict_lines(robot, then, settings.verification).lines_world
-        projected = _project(robot, lines, [then, *_displace(then)])
-        projected = projected[:, find_distinct(projected[0], view.segments_px, settings.verification)]
+        shown = predict_lines(robot, then, settings.verification)
+        projected = _project(robot, shown.lines_world, [then, *_displace(then)])
+        tells = find_distinct(projected[0], view.segments_px, settings.verification)
+        shown, projected = shown[tells], projected[:, tells]
+        errors = find_errors(robot, shown)
         agreement = compute_agreement(
-            projected[0], view.segments_px, projected[1:], settings.verification.line_tolerance_px)
+            projected[0], view.segments_px, projected[1:], settings.verification.line_tolerance_px
+        ) if errors.is_exact else check_lines(
+            robot, shown.lines_world, view.segments_px, then, settings.verification, errors, settings.pose,
+            list_names(shown)).agreement
         visible, matched = visible + agreement.visible, matched + agreement.matched
         terms.append(compute_log_ratio(agreement.matched, agreement.visible, agreement.chance))
         if agreement.visible >= MIN_VIEW_LINES:
@@ -304,13 +311,6 @@ def compute_pose_likelihood(
         lengths, explained = lengths + length, explained + part
     part = explained / lengths if lengths > 0.0 else 0.0
     return PoseLikelihood(visible, matched, math.fsum(terms), part, weakest)
-
-
-def compute_log_ratio(matched: int, visible: int, chance: float) -> float:
-    """Compute the tempered log likelihood ratio of so many matched lines at the right pose and at a wrong one."""
-    p, rate = min(max(chance, CERTAINTY_BOUNDS[0]), CERTAINTY_BOUNDS[1]), DETECTION_RATE
-    found, missed = math.log(rate / p), math.log((1.0 - rate) / (1.0 - p))
-    return LINE_INDEPENDENCE * (matched * found + (visible - matched) * missed)
 
 
 def _project(robot: RobotModel, lines_world: Floats, poses: Sequence[Pose2]) -> Floats:

@@ -9,8 +9,9 @@ before it is seen, follows from the information matrix of the predicted lines, i
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose.displacements import fit_displacements
 from knowledge_sources.methods.pose.planar import compute_camera_poses, compute_point_jacobian, to_pose2
 from knowledge_sources.settings import DEFAULT, PoseSettings, VerificationSettings
+from world_models.building.building import Building
 from world_models.building.model_errors import LineErrors, find_line_errors
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
@@ -41,6 +43,9 @@ DISPLACEMENT_RAD = 0.07  # turn of the nearer wrong poses at which chance is cou
 PATTERN_REACH_PX = 8.0, 32.0  # how far aside it is looked for a pattern: nearer ones are the line's own edges
 PATTERN_STEP_PX = 2.0  # of the places aside at which it is looked
 MAX_PATTERN_PART = 0.4  # part of the places aside, covered by what the model lacks, from which it is a pattern
+DETECTION_RATE = 0.85  # probability that a predicted line is found at the right pose: others are hidden or too faint
+CERTAINTY_BOUNDS = 0.04, 0.6  # of the chance of a match, as a line counts for or against a pose
+LINE_INDEPENDENCE = 0.5  # weight of a line: lines of one thing are seen or missed together (tempered likelihood)
 LINE_TOLERANCE_RAD = 0.06  # largest angle between a segment and the line that it covers
 MAX_LINE_WEIGHT_PX = 100.0  # length from which a longer line weighs no more
 
@@ -59,6 +64,11 @@ def predict_lines(
 def find_errors(robot: RobotModel, lines: VisibleLines) -> LineErrors:
     """How well the model knows lines that it predicts."""
     return find_line_errors(robot.world, [lines.marks[int(i)] for i in lines.landmark], lines.line.tolist())
+
+
+def list_names(lines: VisibleLines) -> list[str]:
+    """The landmark of each line that it predicts."""
+    return [lines.marks[int(i)].name for i in lines.landmark]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,6 +128,13 @@ def compute_p_false(matched: int, visible: int, chance: float) -> float:
     # As scipy.stats.binom.sf to the bit, whose import takes a quarter of a second.
     tail = float(betainc(matched, visible - matched + 1, chance)) if matched else 1.0
     return min(1.0, TEST_COUNT * tail)
+
+
+def compute_log_ratio(matched: int, visible: int, chance: float) -> float:
+    """Compute the tempered log likelihood ratio of so many matched lines at the right pose and at a wrong one."""
+    p, rate = min(max(chance, CERTAINTY_BOUNDS[0]), CERTAINTY_BOUNDS[1]), DETECTION_RATE
+    found, missed = math.log(rate / p), math.log((1.0 - rate) / (1.0 - p))
+    return LINE_INDEPENDENCE * (matched * found + (visible - matched) * missed)
 
 
 def find_distinct(
@@ -227,12 +244,13 @@ class LineCheck:
 def check_lines(
     robot: RobotModel, lines_world: Floats, segments_px: Floats, world_from_robot: Pose2,
     settings: VerificationSettings = DEFAULT.verification, errors: LineErrors | None = None,
-    pose_settings: PoseSettings = DEFAULT.pose,
+    pose_settings: PoseSettings = DEFAULT.pose, landmarks: Sequence[str] = (),
 ) -> LineCheck:
     """Compare model lines (m, 2, 3) [m, world], visible from a pose, with segments (k, 2, 2) of the picture.
 
     Where the model is inexact, by ``errors``, its lines are displaced as they fit best: at this pose, and as freely at
-    the wrong ones at which chance is counted.
+    the wrong ones at which chance is counted. And of a thing of which no more is found than by chance one line is asked
+    for: a shelf that was moved away is one difference, not thirty missed lines. ``landmarks``: m names, or none.
     """
     state = world_from_robot.vector
     states = np.concatenate([state[None], _displace(state)])
@@ -242,11 +260,32 @@ def check_lines(
         few = np.concatenate([states[:1], _take_few(states[1:])])
         projected = np.concatenate([
             _project_displaced(robot, lines_world, errors, segments_px, s, pose_settings) for s in few])
+        found = compute_agreement(projected[0], segments_px, projected[1:], settings.line_tolerance_px)
+        projected[:, _find_unasked(robot.world, projected[0], found, landmarks)] = np.nan
     here, displaced = np.split(projected, [1])
     agreement, sharp = (compute_agreement(here[0], segments_px, displaced, tolerance_px)
                         for tolerance_px in (settings.line_tolerance_px, SHARP_TOLERANCE_PX))
     lengths = np.linalg.norm(here[0, :, 1] - here[0, :, 0], axis=1)
     return LineCheck(agreement, sharp, agreement.covered_length(lengths), here[0])
+
+
+def _find_unasked(building: Building, lines_px: Floats, found: Agreement, landmarks: Sequence[str]) -> Mask:
+    """Which (m,) of the lines (m, 2, 2) are of things that are not there, but for the longest missed one of each."""
+    unasked = np.zeros(len(lines_px), bool)
+    missed = found.coverage < MIN_COVERED_FRACTION
+    lengths = np.where(missed, np.linalg.norm(lines_px[:, 1] - lines_px[:, 0], axis=1), -1.0)
+    for name in filter(partial(_is_thing, building), dict.fromkeys(landmarks)):
+        own = np.flatnonzero([one == name for one in landmarks] & ~np.isnan(found.coverage))
+        if compute_log_ratio(int(np.count_nonzero(~missed[own])), len(own), found.chance) < 0.0:
+            unasked[own] = True
+            unasked[own[np.argmax(lengths[own])]] = False
+    return unasked
+
+
+def _is_thing(building: Building, name: str) -> bool:
+    """Whether a landmark is a thing, and no wall or door."""
+    locale, is_within, _ = name.rpartition("/")
+    return bool(is_within) and any(thing.name == name for thing in building.things_of(locale))
 
 
 def project_lines(robot: RobotModel, lines_world: Floats, world_from_robot: Pose2) -> Floats:

@@ -18,6 +18,7 @@ from knowledge_sources.methods.verification.line_check import (
     check_lines,
     find_distinct,
     find_errors,
+    list_names,
     predict_lines,
     project_lines,
 )
@@ -147,8 +148,10 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     milestone, fix, segments_px, s = seen.milestone, seen.fix, seen.segments.segments_px, settings
     lines, pose = np.array(milestone.expected, float).reshape(-1, 2, 3), fix.world_from_robot
     asked = find_distinct(project_lines(robot, lines, pose), segments_px, s.verification)
+    patterned = int(np.count_nonzero(~asked))
     lines, errors = lines[asked], milestone.errors.take(np.flatnonzero(asked))
-    agreed = check_lines(robot, lines, segments_px, pose, s.verification, errors, s.pose)
+    agreed = check_lines(robot, lines, segments_px, pose, s.verification, errors, s.pose,
+                         [milestone.landmarks[i] for i in np.array(milestone.landmark_of, np.intp)[asked]])
     plain_px = agreed.projected_px if not milestone.displacement_modes else check_lines(
         robot, lines, segments_px, pose, s.verification).projected_px
     faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors, s)
@@ -172,7 +175,7 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         before=before.pose,
         covariance=before.covariance,
         expected=len(lines),
-        patterned=int(np.count_nonzero(~asked)),
+        patterned=patterned,
         lines=agreed,
         faces=faces,
         evidence=evidence,
@@ -254,7 +257,7 @@ def compute_coverage_elsewhere(w: Weighed, there: Pose2, settings: Settings) -> 
     corrected = there @ (w.before.inverse() @ w.pose)
     lines = predict_lines(w.robot, corrected, settings.verification)
     return check_lines(w.robot, lines.lines_world, w.segments.segments_px, corrected, settings.verification,
-                       find_errors(w.robot, lines), settings.pose).coverage
+                       find_errors(w.robot, lines), settings.pose, list_names(lines)).coverage
 
 
 def certify(names: tuple[str, str], w: Weighed, verdict: Verdict, fix: PoseFix) -> Certificate:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.optimize import approx_fprime
 from scipy.stats import binom
 
-from knowledge_sources.methods.localization import refinement
-from knowledge_sources.methods.localization.refinement import compute_log_ratio
+from knowledge_sources.methods.verification import line_check
 from knowledge_sources.methods.verification.line_check import (
     EPSILON_INFORMATION,
+    compute_log_ratio,
     compute_view_quality,
 )
 from world_models.camera import Camera, CameraMount
@@ -61,6 +61,6 @@ def test_a_view_promises_the_bound_of_its_lines_by_finite_differences(seed: int,
 @given(visible=st.integers(0, 60), part=st.floats(0.0, 1.0), chance=st.floats(0.0, 1.0))
 def test_matched_lines_are_worth_their_binomial_odds(visible: int, part: float, chance: float) -> None:
     matched = round(part * visible)
-    p = float(np.clip(chance, *refinement.CERTAINTY_BOUNDS))
-    odds = binom.logpmf(matched, visible, refinement.DETECTION_RATE) - binom.logpmf(matched, visible, p)
-    assert math.isclose(compute_log_ratio(matched, visible, chance), refinement.LINE_INDEPENDENCE * odds, abs_tol=1e-7)
+    p = float(np.clip(chance, *line_check.CERTAINTY_BOUNDS))
+    odds = binom.logpmf(matched, visible, line_check.DETECTION_RATE) - binom.logpmf(matched, visible, p)
+    assert math.isclose(compute_log_ratio(matched, visible, chance), line_check.LINE_INDEPENDENCE * odds, abs_tol=1e-7)

@@ -89,3 +89,19 @@ def test_the_stage_is_built_of_it_and_the_model_is_not() -> None:
     assert other.start_world == exact.start_world and other.goal_world == exact.goal_world
     low = [s.building.obstacles.segments_world.reshape(-1, 2).min(axis=0) for s in (exact, other)]
     assert not np.allclose(low[0], low[1], atol=1e-3)
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_all_doors_are_beside_and_all_corridors_wider_by_what_is_asked(seed: int) -> None:
+    spec = read_floor(seed)
+    doors = displace(spec, TrueInexact(door_m=0.1, seed=seed))
+    assert set(np.round(np.abs(list(doors.doors_m.values())), 9)) <= {0.1, 0.05, 0.025}
+    assert not any(doors.walls_m.values())
+    wider = build_world(displace(spec, TrueInexact(corridor_m=0.1, seed=seed)).spec)
+    model = build_world(spec)
+    corridors = [name for name, locale in spec.locales.items() if locale.kind == "hallway"]
+    for name in corridors:
+        before, after = (np.ptp(world.outline(name), axis=0) for world in (model, wider))
+        assert np.min(after) == pytest.approx(np.min(before) + 0.1)
+        assert np.max(after) == pytest.approx(np.max(before))
+    assert corridors

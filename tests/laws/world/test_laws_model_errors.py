@@ -57,3 +57,22 @@ def test_a_part_may_be_known_better_than_the_rest() -> None:
     assert (find_sigma_m(world, "one"), find_sigma_m(world, "two")) == (0.01, 0.05)
     assert find_sigma_m(world, "one", "one/box") == 0.08
     assert find_sigma_m(world, "one", "way") == find_sigma_m(world, "two", "way") == 0.03
+
+
+def test_a_wall_with_a_door_is_one_from_both_sides_and_what_the_door_cuts_moves_with_it() -> None:
+    world = read("sigma_cm = 5")
+    for door in world.doorways:
+        jambs = np.concatenate(door.thresholds_world)
+        ways = []
+        for locale in door.between:
+            walls = [m for m in world.landmarks if m.kind == "wall" and m.locale == locale]
+            lines = [(m, i) for m in walls for i, line in enumerate(m.lines_world)
+                     if np.linalg.norm(line[:, None, :2] - jambs, axis=2).min(axis=1).max() < 0.15]
+            assert lines  # the ends of its baseboards
+            errors = find_line_errors(world, [m for m, _ in lines], [i for _, i in lines])
+            along = errors.displacements[errors.displacement_modes.index(f"{door.name} along")]
+            assert np.allclose(np.linalg.norm(along, axis=1), 0.05) and np.allclose(along @ [0, 0, 1], 0.0)
+            across = [name for name in errors.displacement_modes if " wall " in name]
+            ways.append((across, errors.displacements[errors.displacement_modes.index(across[0]), 0], along[0]))
+        (one, out, left), (other, back, right) = ways
+        assert one == other and np.allclose(out, back) and np.allclose(left, right)

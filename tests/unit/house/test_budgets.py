@@ -14,13 +14,13 @@ import pytest
 ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
-    "world_models": 10_190,
-    "knowledge_sources": 22_850,
-    "sim": 5_935,
+    "world_models": 10_220,
+    "knowledge_sources": 22_890,
+    "sim": 5_945,
     "logs": 7_756,
     "harvey": 11_192,
-    "experiments": 11_340,
-    "tests": 45_565,
+    "experiments": 11_345,
+    "tests": 45_630,
     "extras": 22_200,
 }
 """Of Python files, at most."""
