@@ -9,7 +9,7 @@ In reading order:
 * :mod:`.ifc`: IFC (ISO 16739) read, in a process of its own; :mod:`.ifc_file` has the opened file, :mod:`.ifc_elements`
   what its elements are on the plan.
 * :mod:`.ros_map`: a ROS map read; :mod:`.ros_map_file` has its files, which are written too, :mod:`.ros_map_rooms` its
-  floor parted into rooms.
+  floor parted into rooms, at doorways and at wide openings (:mod:`.ros_map_openings`).
 * :mod:`.polygons`: outlines cleaned, kept apart by walls, and straightened at doors.
 * :mod:`.placement`: doors, wide openings and windows placed in walls, furniture and stairs fitted into rooms.
 * :mod:`.layout`: rooms with walls, openings and furniture in place.

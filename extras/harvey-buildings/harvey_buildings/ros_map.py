@@ -27,7 +27,8 @@ from harvey_buildings.building_plan import (
 )
 from harvey_buildings.polygons import clean_outline, extract_outline, square_outline
 from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN, Cells, MapFile, read_cells, read_map_yaml
-from harvey_buildings.ros_map_rooms import Gap, Labels, Mask, clean_floor, part_rooms, rooms_beside
+from harvey_buildings.ros_map_openings import Gap, Mask, trace
+from harvey_buildings.ros_map_rooms import Labels, clean_floor, part_rooms, rooms_beside
 from world_models.building.checks import Watched, pass_on
 
 MARGIN_CELLS = 3
@@ -154,7 +155,7 @@ def room_shape(
     margin = round(SMOOTH_M / cell_m) + 2
     smooth = _smooth(np.pad(room, margin), SMOOTH_M / cell_m)
     corner = np.array(first) - margin
-    shape = _largest(shapely.transform(_trace(smooth), lambda points: points + corner))
+    shape = _largest(shapely.transform(trace(smooth), lambda points: points + corner))
     if shape is None:
         return None
     outline = clean_outline(shapely.get_coordinates(shape.simplify(STRAIGHT_CELLS).exterior) * cell_m)
@@ -190,19 +191,10 @@ def _axes(gap: Gap, cell_m: float) -> tuple[Floats, Floats, Floats]:
 
 
 def _smooth(room: Mask, radius: float) -> NDArray[np.bool_]:
-    """The cells opened and closed by a disc."""
-    inner = ndimage.distance_transform_edt(room) > radius
-    opened = ndimage.distance_transform_edt(~inner) <= radius if inner.any() else room
-    outer = ndimage.distance_transform_edt(~opened) > radius
-    return np.asarray(ndimage.distance_transform_edt(~outer) > radius, dtype=bool)
-
-
-def _trace(room: Mask) -> shapely.Geometry:
-    """The border of cells, as polygons in columns and rows; the middle of a cell is a whole number."""
-    edge = np.diff(np.pad(room, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    rows, first = np.nonzero(edge == 1)
-    last = np.nonzero(edge == -1)[1]
-    return shapely.union_all(shapely.box(first - 0.5, rows - 0.5, last - 0.5, rows + 0.5))
+    """The cells opened and closed by a square, which keeps the corners of straight walls."""
+    square = np.ones((2 * int(radius) + 1,) * 2, bool)
+    opened = ndimage.binary_opening(room, square)
+    return np.asarray(ndimage.binary_closing(opened if opened.any() else room, square), dtype=bool)
 
 
 def _largest(shape: shapely.Geometry) -> shapely.Polygon | None:
@@ -218,9 +210,9 @@ def gap_on_map(gap: Gap) -> tuple[Floats, Floats]:
 
 def fill_to_walls(labels: Labels, open_floor: Mask, cells: int) -> Labels:
     """The rooms grown by up to so many cells into floor that was opened away at corners and jambs."""
-    distance, nearest = ndimage.distance_transform_edt(labels == 0, return_indices=True)
-    near = labels[nearest[0], nearest[1]]
-    return np.where(open_floor & (labels == 0) & (distance <= cells), near, labels)
+    nearest = ndimage.distance_transform_edt(labels == 0, return_distances=False, return_indices=True)
+    joined = ndimage.binary_dilation(labels > 0, iterations=cells, mask=(labels > 0) | open_floor)
+    return np.where(joined, labels[nearest[0], nearest[1]], labels)  # what is hollow behind a wall is not reached
 
 
 WALL_HEIGHT_M, DOOR_HEIGHT_M = 2.5, 2.05
@@ -285,7 +277,7 @@ def _add_rooms(plan: BuildingPlan, labels: Labels, gaps: list[Gap], grid: Grid, 
 
 def _trace_outline(shape: shapely.Geometry) -> Floats | None:
     """The outline (k, 2) of a shape; where it touches itself, without its narrowest parts."""
-    for narrow_m in (0.0, 0.03, 0.06, 0.12):
+    for narrow_m in (0.03, 0.06, 0.12):
         part = shape.buffer(-narrow_m, join_style="mitre").buffer(narrow_m, join_style="mitre") if narrow_m else shape
         outline = extract_outline(part)
         if outline is not None:

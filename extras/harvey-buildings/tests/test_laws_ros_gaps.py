@@ -19,15 +19,8 @@ from numpy.typing import NDArray
 
 from harvey_buildings.ros_map import Grid, find_wall_turn, gap_on_map, make_grid
 from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN, MapFile
-from harvey_buildings.ros_map_rooms import (
-    Gap,
-    _close_slanting,
-    _line,
-    clean_floor,
-    close_gaps,
-    part_rooms,
-    rooms_beside,
-)
+from harvey_buildings.ros_map_openings import Gap, close_openings, line_cells
+from harvey_buildings.ros_map_rooms import clean_floor, close_gaps, part_rooms, rooms_beside
 
 Mask = NDArray[np.bool_]
 
@@ -153,18 +146,18 @@ def test_a_door_in_a_slanting_wall(angle_deg: float, is_mirrored: bool, width_m:
 
 
 @pytest.mark.parametrize(("angle_deg", "width_m", "is_gap"), [
-    (45.0, 0.4, False), (45.0, 0.6, True), (45.0, 1.2, True), (45.0, 1.55, False), (30.0, 0.4, False),
-    (30.0, 1.6, False), (18.0, 0.9, True), (6.0, 0.9, False),
+    (45.0, 0.4, False), (45.0, 0.6, True), (45.0, 1.2, True), (45.0, 1.55, False), (30.0, 0.3, False),
+    (30.0, 1.6, False), (18.0, 0.9, True), (6.0, 0.9, True),
 ])
 def test_which_slanting_openings_are_doors(angle_deg: float, width_m: float, is_gap: bool) -> None:
-    """From 0.5 to 1.3 m wide, as cells tell, in walls more than 14 degrees off the axes."""
-    assert bool(_close_slanting(slanting(angle_deg, width_m)[0].copy(), 0.05)) == is_gap
+    """From 0.5 to 1.3 m wide, as cells tell."""
+    assert bool(close_openings(slanting(angle_deg, width_m)[0], 0.05)[1]) == is_gap
 
 
 @given(st.integers(0, 30), st.integers(0, 30), st.integers(0, 30), st.integers(0, 30))
 def test_the_line_of_a_gap_lets_nothing_pass_between_its_cells(r0: int, c0: int, r1: int, c1: int) -> None:
     """Consecutive cells share a side, and each lies near the straight line."""
-    cells = _line(Gap((r0, c0), (r1, c1), 1.0, 1.0, (0.0, 0.0)))
+    cells = line_cells((r0, c0), (r1, c1))
     assert cells[0] == (r0, c0) and cells[-1] == (r1, c1)
     distinct = list(dict.fromkeys(cells))
     assert all(abs(a - c) + abs(b - d) == 1 for (a, b), (c, d) in pairwise(distinct))
@@ -173,12 +166,12 @@ def test_the_line_of_a_gap_lets_nothing_pass_between_its_cells(r0: int, c0: int,
 
 
 @pytest.mark.parametrize(("radius_m", "corridor_m", "long_m", "is_closed"), [
-    (3.0, 1.6, 12.0, True), (2.0, 1.6, 12.0, True), (3.0, 1.6, 2.0, False), (1.2, 1.6, 12.0, False),
+    (3.0, 1.6, 12.0, True), (2.0, 1.6, 12.0, True), (3.0, 1.6, 2.0, False), (0.9, 1.6, 12.0, False),
 ])
 def test_the_mouth_of_a_corridor_into_a_hall(
     radius_m: float, corridor_m: float, long_m: float, is_closed: bool
 ) -> None:
-    """A hall holds a circle of 1.75 m; a corridor is longer than twice its width."""
+    """A corridor is longer than wide, and the hall is twice as wide."""
     cell_m = 0.05
     rows, columns = np.mgrid[:160, :420]
     floor = np.hypot(rows - 80, columns - 80) * cell_m < radius_m
@@ -196,6 +189,55 @@ def test_the_mouth_of_a_corridor_into_a_hall(
         assert not floor[gap.start] and not floor[gap.end]
         assert gap.width == pytest.approx(on_floor * np.hypot(*np.subtract(gap.end, gap.start)), abs=0.5)
         assert gap.middle == pytest.approx(between.mean(axis=0))
+
+
+def drawn(*boxes: tuple[int, int, int, int], tall: int = 400, wide: int = 420) -> Mask:
+    """Floor in boxes of rows and columns, from first to before last."""
+    floor = np.zeros((tall, wide), bool)
+    for r0, r1, c0, c1 in boxes:
+        floor[r0:r1, c0:c1] = True
+    return floor
+
+
+CORRIDOR = (100, 140, 10, 410)
+
+
+@pytest.mark.parametrize("side", list(SIDES))
+@pytest.mark.parametrize(("boxes", "rooms"), [
+    ((CORRIDOR, (100, 390, 200, 240)), 1),  # a branch as wide as the corridor is a piece of it
+    ((CORRIDOR, (100, 230, 370, 410)), 1),  # and so it is round a corner
+    ((CORRIDOR, (10, 101, 150, 230)), 2),  # a lounge beside it is none
+    ((CORRIDOR, (80, 101, 150, 200)), 1),  # a niche is
+    ((CORRIDOR, (60, 200, 10, 150)), 2),  # a hall at its end
+    (((10, 120, 10, 160), (60, 120, 10, 190)), 1),  # a room with a corner
+])
+def test_pieces_of_a_corridor_are_joined_and_lounges_are_not(
+    side: str, boxes: tuple[tuple[int, int, int, int], ...], rooms: int
+) -> None:
+    """In whatever direction they lie; openings have no jambs here."""
+    labels, gaps = part_rooms(np.ascontiguousarray(SIDES[side][0](drawn(*boxes))), 0.05)
+    assert len(np.unique(labels)) - 1 == rooms and len(gaps) == rooms - 1
+
+
+@pytest.mark.parametrize(("apart", "parts"), [(20, True), (26, True), (30, False)])
+def test_things_in_a_row_part_two_rooms_where_only_doorways_are_between_them(apart: int, parts: bool) -> None:
+    """Up to 1.3 m; one thing alone is furniture."""
+    wide = 3 * apart + 2 * 24
+    free = np.pad(np.ones((160, wide), bool), 6)
+    for first in (apart, 2 * apart + 24):
+        free[80:92, 6 + first:6 + first + 24] = False
+    floor, _ = clean_floor(free, 0.05)
+    assert (not floor[85, 6 + apart + 12]) == parts
+    assert len(np.unique(part_rooms(floor, 0.05)[0])) - 1 == 1 + parts
+    free[80:92, 6 + apart:6 + apart + 24] = True
+    assert clean_floor(free, 0.05)[0][85, 6 + 2 * apart + 36]
+
+
+def test_what_is_hollow_behind_a_thin_wall_is_no_part_of_the_room() -> None:
+    """A hollow wall of 0.5 m, drawn by its two faces."""
+    floor = drawn((20, 120, 20, 160), (20, 120, 161, 171))
+    labels, _ = part_rooms(floor, 0.05)
+    assert labels[60, 158] and not labels[20:120, 161:171].any()
 
 
 @pytest.mark.parametrize(("side", "is_thing"), [(10, True), (11, False)])

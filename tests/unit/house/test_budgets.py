@@ -21,7 +21,7 @@ LINES = {
     "harvey": 11_192,
     "experiments": 11_345,
     "tests": 45_630,
-    "extras": 22_200,
+    "extras": 22_400,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}
