@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from blackboard.entry import Ref
 from blackboard.journal import Decision
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
@@ -20,9 +21,10 @@ from experiments import drives
 from experiments.drives import Claim, Driven, GoalEnd, Trial
 from experiments.generated.missions import write_twin_mission
 from experiments.report import Cell, Report
-from experiments.trials import at_most
+from experiments.trials import at_least, at_most
 from harvey.campaign.campaign import Task
-from world_models.entries.location import PlaceOdds
+from world_models.entries.location import PlaceOdds, TwinOdds
+from world_models.entries.task import Outcome
 
 RIGHT, WRONG = "right", "wrong"
 MISSIONS, QUICK_MISSIONS = 3_000, 4
@@ -38,11 +40,19 @@ class TwinEnd(GoalEnd):
         rooms: number of identical rooms.
         doubts: times that the robot doubted its place at the goal level.
         by_odds: times that a place was believed by what was told or tracked.
+        said: probability that it is where it believes, as it says at the end where other places agree with its
+            pictures; None where it says nothing of others, and is sure.
     """
 
     rooms: int
     doubts: int
     by_odds: int
+    said: float | None
+
+    @property
+    def is_wrong_and_sure(self) -> bool:
+        """Whether it says that it reached the goal, says nothing of other places, and is at one."""
+        return self.is_wrong and self.said is None
 
     @property
     def is_noticed(self) -> bool:
@@ -54,6 +64,8 @@ def drive(trial: Trial) -> TwinEnd:
     """Drive the mission of a trial."""
     doubts: set[str] = set()
     odds: list[PlaceOdds] = []
+    twins: dict[Ref, float] = {}
+    said: list[float] = []
 
     def note(decision: Decision) -> None:
         for change in decision.made:
@@ -62,21 +74,27 @@ def drive(trial: Trial) -> TwinEnd:
                 doubts.add(change.entry.id)
             elif isinstance(value, PlaceOdds):
                 odds.append(value)
+            elif isinstance(value, TwinOdds):
+                twins[change.entry.ref] = value.probability
+            elif isinstance(value, Outcome):
+                said[:] = [twins[ref] for ref in change.entry.because if ref in twins]
 
     with TemporaryDirectory() as folder:
         mission = write_twin_mission(Path(folder), trial.seed, is_told_right=trial.row == RIGHT)
         driven = drives.drive_task(Task(str(mission.path), (), trial.seed), note)
-    return TwinEnd.of(trial, driven, rooms=mission.rooms, doubts=len(doubts), by_odds=len(odds))
+    return TwinEnd.of(trial, driven, rooms=mission.rooms, doubts=len(doubts), by_odds=len(odds),
+                      said=said[0] if said else None)
 
 
 def _wrong_at_most(ends: Sequence[TwinEnd]) -> Cell:
-    return f"{at_most(sum(e.is_wrong for e in ends), len(ends)):.2%}"
+    return f"{at_most(sum(e.is_wrong_and_sure for e in ends), len(ends)):.2%}"
 
 
 FIGURES: Mapping[str, drives.Figure[TwinEnd]] = {
     **drives.pick("missions"), "reached": drives.total(lambda e: e.is_right),
     "proves at least": drives.proved(lambda e: e.is_right), "noticed": drives.total(lambda e: e.is_noticed),
-    "wrong and confident": drives.total(lambda e: e.is_wrong), "proves at most": _wrong_at_most,
+    "wrong, and said so of other places": drives.total(lambda e: e.is_wrong and not e.is_wrong_and_sure),
+    "wrong and confident": drives.total(lambda e: e.is_wrong_and_sure), "proves at most": _wrong_at_most,
     "believed by odds": drives.total(lambda e: e.by_odds), **drives.pick("relocated", "robot's mean s", "mean CPU s"),
 }
 
@@ -92,8 +110,9 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
         "Missions on floors of 5 to 40 identical rooms", "told", FIGURES,
         notes=(
             "reached: the goal, and in truth. noticed: it doubted its place, and does not end as reached elsewhere."
-            " wrong and confident: it ends as reached, and is elsewhere. believed by odds: times that a place was"
-            " believed by what was told or tracked, of several that look alike.",
+            " wrong and confident: it ends as reached, is elsewhere, and says nothing of other places. Where others"
+            " agree with all pictures it says so, and how likely it is where it believes. believed by odds: times that"
+            " a place was believed by what was told or tracked, of several that look alike.",
             "Paper and peers have no such missions: the paper's robot always knows where it begins.",
         ),
         claims=_claims(driven, quick), is_flawed=lambda e: not (e.is_right if e.row == RIGHT else e.is_noticed),
@@ -112,6 +131,15 @@ def _claims(driven: Driven[TwinEnd], quick: bool) -> Iterator[Claim]:
     if (wrong := driven.rows.get(WRONG)) and not quick:
         yield drives.claim_share(f"told wrong: at least {MIN_NOTICED:.0%} notice", lambda e: e.is_noticed, wrong,
                                  MIN_NOTICED)
-    confident, of = sum(e.is_wrong for e in driven.ends), len(driven.ends)
+    confident, of = sum(e.is_wrong_and_sure for e in driven.ends), len(driven.ends)
     yield (f"wrong and confident: at most {MAX_WRONG:.1%}: {confident} of {of}, so at most"
            f" {at_most(confident, of):.2%}", confident <= MAX_WRONG * of)
+    if not quick and (unsure := [e for e in driven.ends if e.is_reached and e.said is not None]):
+        yield claim_said(unsure)
+
+
+def claim_said(unsure: Sequence[TwinEnd]) -> Claim:
+    """That it is elsewhere no more often than it says; only of missions that are told wrong as often as it assumes."""
+    wrong, said = sum(e.is_wrong for e in unsure), float(np.mean([1.0 - (e.said or 0.0) for e in unsure]))
+    return (f"where it names other places it is there no more often than it says ({said:.1%}): {wrong} of"
+            f" {len(unsure)}, so at least {at_least(wrong, len(unsure)):.1%}", at_least(wrong, len(unsure)) <= said)

@@ -63,6 +63,9 @@ def test_a_carton_that_the_model_lacks_is_seen_and_driven_round(tmp_path: Path) 
     made = [change.entry for d in decisions for change in d.made]
     found = [e for e in made if isinstance(e.value, Obstacle) and e.value.is_there]
     assert (result.outcome, result.collisions, result.false_accepts) == ("reached", 0, 0)
+    # Not mended: at 18.1 ft it holds 6 x 30 px of free floor in the picture's lowest rows for a thing, at 0.71. Patches
+    # there reach over the picture's edge, and show half of themselves mirrored (relief.py). Where they tell nothing,
+    # that thing is gone, but the carton is held for two, 0.3 m apart.
     assert {e.value.name for e in found if e.value.certainty >= 0.9} == {"north-hall/obstacle-1"}
     assert found[0].value.by == "camera" and found[0].value.x_m == pytest.approx(14 * 0.3048, abs=0.25)
     assert found[0].because[0].id.startswith("FreeFloor-")

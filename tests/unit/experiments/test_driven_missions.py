@@ -38,7 +38,7 @@ OWN: dict[ModuleType, tuple[type[End], dict[str, Any]]] = {
         "verdict": "reached", "shortest_m": 10.0, "contact_speeds": [], "answered": 0, "false_obstacles": [],
         "forgotten": [],
         "stops": 1, "needless": 0}),
-    twins: (twins.TwinEnd, {"rooms": 8, "doubts": 0, "by_odds": 0}),
+    twins: (twins.TwinEnd, {"rooms": 8, "doubts": 0, "by_odds": 0, "said": None}),
     large: (large.LargeEnd, {"cpu_s": 8.0}),
     missions: (missions.MissionEnd, {}),
     soak: (soak.SoakEnd, {"memory_mb": 400.0, "process": 7}),
@@ -98,6 +98,7 @@ def test_flawless_missions_hold_every_claim(
     (twins, ("right",), {"outcome": "lost"}, "told right"),
     (twins, ("wrong",), {"doubts": 0}, "told wrong"),
     (twins, ("wrong",), {"error_m": 4.4}, "wrong and confident"),
+    (twins, ("wrong",), {"error_m": 4.4, "said": 0.987}, "more often than it says"),
     (soak, (), {"false_accepts": 1}, "no milestone"),
     *((every, (), {"believed_shut": ["d at 3.0 s"]}, "no open door")
       for every in (doors, inexact, light, miscalibrated, obstacles, twins, soak)),
