@@ -38,7 +38,7 @@ from world_models.frames import Pose
 CAMERA_BAND_PX = 6.0  # half-width of the bands that are searched for edges around the first pose
 CAMERA_SECOND_PRIOR = 0.15  # standard deviation of the first pose, as a part of the prior's
 CAMERA_NEAR_PRIOR = 0.5  # the same of a second try from the prior, where nothing is verified from the whole of it
-CAMERA_START_SIGMAS = 1.5  # shifts of further tries, in the prior's deviations
+CAMERA_START_SIGMAS = 1.5  # shifts of further tries along its axes, in the prior's deviations; to its corners, one
 CAMERA_COARSE_PAIR_PX = 5.0  # restricted space of the first match (§6.1.4)
 CAMERA_COARSE_SIGMA_PX = 1.5  # deviation of an end of a pair of the first match
 CAMERA_FINE_PAIR_PX = 3.0  # restricted space of the second match (§6.1.4)
@@ -146,13 +146,14 @@ def locate_camera(
         build_camera_parameters(prior, spread), np.asarray(model_lines_world, float), image, camera, spread,
         segments_px, tolerance_m, tolerance_rad, rng)
     best = search.locate(prior, spread)
-    away = CAMERA_START_SIGMAS * np.linalg.cholesky(spread)[3:, 3:].T
-    for shift in (np.zeros(3), *away, *-away):  # starts are sparse in a wide prior, and may see nothing of the model
+    root = np.linalg.cholesky(spread)[3:, 3:]
+    corners = np.stack(np.meshgrid(*[[1.0, -1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3) @ root.T
+    away = CAMERA_START_SIGMAS * root.T
+    for shift in (np.zeros(3), *away, *-away, *corners):  # starts are sparse in a wide prior, and may see nothing
         if best is not None and best.verdict is PoseVerdict.VERIFIED:
             break
         near = search.locate(prior.perturbed(np.zeros(3), shift), CAMERA_NEAR_PRIOR**2 * spread)
-        if near is not None and (best is None or near.coverage > best.coverage):
-            best = near
+        best = search.choose(best, near)
     for _ in range(CAMERA_MAX_RESTARTS):
         best, is_better = search.look_elsewhere(best)
         if best is None or not is_better:
@@ -181,8 +182,8 @@ class CameraSearch:
         if best is None:
             return None, False
         pose = best.camera_from_world
-        other = self.locate(pose, self.covariance)
-        if other is not None and other.coverage > best.coverage:
+        other = self.choose(best, self.locate(pose, self.covariance))
+        if other is not None and other is not best:
             if not self.is_same(other.camera_from_world, pose):
                 return other, True
             best, pose = other, other.camera_from_world
@@ -210,22 +211,32 @@ class CameraSearch:
 
         ``chance`` is the probability that a line is found at a wrong pose.
         """
-
-        def score(at: Pose) -> PoseScore:
-            found = compute_pose_score(project_leaders(self.model, self.camera, at), self.segments_px, chance)
-            step = self.prior.compute_step(at)
-            far = min(0.5 * float(step @ self.prior.information @ step), RIVAL_MAX_PRIOR)
-            return replace(found, log_likelihood=found.log_likelihood - far)
-
-        own, best = score(pose), sorted(others, key=lambda at: -score(at).log_likelihood)[:RIVAL_MAX_REFINED]
+        own = self._score(pose, chance)
+        best = sorted(others, key=lambda at: -self._score(at, chance).log_likelihood)[:RIVAL_MAX_REFINED]
         needed, rivals = RIVAL_MIN_LEAD + RIVAL_LEAD_PER_LINE * own.count, []
         for other in best:
             near = self._solve(
                 self.segments_px, other, spread, (CAMERA_COARSE_PAIR_PX, CAMERA_COARSE_SIGMA_PX), trunc_r_and_t)
             refined = other if near is None else near[0].camera_from_world
             if not self.is_same(other, pose) and not self.is_same(refined, pose):
-                rivals += [Rival(at, own.log_likelihood - score(at).log_likelihood, needed) for at in (other, refined)]
+                rivals += [Rival(at, own.log_likelihood - self._score(at, chance).log_likelihood, needed)
+                           for at in (other, refined)]
         return sorted(rivals, key=lambda rival: rival.lead)
+
+    def choose(self, best: CameraFix | None, other: CameraFix | None) -> CameraFix | None:
+        """The pose that explains more; not the better covered one: where little is in view, little is amiss."""
+        if best is None or other is None:
+            return best or other
+        chance = max(best.evidence.chance, other.evidence.chance)
+        one, two = (self._score(fix.camera_from_world, chance).log_likelihood for fix in (best, other))
+        return other if two > one else best
+
+    def _score(self, at: Pose, chance: float) -> PoseScore:
+        """How much picture and prior speak for a pose."""
+        found = compute_pose_score(project_leaders(self.model, self.camera, at), self.segments_px, chance)
+        step = self.prior.compute_step(at)
+        far = min(0.5 * float(step @ self.prior.information @ step), RIVAL_MAX_PRIOR)
+        return replace(found, log_likelihood=found.log_likelihood - far)
 
     def locate(self, prior: Pose, covariance: Floats) -> CameraFix | None:
         """The pose that the picture shows within a prior, with its own verdict."""

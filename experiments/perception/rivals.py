@@ -95,18 +95,21 @@ def find_self_motions(model_lines_world: Any, camera: Camera, pose: Pose) -> tup
     visible &= lengths >= MIN_LINE_LENGTH_PX
     if np.count_nonzero(visible) < 2:
         return [], np.eye(6)
-    at_camera, lengths, here = pose.apply(lines[visible]), lengths[visible], here[visible]
-    depth = max(float(np.median(at_camera[..., 2].mean(axis=1))), MIN_DEPTH_M)
+    at_camera = pose.apply(lines)
+    depth = max(float(np.median(at_camera[visible, :, 2].mean(axis=1))), MIN_DEPTH_M)
     spread_rad = VOTE_PX / camera.fx
-    steps = _vote(at_camera, lengths, spread_rad * depth, depth)
+    sizes = np.linalg.norm(at_camera[:, 1] - at_camera[:, 0], axis=1) * camera.fx / depth
+    steps = _vote(at_camera, sizes, spread_rad * depth, depth)  # what is not in view may repeat what is
+    here = here[visible]
     poses = [pose.perturbed(np.zeros(3), step) for step in steps]
     poses += [pose.perturbed(np.array([-step[1], step[0], 0.0]) / depth, np.zeros(3)) for step in steps]
     found = []
     for other in poses:
-        there, seen = camera.project_segments(lines[visible], other)
+        there, seen = camera.project_segments(lines, other)
         if np.any(seen):
             covered = compute_coverage(there[seen], here, ALIKE_PX, ALIKE_RAD)
-            found.append((float(np.average(covered, weights=np.minimum(lengths[seen], MAX_LINE_WEIGHT_PX))), other))
+            length = np.linalg.norm(there[seen, 1] - there[seen, 0], axis=1)
+            found.append((float(np.average(covered, weights=np.clip(length, 1e-9, MAX_LINE_WEIGHT_PX))), other))
     alike = [pair for pair in found if pair[0] >= MIN_SELF_SIMILARITY]
     spread = np.diag(np.repeat([spread_rad, spread_rad * depth], 3) ** 2)
     return [other for _, other in sorted(alike, key=lambda pair: -pair[0])], spread
