@@ -24,6 +24,10 @@ class BuildingError(WorldError):
     """A building file that cannot be read: names the file, what was expected and what was got."""
 
 
+class NoWayError(BuildingError):
+    """A map in which most rooms have no doorway, so that what was traced cannot be trusted."""
+
+
 @dataclass(frozen=True, slots=True)
 class Storey:
     """A storey of the building and its height above the file's zero [m]."""

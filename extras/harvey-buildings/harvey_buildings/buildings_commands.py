@@ -33,6 +33,7 @@ def _export_arguments(parser: ArgumentParser) -> None:
 
 def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
     from harvey_buildings import import_building
+    from harvey_buildings.building_plan import NoWayError
 
     path = Path(file)
     target = Path(out or path.with_suffix(".toml").name)
@@ -40,7 +41,11 @@ def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
         raise BadInput(f"--out: expected a name that ends in .toml, got {str(target)!r}")
     if wall_height_m is not None and not MIN_WALL_M <= wall_height_m <= MAX_WALL_M:
         raise BadInput(f"--wall-height: expected {MIN_WALL_M:g} to {MAX_WALL_M:g} metres, got {wall_height_m:g}")
-    made = import_building(path, wall_height_m, with_bar)
+    try:
+        made = import_building(path, wall_height_m, with_bar)
+    except NoWayError as error:
+        print(f"{error}; no file is written", file=sys.stderr)
+        return 1
     target.write_text(made.text, encoding="utf-8")
     print(f"{made.report}\n")
     code = print_check(load_file(str(target), []), str(target))
@@ -77,8 +82,8 @@ IMPORT = CliCommand(
      ("harvey world import map.yaml --out floor.toml --wall-height 2.7", "rooms and doors traced from a ROS map")),
     _import_arguments, lambda args: _import(args.file, args.out, args.wall_height),
     "Then checks it, as harvey world check does. Exit code 0: it has no faults. 1: none of its rooms, two or more,\n"
-    "has a way to another: no doorway, opening, stairs or lift; the file is written. 2: it cannot be read, or has\n"
-    "faults, or is a ROS map most of whose rooms have no doorway.",
+    "has a way to another: no doorway, opening, stairs or lift; the file is written. Or it is a ROS map most of whose\n"
+    "rooms have no doorway; no file is written. 2: it cannot be read, or has faults.",
 )
 EXPORT = CliCommand(
     "export", "write a world for other programs: a ROS map, SVG, GeoJSON or glTF",

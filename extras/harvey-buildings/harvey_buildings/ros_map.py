@@ -20,6 +20,7 @@ from harvey_buildings.building_plan import (
     BuildingError,
     BuildingPlan,
     Floats,
+    NoWayError,
     Space,
     Storey,
     WallOpening,
@@ -223,7 +224,8 @@ MOST_PIECES = 20_000
 
 
 def read_ros_map(path: Path, wall_height_m: float = WALL_HEIGHT_M, *, watched: Watched = pass_on) -> BuildingPlan:
-    """The plan of a ROS map, in the map's frame. Raises BuildingError where it cannot be read or has no room."""
+    """The plan of a ROS map, in the map's frame. Raises BuildingError where it cannot be read or has no room,
+    NoWayError where most rooms have no doorway."""
     file = read_map_yaml(path)
     cells = read_cells(file)
     for value, what, key in ((FREE, "free", "free_thresh"), (OCCUPIED, "occupied", "occupied_thresh")):
@@ -246,8 +248,8 @@ def read_ros_map(path: Path, wall_height_m: float = WALL_HEIGHT_M, *, watched: W
     _add_doors(plan, labels, gaps, names, grid)
     joined = {room for opening in plan.openings for room in opening.rooms}
     if len(names) > 1 and len(joined) < len(names) / 2:
-        raise BuildingError(f"{file.image.name}: expected a doorway to most rooms, got none to "
-                            f"{len(names) - len(joined)} of {len(names)}: its walls or gaps are not those of rooms")
+        raise NoWayError(f"{file.image.name}: expected a doorway to most rooms, got none to "
+                         f"{len(names) - len(joined)} of {len(names)}: its walls or gaps are not those of rooms")
     _report(plan, file, grid, labels, len(things))
     return plan
 

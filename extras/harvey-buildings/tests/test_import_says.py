@@ -58,7 +58,10 @@ def test_rooms_without_a_way_are_exit_code_1(tmp_path: Path, monkeypatch: pytest
 
 
 @pytest.mark.parametrize("has_doors", [True, False])
-def test_a_map_most_of_whose_rooms_have_no_doorway_is_refused(tmp_path: Path, has_doors: bool) -> None:
+def test_a_map_most_of_whose_rooms_have_no_doorway_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], has_doors: bool,
+) -> None:
+    """The command line ends with 1 and writes no file."""
     picture = np.zeros((100, 320), np.uint8)
     for first in (10, 110, 210):
         picture[10:90, first : first + 95] = 254
@@ -72,6 +75,10 @@ def test_a_map_most_of_whose_rooms_have_no_doorway_is_refused(tmp_path: Path, ha
     else:
         with pytest.raises(BuildingError, match="expected a doorway to most rooms, got none to 3 of 3"):
             read_ros_map(tmp_path / "m.yaml")
+    made = tmp_path / "m.toml"
+    assert main(["world", "import", str(tmp_path / "m.yaml"), "--out", str(made)]) == int(not has_doors)
+    assert made.exists() == has_doors
+    assert ("got none to 3 of 3" in capsys.readouterr().err) != has_doors
 
 
 @pytest.mark.skipif(find_spec("ifcopenshell") is None, reason="needs ifcopenshell")

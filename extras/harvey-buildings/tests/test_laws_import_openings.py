@@ -6,6 +6,7 @@ Rooms are drawn beside one another and turned by any angle; each bound has a row
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,8 +49,8 @@ def rooms(angle: float = 0.0, gap: float = GAP) -> dict[str, Floats]:
     return {"a": turned(rectangle(5.0, DEPTH), angle), "b": turned(rectangle(3.0, DEPTH, 5.0 + gap), angle)}
 
 
-def door(x: float, y: float, width: float, angle: float = 0.0, **more: object) -> WallOpening:
-    return WallOpening("d", "s", turned(np.array([x, y]), angle), width, 2.0, **more)  # type: ignore[arg-type]
+def door(x: float, y: float, width: float, angle: float = 0.0, **more: Any) -> WallOpening:
+    return WallOpening("d", "s", turned(np.array([x, y]), angle), width, 2.0, **more)
 
 
 @settings(max_examples=60)
@@ -200,11 +201,12 @@ def test_a_window_is_on_the_side_that_runs_along_it_and_holds_half_of_it(
         assert pane is None or (found[0].along_m, found[0].width_m) == pytest.approx(pane)
 
 
+Box = tuple[float, float, float, float, float, float]
 SPACE = Space("a", "room", "a", "s", rectangle(5.0, 4.0), 3.0, 2.5)
 
 
-def thing(x: float, y: float, *boxes: tuple[float, ...], turn: float = 0.0, kind: str = "table") -> Furnishing:
-    return Furnishing("t", kind, "a", np.array([x, y]), turn, tuple(boxes))  # type: ignore[arg-type]
+def thing(x: float, y: float, *boxes: Box, turn: float = 0.0, kind: str = "table") -> Furnishing:
+    return Furnishing("t", kind, "a", np.array([x, y]), turn, boxes)
 
 
 @settings(max_examples=50)

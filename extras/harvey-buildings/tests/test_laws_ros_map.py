@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -219,9 +220,9 @@ def said(capsys: pytest.CaptureFixture[str], *argv: str) -> tuple[int, str]:
     ({"picture": pgm(np.pad(np.full((4, 4), 254, np.uint8), 2))}, "m.pgm: expected a room of 1.5 m2"),
 ])
 def test_a_map_that_cannot_be_read(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], changed: dict[str, str | bytes | None], names: str,
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], changed: dict[str, Any], names: str,
 ) -> None:
-    path = write(tmp_path, **{"picture": pgm(FRAME), **changed})  # type: ignore[arg-type]
+    path = write(tmp_path, **{"picture": pgm(FRAME), **changed})
     code, text = said(capsys, str(path), "--out", str(tmp_path / "m.toml"))
     assert code == 2
     assert names in text

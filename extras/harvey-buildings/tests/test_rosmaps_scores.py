@@ -12,7 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from harvey_buildings.experiments.rosmaps_scores import correlate_rooms, count_found, draw_rooms, read_truth
+from harvey_buildings.experiments.rosmaps_scores import (
+    MapTruth,
+    correlate_rooms,
+    count_found,
+    draw_beside,
+    draw_rooms,
+    read_truth,
+)
 
 LABELS = arrays(np.int32, (6, 7), elements=st.integers(0, 3))
 
@@ -62,3 +69,14 @@ def test_a_line_across_a_doorway_is_the_truth_of_it(tmp_path: Path) -> None:
     drawn = draw_rooms({"a": np.array([[5, 5], [45, 5], [45, 55], [5, 55]]) * 0.05,
                         "b": np.array([[50, 5], [95, 5], [95, 55], [50, 55]]) * 0.05}, (60, 100), 0.05)
     assert correlate_rooms(truth.rooms, drawn)[0] == pytest.approx(1.0)
+
+
+def test_the_true_rooms_are_drawn_beside_the_traced(tmp_path: Path) -> None:
+    """Outside is dark, doorways are red, and each room has one shade."""
+    rooms = np.zeros((40, 60), np.int32)
+    rooms[5:35, 5:55] = 1
+    draw_beside(MapTruth(rooms, np.array([[1.5, 1.0]])), MapTruth(rooms, np.zeros((0, 2))), 0.05, tmp_path / "m.png")
+    picture = cv2.imread(str(tmp_path / "m.png"))
+    assert picture is not None and picture.shape == (40, 60 + 8 + 60, 3)
+    assert picture[19, 30].tolist() == [0, 0, 255] and picture[19, 98].tolist() == picture[10, 10].tolist()
+    assert picture[2, 2].max() < 30 < picture[10, 10].max() and (picture[:, 60:68] == 255).all()

@@ -21,7 +21,7 @@ LINES = {
     "harvey": 11_192,
     "experiments": 11_385,
     "tests": 45_635,
-    "extras": 22_400,
+    "extras": 22_460,
 }
 """Of Python files, at most."""
 BYTES = {"ARCHITECTURE.md": 12_000}

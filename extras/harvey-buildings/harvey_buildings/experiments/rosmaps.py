@@ -26,6 +26,7 @@ from harvey_buildings.experiments.rosmaps_scores import (
     MapTruth,
     correlate_rooms,
     count_found,
+    draw_beside,
     draw_rooms,
     read_truth,
 )
@@ -53,7 +54,8 @@ COLUMNS = ("map", "true rooms", "traced", "Matthews correlation", "weighted by a
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """How one map was traced; ``kind`` is empty, furnished or generated; ``extra``: openings at no true doorway."""
+    """How one map was traced; ``kind`` is empty, furnished or generated; ``extra``: openings at no true doorway;
+    ``picture``: the file with its true rooms beside the traced ones."""
 
     name: str
     kind: str
@@ -65,6 +67,12 @@ class Score:
     found: int
     extra: int
     faults: int
+    picture: Path
+
+    @property
+    def stays_below(self) -> bool:
+        """Whether the map alone has less than is claimed of all of its kind."""
+        return self.correlation < LEAST[self.kind] or self.found < MIN_DOORS * self.doorways
 
 
 def run(quick: bool, seed: int, missions: int | None = None) -> Report:
@@ -90,9 +98,9 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
             " rooms. A doorway is found where an opening between two traced rooms is within 0.5 m of it; not true:"
             " openings at no true doorway, most of them where a corridor is parted.",
             *(f"{kind}: {_doors(kind, scores)}" for kind in _kinds(scores)),
-            *(f"{score.name} stays below: correlation {score.correlation:.3f}, {score.found} of {score.doorways} doors"
-              for score in scores
-              if score.correlation < LEAST[score.kind] or score.found < MIN_DOORS * score.doorways),
+            *(f"{score.name} stays below: correlation {score.correlation:.3f}, {score.found} of {score.doorways} doors;"
+              f" {score.picture}: true rooms and doorways on the left, traced ones on the right"
+              for score in scores if score.stays_below),
             f"Missions between rooms of the traced floors (seeds from {JUDGED_SEED}): {len(arrived)} of {len(ends)}"
             f" reached within {100.0 * MAX_ERROR_M:.0f} cm, at least {at_least(len(arrived), len(ends)):.1%} (95 %);"
             f" farthest {worst_mm:.0f} mm; otherwise: "
@@ -157,8 +165,11 @@ def _score(file: Path, name: str, kind: str, truth: MapTruth, low: np.ndarray | 
     openings = [door.centre_world - corner for door in world.doorways]
     found = count_found(truth.doorways, openings)
     rooms = len(np.unique(truth.rooms[truth.rooms > 0]))
-    return world, Score(name, kind, rooms, len(world.rooms), correlation, weighted, len(truth.doorways), found,
-                        len(openings) - found, len(check_world(world)))
+    score = Score(name, kind, rooms, len(world.rooms), correlation, weighted, len(truth.doorways), found,
+                  len(openings) - found, len(check_world(world)), target.with_suffix(".below.png"))
+    if score.stays_below:
+        draw_beside(truth, MapTruth(traced, np.array(openings).reshape(-1, 2)), CELL_M, score.picture)
+    return world, score
 
 
 def _draw(floors: Sequence[tuple[Path, World, Score]], count: int, seed: int) -> Iterator[tuple[Path, Trip]]:

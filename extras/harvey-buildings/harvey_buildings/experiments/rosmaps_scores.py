@@ -71,6 +71,22 @@ def draw_rooms(outlines: Mapping[str, NDArray[np.float64]], shape: tuple[int, in
     return labels
 
 
+def draw_beside(truth: MapTruth, traced: MapTruth, cell_m: float, path: Path) -> None:
+    """Write a picture: the true rooms, each in a colour of its own, and beside them the traced; doorways are red."""
+    from matplotlib.image import imsave
+
+    parts = []
+    for which in (truth, traced):
+        shades = np.random.default_rng(0).uniform(0.35, 0.95, (int(which.rooms.max()) + 1, 3))
+        shades[0] = 0.1
+        part = shades[which.rooms]
+        for x, y in which.doorways:
+            row, column = len(part) - 1 - int(y / cell_m), int(x / cell_m)
+            part[max(row - 3, 0) : row + 4, max(column - 3, 0) : column + 4] = (1.0, 0.0, 0.0)
+        parts += [part, np.ones((len(part), 8, 3))]
+    imsave(path, np.concatenate(parts[:-1], axis=1))
+
+
 def correlate_rooms(truth: Labels, traced: Labels) -> tuple[float, float]:
     """The Matthews correlation, mean over the true rooms and weighted by their area; 0 for a room without a pair."""
     rooms, found = int(truth.max()), int(traced.max())
