@@ -200,8 +200,8 @@ class LocalizationSettings:
         1.15, "1",
         "Smallest sum of matched and explained parts: a pose nearby has a little of both.", "rough-day, seed 91")
     sure_log_likelihood: float = setting(
-        40.0, "1", "Log likelihood from which segments need no explanation: the model lacks what is on full shelves.",
-        "engineering judgement, checked with harvey experiment kidnap")
+        30.0, "1", "Log likelihood from which segments need no explanation: the model lacks what is on full shelves.",
+        "own floors, plain and textured, and development floors of miniworld: the best place in rooms where it is not")
     sure_matched_fraction: float = setting(
         0.75, "1", "Part of the predicted lines from which, at that likelihood, segments need no explanation.",
         "engineering judgement, checked with harvey experiment kidnap")

@@ -25,6 +25,9 @@ from knowledge_sources.methods.localization.global_localization import (
 from knowledge_sources.settings import DEFAULT, LocalizationSettings
 from world_models.frames import Pose2
 
+LOG_PLACES = 12.0
+"""Logarithm of the number of distinct poses on a floor of forty rooms, 0.45 m or 10 degrees apart."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StatedPlace:
@@ -78,8 +81,11 @@ def weigh_told(
 
 
 def _is_far_from_chance(candidate: PlaceCandidate, settings: LocalizationSettings) -> bool:
-    """Whether so much agrees that only the same place shows it, though a model that is inexact lacks many lines."""
-    return candidate.likelihood.log_likelihood >= settings.sure_log_likelihood
+    """Whether so much agrees that only the same place shows it, though a model that is inexact lacks many lines.
+
+    It is one place, not the best of a floor, which chance has so many trials to be.
+    """
+    return candidate.likelihood.log_likelihood >= settings.sure_log_likelihood - LOG_PLACES
 
 
 def compute_place_odds(

@@ -1,7 +1,8 @@
 """From a rough pose to a precise one, and how likely all views are there.
 
 The pose is refined by iterated closest lines and a Kalman filter over all motions between the views. Its likelihood
-counts matched and missed lines, against what chance would match.
+counts matched and missed lines, against what chance would match. Lines in a pattern that the model does not have, as
+bricks, neither move the pose nor count.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from knowledge_sources.methods.verification.line_check import (
     find_errors,
     list_names,
     predict_lines,
+    take_distinct,
 )
 from knowledge_sources.settings import DEFAULT, LocalizationSettings, Settings
 from world_models.frames import Pose, Pose2
@@ -96,6 +98,7 @@ def refine_pose(
     view in which most model lines are visible: once the pose is known from it, clutter in the others, or a wrong turn,
     does no harm. Where the views contradict one another, the covariance grows by Birge's ratio.
     """
+    views = [replace(v, segments_px=take_distinct(v.segments_px, settings.verification)) for v in views]
     visible = [len(predict_lines(robot, view.pose_then(pose), settings.verification)) for view in views]
     order = sorted(range(len(views)), key=lambda k: (_is_turn_uncertain(views[k]), -visible[k]))
     state = _start(views, pose, order[0])

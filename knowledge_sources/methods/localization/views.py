@@ -25,6 +25,7 @@ from world_models.frames import Pose, Pose2, wrap_angle
 LEVEL_HEADING_SIGMA_RAD = math.radians(0.3)  # standard deviation of a turn measured by level lines
 MAX_HEADING_CORRECTION_RAD = math.radians(20.0)
 """Largest correction of a turn by level lines; odometry decides between the four."""
+MAX_HEADING_SIGMAS = 5.0  # the same in standard deviations of the turn
 MIN_TURN_BETWEEN_VIEWS_RAD = math.radians(10.0)
 """Turn from which nothing of the building stays where it is in the picture."""
 STATIONARY_PX = 1.5  # distance of two segments that are one stationary line
@@ -119,7 +120,7 @@ def align_headings(
     out, off_later = [views[-1]], 0.0
     for k in range(len(views) - 2, -1, -1):
         view, off = views[k], math.remainder(axis - axes[k], RIGHT_ANGLE_RAD) if k in axes else math.inf
-        if abs(off) < MAX_HEADING_CORRECTION_RAD and k != reference:
+        if abs(off) < _bound_correction(view.covariance) and k != reference:
             view = replace(view, covariance=_limit_turn_variance(view.covariance, variance))
         else:
             off = off_later
@@ -136,6 +137,12 @@ def _find_axes(
     found = [find_level_direction(v.segments_px, camera, camera_from_robot) for v in views]
     return {k: direction + view.now_from_then.heading_rad
             for k, (view, direction) in enumerate(zip(views, found, strict=True)) if direction is not None}
+
+
+def _bound_correction(covariance: Floats) -> float:
+    """By how much level lines may correct a turn [rad]: beyond what the wheels can do they are another direction."""
+    sigma_rad = math.sqrt(float(covariance[2, 2]) + LEVEL_HEADING_SIGMA_RAD**2)
+    return min(MAX_HEADING_CORRECTION_RAD, MAX_HEADING_SIGMAS * sigma_rad)
 
 
 def _correct_turn(view: CameraView, later: CameraView, now_from_later: Pose2, more_rad: float) -> Pose2:

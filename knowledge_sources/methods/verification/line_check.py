@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from scipy.special import betainc
+from scipy.special import betainc, betaln
 
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose.displacements import fit_displacements
@@ -43,7 +43,9 @@ DISPLACEMENT_RAD = 0.07  # turn of the nearer wrong poses at which chance is cou
 PATTERN_REACH_PX = 8.0, 32.0  # how far aside it is looked for a pattern: nearer ones are the line's own edges
 PATTERN_STEP_PX = 2.0  # of the places aside at which it is looked
 MAX_PATTERN_PART = 0.4  # part of the places aside, covered by what the model lacks, from which it is a pattern
-DETECTION_RATE = 0.85  # probability that a predicted line is found at the right pose: others are hidden or too faint
+FOUND_AND_MISSED = 6.0, 2.0
+"""Beta distribution of the part of the predicted lines that a picture shows at the right pose: others are hidden, too
+faint, or lost among bricks and planks."""
 CERTAINTY_BOUNDS = 0.04, 0.6  # of the chance of a match, as a line counts for or against a pose
 LINE_INDEPENDENCE = 0.5  # weight of a line: lines of one thing are seen or missed together (tempered likelihood)
 LINE_TOLERANCE_RAD = 0.06  # largest angle between a segment and the line that it covers
@@ -131,10 +133,14 @@ def compute_p_false(matched: int, visible: int, chance: float) -> float:
 
 
 def compute_log_ratio(matched: int, visible: int, chance: float) -> float:
-    """Compute the tempered log likelihood ratio of so many matched lines at the right pose and at a wrong one."""
-    p, rate = min(max(chance, CERTAINTY_BOUNDS[0]), CERTAINTY_BOUNDS[1]), DETECTION_RATE
-    found, missed = math.log(rate / p), math.log((1.0 - rate) / (1.0 - p))
-    return LINE_INDEPENDENCE * (matched * found + (visible - matched) * missed)
+    """Compute the tempered log likelihood ratio of so many matched lines at the right pose and at a wrong one.
+
+    How many a picture shows at the right pose is not known beforehand: the likelihood is its mean over what may be.
+    """
+    p = min(max(chance, CERTAINTY_BOUNDS[0]), CERTAINTY_BOUNDS[1])
+    found, missed = LINE_INDEPENDENCE * matched, LINE_INDEPENDENCE * (visible - matched)
+    a, b = FOUND_AND_MISSED
+    return float(betaln(a + found, b + missed) - betaln(a, b)) - found * math.log(p) - missed * math.log(1.0 - p)
 
 
 def find_distinct(

@@ -27,6 +27,7 @@ from knowledge_sources.methods.localization.global_localization import (
 )
 from knowledge_sources.methods.localization.next_view import SensingAction
 from knowledge_sources.methods.localization.place_odds import (
+    LOG_PLACES,
     StatedPlace,
     compute_place_odds,
     compute_prior,
@@ -49,6 +50,7 @@ FOUND, PROBE, AMBIGUOUS = LocalizationStatus.FOUND, LocalizationStatus.PROBE, Lo
 S = DEFAULT.localization
 LOOKS = [Pose2(0.0, 0.0, 0.5 * k) for k in range(8)]
 SMALL = 1e-6
+FAR = S.sure_log_likelihood - LOG_PLACES
 ACTION = SensingAction(0.3, 0.6, 1.0)
 ROBOT = RobotModel(generated_floor(11, 4, symmetric=True).world, Camera.from_field_of_view(1.1), CameraMount(1.0, 0.1),
                    ActuatorModel())
@@ -151,8 +153,8 @@ def test_the_told_place_is_believed_at_the_stated_odds(tied: bool, bound: float)
 
 
 @pytest.mark.parametrize(("log", "looks", "x_m", "expected"), [
-    (S.sure_log_likelihood, S.max_searched_views, 2.0, FOUND), (S.sure_log_likelihood - SMALL, 9, 2.0, PROBE),
-    (S.sure_log_likelihood, S.max_searched_views - 1, 2.0, PROBE), (S.sure_log_likelihood, 9, 9.0, PROBE)])
+    (FAR, S.max_searched_views, 2.0, FOUND), (FAR - SMALL, 9, 2.0, PROBE),
+    (FAR, S.max_searched_views - 1, 2.0, PROBE), (S.sure_log_likelihood, 9, 9.0, PROBE)])
 def test_where_it_was_told_to_be_it_need_only_be_far_from_chance(
     log: float, looks: int, x_m: float, expected: LocalizationStatus
 ) -> None:

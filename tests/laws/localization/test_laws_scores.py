@@ -8,8 +8,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.integrate import quad
 from scipy.optimize import approx_fprime
-from scipy.stats import binom
+from scipy.stats import beta
 
 from knowledge_sources.methods.verification import line_check
 from knowledge_sources.methods.verification.line_check import (
@@ -59,8 +60,17 @@ def test_a_view_promises_the_bound_of_its_lines_by_finite_differences(seed: int,
 
 @some
 @given(visible=st.integers(0, 60), part=st.floats(0.0, 1.0), chance=st.floats(0.0, 1.0))
-def test_matched_lines_are_worth_their_binomial_odds(visible: int, part: float, chance: float) -> None:
+def test_matched_lines_are_worth_their_odds_whatever_part_of_them_a_picture_shows(
+    visible: int, part: float, chance: float
+) -> None:
     matched = round(part * visible)
     p = float(np.clip(chance, *line_check.CERTAINTY_BOUNDS))
-    odds = binom.logpmf(matched, visible, line_check.DETECTION_RATE) - binom.logpmf(matched, visible, p)
-    assert math.isclose(compute_log_ratio(matched, visible, chance), line_check.LINE_INDEPENDENCE * odds, abs_tol=1e-7)
+    worth = line_check.LINE_INDEPENDENCE
+
+    def odds(rate: float) -> float:
+        found, missed = worth * matched, worth * (visible - matched)
+        here, elsewhere = (found * math.log(r) + missed * math.log(1.0 - r) for r in (rate, p))
+        return math.exp(here - elsewhere) * float(beta.pdf(rate, *line_check.FOUND_AND_MISSED))
+
+    mean = quad(odds, 1e-12, 1.0 - 1e-12, points=[0.5, max(0.01, min(0.99, part))], limit=200)[0]
+    assert math.isclose(compute_log_ratio(matched, visible, chance), math.log(mean), abs_tol=1e-5)
