@@ -17,6 +17,7 @@ from knowledge_sources.floor_ahead import FloorAhead
 from knowledge_sources.methods.motion.increments import (
     MAX_HEADING_ERROR_RAD,
     MAX_LOOK_ERROR_RAD,
+    count_increment,
     find_aim,
     plan_increment,
     plan_turn,
@@ -102,9 +103,8 @@ class Motor(RobotKnowledgeSource):
         match case:
             case Turn():
                 yield Post(case.command, (case.milestone, case.belief.entry))
-            case Begin():
-                leg = lay_leg(case.sketch.id, case.sketch.value, case.belief.pose, case.belief.world)
-                yield Post(leg, (case.sketch, case.belief.entry))
+            case Begin(sketch, belief):
+                yield Post(lay_leg(sketch.id, sketch.value, belief.pose, belief.world), (sketch, belief.entry))
             case Drive():
                 yield from self._command_increment(view, case.leg, case.belief)
 
@@ -130,7 +130,7 @@ class Motor(RobotKnowledgeSource):
         if command is None:
             yield Revise(leg, replace(seen, status="arrived"), (leg, belief, *corrected))
             return
-        step = Revise(leg, replace(seen, increments=seen.increments + 1), (leg, belief, *corrected))
+        step = Revise(leg, count_increment(seen, command), (leg, belief, *corrected))
         yield step
         yield Post(command, (step, belief, *(() if drift is None else (drift,)), *told))
 

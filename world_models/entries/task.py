@@ -194,6 +194,7 @@ class Leg:
         aim_rad: how far to the left of its heading the point lay that it then steered at [rad].
         looking_rad: the heading that the robot turns to, to see floor that it will need [rad, world]; None on the way.
         looked_at: x, y and heading of each such look on this leg.
+        turned_rad: how far it has turned towards its aim since it last moved [rad].
     """
 
     sketch: str
@@ -211,6 +212,7 @@ class Leg:
     aim_rad: float | None = None
     looking_rad: float | None = None
     looked_at: tuple[tuple[float, float, float], ...] = ()
+    turned_rad: float = 0.0
 
     def carries_out(self, id: str, sketch: PlanSketch) -> bool:
         """Whether it is the way of the current subgoal of a sketch, which is called so on the board."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from knowledge_sources.methods.motion.pure_pursuit import (
     compute_bearing,
@@ -26,7 +27,13 @@ MAX_LOOK_ERROR_RAD = math.radians(6.0)
 def plan_increment(
     actuator: ActuatorModel, leg: Leg, here: Pose2, curvature_per_m: float, lookahead_m: float
 ) -> MotorCommand | None:
-    """The next increment from a pose (world); None on arrival. A move is an arc whose chord points at the aim."""
+    """The next increment from a pose (world); None on arrival. A move is an arc whose chord points at the aim.
+
+    Near its end it may turn in vain, as what it follows shifts its belief as it turns. After a full turn without a move
+    it has arrived: the look at the milestone tells by how far it missed.
+    """
+    if leg.turned_rad > math.tau:
+        return None
     along, left = measure_progress(leg, here)
     within_m = leg.tolerance_m * ARRIVAL_PART
     away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
@@ -38,6 +45,12 @@ def plan_increment(
     distance = min(actuator.increment_m, actuator.compute_command_m(away))
     turn = compute_chord_turn(turn, curvature_per_m, actuator.reach * distance)
     return MotorCommand(turn if abs(turn) > MAX_ARRIVAL_HEADING_ERROR_RAD / 10 else 0.0, distance)
+
+
+def count_increment(leg: Leg, command: MotorCommand) -> Leg:
+    """The leg with one more increment; a turn to look at the floor is none towards its aim."""
+    turned = 0.0 if leg.looking_rad is not None else leg.turned_rad + abs(command.turn_rad)
+    return replace(leg, increments=leg.increments + 1, turned_rad=0.0 if command.move_m > 0.0 else turned)
 
 
 def plan_turn(heading_rad: float | None, here: Pose2, actuator: ActuatorModel, most_rad: float) -> MotorCommand | None:

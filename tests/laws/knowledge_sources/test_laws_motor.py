@@ -35,7 +35,7 @@ from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.motor import Motor
 from knowledge_sources.floor_ahead import MIN_INCREMENT_M, UNSURE_GAP_M
 from knowledge_sources.methods.floor.seen_floor import find_floor
-from knowledge_sources.methods.motion.increments import MAX_HEADING_ERROR_RAD
+from knowledge_sources.methods.motion.increments import MAX_HEADING_ERROR_RAD, count_increment, plan_increment
 from knowledge_sources.methods.motion.pure_pursuit import MAX_START_OFFSET_M
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
@@ -329,3 +329,22 @@ def test_what_it_watches() -> None:
     assert wakes(BLIND, Posted(milestone)) and isinstance(milestone.value, Milestone)
     candidate = bench.put(replace(belief.value, status="candidate"))
     assert not wakes(BLIND, Posted(candidate))
+
+
+@settings(deadline=None, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), gap_m=st.floats(0.011, 0.2))
+def test_a_leg_is_not_turned_to_for_ever(seed: int, gap_m: float) -> None:
+    """Its end is believed now here and now there, as what is followed shifts the belief while it turns."""
+    rng, leg, turned_rad = np.random.default_rng(seed), Leg("PlanSketch-1", 0, 0.0, 0.0, 1.0, 0.0, 0.01), 0.0
+    for _ in range(400):
+        bearing, side = rng.uniform(-math.pi, math.pi, 2)
+        here = Pose2(1.0 + gap_m * math.cos(bearing), gap_m * math.sin(bearing), side)
+        command = plan_increment(ACTUATOR, leg, here, 0.0, 0.5)
+        if command is None:
+            break
+        turned_rad = 0.0 if command.move_m > 0.0 else turned_rad + abs(command.turn_rad)
+        leg = count_increment(leg, command)
+        looking = count_increment(replace(leg, looking_rad=0.0), command)
+        assert command.move_m > 0.0 or looking.turned_rad == 0.0  # turns to look at the floor do not count
+        assert leg.turned_rad == pytest.approx(turned_rad)
+        assert turned_rad <= math.tau + ACTUATOR.turn_increment_rad
