@@ -15,12 +15,12 @@ ROOT = Path(__file__).parents[3]
 LINES = {
     "blackboard": 2_200,
     "world_models": 10_220,
-    "knowledge_sources": 22_890,
+    "knowledge_sources": 22_920,
     "sim": 5_945,
     "logs": 7_756,
     "harvey": 11_192,
     "experiments": 11_385,
-    "tests": 45_635,
+    "tests": 45_770,
     "extras": 22_460,
 }
 """Of Python files, at most."""
