@@ -191,23 +191,26 @@ class SubgoalPlanner:
     def _find_ends(
         self, passage: Passage, origin: str, destination: str, rooms_m: tuple[float, float], aslant: bool
     ) -> _Ends | None:
-        """The places before and behind a passage: straight before it, or past what stands there, aslant."""
-        before, behind = (self._find_place_before(passage, side, most_m)
-                          for side, most_m in zip((origin, destination), rooms_m, strict=True))
-        if before is not None and behind is not None:
-            return _Ends(before, behind, self._way_tolerance_m(passage))
-        if not aslant or isinstance(passage, Link) or not self._cluttered & {origin, destination}:
-            return None
-        middles = [self._find_middle(passage, side) for side in (origin, destination)]
-        for clearance_m in self._settings.clearances_m:
-            free = self._find_free_passage(passage, (origin, destination), clearance_m)
-            line = find_line_through(free, middles, passage.outward_from(origin), DOORWAY_DISTANCES_M,
-                                     DOORWAY_OFFSETS_M)
-            if line is not None:
-                before, behind = (Place.of_world(self._building, side, float(x), float(y))
-                                  for side, (x, y) in zip((origin, destination), line, strict=True))
-                return _Ends(before, behind, min(clearance_m, self._way_tolerance_m(passage)))
-        return None
+        """The places before and behind a passage: straight before it, or past what stands there, aslant.
+
+        A thing of the model beside a doorway is no reason to take another one; where it leaves no room for the way, it
+        may be elsewhere, and the passage is tried.
+        """
+        sides = origin, destination
+        ends = [self._find_place_before(passage, side, m) for side, m in zip(sides, rooms_m, strict=True)]
+        if None in ends and not isinstance(passage, Link) and (aslant or not self._cluttered.intersection(sides)):
+            middles = [self._find_middle(passage, side) for side in sides]
+            for clearance_m in self._settings.clearances_m:
+                free = self._find_free_passage(passage, sides, clearance_m)
+                line = find_line_through(free, middles, passage.outward_from(origin), DOORWAY_DISTANCES_M,
+                                         DOORWAY_OFFSETS_M)
+                if line is not None:
+                    before, behind = (Place.of_world(self._building, side, float(x), float(y))
+                                      for side, (x, y) in zip(sides, line, strict=True))
+                    return _Ends(before, behind, min(clearance_m, self._way_tolerance_m(passage)))
+        before, behind = (self._find_place_before(passage, side, 0.0, is_tried=True) if end is None
+                          and side not in self._cluttered else end for side, end in zip(sides, ends, strict=True))
+        return None if before is None or behind is None else _Ends(before, behind, self._way_tolerance_m(passage))
 
     def _find_free_passage(self, passage: Doorway, rooms: tuple[str, str], margin_m: float) -> Geometry:
         """Where the robot's centre may be in two rooms and the doorway between them, with a margin round the robot."""
@@ -228,9 +231,11 @@ class SubgoalPlanner:
             return WAY_TOLERANCE_M
         return max(beside, self._settings.clearances_m[-1])
 
-    def _find_place_before(self, passage: Passage, locale: str, most_m: float) -> Place | None:
+    def _find_place_before(
+        self, passage: Passage, locale: str, most_m: float, *, is_tried: bool = False
+    ) -> Place | None:
         """The place from which a passage is passed straight, rather no farther from it; None where something is in the
-        way.
+        way, unless it ``is_tried`` all the same.
         """
         if isinstance(passage, Link):
             x, y, heading = passage.stop_of(locale)
@@ -242,7 +247,7 @@ class SubgoalPlanner:
         fit: Iterator[float] = chain(seeing, near)
         if locale in self._cluttered:
             fit = (m for m in fit if self._is_passed(middle, middle - m * outward, locale))
-        away = next(fit, None if locale in self._cluttered else DOORWAY_DISTANCES_M[0])
+        away = next(fit, DOORWAY_DISTANCES_M[0] if is_tried else None)
         if away is None:
             return None
         x, y = middle - away * outward

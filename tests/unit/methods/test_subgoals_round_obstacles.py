@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import shapely
 
+from experiments.generated.floors import generated_floor
+from knowledge_sources.methods.motion.routes import list_obstacles
 from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
 from knowledge_sources.settings import DEFAULT
 from two_doors import two_doors
@@ -97,3 +99,21 @@ def test_where_there_is_room_the_way_keeps_away_from_what_the_model_lacks(world:
     radius_m = RobotModel(world, Camera.from_field_of_view(1.1), CameraMount(1.0), ActuatorModel()).radius_m
     away_m = shapely.LineString(way).distance(shapely.Polygon(thing.footprint))
     assert away_m > radius_m + DEFAULT.plan.clearances_m[0] + DEFAULT.plan.overhang_m - 0.01
+
+
+@pytest.mark.parametrize("seed", [2, 1_000_005])
+def test_things_of_the_model_beside_a_doorway_are_passed_without_contact(seed: int) -> None:
+    """Here things stand beside a doorway, so that there is room only aslant: one was touched again and again."""
+    world = generated_floor(seed, 6, open_share=1.0).world
+    robot = RobotModel(world, Camera.from_field_of_view(1.1), CameraMount(1.0), ActuatorModel())
+    planner, passed = SubgoalPlanner(robot, DEFAULT.plan), 0
+    for doorway in world.doorways:
+        rooms = doorway.between
+        here, there = (Place.of_world(world, room, *np.mean(world.outline(room), axis=0).tolist()) for room in rooms)
+        for part in planner.plan_between_locales(here, there, 0.1) or ():
+            if part.passage == doorway.name:
+                leg = shapely.LineString([end.in_world(world).position for end in (part.origin, part.destination)])
+                things = [thing for room in rooms for thing in list_obstacles(world, room)]
+                assert all(leg.distance(shapely.Polygon(thing)) >= robot.radius_m for thing in things), doorway.name
+                passed += 1
+    assert passed >= 6
