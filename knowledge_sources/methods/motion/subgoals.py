@@ -193,8 +193,7 @@ class SubgoalPlanner:
     ) -> _Ends | None:
         """The places before and behind a passage: straight before it, or past what stands there, aslant.
 
-        A thing of the model beside a doorway is no reason to take another one; where it leaves no room for the way, it
-        may be elsewhere, and the passage is tried.
+        Where a thing of the model leaves no room for either, it may be elsewhere: the passage is tried.
         """
         sides = origin, destination
         ends = [self._find_place_before(passage, side, m) for side, m in zip(sides, rooms_m, strict=True)]
@@ -205,9 +204,9 @@ class SubgoalPlanner:
                 line = find_line_through(free, middles, passage.outward_from(origin), DOORWAY_DISTANCES_M,
                                          DOORWAY_OFFSETS_M)
                 if line is not None:
-                    before, behind = (Place.of_world(self._building, side, float(x), float(y))
-                                      for side, (x, y) in zip(sides, line, strict=True))
-                    return _Ends(before, behind, min(clearance_m, self._way_tolerance_m(passage)))
+                    a, b = (Place.of_world(self._building, side, float(x), float(y))
+                            for side, (x, y) in zip(sides, line, strict=True))
+                    return _Ends(a, b, min(clearance_m, self._way_tolerance_m(passage)))
         before, behind = (self._find_place_before(passage, side, 0.0, is_tried=True) if end is None
                           and side not in self._cluttered else end for side, end in zip(sides, ends, strict=True))
         return None if before is None or behind is None else _Ends(before, behind, self._way_tolerance_m(passage))
@@ -231,9 +230,7 @@ class SubgoalPlanner:
             return WAY_TOLERANCE_M
         return max(beside, self._settings.clearances_m[-1])
 
-    def _find_place_before(
-        self, passage: Passage, locale: str, most_m: float, *, is_tried: bool = False
-    ) -> Place | None:
+    def _find_place_before(self, passage: Passage, locale: str, most_m: float, is_tried: bool = False) -> Place | None:
         """The place from which a passage is passed straight, rather no farther from it; None where something is in the
         way, unless it ``is_tried`` all the same.
         """
@@ -247,11 +244,9 @@ class SubgoalPlanner:
         fit: Iterator[float] = chain(seeing, near)
         if locale in self._cluttered:
             fit = (m for m in fit if self._is_passed(middle, middle - m * outward, locale))
-        away = next(fit, DOORWAY_DISTANCES_M[0] if is_tried else None)
-        if away is None:
-            return None
+        away = next(fit, DOORWAY_DISTANCES_M[0] if is_tried else math.nan)
         x, y = middle - away * outward
-        if not is_clear(self._free_space(locale, -self._robot.radius_m), middle, (x, y)):
+        if math.isnan(away) or not is_clear(self._free_space(locale, -self._robot.radius_m), middle, (x, y)):
             return None
         return Place.of_world(self._building, locale, float(x), float(y))
 
