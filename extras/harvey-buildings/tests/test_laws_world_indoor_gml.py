@@ -39,7 +39,7 @@ class Dialect:
     def point(self, x: float, y: float, z: float) -> tuple[float, float, float]:
         c, s = math.cos(self.turn_rad), math.sin(self.turn_rad)
         placed = (c * x - s * y + self.at[0], s * x + c * y + self.at[1], z + self.at[2])
-        return tuple(value / self.unit_m for value in placed)  # type: ignore[return-value]
+        return placed[0] / self.unit_m, placed[1] / self.unit_m, placed[2] / self.unit_m
 
     def ring(self, points: list[tuple[float, float, float]]) -> str:
         placed = [self.point(*p) for p in points]
