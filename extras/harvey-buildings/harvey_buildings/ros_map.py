@@ -27,7 +27,16 @@ from harvey_buildings.building_plan import (
     slug,
 )
 from harvey_buildings.polygons import clean_outline, extract_outline, square_outline
-from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN, Cells, MapFile, read_cells, read_map_yaml
+from harvey_buildings.ros_map_file import (
+    FREE,
+    OCCUPIED,
+    SAVED_UNKNOWN,
+    UNKNOWN,
+    Cells,
+    MapFile,
+    read_cells,
+    read_map_yaml,
+)
 from harvey_buildings.ros_map_openings import Gap, Mask, trace
 from harvey_buildings.ros_map_rooms import Labels, clean_floor, part_rooms, rooms_beside
 from world_models.building.checks import Watched, pass_on
@@ -308,6 +317,9 @@ def _report(plan: BuildingPlan, file: MapFile, grid: Grid, labels: Labels, thing
                           f"{min(DOOR_HEIGHT_M, plan.spaces[0].height_m - HEADER_M):g} m: a grid has no heights")
     report.guessed.append("rooms end where a wall has a gap; their names are numbers, from the top of the picture down")
     report.guessed.append("what is unknown beside free floor is taken for wall")
+    if file.mode != "raw" and not file.free <= SAVED_UNKNOWN <= file.occupied:
+        report.guessed.append(f"cells of grey {50 if file.negate else 205} are unknown, as savers write them, whatever "
+                              f"free_thresh {file.free:g} and occupied_thresh {file.occupied:g} say")
     if grid.turn_rad:
         report.guessed.append(f"most walls run {abs(math.degrees(grid.turn_rad)):.1f} degrees off the picture's axes; "
                               "walls nearly along those directions are straightened to them")

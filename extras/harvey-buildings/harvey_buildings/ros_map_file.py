@@ -23,6 +23,8 @@ from world_models.building.world import World
 from world_models.files.regular_files import read_regular
 
 MODES = ("trinary", "scale", "raw")
+YES, NO = ("1", "true", "yes", "on", "y"), ("0", "false", "no", "off", "n")
+"""A switch as YAML's readers take it."""
 MAX_YAML_BYTES = 100_000
 MAX_RESOLUTION_M = 1.0
 EXAMPLE = ("image: {image}", "resolution: 0.05", "origin: [0.0, 0.0, 0.0]", "negate: 0", "occupied_thresh: 0.65",
@@ -160,13 +162,15 @@ def _origin(path: Path, value: str, line: int) -> tuple[float, float, float]:
 
 def _switch(path: Path, keys: dict[str, tuple[str, int]]) -> bool:
     value, line = keys.get("negate", ("0", 0))
-    if value.lower() not in ("0", "1", "true", "false"):
+    if value.lower() not in (*YES, *NO):
         raise BuildingError(f"{path.name}:{line}: expected negate 0 or 1, got {value[:60]!r}")
-    return value.lower() in ("1", "true")
+    return value.lower() in YES
 
 
 Cells = NDArray[np.int8]
 FREE, OCCUPIED, UNKNOWN = np.int8(0), np.int8(1), np.int8(-1)
+SAVED_UNKNOWN = 50 / 255
+"""Occupancy of the grey that savers write for unknown, 205."""
 MAX_CELLS = 100_000_000
 MAX_BYTES = 500_000_000
 PICTURES = (".pgm", ".png")
@@ -185,7 +189,9 @@ def read_cells(file: MapFile) -> Cells:
 
     ``trinary`` and ``scale``: map_server, "Value Interpretation": occupancy p = (255 - x) / 255, or x / 255 where
     ``negate``; a colour counts by the mean of its channels. ``raw``: x from 0 to 100 is the occupancy in percent.
-    A transparent pixel is unknown. (The map server's trinary mode counts the alpha channel as a colour.)
+    A transparent pixel is unknown, in ``scale`` one that is not quite opaque too. (The map server's trinary mode counts
+    the alpha channel as a colour.) So is a cell of 205 (50 where ``negate``) whatever the thresholds: savers write it
+    for unknown, and Nav2's, until 2025, with a ``free_thresh`` of 0.25, which would make it free.
     """
     picture, alpha = _read_picture(file.image)
     if file.mode == "raw":
@@ -193,12 +199,12 @@ def read_cells(file: MapFile) -> Cells:
         seen = picture <= 100.0
     else:
         p = picture / 255.0 if file.negate else (255.0 - picture) / 255.0
-        seen = np.ones(p.shape, bool)
+        seen = np.abs(p - SAVED_UNKNOWN) > 1e-3
     cells = np.full(p.shape, UNKNOWN)
     cells[seen & (p < file.free)] = FREE
     cells[seen & (p > file.occupied)] = OCCUPIED
     if alpha is not None:
-        cells[alpha < 0.5] = UNKNOWN
+        cells[alpha < (1.0 if file.mode == "scale" else 0.5)] = UNKNOWN
     return cells
 
 

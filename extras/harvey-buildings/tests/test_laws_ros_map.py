@@ -16,7 +16,7 @@ from hypothesis.extra.numpy import arrays
 
 from experiments.generated.floors import ScanNoise, write_floor_map
 from harvey.cli import main
-from harvey_buildings import BuildingError, import_building
+from harvey_buildings import BuildingError, import_building, read_plan
 from harvey_buildings.ros_map import find_wall_turn, make_grid
 from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN, MapFile, read_cells, read_map_yaml
 from world_models.building.checks import check_world
@@ -58,9 +58,32 @@ def test_cells_are_those_of_the_map_server_in_each_format(
     p = picture / 255.0 if negate else (255.0 - picture) / 255.0
     near = (np.abs(p - free) < 1e-6) | (np.abs(p - occupied) < 1e-6)
     expected = np.where(p < free, FREE, np.where(p > occupied, OCCUPIED, UNKNOWN))
+    expected[picture == (50 if negate else 205)] = UNKNOWN  # what savers write for it
     for kind in ("P2", "P5", "png"):
         cells = cells_of(write_map(tmp_path, picture, kind, **keys))
         assert (cells == expected)[~near].all()
+
+
+@pytest.mark.parametrize(("mode", "negate"), [("trinary", "no"), ("trinary", "on"), ("scale", "0")])
+def test_what_nav2_saves_as_unknown_stays_unknown(tmp_path: Path, mode: str, negate: str) -> None:
+    """Its saver's free_thresh of 0.25 is above the occupancy of its grey of unknown: 50 of 255."""
+    picture = np.full((60, 120), 205, np.uint8)
+    for left in (10, 61):
+        picture[10:50, left : left + 49] = 0
+        picture[12:48, left + 2 : left + 47] = 254
+    picture[20:38, 57:63] = 254
+    path = write_map(tmp_path, 255 - picture if negate == "on" else picture, mode=mode, negate=negate,
+                     occupied_thresh=0.65, free_thresh=0.25)
+    assert ((cells_of(path) == UNKNOWN) == (picture == 205)).all()
+    plan, _ = read_plan(path)
+    assert len(plan.spaces) == 2 and len(plan.openings) == 1 and "205 are" in str(plan.report).replace(" 50 ", " 205 ")
+
+
+def test_a_pixel_of_scale_that_is_not_quite_opaque_is_unknown(tmp_path: Path) -> None:
+    path = write_map(tmp_path, np.full((2, 2), 254, np.uint8), "png", mode="scale")
+    alpha = np.array([[255, 250], [0, 255]], np.uint8)
+    cv2.imwrite(str(tmp_path / "m.png"), np.dstack([np.full((2, 2, 3), 254, np.uint8), alpha]))
+    assert cells_of(path).tolist() == [[FREE, UNKNOWN], [UNKNOWN, FREE]]
 
 
 @MANY
