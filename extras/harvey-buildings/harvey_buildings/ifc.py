@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import multiprocessing
 import re
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from harvey_buildings.building_plan import BuildingError, BuildingPlan
+from harvey_buildings.building_plan import BuildingError, BuildingPlan, Floats
 from harvey_buildings.ifc_elements import FURNITURE, Contents, Passages, Spaces
 from harvey_buildings.ifc_file import ELEMENT_S, READ_ERRORS, ElementShape, IfcFile, ReadingProgress, first_line
 
@@ -75,13 +76,15 @@ def _read(path: Path, send: Callable[[ReadingProgress], None]) -> BuildingPlan:
 
     try:
         send(ReadingProgress("opening it", OPEN_S + OPEN_S_PER_MB * path.stat().st_size / 1e6))
-        if _is_truncated(path):
+        data = path.read_bytes()
+        text = to_step(data)
+        if _is_truncated(text):
             raise ValueError("one that is cut off: END-ISO-10303-21; is missing")
-        plain = path.read_bytes().isascii()
-        model = ifcopenshell.open(str(path)) if plain else ifcopenshell.file.from_string(_to_ascii(path))
+        plain = text.encode() == data
+        model = ifcopenshell.open(str(path)) if plain else ifcopenshell.file.from_string(text)
     except (*READ_ERRORS, OSError, ifcopenshell.Error) as error:
         raise BuildingError(f"{path.name}: expected an IFC file, got: {first_line(error)}") from None
-    file = IfcFile(path.stem, path.name, model, _build_shape_reader(), _read_height, send)
+    file = IfcFile(path.stem, path.name, model, _build_shape_reader(), _read_placement, send)
     try:
         if not _has_unit(model):
             _assume_metres(model)
@@ -95,18 +98,29 @@ def _read(path: Path, send: Callable[[ReadingProgress], None]) -> BuildingPlan:
                             ) from None
 
 
-def _is_truncated(path: Path) -> bool:
-    data = path.read_bytes()
-    return b"ISO-10303-21;" in data[:TAIL_BYTES] and b"END-ISO-10303-21" not in data[-TAIL_BYTES:]
+def _is_truncated(text: str) -> bool:
+    return "ISO-10303-21;" in text[:TAIL_BYTES] and "END-ISO-10303-21" not in text[-TAIL_BYTES:]
 
 
-def _to_ascii(path: Path) -> str:
-    """The text of a file with every non-ASCII letter escaped as STEP wants it; some programs do not escape them."""
-    data = path.read_bytes()
+MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
+         (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+"""Byte order marks, which editors put before a text, and what they say of it; UTF-16's is the start of UTF-32's."""
+ESCAPES = re.compile(r"(\\\\|\\S\\[^']|\\P[A-I]\\|\\X\\[0-9A-F]{2}|\\X2\\(?:[0-9A-F]{4})+\\X0\\"
+                     r"|\\X4\\(?:[0-9A-F]{8})+\\X0\\)|\\")
+"""What may follow a backslash in a text (ISO 10303-21, 6.4.3), or one that stands alone, as in C:\\temp."""
+
+
+def to_step(data: bytes) -> str:
+    """A file as STEP wants it, which some programs do not write: no mark at its start, every letter beyond ASCII
+    escaped, and every backslash that begins no escape. Raises ValueError where its mark is not true."""
+    marked = next((encoding for mark, encoding in MARKS if data.startswith(mark)), None)
     try:
-        text = data.decode("utf-8")
+        text = data.decode(marked or "utf-8")
     except UnicodeDecodeError:
+        if marked:
+            raise ValueError(f"one whose first bytes say {marked}, which it is not") from None
         text = data.decode("cp1252", errors="replace")
+    text = ESCAPES.sub(lambda found: found[1] or r"\\", text)
     return re.sub(r"[^\x00-\x7f]+", lambda found: f"\\X4\\{found[0].encode('utf-32-be').hex().upper()}\\X0\\", text)
 
 
@@ -145,13 +159,13 @@ def _find_reason(log: str) -> str | None:
     return found and first_line(ValueError(" ".join(part for part in found.groups() if part)))
 
 
-def _read_height(element: Any) -> float | None:
-    """Height of an element's placement above the file's zero, in the file's unit; None where it has none."""
+def _read_placement(element: Any) -> Floats | None:
+    """(4, 4) file_from_element of an element's placement, in the file's unit; None where it has none."""
     import ifcopenshell.util.placement
 
     if getattr(element, "ObjectPlacement", None) is None:
         return None
-    return float(ifcopenshell.util.placement.get_local_placement(element.ObjectPlacement)[2][3])
+    return np.array(ifcopenshell.util.placement.get_local_placement(element.ObjectPlacement), float)
 
 
 def _has_unit(model: Any) -> bool:

@@ -63,7 +63,8 @@ class Spaces:
     def _read_storeys(self) -> None:
         found = []
         for storey in self._file.all("IfcBuildingStorey"):
-            elevation, placed = getattr(storey, "Elevation", None), self._file.height(storey)
+            elevation, frame = getattr(storey, "Elevation", None), self._file.placement(storey)
+            placed = None if frame is None else float(frame[2, 3])
             height = elevation if elevation is not None else placed
             found.append((float(height or 0.0) * self._file.unit_m, storey, placed))
         apart = len({placed for _, _, placed in found}) == len(found)
@@ -198,6 +199,7 @@ class Passages:
         self._file, self._plan, self._spaces = file, file.plan, spaces
         self._virtual: set[str] = set()
         self._bounds: dict[int, list[str]] = {}
+        self._stated = 0
 
     def read(self) -> None:
         """Read everything into the file's plan."""
@@ -207,6 +209,9 @@ class Passages:
         for storey in self._plan.storeys:
             self._find_meetings(storey.name)
         self._file.each("IfcWindow", self._read_window)
+        if self._stated:
+            self._plan.report.guessed.append(f"{self._stated} doors and windows have no shape: their stated width and "
+                                             "height, from where they are placed")
 
     def _read_boundaries(self) -> None:
         """Read which spaces a door bounds, and which spaces have a virtual boundary."""
@@ -258,6 +263,9 @@ class Passages:
     def _find_hole(self, element: Any, opening: Any, stated_m: float | None) -> WallHole:
         own = self._file.body_of(element) if element is not None else None
         made = self._file.body_of(opening) if opening is not None else None
+        if own is None and made is None and element is not None:
+            own = self._file.stated_box(element)
+            self._stated += own is not None
         wall = host(opening)
         return find_hole(own, made, lambda: self._file.body_of(wall) if wall is not None else None, stated_m)
 

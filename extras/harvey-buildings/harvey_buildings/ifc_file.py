@@ -163,7 +163,8 @@ def find_hole(
     """The wall hole of an element; its opening counts first, as a door's frame is wider, or its leaf is drawn open.
 
     Args:
-        own, opening: shape of the element and of the opening that it fills, where they have one.
+        own, opening: shape of the element (else its stated size, where it stands) and of the opening that it fills,
+            where they have one.
         wall: reads the shape of the wall.
         stated_m: width according to the file, where it says so.
 
@@ -172,7 +173,7 @@ def find_hole(
     """
     shape = opening or own
     if shape is None:
-        raise ValueError("neither it nor its opening has a shape")
+        raise ValueError("neither it nor its opening has a shape, and its place, width and height are not all stated")
     stated_m = stated_m if stated_m is not None and stated_m > MIN_DOOR_WIDTH_M else None
     along = _find_direction(own or shape, shape, wall, stated_m)
     normal = np.array([-along[1], along[0]])
@@ -241,7 +242,7 @@ class IfcFile:
         stem, source: name of the file without and with its suffix.
         model: the file as ifcopenshell has it.
         shape: reads the shape of an element; with True also roughly, from its bounding box or its lines on the plan.
-        height: reads the height of an element's placement, in the file's unit.
+        placement: reads the placement (4, 4) of an element, in the file's unit; None where it has none.
         send: takes progress messages. doing: what is read now, with its entity.
         unit_m: the file's unit of length [m].
         origin: origin and direction of the plan in the file; known once the spaces are.
@@ -253,7 +254,7 @@ class IfcFile:
     source: str
     model: Any
     shape: Callable[[Any, bool], ElementShape]
-    height: Callable[[Any], float | None]
+    placement: Callable[[Any], Floats | None]
     send: Callable[[ReadingProgress], None]
     unit_m: float = 1.0
     doing: str = "reading its unit of length"
@@ -308,6 +309,17 @@ class IfcFile:
             return self.body(element)
         except READ_ERRORS:
             return None
+
+    def stated_box(self, element: Any) -> ElementShape | None:
+        """The hole of a door or window without a shape: its stated size, from its placement along x and up, as the
+        standard has it; None where the file does not say it whole."""
+        frame = self.placement(element)
+        size = [getattr(element, name, None) for name in ("OverallWidth", "OverallHeight")]
+        if frame is None or not all(size):
+            return None
+        corners = np.array([[x, 0.0, z] for x in (0.0, size[0]) for z in (0.0, size[1])]) * self.unit_m
+        frame[:3, 3] *= self.unit_m
+        return self.origin.place_on_plan(ElementShape(corners, (), frame[:3]))
 
     def distance_m(self, space: str, point: Floats) -> float:
         """Distance on the plan of a point (2,) from the floor of a space [m]."""

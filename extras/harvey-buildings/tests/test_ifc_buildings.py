@@ -11,7 +11,7 @@ import pytest
 import shapely
 
 from harvey.cli import main
-from harvey_buildings import BuildingError, import_building
+from harvey_buildings import BuildingError, import_building, read_plan
 from harvey_buildings.building_plan import Space
 from harvey_buildings.ifc_file import find_climbed_spaces
 from harvey_buildings.polygons import Floats, extract_outline, separate_outlines, straighten_wall
@@ -108,6 +108,43 @@ def test_doors_by_boundary_of_their_opening_without_a_leaf_and_across_their_fram
     world, _ = import_house(house, tmp_path)
     assert doors(world) == {("a", "b"), ("b", "c")}
     assert [d.width_m for d in world.doorways] == pytest.approx([0.9, 0.9], abs=1e-3)
+
+
+@pytest.mark.parametrize("unit", ["millimetre", "foot"])
+def test_a_door_and_a_window_without_any_shape_are_where_their_stated_size_and_place_say(
+        tmp_path: Path, unit: str) -> None:
+    """Also turned and far from zero; the wall's depth is not stated, so the place is right along the wall alone."""
+    plans = []
+    for bare in (False, True):
+        house = flat(House("IFC4", unit, (2_600_000.0, 1_200_000.0, 400.0, 30.0)))
+        house.door(0.0, 1.0, 0.2, 2.5, kind="IfcWindow", wall=house.file.by_type("IfcWall")[0], low=0.9, height=1.2)
+        for element in house.file.by_type("IfcDoor") + house.file.by_type("IfcWindow") if bare else ():
+            element.Representation = element.FillsVoids[0].RelatingOpeningElement.Representation = None
+        if bare:
+            house.file.by_type("IfcWindow")[0].ObjectPlacement.RelativePlacement.Location = house.point(0.1, 1.0, 0.9)
+        plans.append(read_plan(house.write(tmp_path / "house.ifc"))[0])
+    shaped, stated = plans
+    assert "2 doors and windows have no shape: their stated width" in str(stated.report)
+    for old, new in zip(shaped.openings + shaped.windows, stated.openings + stated.windows, strict=True):
+        assert new.centre == pytest.approx(old.centre, abs=0.02) and abs(new.along @ old.along) > 0.999
+        assert (new.width_m, new.height_m) == pytest.approx((old.width_m, old.height_m), abs=1e-3)
+    assert stated.windows[0].sill_m == pytest.approx(shaped.windows[0].sill_m, abs=1e-3)
+    house.file.by_type("IfcDoor")[0].OverallHeight = None
+    told = str(read_plan(house.write(tmp_path / "house.ifc"))[0].report)
+    assert "0 of 1 doors" in told and "its place, width and height are not all stated" in told
+
+
+@pytest.mark.parametrize("mark", [b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff"])
+def test_a_byte_order_mark_and_lone_backslashes_are_no_hindrance(tmp_path: Path, mark: bytes) -> None:
+    path = flat(House()).write(tmp_path / "house.ifc")
+    text = path.read_text().replace("FILE_NAME('", "FILE_NAME('C:\\temp\\")
+    text = text.replace("Living", "C:\\new\\X2\\ \\S\\").replace("Bath", "\\X2\\00FC\\X0\\ \\\\ \xfc")
+    encoding = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}.get(mark, "utf-8")
+    path.write_bytes(mark + text.encode(encoding))
+    assert [space.label for space in read_plan(path)[0].spaces] == ["C:\\new\\X2\\ \\S\\", "\xfc \\ \xfc"]
+    path.write_bytes(mark + text.encode("cp1252") + b" ")
+    with pytest.raises(BuildingError, match=r"first bytes say utf-.*, which it is not"):
+        read_plan(path)
 
 
 def test_a_thin_wall_is_a_wall_though_the_file_has_no_boundaries(tmp_path: Path) -> None:
