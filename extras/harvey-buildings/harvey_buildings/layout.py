@@ -42,6 +42,7 @@ from harvey_buildings.polygons import (
     straighten_wall,
 )
 from world_models.building.checks import Watched, pass_on
+from world_models.files.construction.specs import DOOR_SIZES_M
 
 STOREY_GAP_M = 10.0
 """Distance between storeys that are laid out side by side."""
@@ -57,7 +58,7 @@ MAX_MEETING_GAP_M = 2.5 * THIN_WALL_M
 MAX_OLD_WALL_M = 0.89
 """Thickness of the walls of old houses: tried for a door where no thinner wall fits."""
 DOORWAY_CLEARANCE_M = 0.05
-MIN_OPENING_M = 0.05
+MIN_OPENING_M, MAX_OPENING_M = DOOR_SIZES_M
 MAX_STEP_M = 0.05
 LINTEL_M, MIN_PANE_M = 0.1, 0.02
 """Wall above a window, and its least height."""
@@ -156,6 +157,10 @@ def _place_openings(layout: Layout, storey: str, watched: Watched) -> None:
         if opening.width_m < MIN_OPENING_M:
             report.left_out.append(f"{opening.name}: narrower than {100 * MIN_OPENING_M:.0f} cm")
             continue
+        if opening.width_m > MAX_OPENING_M:
+            report.guessed.append(f"{opening.name}: {opening.width_m:.1f} m wide in the file; its middle "
+                                  f"{MAX_OPENING_M:g} m, as no opening of a world is wider")
+            opening = replace(opening, width_m=MAX_OPENING_M)
         cut = _door(layout, opening, _near(opening, outlines))
         if cut is not None and overlap(cut, layout.cuts, layout.rooms):
             if opening.has_leaf:
@@ -183,7 +188,7 @@ def _door(layout: Layout, opening: WallOpening, outlines: Mapping[str, Floats]) 
         low = min(layout.plan.space(room).height_m for room in cut.between)
         if change > 0.01:
             report.guessed.append(f"door {opening.name}: moved or narrowed by {100 * change:.0f} cm to fit its wall")
-        return _limit_height(cut, low)
+        return _limit_size(cut, low)
     if not opening.has_leaf:
         report.left_out.append(f"{opening.name}: an opening, but not between two spaces of one storey")
         return None
@@ -193,13 +198,13 @@ def _door(layout: Layout, opening: WallOpening, outlines: Mapping[str, Floats]) 
         report.left_out.append(f"door {opening.name}: no wall{joined} where it should be")
         return None
     report.guessed.append(f"door {opening.name}: leads out of {out.between[0]} to no space of the file; drawn closed")
-    return _limit_height(out, layout.plan.space(out.between[0]).height_m)
+    return _limit_size(out, layout.plan.space(out.between[0]).height_m)
 
 
-def _limit_height(cut: PlacedOpening, ceiling_m: float) -> PlacedOpening:
-    """The opening with HEADER_M of wall above it, in tenths of a millimetre."""
-    height_m = min(cut.height_m, ceiling_m - HEADER_M)
-    return replace(cut, along_m=round(cut.along_m, 4), width_m=round(cut.width_m, 4), height_m=round(height_m, 4))
+def _limit_size(cut: PlacedOpening, ceiling_m: float) -> PlacedOpening:
+    """The opening with HEADER_M of wall above it, no larger than a world may have it, in tenths of a millimetre."""
+    height_m, width_m = min(cut.height_m, ceiling_m - HEADER_M, MAX_OPENING_M), min(cut.width_m, MAX_OPENING_M)
+    return replace(cut, along_m=round(cut.along_m, 4), width_m=round(width_m, 4), height_m=round(height_m, 4))
 
 
 def _place_wide_opening(layout: Layout, a: str, b: str, outlines: Mapping[str, Floats]) -> None:
@@ -212,7 +217,8 @@ def _place_wide_opening(layout: Layout, a: str, b: str, outlines: Mapping[str, F
     if cut is None or overlap(cut, layout.cuts, layout.rooms):
         report.left_out.append(f"{a} and {b} meet without a wall, but not along a line with room for an opening")
         return
-    layout.cuts.append(_limit_height(cut, height + HEADER_M))
+    cut = _limit_size(cut, height + HEADER_M)
+    layout.cuts.append(cut)
     report.guessed.append(f"{a} to {b}: no wall between them in the file; an opening {cut.width_m:.2f} m wide, "
                            "where no furniture stands in the way")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -100,6 +101,78 @@ def test_what_is_guessed_is_told(tmp_path: Path) -> None:
     told = str(import_building(tmp_path / "unit.geojson").report)
     assert "3 rooms, 2 doorways, 0 things, 0 links of 6 features; x and y are metres east and north" in told
     assert "rooms are 2.5 m high" in told and "doorways are 2.05 m high" in told and "storeys are 3 m apart" in told
+
+
+def write_tower(folder: Path, units: list[dict], crs: str | None = None, **others: list) -> Path:
+    """Units on three levels, and other files by name; coordinates as they are given."""
+    levels = [imdf("level", f"l{n}", None, {"ordinal": n, "name": {"en": f"Level {n}"}}) for n in range(3)]
+    for stem, features in {"unit": units, "level": levels, **others}.items():
+        told = {} if crs is None else {"crs": {"type": "name", "properties": {"name": crs}}}
+        text = json.dumps({"type": "FeatureCollection", **told, "features": features})
+        (folder / f"{stem}.geojson").write_text(text, encoding="utf-8")
+    return folder / "unit.geojson"
+
+
+def unit(name: str, level: int, x0: float, y0: float, x1: float, y1: float, category: str = "room",
+         at: tuple[float, float] = (11.0, 48.0), by: float | None = None) -> dict:
+    """A unit of so many metres, in degrees from a place; or times ``by`` where that is given."""
+    scale = np.array([1.0 / np.cos(np.radians(at[1])), 1.0]) / DEGREE_M if by is None else np.full(2, by)
+    ring = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]]) * scale + at
+    return imdf("unit", name, {"type": "Polygon", "coordinates": [ring.tolist()]},
+                {"category": category, "level_id": f"l{level}", "name": None})
+
+
+@pytest.mark.parametrize(("category", "levels", "joined"), [
+    ("elevator", (0, 1, 2), "elevator"), ("elevator", (0, 2), "elevator"), ("stairs", (0, 1, 2), "stairs"),
+    ("escalator", (0, 1), "stairs"), ("ramp", (1, 2), "stairs"), ("stairs", (0, 2), ""), ("room", (0, 1), "")])
+def test_units_of_lifts_and_stairs_over_one_another_join_their_levels(
+        tmp_path: Path, category: str, levels: tuple[int, ...], joined: str) -> None:
+    units = [unit(f"h{n}", n, 0, 0, 8, 4) for n in range(3)] + [
+        unit(f"s{n}", n, 8, 0, 11, 4, category) for n in levels] + [unit("other", 1, 20, 0, 23, 4, category)]
+    plan, _ = read_plan(write_tower(tmp_path, units))
+    assert [storey.name for storey in plan.storeys] == ["level-0", "level-1", "level-2"]
+    pairs = [(f"s{a}", f"s{b}") for a, b in pairwise(levels)]
+    assert [(link.kind, link.between) for link in plan.links] == ([(joined, pair) for pair in pairs] if joined else [])
+
+
+def test_a_relationship_joins_the_units_that_it_names_and_a_level_that_lacks_is_told(tmp_path: Path) -> None:
+    units = [unit(f"h{n}", n, 9.0 * n, 0, 9.0 * n + 8.0, 4) for n in range(3)]
+    way = imdf("relationship", "r", None, {"category": "ramp", "origin": {"id": "h2"}, "intermediary": [{"id": "h1"}],
+                                           "destination": {"id": "h0"}})
+    path = write_tower(tmp_path, units, relationship=[way])
+    assert [link.between for link in read_plan(path)[0].links] == [("h0", "h1"), ("h1", "h2")]
+    (tmp_path / "level.geojson").unlink()
+    with pytest.raises(BuildingError, match=r"expected each level that a unit is on .*got none with the id 'l0'"):
+        read_plan(path)
+
+
+@pytest.mark.parametrize(("crs", "at", "by"), [
+    ("urn:ogc:def:crs:EPSG::3857", (1_224_514.4, 6_106_854.8), 1.0 / np.cos(np.radians(48.0))),
+    ("EPSG:32632", (649_000.0, 5_318_000.0), 1.0), ("urn:ogc:def:crs:OGC:1.3:CRS84", (11.0, 48.0), None),
+    ("urn:ogc:def:crs:EPSG::2263", None, None), (None, (649_000.0, 5_318_000.0), 1.0)])
+def test_projected_metres_are_used_as_such_or_refused_by_name(
+        tmp_path: Path, crs: str | None, at: tuple[float, float] | None, by: float | None) -> None:
+    path = write_tower(tmp_path, [unit("den", 0, 0, 0, 8, 4, at=at or (11.0, 48.0), by=by)], crs)
+    if at is None or crs is None:
+        with pytest.raises(BuildingError, match=r"EPSG:3857 or a zone of UTM\)?, got .*(2263|coordinates up to 5.318)"):
+            read_plan(path)
+        return
+    assert np.ptp(read_plan(path)[0].spaces[0].outline, axis=0) == pytest.approx([8.0, 4.0], abs=0.01)
+
+
+def test_an_opening_is_as_wide_as_a_world_may_have_it_and_what_export_writes_is_read(tmp_path: Path) -> None:
+    """Two halls beside each other with an opening of 25 m; then one as wide and halls as high as a world allows."""
+    units = [unit("one", 0, 0, 0, 30, 40), unit("two", 0, 30.1, 0, 60, 40)]
+    line = unit("", 0, 30.05, 5, 30.05, 30)["geometry"]["coordinates"][0][1:3]
+    gap = imdf("opening", "gap", {"type": "LineString", "coordinates": line}, {"level_id": "l0"})
+    path = write_tower(tmp_path, units, opening=[gap])
+    made = import_building(path)
+    assert again(path).doorways[0].width_m == 20.0 and "gap: 25.0 m wide in the file" in str(made.report)
+    tall = made.text.replace("height = 2.5", "height = 60").replace("height = 2.05", "height = 20")
+    world = read_world(Source.parse(tall, "tall.toml"))
+    export_world(world, tmp_path / "w.geojson")
+    assert_same(world, other := again(tmp_path / "w.geojson"), 0.01)
+    assert other.doorways[0].height_m == 20.0 and other.locale("one").height_m == 60.0
 
 
 SQUARE = {"type": "Polygon", "coordinates": [[[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]]}

@@ -13,6 +13,9 @@ from world_models.building.geometry.faces import Finish
 from world_models.building.geometry.solids import Box
 from world_models.frames import Pose
 
+DOOR_SIZES_M, ROOM_HEIGHTS_M = (0.1, 20.0), (0.1, 1000.0)
+"""Least and most width and height of a door, and height of a room, that a world file may have [m]."""
+
 
 @dataclass(frozen=True)
 class RoomFinishes:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from world_models.building.geometry.faces import Finish
 from world_models.building.geometry.outlines import is_simple
 from world_models.building.model_errors import SIGMA
-from world_models.files.construction.specs import LocaleSpec, RoomFinishes
+from world_models.files.construction.specs import ROOM_HEIGHTS_M, LocaleSpec, RoomFinishes
 from world_models.files.toml.placements import SharedParts
 from world_models.files.toml.source import Node
 from world_models.frames import Pose
@@ -51,7 +51,7 @@ class LocaleReader:
         if kind is None:
             raise node.fail("the key 'kind'", f"keys {', '.join(node.value) or 'none'}")
         outline, walls = self._read_outline(node)
-        height_m = self.length(node, "height", 0.1, 1000.0, 2.7)
+        height_m = self.length(node, "height", *ROOM_HEIGHTS_M, 2.7)
         finishes = self._read_finishes(node, walls)
         properties = read_properties(node.get("properties"))
         if "sky" in node and node["sky"].flag():

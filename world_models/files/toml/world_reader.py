@@ -9,7 +9,7 @@ from pathlib import Path
 
 from world_models.building.geometry.faces import Finish
 from world_models.building.model_errors import SIGMA, SIGMAS
-from world_models.files.construction.specs import DoorSpec, LinkSpec, LocaleSpec, ThingSpec, WorldSpec
+from world_models.files.construction.specs import DOOR_SIZES_M, DoorSpec, LinkSpec, LocaleSpec, ThingSpec, WorldSpec
 from world_models.files.toml.locale_reader import LOCALE_KEYS, LocaleReader, pose_at, read_properties, read_sigma
 from world_models.files.toml.other_files import (
     COPY_KEYS,
@@ -189,8 +189,8 @@ class WorldReader:
         leaf, threshold = (self.reader.finish(node, key, DOOR_FINISH) for key in ("leaf", "threshold"))
         return DoorSpec(
             name, between, self._read_wall(node["wall"], between[0]), along_m,
-            self.reader.length(node, "width", 0.1, 20.0, 0.9, "door_width"),
-            self.reader.length(node, "height", 0.1, 20.0, 2.0, "door_height"),
+            self.reader.length(node, "width", *DOOR_SIZES_M, 0.9, "door_width"),
+            self.reader.length(node, "height", *DOOR_SIZES_M, 2.0, "door_height"),
             is_open, casing, leaf, threshold, self.reader.shared.part(node["panel"]) if "panel" in node else (),
             node.where,
         )
