@@ -14,6 +14,7 @@ from sim.body.simulated_building import Elevators, SimulatedBuilding
 from sim.ground_truth.table import AS_TOLD
 from sim.ground_truth.true_changes import ChangingFaces, State
 from sim.render.lights import Lights, Room, check_light
+from sim.render.optics import check_lens
 from sim.scenario import Scenario
 from sim.scenario_changes import (
     check_names,
@@ -148,7 +149,9 @@ def _world(scenario: Scenario) -> World:
 def _true_camera(scenario: Scenario) -> tuple[Camera, CameraMount]:
     """The camera and its mounting as they are. Raises ScenarioError where there is no such camera."""
     try:
-        return scenario.truth.camera.mounted(scenario.camera.camera, scenario.camera.mount)
+        camera, mount = scenario.truth.camera.mounted(scenario.camera.camera, scenario.camera.mount)
+        check_lens(camera)
+        return camera, mount
     except ValueError as error:
         raise scenario.refused(("truth", "camera"), str(error)) from None
 

@@ -138,6 +138,7 @@ class TrueCamera(Bounded):
     Attributes:
         tilt_rad: of its mounting, positive downward; roll_rad: clockwise as the camera looks; yaw_rad: to the left.
         height_m: of its mounting; focal_px: of its focal length.
+        distortion: of its lens, whole and not by how much it differs, in the order of [camera]; empty: as believed.
     """
 
     tilt_rad: float = bounded(0.0, -0.5, 0.5)
@@ -145,6 +146,7 @@ class TrueCamera(Bounded):
     yaw_rad: float = bounded(0.0, -0.5, 0.5)
     height_m: float = bounded(0.0, -1.0, 1.0)
     focal_px: float = bounded(0.0, -2000.0, 2000.0)
+    distortion: tuple[float, ...] = ()
 
     def mounted(self, camera: Camera, mount: CameraMount) -> tuple[Camera, CameraMount]:
         """The true camera and mounting. Raises ValueError where there is no such camera."""
@@ -155,7 +157,7 @@ class TrueCamera(Bounded):
         if min(*focal, height_m) <= 0.0:
             raise ValueError(f"expected a focal length above 0 px and a height above 0 m, "
                              f"got {min(focal):g} px and {height_m:g} m")
-        return (replace(camera, fx=focal[0], fy=focal[1]),
+        return (replace(camera, fx=focal[0], fy=focal[1], distortion=self.distortion or camera.distortion),
                 replace(mount, height_m=height_m, tilt_rad=mount.tilt_rad + self.tilt_rad,
                         roll_rad=mount.roll_rad + self.roll_rad, yaw_rad=mount.yaw_rad + self.yaw_rad))
 

@@ -70,15 +70,16 @@ def check_lens(camera: Camera) -> None:
 
 
 def distort(rays: Floats, distortion: Floats) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
-    """Distort rays (..., 2) = (x / z, y / z) by (k1, k2, p1, p2, k3).
+    """Distort rays (..., 2) = (x / z, y / z) by (k1, k2, p1, p2[, k3[, k4, k5, k6]]).
 
     Returns the distorted rays, and their derivatives dx/dx, dx/dy = dy/dx and dy/dy, (...) each.
     """
-    k1, k2, p1, p2, k3 = distortion
+    k1, k2, p1, p2, k3, k4, k5, k6 = np.pad(distortion, (0, 8 - len(distortion)))
     x, y = rays[..., 0], rays[..., 1]
     r2 = x * x + y * y
-    radial = 1.0 + k1 * r2 + k2 * r2**2 + k3 * r2**3
-    slope = 2.0 * (k1 + 2.0 * k2 * r2 + 3.0 * k3 * r2**2)
+    under = 1.0 + k4 * r2 + k5 * r2**2 + k6 * r2**3
+    radial = (1.0 + k1 * r2 + k2 * r2**2 + k3 * r2**3) / under
+    slope = 2.0 * (k1 - radial * k4 + 2.0 * (k2 - radial * k5) * r2 + 3.0 * (k3 - radial * k6) * r2**2) / under
     out = np.stack([x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
                     y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y], axis=-1)
     cross = x * y * slope + 2.0 * (p1 * x + p2 * y)

@@ -55,6 +55,15 @@ def test_opencv_bends_the_same_way(lens: Camera, px: np.ndarray) -> None:
     np.testing.assert_allclose(lens.project(rays), np.asarray(theirs).reshape(-1, 2), atol=1e-9)
 
 
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.floats(-0.1, 0.1), min_size=8, max_size=8), pixels)
+def test_the_simulator_bends_by_eight_terms_as_opencv_does(terms: list[float], px: np.ndarray) -> None:
+    rays = PLAIN.rays(px)
+    theirs = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), np.eye(3), np.array(terms))[0].reshape(-1, 2)
+    np.testing.assert_allclose(distort(rays[..., :2], np.array(terms))[0], theirs, atol=1e-9)
+    np.testing.assert_allclose(undistort(theirs, np.array(terms)), rays[..., :2], atol=1e-9)
+
+
 @settings(max_examples=60, deadline=None)
 @given(lenses(), pixels)
 def test_the_simulator_s_lens_is_the_robot_s(lens: Camera, px: np.ndarray) -> None:

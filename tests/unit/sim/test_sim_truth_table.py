@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -66,6 +67,8 @@ def test_a_malformed_table_is_pointed_at(text: str, message: str) -> None:
      r"m\.toml:4: truth\.walls\.0\.wall: expected a wall of the building, one of hallway/north-wall.*'hallway/nort-"),
     ('[[truth.walls]]\nwall = "hallway/floor"\nmissing = true\n', r"truth\.walls\.0\.wall: expected a wall of the"),
     ("[truth.camera]\nfocal_px = -1000\n", r"m\.toml:3: truth\.camera: expected a focal length above 0"),
+    ("[truth.camera]\ndistortion = [0.1]\n", r"m\.toml:3: truth\.camera: expected 4.* distortion coefficients"),
+    ("[truth.camera]\ndistortion = [-9, 0, 0, 0]\n", r"m\.toml:3: truth\.camera: expected a distortion that has one"),
 ])
 def test_what_does_not_go_with_the_building_is_pointed_at(text: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
@@ -145,6 +148,19 @@ def test_the_true_camera_differs_and_the_robot_believes_the_scenarios() -> None:
     camera, true_mount = TrueCamera(tilt_rad=0.1, height_m=0.02, focal_px=5.0).mounted(believed, mount)
     assert (camera.fx - believed.fx, camera.cx - believed.cx) == (5.0, 0.0)
     assert true_mount.height_m == mount.height_m + 0.02 and true_mount.tilt_rad == mount.tilt_rad + 0.1
+
+
+def test_the_true_lens_is_in_the_pictures_and_the_robot_believes_its_own() -> None:
+    """Believed (-0.05) and true (-0.1), or none: the picture is that of a camera whose own file says the true one."""
+    def seen(believed: str, true: str) -> bytes:
+        lens = {"camera.distortion": believed} | ({"truth.camera.distortion": true} if true else {})
+        scenario = with_settings(parse_scenario(SMALL), lens)
+        stage = build_stage(scenario)
+        assert [float(k) for k in stage.scenario.camera.distortion] == json.loads(believed)
+        return stage.body(0).picture()
+    bent = "[-0.1, 0.0, 0.0, 0.0]"
+    assert seen("[-0.05, 0.0, 0.0, 0.0]", bent) == seen(bent, "") != seen("[-0.05, 0.0, 0.0, 0.0]", "")
+    assert seen(bent, "[0, 0, 0, 0, 0]") != seen(bent, "")
 
 
 @pytest.mark.parametrize(("name", "added"), [("box-in-the-way", "extra-0-box"), ("door-found-shut", "true-leaf")])
