@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -95,20 +94,17 @@ def _whole(run: RunDirectory) -> Path:
 
 def _runs(text: str) -> list[RunDirectory]:
     """One run, or all runs of a directory in the order of their numbers. Raises BadInput where there is none."""
+    from world_models.words import by_numbers
+
     here = find_directory(text)
     if not _is_campaign(here):
         return [open_run(text)]
-    return [open_run(str(path)) for path in sorted((p.parent for p in here.glob("*/journal.jsonl")), key=_natural)]
+    return [open_run(str(path)) for path in sorted((p.parent for p in here.glob("*/journal.jsonl")), key=by_numbers)]
 
 
 def _is_campaign(here: Path) -> bool:
     """Whether a directory holds runs and is none."""
     return not (here / "journal.jsonl").exists() and any(here.glob("*/journal.jsonl"))
-
-
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """Sorts 2 before 10."""
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def _beside(runs: list[RunDirectory]) -> Path:

@@ -24,11 +24,15 @@ from knowledge_sources.methods.calibration.intrinsics import (
 from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
 from knowledge_sources.methods.features.picture import read_picture
 from world_models.camera import CameraDeviation, CameraMount
-from world_models.words import count
+from world_models.words import by_numbers, count
 
 ENDINGS = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".webp")
 NEW_PX = 0.08
 """A live view is new when its corners have moved so far on the average, as part of the picture's width."""
+SAME_PX = 0.02
+"""Two pictures show the same view where the corners have moved less on the average, as part of the picture's width."""
+MAX_SPREAD_PX = 0.01
+"""A camera is of no use that says no better, as part of the picture's width, where a direction is seen in it."""
 ROLLED = math.radians(1.0)
 UNITS = (("fx", "px"), ("fy", "px"), ("cx", "px"), ("cy", "px"))
 Grey = NDArray[np.uint8]
@@ -60,9 +64,11 @@ def picture_files(names: Sequence[str]) -> tuple[Path, ...]:
     files: list[Path] = []
     for name in names:
         path = Path(name)
-        found = sorted(p for p in path.iterdir() if p.suffix.lower() in ENDINGS) if path.is_dir() else [path]
+        found = [path]
+        if path.is_dir():
+            found = sorted((p for p in path.iterdir() if p.suffix.lower() in ENDINGS), key=by_numbers)
         if not path.exists() and any(c in name for c in "*?["):
-            found = sorted(path.parent.glob(path.name))
+            found = sorted(path.parent.glob(path.name), key=by_numbers)
         if not found or not all(p.is_file() for p in found):
             raise BadInput(f"expected pictures of a chessboard, a folder or a pattern of them, got {name!r}")
         files += found
@@ -87,6 +93,9 @@ def find_boards(pictures: Iterator[tuple[str, Grey]], pattern: Pattern, tell: Ca
         here = grey.shape[1], grey.shape[0]
         size = size or here
         corners = find_corners(grey, pattern) if here == size else f"its size is {here}, that of the others {size}"
+        if not isinstance(corners, str):
+            again = next((view.name for view in views if _moved_px(corners, view.corners_px) < SAME_PX * here[0]), None)
+            corners = corners if again is None else f"the same view as {again}, which counts once"
         tell(f"{name}: {corners if isinstance(corners, str) else 'board found'}")
         if isinstance(corners, str):
             useless.append((name, corners))
@@ -98,6 +107,11 @@ def find_boards(pictures: Iterator[tuple[str, Grey]], pattern: Pattern, tell: Ca
         raise BadInput(f"expected a board of {pattern.columns} x {pattern.rows} inner corners in at least one of "
                        f"{count(len(useless), 'picture')}, got none{why}")
     return Boards(tuple(views), shown, size, tuple(useless))
+
+
+def _moved_px(corners: NDArray[np.float64], old: NDArray[np.float64]) -> float:
+    """How far corners (n, 2) are from others on the average [px]; a board may be found from either end."""
+    return min(float(np.mean(np.linalg.norm(way - old, axis=1))) for way in (corners, corners[::-1]))
 
 
 def live_pictures(
@@ -116,7 +130,7 @@ def live_pictures(
             told, before = found, told
             if told != before:
                 tell(f"waiting: {found}")
-        elif all(np.mean(np.linalg.norm(found - old, axis=1)) > NEW_PX * grey.shape[1] for old in kept):
+        elif all(_moved_px(found, old) > NEW_PX * grey.shape[1] for old in kept):
             kept.append(found)
             told = ""
             yield f"view {len(kept)} of {wanted}", grey
@@ -125,9 +139,17 @@ def live_pictures(
 def calibrate_camera(boards: Boards, pattern: Pattern, *, with_k3: bool) -> Calibration:
     """Raises BadInput where the views do not do."""
     try:
-        return calibrate(boards.views, pattern, boards.size, with_k3=with_k3)
+        found = calibrate(boards.views, pattern, boards.size, with_k3=with_k3)
+        limit_px = MAX_SPREAD_PX * found.camera.width
+        if found.spread_px <= limit_px:
+            return found
+        raise ValueError(
+            f"expected views that tell to {limit_px:.2g} px where a direction is seen, got {found.spread_px:.2g} px "
+            f"(fx {found.camera.fx:.0f} +- {found.deviations[0]:.2g} px): take the board from more sides, tilted up to "
+            "45 degrees, near and far, into every corner of the picture")
     except ValueError as error:
-        raise BadInput(f"calibration: {error}") from None
+        told = "".join(f"; {name}: {why}" for name, why in boards.useless[:1])
+        raise BadInput(f"calibration: {error}{told}") from None
 
 
 def find_mounting(

@@ -193,7 +193,9 @@ def picture_of(retrieved: Any) -> CapturedPicture | None:
 
 
 def _of_bytes(data: bytes) -> CapturedPicture | None:
-    # A picture that breaks off is filled up with grey by the decoder without a word: look for the end mark.
+    # A picture that breaks off is filled up with grey by the decoder without a word: look for the end mark. Drivers
+    # fill their buffers up behind it.
+    data = data.rstrip(b"\0\xff")
     if not data.startswith(b"\xff\xd8") or b"\xff\xd9" not in data[-64:]:
         return None
     grey = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE)

@@ -92,6 +92,8 @@ MAX_VIEW_RMS_RATIO = 3.0  # largest RMS error of a view over that of the median 
 CALIBRATION_ITERATIONS = 100  # iteration limit of the calibration
 CALIBRATION_TOLERANCE = 1e-10  # relative step at which the calibration ends
 
+GRID = 9  # places along each side of the picture at which it is said how sure the camera is
+
 PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 """Names of the parameters, in OpenCV's order."""
 
@@ -134,6 +136,16 @@ class Calibration:
     def deviations(self) -> Floats:
         """(p,) standard deviations of the parameters."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def spread_px(self) -> float:
+        """Standard deviation of where a direction is seen [px], by the covariance; the median over the picture."""
+        c, p = self.camera, len(self.covariance)
+        u, v = np.meshgrid(np.linspace(0, c.width - 1, GRID), np.linspace(0, c.height - 1, GRID))
+        rays = np.stack([(u - c.cx) / c.fx, (v - c.cy) / c.fy, np.ones_like(u)], axis=-1).reshape(-1, 3)
+        inner = np.asarray(cv2.projectPoints(rays, np.zeros(3), np.zeros(3), c.matrix, c.distortion)[1])[:, 6 : 6 + p]
+        variances = np.einsum("ij,jk,ik->i", inner, self.covariance, inner).reshape(-1, 2).sum(axis=1)
+        return float(np.sqrt(np.median(variances)))
 
     @property
     def view_rms_px(self) -> Floats:

@@ -12,6 +12,8 @@ import pytest
 
 from experiments.generated.scenes import chessboard_picture, chessboard_renderer, chessboard_view
 from harvey.cli import main
+from harvey.errors import BadInput
+from harvey.hardware.calibration import Boards, calibrate_camera, find_boards, picture_files
 from knowledge_sources.methods.calibration.intrinsics import BoardView, Calibration, Pattern, calibrate, find_corners
 from knowledge_sources.methods.calibration.mounting import estimate_mounting
 from knowledge_sources.methods.features.picture import read_picture
@@ -70,6 +72,35 @@ def test_a_view_that_stands_out_is_left_out(views: list[BoardView]) -> None:
 def test_too_few_views_are_refused(views: list[BoardView]) -> None:
     with pytest.raises(ValueError, match=r"expected at least 4 views .* got 3"):
         calibrate(views[:3], PATTERN, (512, 512))
+
+
+def test_views_that_are_alike_count_once(pictures: list[bytes]) -> None:
+    """One view again, moved by 4 px, and turned by half a circle, which is found from the other end."""
+    grey = read_picture(pictures[0]).grey
+    moved = cv2.warpAffine(grey, np.float32([[1, 0, 4], [0, 1, 0]]), (512, 512), borderMode=cv2.BORDER_REPLICATE)
+    shown = [("a", grey), ("b", moved), ("c", read_picture(pictures[1]).grey), ("d", grey)]
+    boards = find_boards(iter(shown), PATTERN, lambda _: None)
+    assert [view.name for view in boards.views] == ["a", "c"]
+    assert boards.useless == tuple((name, "the same view as a, which counts once") for name in "bd")
+
+
+def test_a_camera_of_no_use_by_its_own_deviations_is_refused(views: list[BoardView]) -> None:
+    """Boards at one distance, hardly tilted, do not tell the focal length; four views from all sides do."""
+    rng = np.random.default_rng(1)
+    upright = [BoardView(f"{x}", CAMERA.project(np.add(PATTERN.points, [x, -0.06, 0.4])) + rng.normal(0.0, 0.05, (54, 2)))
+               for x in (-0.16, -0.12, -0.08, -0.04, 0.0)]
+    with pytest.raises(BadInput, match=r"tell to 5\.1 px where a direction is seen, got .* \(fx \d+ \+- .*more sides"):
+        calibrate_camera(Boards(tuple(upright), np.zeros((512, 512), np.uint8), (512, 512), ()), PATTERN, with_k3=False)
+    few = Boards(tuple(views[:4]), np.zeros((512, 512), np.uint8), (512, 512), ())
+    found = calibrate_camera(few, PATTERN, with_k3=False)
+    assert found.spread_px < 2.0 and found.spread_px > found.deviations[2]
+
+
+def test_pictures_of_a_folder_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    for number in (10, 9, 2, 1, 100):
+        (tmp_path / f"b{number}.jpg").touch()
+    for given in (str(tmp_path), str(tmp_path / "b*.jpg")):
+        assert [path.stem for path in picture_files([given])] == ["b1", "b2", "b9", "b10", "b100"]
 
 
 def test_useless_pictures_say_why(pictures: list[bytes]) -> None:

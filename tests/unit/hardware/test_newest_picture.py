@@ -245,12 +245,15 @@ def test_images_are_compressed_with_quality_95_and_keep_their_size() -> None:
     assert picture == CapturedPicture(jpeg, (50, 30), False)
 
 
-@pytest.mark.parametrize(("behind", "is_whole"), [(0, True), (62, True), (63, False)])
-def test_a_jpeg_is_whole_if_its_end_mark_is_among_the_last_64_bytes(behind: int, is_whole: bool) -> None:
-    data = np.frombuffer(jpeg(77) + b"\0" * behind, np.uint8)
+@pytest.mark.parametrize(("behind", "is_whole"), [
+    (b"", True), (b"x" * 62, True), (b"x" * 63, False), (b"\0" * 9000, True), (b"\xff" * 512, True)])
+def test_a_jpeg_is_whole_if_its_end_mark_is_among_the_last_64_bytes_but_for_padding(
+        behind: bytes, is_whole: bool) -> None:
+    data = np.frombuffer(jpeg(77) + behind, np.uint8)
     for shaped in (data, data[None, :], data[:, None]):
         assert (picture_of(shaped) is not None) == is_whole
-    assert picture_of(data[1:]) is None and picture_of(data[:-70]) is None
+    cut = np.frombuffer(jpeg(77)[:-70] + behind, np.uint8)
+    assert picture_of(data[1:]) is None and picture_of(cut) is None
 
 
 @pytest.mark.parametrize(("source", "expected"), [
