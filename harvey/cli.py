@@ -13,6 +13,7 @@ import os
 import sys
 from argparse import Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
+from io import TextIOWrapper
 from typing import Any
 
 EPILOG = """examples:
@@ -33,6 +34,8 @@ INTERRUPTED, OUTPUT_CLOSED, TERMINATED = 130, 141, 143
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal may not know every letter
     gc.set_threshold(*GC_THRESHOLDS)
     atexit.register(gc.freeze)  # what is left then goes with the process: a third of a second to look through it
     try:
@@ -73,12 +76,8 @@ def _run(argv: Sequence[str] | None) -> int:
     from harvey.errors import Terminated, terminable
 
     try:
-        args = _parse(argv)
-    except SystemExit as stop:
-        return stop.code if isinstance(stop.code, int) else 2
-    try:
         with terminable():
-            return _answer(args)
+            return _answer(argv)
     except Terminated as stop:
         _print_error("terminated", stop)
         return TERMINATED
@@ -93,15 +92,20 @@ def _parse(argv: Sequence[str] | None) -> Namespace:
     return args
 
 
-def _answer(args: Namespace) -> int:
+def _answer(argv: Sequence[str] | None) -> int:
     from harvey.errors import BadInput
     from logs.run_errors import RecordingError
     from world_models.files.toml.source import WorldError
     from world_models.plugins import PluginError
 
     try:
-        code: int = args.command.run(args)
-        sys.stdout.flush()
+        try:
+            args = _parse(argv)
+        except SystemExit as stop:
+            code = stop.code if isinstance(stop.code, int) else 2
+        else:
+            code = args.command.run(args)
+        print(end="", flush=True)  # what is left; also of --help
         return code
     except BrokenPipeError as error:
         _discard_output()

@@ -32,18 +32,27 @@ def test_a_closed_pipe_ends_a_run_that_is_not_finished_with_an_error(tmp_path: P
         f"harvey: the output was closed; what was recorded is kept; harvey resume {out} goes on with it")
 
 
-def test_a_closed_pipe_is_no_news_where_nothing_was_under_way() -> None:
-    with subprocess.Popen([*HARVEY, "list"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None and process.stderr is not None
-        process.stdout.close()
-        assert process.stderr.read() == ""
-    assert process.returncode == 141
+@pytest.mark.parametrize("asked", ["list", "--version", "why --help"])
+def test_a_closed_pipe_is_no_news_where_nothing_was_under_way(asked: str) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run([*HARVEY, *asked.split()], stdout=writer, stderr=subprocess.PIPE, text=True)
+    os.close(writer)
+    assert done.stderr == "" and done.returncode in ((0, 141) if "--help" in asked else (141,))
+
+
+@pytest.mark.parametrize("asked", ["list", "settings", "--help"])
+def test_a_terminal_that_knows_ascii_only_is_told_in_its_letters(asked: str) -> None:
+    environment = {**os.environ, "LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    done = subprocess.run([*HARVEY, *asked.split()], capture_output=True, env=environment)
+    assert (done.returncode, done.stderr) == (0, b"") and done.stdout.isascii() and len(done.stdout) > 500
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
-def test_a_full_disk_behind_standard_output_is_named() -> None:
+@pytest.mark.parametrize("asked", ["list", "--version"])
+def test_a_full_disk_behind_standard_output_is_named(asked: str) -> None:
     with open("/dev/full", "w") as full:
-        done = subprocess.run([*HARVEY, "list"], stdout=full, stderr=subprocess.PIPE, text=True)
+        done = subprocess.run([*HARVEY, asked], stdout=full, stderr=subprocess.PIPE, text=True)
     assert (done.returncode, done.stderr) == (2, "harvey: standard output: No space left on device\n")
 
 

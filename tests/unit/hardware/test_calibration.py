@@ -87,8 +87,8 @@ def test_views_that_are_alike_count_once(pictures: list[bytes]) -> None:
 def test_a_camera_of_no_use_by_its_own_deviations_is_refused(views: list[BoardView]) -> None:
     """Boards at one distance, hardly tilted, do not tell the focal length; four views from all sides do."""
     rng = np.random.default_rng(1)
-    upright = [BoardView(f"{x}", CAMERA.project(np.add(PATTERN.points, [x, -0.06, 0.4])) + rng.normal(0.0, 0.05, (54, 2)))
-               for x in (-0.16, -0.12, -0.08, -0.04, 0.0)]
+    seen = [CAMERA.project(np.add(PATTERN.points, [x, -0.06, 0.4])) for x in (-0.16, -0.12, -0.08, -0.04, 0.0)]
+    upright = [BoardView(str(i), px + rng.normal(0.0, 0.05, px.shape)) for i, px in enumerate(seen)]
     with pytest.raises(BadInput, match=r"tell to 5\.1 px where a direction is seen, got .* \(fx \d+ \+- .*more sides"):
         calibrate_camera(Boards(tuple(upright), np.zeros((512, 512), np.uint8), (512, 512), ()), PATTERN, with_k3=False)
     few = Boards(tuple(views[:4]), np.zeros((512, 512), np.uint8), (512, 512), ())
