@@ -75,7 +75,6 @@ def test_too_few_views_are_refused(views: list[BoardView]) -> None:
 
 
 def test_views_that_are_alike_count_once(pictures: list[bytes]) -> None:
-    """One view again, moved by 4 px, and turned by half a circle, which is found from the other end."""
     grey = read_picture(pictures[0]).grey
     moved = cv2.warpAffine(grey, np.float32([[1, 0, 4], [0, 1, 0]]), (512, 512), borderMode=cv2.BORDER_REPLICATE)
     shown = [("a", grey), ("b", moved), ("c", read_picture(pictures[1]).grey), ("d", grey)]
@@ -91,16 +90,14 @@ def test_a_camera_of_no_use_by_its_own_deviations_is_refused(views: list[BoardVi
     upright = [BoardView(str(i), px + rng.normal(0.0, 0.05, px.shape)) for i, px in enumerate(seen)]
     with pytest.raises(BadInput, match=r"tell to 5\.1 px where a direction is seen, got .* \(fx \d+ \+- .*more sides"):
         calibrate_camera(Boards(tuple(upright), np.zeros((512, 512), np.uint8), (512, 512), ()), PATTERN, with_k3=False)
-    few = Boards(tuple(views[:4]), np.zeros((512, 512), np.uint8), (512, 512), ())
-    found = calibrate_camera(few, PATTERN, with_k3=False)
-    assert found.spread_px < 2.0 and found.spread_px > found.deviations[2]
+    assert calibrate(views[:4], PATTERN, (512, 512)).spread_px < 2.0
 
 
 def test_pictures_of_a_folder_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
-    for number in (10, 9, 2, 1, 100):
-        (tmp_path / f"b{number}.jpg").touch()
+    for name in ("b10", "b2", "b1", "b100"):
+        (tmp_path / f"{name}.jpg").touch()
     for given in (str(tmp_path), str(tmp_path / "b*.jpg")):
-        assert [path.stem for path in picture_files([given])] == ["b1", "b2", "b9", "b10", "b100"]
+        assert [path.stem for path in picture_files([given])] == ["b1", "b2", "b10", "b100"]
 
 
 def test_useless_pictures_say_why(pictures: list[bytes]) -> None:

@@ -154,9 +154,8 @@ def test_the_true_lens_is_in_the_pictures_and_the_robot_believes_its_own() -> No
     """Believed (-0.05) and true (-0.1), or none: the picture is that of a camera whose own file says the true one."""
     def seen(believed: str, true: str) -> bytes:
         lens = {"camera.distortion": believed} | ({"truth.camera.distortion": true} if true else {})
-        scenario = with_settings(parse_scenario(SMALL), lens)
-        stage = build_stage(scenario)
-        assert [float(k) for k in stage.scenario.camera.distortion] == json.loads(believed)
+        stage = build_stage(with_settings(parse_scenario(SMALL), lens))
+        assert list(stage.scenario.camera.distortion) == json.loads(believed)
         return stage.body(0).picture()
     bent = "[-0.1, 0.0, 0.0, 0.0]"
     assert seen("[-0.05, 0.0, 0.0, 0.0]", bent) == seen(bent, "") != seen("[-0.05, 0.0, 0.0, 0.0]", "")
