@@ -84,7 +84,6 @@ def test_views_that_are_alike_count_once(pictures: list[bytes]) -> None:
 
 
 def test_a_camera_of_no_use_by_its_own_deviations_is_refused(views: list[BoardView]) -> None:
-    """Boards at one distance, hardly tilted, do not tell the focal length; four views from all sides do."""
     rng = np.random.default_rng(1)
     seen = [CAMERA.project(np.add(PATTERN.points, [x, -0.06, 0.4])) for x in (-0.16, -0.12, -0.08, -0.04, 0.0)]
     upright = [BoardView(str(i), px + rng.normal(0.0, 0.05, px.shape)) for i, px in enumerate(seen)]
