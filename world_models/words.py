@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -150,6 +152,12 @@ def grouped(parts: Iterable[str]) -> list[str]:
 def short(text: str, most: int = 34) -> str:
     """The beginning of a text that may be too long for its place."""
     return text if len(text) <= most else text[: most - 1] + "…"
+
+
+def natural_order(path: Path) -> tuple[list[tuple[int, str]], str]:
+    """Sorts files whose names have numbers in them: 2 before 10."""
+    parts = re.split(r"(\d+)", path.name)
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], path.name
 
 
 def sentence(value: Any) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -16,6 +15,7 @@ from typing import Any
 from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
 from logs.run_directory import RunDirectory, find_directory, open_run
+from world_models.words import natural_order
 
 OVERVIEW = "overview.rrd"
 LOOPBACK = ("--bind", "127.0.0.1")
@@ -98,17 +98,12 @@ def _runs(text: str) -> list[RunDirectory]:
     here = find_directory(text)
     if not _is_campaign(here):
         return [open_run(text)]
-    return [open_run(str(path)) for path in sorted((p.parent for p in here.glob("*/journal.jsonl")), key=_natural)]
+    return [open_run(str(path)) for path in sorted((p.parent for p in here.glob("*/journal.jsonl")), key=natural_order)]
 
 
 def _is_campaign(here: Path) -> bool:
     """Whether a directory holds runs and is none."""
     return not (here / "journal.jsonl").exists() and any(here.glob("*/journal.jsonl"))
-
-
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """Sorts 2 before 10."""
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def _beside(runs: list[RunDirectory]) -> Path:
