@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("bag", metavar="BAG", help="a bag of ROS 2 (mcap, sqlite3) or ROS 1: its folder or a file; a"
-                        " video, or a folder of pictures, without odometry; or a robot that goes on, as ros2:robot.toml")
+    parser.add_argument("bag", metavar="BAG", help="a bag of ROS 2 (mcap, sqlite3) or ROS 1, its folder or a file;"
+                        " a video, or a folder of pictures, without odometry; a robot that goes on, as ros2:robot.toml")
     parser.add_argument("--world", metavar="FILE", required=True,
                         help="the building: a world file, or the name of one that comes with Harvey")
     parser.add_argument("--start", metavar="PLACE", help='where it was first, in feet, as "(hallway (4,4,0))";'
