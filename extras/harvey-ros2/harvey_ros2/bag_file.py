@@ -22,6 +22,7 @@ from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, Message, Schema
 from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinition, MessageDefinitionFormat
 from rosbags.rosbag1 import Reader as RosOneReader
+from rosbags.rosbag1 import ReaderError
 from rosbags.rosbag1.reader import Header, RecordType
 from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
@@ -179,12 +180,11 @@ class _Scanned:
         with self._path.open("rb") as file:
             try:
                 yield from self._scan(file)
-            except (EOFError, *BAD) as error:
-                what = f"{self._path.name} breaks off after {file.tell()} bytes"
-                if not isinstance(error, EOFError):
-                    what = f"{self._path.name} is damaged before byte {file.tell()}"
-                if f"{what}: what is whole before is read" not in self._broken:
-                    self._broken.append(f"{what}: what is whole before is read")
+            except (EOFError, ReaderError, *BAD) as error:
+                how = "breaks off after" if isinstance(error, EOFError) else "is damaged before"
+                what = f"{self._path.name} {how} {file.tell()} bytes: what is whole till there is read"
+                if what not in self._broken:
+                    self._broken.append(what)
 
     def _scan(self, file: BinaryIO) -> Iterator[tuple[int, int, bytes]]:
         raise NotImplementedError
