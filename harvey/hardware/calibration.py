@@ -24,11 +24,16 @@ from knowledge_sources.methods.calibration.intrinsics import (
 from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
 from knowledge_sources.methods.features.picture import read_picture
 from world_models.camera import CameraDeviation, CameraMount
-from world_models.words import count
+from world_models.files.regular_files import read_regular
+from world_models.words import count, natural_order
 
 ENDINGS = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".pgm", ".webp")
 NEW_PX = 0.08
 """A live view is new when its corners have moved so far on the average, as part of the picture's width."""
+ALIKE_PX = 0.005
+"""A view whose corners are so near those of another one tells nothing new, as part of the picture's width."""
+MOST_FOCAL = 0.05
+"""Views that leave a larger part of the focal length open are of no use."""
 ROLLED = math.radians(1.0)
 UNITS = (("fx", "px"), ("fy", "px"), ("cx", "px"), ("cy", "px"))
 Grey = NDArray[np.uint8]
@@ -60,19 +65,19 @@ def picture_files(names: Sequence[str]) -> tuple[Path, ...]:
     files: list[Path] = []
     for name in names:
         path = Path(name)
-        found = sorted(p for p in path.iterdir() if p.suffix.lower() in ENDINGS) if path.is_dir() else [path]
+        found = [p for p in path.iterdir() if p.suffix.lower() in ENDINGS] if path.is_dir() else [path]
         if not path.exists() and any(c in name for c in "*?["):
-            found = sorted(path.parent.glob(path.name))
+            found = list(path.parent.glob(path.name))
         if not found or not all(p.is_file() for p in found):
             raise BadInput(f"expected pictures of a chessboard, a folder or a pattern of them, got {name!r}")
-        files += found
+        files += sorted(found, key=natural_order)
     return tuple(dict.fromkeys(files))
 
 
 def grey_of(path: Path) -> Grey:
     """A picture. Raises BadInput."""
     try:
-        return read_picture(path.read_bytes()).grey
+        return read_picture(read_regular(path)).grey
     except (OSError, ValueError) as error:
         raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}") from None
 
@@ -87,6 +92,9 @@ def find_boards(pictures: Iterator[tuple[str, Grey]], pattern: Pattern, tell: Ca
         here = grey.shape[1], grey.shape[0]
         size = size or here
         corners = find_corners(grey, pattern) if here == size else f"its size is {here}, that of the others {size}"
+        if not isinstance(corners, str):
+            like = [view.name for view in views if _measure_move(corners, view.corners_px) < ALIKE_PX * here[0]]
+            corners = f"the same view as {like[0]}" if like else corners
         tell(f"{name}: {corners if isinstance(corners, str) else 'board found'}")
         if isinstance(corners, str):
             useless.append((name, corners))
@@ -116,7 +124,7 @@ def live_pictures(
             told, before = found, told
             if told != before:
                 tell(f"waiting: {found}")
-        elif all(np.mean(np.linalg.norm(found - old, axis=1)) > NEW_PX * grey.shape[1] for old in kept):
+        elif all(_measure_move(found, old) > NEW_PX * grey.shape[1] for old in kept):
             kept.append(found)
             told = ""
             yield f"view {len(kept)} of {wanted}", grey
@@ -125,9 +133,14 @@ def live_pictures(
 def calibrate_camera(boards: Boards, pattern: Pattern, *, with_k3: bool) -> Calibration:
     """Raises BadInput where the views do not do."""
     try:
-        return calibrate(boards.views, pattern, boards.size, with_k3=with_k3)
+        found = calibrate(boards.views, pattern, boards.size, with_k3=with_k3)
     except ValueError as error:
         raise BadInput(f"calibration: {error}") from None
+    sigma, focal = max(zip(found.deviations[:2], found.values[:2], strict=True), key=lambda pair: pair[0] / pair[1])
+    if not sigma <= MOST_FOCAL * focal:
+        raise BadInput(f"calibration: expected views that tell the focal length to {100.0 * MOST_FOCAL:g} %, got "
+                       f"{focal:.4g} +- {sigma:.3g} px: hold the board near and far, and tilted to all sides")
+    return found
 
 
 def find_mounting(
@@ -180,6 +193,11 @@ def report(
         lines += ["", f"no corner was seen in {missing} of 16 parts of the picture: the distortion is a guess there; "
                       "hold the board into the corners too"]
     return (*lines, *(() if found is None or board is None else _mounting_lines(found, board)))
+
+
+def _measure_move(corners: NDArray[np.float64], others: NDArray[np.float64]) -> float:
+    """How far corners are from others on the average [px]."""
+    return float(np.mean(np.linalg.norm(corners - others, axis=1)))
 
 
 def _mounting_lines(found: Mounting, board: Mounted) -> tuple[str, ...]:

@@ -12,6 +12,8 @@ import pytest
 
 from experiments.generated.scenes import chessboard_picture, chessboard_renderer, chessboard_view
 from harvey.cli import main
+from harvey.errors import BadInput
+from harvey.hardware.calibration import Boards, calibrate_camera
 from knowledge_sources.methods.calibration.intrinsics import BoardView, Calibration, Pattern, calibrate, find_corners
 from knowledge_sources.methods.calibration.mounting import estimate_mounting
 from knowledge_sources.methods.features.picture import read_picture
@@ -70,6 +72,14 @@ def test_a_view_that_stands_out_is_left_out(views: list[BoardView]) -> None:
 def test_too_few_views_are_refused(views: list[BoardView]) -> None:
     with pytest.raises(ValueError, match=r"expected at least 4 views .* got 3"):
         calibrate(views[:3], PATTERN, (512, 512))
+
+
+def test_views_that_leave_the_focal_length_open_are_refused(views: list[BoardView]) -> None:
+    rng = np.random.default_rng(0)
+    alike = [BoardView(str(i), views[0].corners_px + 3.0 * i + rng.normal(0.0, 0.3, (54, 2))) for i in range(5)]
+    boards = Boards(tuple(alike), np.zeros((512, 512), np.uint8), (512, 512), ())
+    with pytest.raises(BadInput, match=r"tell the focal length to 5 %, got \d+ \+- "):
+        calibrate_camera(boards, PATTERN, with_k3=False)
 
 
 def test_useless_pictures_say_why(pictures: list[bytes]) -> None:
@@ -164,8 +174,8 @@ def test_a_camera_file_that_is_wrong_is_pointed_at(tmp_path: Path, change: tuple
 def test_the_command_writes_file_report_and_picture(
     tmp_path: Path, pictures: list[bytes], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for number, picture in enumerate(pictures):
-        (tmp_path / f"{number:02d}.jpg").write_bytes(picture)
+    for number, picture in enumerate([*pictures, pictures[-1]]):
+        (tmp_path / f"view{number}.jpg").write_bytes(picture)
     (tmp_path / "grey.jpg").write_bytes(cv2.imencode(".jpg", np.full((512, 512), 99, np.uint8))[1].tobytes())
     out = tmp_path / "made" / "eye.toml"
     assert main(["calibrate", str(tmp_path), "--out", str(out)]) == 0
@@ -173,6 +183,7 @@ def test_the_command_writes_file_report_and_picture(
     assert camera.fx == pytest.approx(402.0, abs=1.0) and mount is None
     assert 0.0 < deviation.focal < 0.01 and deviation == CameraDeviation(focal=deviation.focal)
     report = out.with_suffix(".txt").read_text()
+    assert "view10.jpg: the same view as" in report and report.count("view9.jpg") == 2  # the later one is left out
     assert "grey.jpg: no board of 9 x 6" in report and report.strip() in capsys.readouterr().out
     picture = cv2.imread(str(out.with_suffix(".png")))
     assert picture is not None and picture.shape[1] > 1500

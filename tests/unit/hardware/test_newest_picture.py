@@ -245,12 +245,14 @@ def test_images_are_compressed_with_quality_95_and_keep_their_size() -> None:
     assert picture == CapturedPicture(jpeg, (50, 30), False)
 
 
-@pytest.mark.parametrize(("behind", "is_whole"), [(0, True), (62, True), (63, False)])
-def test_a_jpeg_is_whole_if_its_end_mark_is_among_the_last_64_bytes(behind: int, is_whole: bool) -> None:
-    data = np.frombuffer(jpeg(77) + b"\0" * behind, np.uint8)
+@pytest.mark.parametrize("behind", [b"", bytes(5000), b"\xff\xff\xd9 and more"])
+def test_a_jpeg_is_whole_up_to_its_own_end_mark(behind: bytes) -> None:
+    small = jpeg(77)  # within a segment, as telephones put one there
+    whole = small[:2] + b"\xff\xe1" + (len(small) + 2).to_bytes(2, "big") + small + small[2:]
+    data = np.frombuffer(whole + behind, np.uint8)
     for shaped in (data, data[None, :], data[:, None]):
-        assert (picture_of(shaped) is not None) == is_whole
-    assert picture_of(data[1:]) is None and picture_of(data[:-70]) is None
+        assert picture_of(shaped) == CapturedPicture(whole, (64, 48), False)
+    assert picture_of(data[1:]) is None and picture_of(data[:len(whole) - 2]) is None
 
 
 @pytest.mark.parametrize(("source", "expected"), [
