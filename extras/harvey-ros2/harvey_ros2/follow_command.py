@@ -21,6 +21,7 @@ MOST_GAP_S = 2.0
 
 if TYPE_CHECKING:
     from harvey_ros2.bag_reader import Bag, BagItem
+    from harvey_ros2.lens_watch import LensWatch
     from harvey_ros2.onlooker import FirstGuess, Onlooker
     from harvey_ros2.run_messages import TimedMessage
     from world_models.building.world import World
@@ -55,6 +56,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     from harvey_ros2.bag_reader import Bag
     from harvey_ros2.film_reader import is_film
+    from harvey_ros2.lens_watch import LensWatch
     from harvey_ros2.messages import message_types
     from harvey_ros2.onlooker import Onlooker, build_onlooker_head
     from harvey_ros2.run_messages import RunMessages
@@ -76,10 +78,20 @@ def _run(args: Namespace) -> int:
         guess, events = _guess(args, known), _Events()
         messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
         onlooker = Onlooker(build_onlooker_head(path.stem, world, robot, guess), out, events.hear, messages=messages)
-        took_s = follow_bag(bag.items(), onlooker, bag.left_out)
+        watch = LensWatch()
+        took_s = follow_bag(bag.items(), onlooker, bag.left_out, watch)
         for line in bag.tell():
             print(line)
-    return _end(onlooker, events, took_s, path, out)
+    return max(_tell_fault(watch, events), _end(onlooker, events, took_s, path, out))
+
+
+def _tell_fault(watch: LensWatch, events: _Events) -> int:
+    """The exit code by what the pictures say of the lens: with another lens no certificate counts."""
+    if not (fault := watch.find_fault()):
+        return 0
+    print(fault)
+    events.certified = 0
+    return 1
 
 
 def _end(onlooker: Onlooker, events: _Events, took_s: list[float], path: Path, out: Path) -> int:
@@ -93,6 +105,7 @@ def _end(onlooker: Onlooker, events: _Events, took_s: list[float], path: Path, o
 
 def _run_film(args: Namespace, path: Path, world: Path, out: Path) -> int:
     from harvey_ros2.film_reader import Film
+    from harvey_ros2.lens_watch import LensWatch
     from harvey_ros2.messages import message_types
     from harvey_ros2.onlooker import Onlooker, build_onlooker_head
     from harvey_ros2.run_messages import RunMessages
@@ -104,13 +117,14 @@ def _run_film(args: Namespace, path: Path, world: Path, out: Path) -> int:
     messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
     onlooker = Onlooker(build_onlooker_head(path.stem, world, robot, guess), out, events.hear, messages=messages,
                         counts=False)
-    took_s = follow_film(film.items(), onlooker)
+    watch = LensWatch()
+    took_s = follow_film(film.items(), onlooker, watch)
     for what, number in sorted(film.left_out.items()):
         print(f"left out: {number} {what}")
-    return _end(onlooker, events, took_s, path, out)
+    return max(_tell_fault(watch, events), _end(onlooker, events, took_s, path, out))
 
 
-def follow_film(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
+def follow_film(items: Iterable[BagItem], onlooker: Onlooker, watch: LensWatch | None = None) -> list[float]:
     """Show pictures without odometry to an onlooker; returns how long each took [s]."""
     took_s: list[float] = []
     for item in items:
@@ -118,6 +132,8 @@ def follow_film(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
             then = time.perf_counter()
             onlooker.look(item.jpeg, item.time_s)
             took_s.append(time.perf_counter() - then)
+            if watch is not None:
+                watch.take(onlooker.scheduler.view)
     return took_s
 
 
@@ -136,7 +152,9 @@ def _run_live(args: Namespace) -> int:
     return 1 if is_lost else 0
 
 
-def follow_bag(items: Iterable[BagItem], onlooker: Onlooker, left_out: Counter[str] | None = None) -> list[float]:
+def follow_bag(
+    items: Iterable[BagItem], onlooker: Onlooker, left_out: Counter[str] | None = None, watch: LensWatch | None = None
+) -> list[float]:
     """Show a recording to an onlooker; returns how long each picture took [s]. ``left_out``: what is not shown."""
     took_s: list[float] = []
     last: Pose2 | None = None
@@ -150,6 +168,8 @@ def follow_bag(items: Iterable[BagItem], onlooker: Onlooker, left_out: Counter[s
             then = time.perf_counter()
             onlooker.look(jpeg, time_s - began_s)
             took_s.append(time.perf_counter() - then)
+            if watch is not None:
+                watch.take(onlooker.scheduler.view)
     return took_s
 
 

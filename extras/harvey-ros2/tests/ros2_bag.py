@@ -14,6 +14,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from harvey_ros2.bag_reader import Bag
 from harvey_ros2.follow_command import build_robot, follow_bag
+from harvey_ros2.lens_watch import LensWatch
 from harvey_ros2.messages import message_types
 from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
 from harvey_ros2.robot_emulator import RobotEmulator, write_camera_info, write_mount, write_picture
@@ -84,8 +85,10 @@ def follow(bag: Path, guess: FirstGuess, out: Path | None = None) -> tuple[list[
         known, robot = build_robot(recording, WORLD, OPTIONS)
         messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
         onlooker = Onlooker(build_onlooker_head("bag", WORLD, robot, guess), out, told.extend, messages=messages)
-        follow_bag(recording.items(), onlooker, recording.left_out)
+        watch = LensWatch()
+        follow_bag(recording.items(), onlooker, recording.left_out, watch)
         onlooker.close("the recording ends")
+    assert watch.find_fault() == "" and watch.offs  # each lens is as it is told
     return told, onlooker
 
 

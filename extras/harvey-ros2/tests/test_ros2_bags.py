@@ -141,6 +141,17 @@ def test_the_same_places_come_of_it(edit: Edit, short: tuple[Path, Truth], tmp_p
     assert check_poses(told, truth, truth[0][0]) >= 7 and not onlooker.is_lost
 
 
+@pytest.mark.parametrize("term", [-0.1, 0.05])
+def test_a_lens_that_bends_otherwise_than_is_told_is_named(
+    term: float, short: tuple[Path, Truth], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = rewrite(short[0], tmp_path / "bag", change_info(d=np.array([term, 0.0, 0.0, 0.0, 0.0])))
+    given = "--world", "research_center", "--start", START, "--reach", "0.951", "--out", str(tmp_path / "run")
+    assert main(["follow", str(bag), *given]) == 1
+    said = capsys.readouterr().out
+    assert f"k1, is off by {'+' if term < 0.0 else '-'}0.0" in said and " 0 certified" in said
+
+
 def as_ros_one(bag: Path, out: Path) -> Path:
     """The bag as ROS 1 has it."""
     store = ros_one_store()
