@@ -119,8 +119,11 @@ class BagFile:
     def _read(self, file: Storage, wanted: Collection[Connection]) -> Iterator[Record]:
         """The messages of one file, up to where it is damaged."""
         own = [one for one in file.connections if one in wanted]
+        names = {(one.topic, one.msgtype) for one in own}
         try:
-            yield from file.messages(own) if own else ()
+            for record in file.messages(own) if own else ():
+                if (record[0].topic, record[0].msgtype) in names:  # a damaged index leads to others
+                    yield record
         except Exception as error:  # whatever the several readers raise
             self._say(f"it is damaged, and read up to there: {_describe(error)}")
 
