@@ -34,9 +34,10 @@ Number = float | str
 """A number; a journal writes one that is not finite as text."""
 
 
-def by_numbers(path: Path) -> list[tuple[int, str]]:
-    """Sorts files by the numbers in their names: 2 before 10."""
-    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", path.name)]
+def by_numbers(path: Path) -> tuple[list[tuple[int, str]], str]:
+    """Sorts files whose names have numbers in them: 2 before 10."""
+    parts = re.split(r"(\d+)", path.name)
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], path.name
 
 
 def number(value: Any) -> float:

@@ -1,7 +1,8 @@
-"""Pictures without odometry: a video, or a folder of pictures in the order of their names."""
+"""Pictures without odometry: a video, or a folder of pictures in the order of the numbers in their names."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +12,10 @@ import numpy as np
 from harvey.errors import BadInput
 from harvey.hardware.drivers.capture import CapturedPicture, picture_of
 from harvey_ros2.bag_reader import BagItem
+from harvey_ros2.picture_message import decompress_picture
 from world_models.camera import Camera
+from world_models.files.regular_files import expect_regular, read_regular
+from world_models.words import by_numbers
 
 VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg")
 PICTURES = (".jpg", ".jpeg", ".png")
@@ -25,14 +29,22 @@ def is_film(path: Path) -> bool:
 
 
 class Film:
-    """Pictures, so many a second."""
+    """Pictures, so many a second.
+
+    Attributes:
+        left_out: what was, with how often: ``pictures that are not whole``.
+    """
 
     def __init__(self, path: Path, rate_hz: float = 0.0) -> None:
         """``rate_hz``: pictures a second; 0 for what the video says. Raises BadInput."""
-        self._path = path
+        self._path, self.left_out = path, Counter[str]()
         if path.is_dir():
             said_hz = 0.0
         else:
+            try:
+                expect_regular(path)  # a pipe would be waited for
+            except OSError as error:
+                raise BadInput(f"{path}: expected a video, got: {error.strerror}") from None
             video = cv2.VideoCapture(str(path))
             said_hz = video.get(cv2.CAP_PROP_FPS) if video.isOpened() else -1.0
             video.release()
@@ -45,7 +57,7 @@ class Film:
 
     def check_size(self, camera: Camera) -> None:
         """Raises BadInput where the first picture is not of the camera's size, or there is none."""
-        first = next(self._read(), None)
+        first = next(self._read(Counter()), None)
         if first is None:
             raise BadInput(f"{self._path}: expected pictures, got none that is whole")
         if first[1].size != (camera.width, camera.height):
@@ -56,23 +68,30 @@ class Film:
     def items(self) -> Iterator[BagItem]:
         """Each picture with its time from the first; those that are not whole, or of another size, are left out."""
         size = None
-        for number, picture in self._read():
+        for number, picture in self._read(self.left_out):
             size = size or picture.size
             if picture.size == size:
                 yield BagItem(number / self._rate_hz, jpeg=picture.jpeg)
+            else:
+                self.left_out["pictures of another size than the first"] += 1
 
-    def _read(self) -> Iterator[tuple[int, CapturedPicture]]:
+    def _read(self, left_out: Counter[str]) -> Iterator[tuple[int, CapturedPicture]]:
         for number, retrieved in enumerate(self._retrieve()):
             picture = None if retrieved is None else picture_of(retrieved)
-            if picture is not None:
+            if picture is None:
+                left_out["pictures that are not whole"] += 1
+            else:
                 yield number, picture
 
     def _retrieve(self) -> Iterator[np.ndarray | None]:
         """JPEG bytes or pixels of each; None for one that cannot be read."""
         if self._path.is_dir():
             for path in _list_pictures(self._path):
-                is_jpeg = path.suffix.lower() != ".png"
-                yield np.frombuffer(path.read_bytes(), np.uint8) if is_jpeg else cv2.imread(str(path))
+                try:
+                    pixels = decompress_picture(np.frombuffer(read_regular(path), np.uint8), path.suffix)
+                except OSError:
+                    pixels = ""
+                yield None if isinstance(pixels, str) else pixels
             return
         video = cv2.VideoCapture(str(self._path))
         try:
@@ -83,4 +102,5 @@ class Film:
 
 
 def _list_pictures(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.iterdir() if path.suffix.lower() in PICTURES and path.is_file())
+    found = (path for path in folder.iterdir() if path.suffix.lower() in PICTURES and path.is_file())
+    return sorted(found, key=by_numbers)

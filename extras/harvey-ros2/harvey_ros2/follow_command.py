@@ -7,6 +7,7 @@ import statistics
 import sys
 import time
 from argparse import ArgumentParser, Namespace
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,8 +16,12 @@ from harvey.commands.command import CliCommand
 from harvey.errors import BadInput
 from logs.run_directory import RUNS, check_vacant
 
+MOST_GAP_S = 2.0
+"""Where the odometry pauses for longer, nobody knows how the robot moved meanwhile [s]."""
+
 if TYPE_CHECKING:
     from harvey_ros2.bag_reader import Bag, BagItem
+    from harvey_ros2.lens_watch import LensWatch
     from harvey_ros2.onlooker import FirstGuess, Onlooker
     from harvey_ros2.run_messages import TimedMessage
     from world_models.building.world import World
@@ -25,8 +30,8 @@ if TYPE_CHECKING:
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("bag", metavar="BAG", help="a bag of ROS 2: its folder, or an .mcap file; a video, or a folder"
-                        " of pictures, without odometry; or a robot that goes on, as ros2:robot.toml")
+    parser.add_argument("bag", metavar="BAG", help="a bag of ROS 2 (mcap, sqlite3) or ROS 1, its folder or a file;"
+                        " a video, or a folder of pictures, without odometry; a robot that goes on, as ros2:robot.toml")
     parser.add_argument("--world", metavar="FILE", required=True,
                         help="the building: a world file, or the name of one that comes with Harvey")
     parser.add_argument("--start", metavar="PLACE", help='where it was first, in feet, as "(hallway (4,4,0))";'
@@ -51,6 +56,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     from harvey_ros2.bag_reader import Bag
     from harvey_ros2.film_reader import is_film
+    from harvey_ros2.lens_watch import LensWatch
     from harvey_ros2.messages import message_types
     from harvey_ros2.onlooker import Onlooker, build_onlooker_head
     from harvey_ros2.run_messages import RunMessages
@@ -72,8 +78,20 @@ def _run(args: Namespace) -> int:
         guess, events = _guess(args, known), _Events()
         messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
         onlooker = Onlooker(build_onlooker_head(path.stem, world, robot, guess), out, events.hear, messages=messages)
-        took_s = follow_bag(bag.items(), onlooker)
-    return _end(onlooker, events, took_s, path, out)
+        watch = LensWatch()
+        took_s = follow_bag(bag.items(), onlooker, bag.left_out, watch)
+        for line in bag.tell():
+            print(line)
+    return max(_tell_fault(watch, events), _end(onlooker, events, took_s, path, out))
+
+
+def _tell_fault(watch: LensWatch, events: _Events) -> int:
+    """The exit code by what the pictures say of the lens: with another lens no certificate counts."""
+    if not (fault := watch.find_fault()):
+        return 0
+    print(fault)
+    events.certified = 0
+    return 1
 
 
 def _end(onlooker: Onlooker, events: _Events, took_s: list[float], path: Path, out: Path) -> int:
@@ -87,6 +105,7 @@ def _end(onlooker: Onlooker, events: _Events, took_s: list[float], path: Path, o
 
 def _run_film(args: Namespace, path: Path, world: Path, out: Path) -> int:
     from harvey_ros2.film_reader import Film
+    from harvey_ros2.lens_watch import LensWatch
     from harvey_ros2.messages import message_types
     from harvey_ros2.onlooker import Onlooker, build_onlooker_head
     from harvey_ros2.run_messages import RunMessages
@@ -98,10 +117,14 @@ def _run_film(args: Namespace, path: Path, world: Path, out: Path) -> int:
     messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
     onlooker = Onlooker(build_onlooker_head(path.stem, world, robot, guess), out, events.hear, messages=messages,
                         counts=False)
-    return _end(onlooker, events, follow_film(film.items(), onlooker), path, out)
+    watch = LensWatch()
+    took_s = follow_film(film.items(), onlooker, watch)
+    for what, number in sorted(film.left_out.items()):
+        print(f"left out: {number} {what}")
+    return max(_tell_fault(watch, events), _end(onlooker, events, took_s, path, out))
 
 
-def follow_film(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
+def follow_film(items: Iterable[BagItem], onlooker: Onlooker, watch: LensWatch | None = None) -> list[float]:
     """Show pictures without odometry to an onlooker; returns how long each took [s]."""
     took_s: list[float] = []
     for item in items:
@@ -109,6 +132,8 @@ def follow_film(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
             then = time.perf_counter()
             onlooker.look(item.jpeg, item.time_s)
             took_s.append(time.perf_counter() - then)
+            if watch is not None:
+                watch.take(onlooker.scheduler.view)
     return took_s
 
 
@@ -127,12 +152,14 @@ def _run_live(args: Namespace) -> int:
     return 1 if is_lost else 0
 
 
-def follow_bag(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
-    """Show a recording to an onlooker; returns how long each picture took [s]."""
+def follow_bag(
+    items: Iterable[BagItem], onlooker: Onlooker, left_out: Counter[str] | None = None, watch: LensWatch | None = None
+) -> list[float]:
+    """Show a recording to an onlooker; returns how long each picture took [s]. ``left_out``: what is not shown."""
     took_s: list[float] = []
     last: Pose2 | None = None
     began_s: float | None = None
-    for time_s, counted, jpeg in pair_with_odometry(items):
+    for time_s, counted, jpeg in pair_with_odometry(items, left_out):
         began_s = time_s if began_s is None else began_s
         if last is not None:
             onlooker.move(last.inverse() @ counted)
@@ -141,32 +168,50 @@ def follow_bag(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
             then = time.perf_counter()
             onlooker.look(jpeg, time_s - began_s)
             took_s.append(time.perf_counter() - then)
+            if watch is not None:
+                watch.take(onlooker.scheduler.view)
     return took_s
 
 
-def pair_with_odometry(items: Iterable[BagItem]) -> Iterator[tuple[float, Pose2, bytes]]:
-    """Each picture with its time and where the wheels counted to be then, between two readings of the odometry."""
+def pair_with_odometry(
+    items: Iterable[BagItem], left_out: Counter[str] | None = None
+) -> Iterator[tuple[float, Pose2, bytes]]:
+    """Each picture with its time and where the wheels counted to be then, between two readings of the odometry.
+
+    Those that lie between none are left out, and counted by why.
+    """
+    from harvey_ros2.bag_reader import MOST_WAITING
     from world_models.frames import Pose2, wrap_angle
 
     waiting: list[BagItem] = []
+    left_out = Counter() if left_out is None else left_out
     before: tuple[float, Pose2] | None = None
     for item in items:
         if item.odometry is None:
             waiting.append(item)
+            if len(waiting) > MOST_WAITING:
+                del waiting[0]
+                left_out["pictures of later times than the odometry"] += 1
             continue
         after = item.time_s, item.odometry
         while waiting and waiting[0].time_s <= after[0]:
             picture = waiting.pop(0)
-            if before is None or after[0] <= before[0]:
-                continue
-            part = (picture.time_s - before[0]) / (after[0] - before[0])
-            if part < 0.0:
-                continue
-            (_, a), (_, b) = before, after
-            turned = wrap_angle(b.heading_rad - a.heading_rad)
-            yield picture.time_s, Pose2(a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m),
-                                        wrap_angle(a.heading_rad + part * turned)), picture.jpeg
+            if picture.time_s < (after if before is None else before)[0]:
+                left_out["pictures from before the odometry begins" if before is None else
+                         "pictures that were recorded too late to be put in order"] += 1
+            elif before is None or after[0] <= before[0]:
+                yield picture.time_s, after[1], picture.jpeg
+            elif after[0] - before[0] > MOST_GAP_S:
+                left_out[f"pictures while the odometry pauses for more than {MOST_GAP_S:g} s"] += 1
+            else:
+                part = (picture.time_s - before[0]) / (after[0] - before[0])
+                (_, a), (_, b) = before, after
+                turned = wrap_angle(b.heading_rad - a.heading_rad)
+                yield picture.time_s, Pose2(a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m),
+                                            wrap_angle(a.heading_rad + part * turned)), picture.jpeg
         before = after
+    if waiting:
+        left_out["pictures of later times than the odometry"] += len(waiting)
 
 
 def build_robot(bag: Bag | None, world: Path, args: Namespace) -> tuple[World, RobotModel]:
@@ -184,6 +229,8 @@ def build_robot(bag: Bag | None, world: Path, args: Namespace) -> tuple[World, R
     deviation = NOT_STATED
     if args.calibration:
         camera, mount, deviation = load_camera(Path(args.calibration))
+        if bag is not None:
+            bag.check_size(camera)
     elif bag is None:
         raise BadInput(f"--calibration: expected a camera file with a [mount] for {args.bag}, got none")
     else:

@@ -8,10 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from harvey.errors import BadInput
 from harvey_ros2.messages import message_types
+from harvey_ros2.middleware import Delivery
 from harvey_ros2.run_messages import KINDS, RunMessages, TimedMessage, topic_of
 from logs.pictures import open_pictures
 from logs.records import is_a
@@ -22,6 +24,8 @@ from logs.timeline import Timeline
 from world_models.entries.body import CameraPicture
 
 DISTRO = "jazzy"
+EVER = QosTime(9223372036, 854775807)
+"""No bound, as rosbag2 writes it."""
 NAMES = frozenset(kind.__name__ for kind in KINDS)
 
 
@@ -57,10 +61,19 @@ def write_bag(messages: Iterator[TimedMessage], folder: Path) -> int:
         for item in messages:
             if item.topic not in connections:
                 topic = topic_of(item.topic)
-                connections[item.topic] = writer.add_connection(topic.name, topic.type, typestore=types.store)
+                connections[item.topic] = writer.add_connection(
+                    topic.name, topic.type, typestore=types.store, offered_qos_profiles=_profiles(topic.delivery))
             writer.write(connections[item.topic], max(0, round(item.time_s * 1e9)), types.encode(item.message))
             number += 1
     return number
+
+
+def _profiles(delivery: Delivery) -> list[Qos]:
+    """How a topic is to be published again: what is said once is kept for who comes later, else tf2 never hears it."""
+    if not delivery.kept:
+        return []  # the default, which every subscriber can hear
+    return [Qos(QosHistory.KEEP_LAST, delivery.depth, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL,
+                EVER, EVER, QosLiveliness.AUTOMATIC, EVER, False)]
 
 
 def _value(record: Any, pictures: Any) -> Any:

@@ -14,6 +14,7 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 Distro = Literal["humble", "jazzy", "kilted"]
 STORES: Mapping[str, Stores] = {
@@ -43,6 +44,15 @@ ADDED: Mapping[str, str] = {
 
 BAD = (SerdeError, ValueError, TypeError, OverflowError, IndexError, AttributeError, MemoryError, struct.error)
 """What rosbags raises where a value or bytes do not fit."""
+
+
+@cache
+def ros_one_store() -> Typestore:
+    """The message types of ROS 1, with that of ``tf``, which rosbags lacks."""
+    store = get_typestore(Stores.ROS1_NOETIC)
+    for name in ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"):
+        store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", name))
+    return store
 
 
 class MessageError(ValueError):

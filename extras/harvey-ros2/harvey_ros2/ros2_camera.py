@@ -10,22 +10,18 @@ import threading
 from typing import Any
 
 import cv2
-import numpy as np
-from numpy.typing import NDArray
 
 from harvey.errors import BadInput
 from harvey.hardware.drivers.capture import CameraFault, CameraKind
 from harvey_ros2.messages import MessageError, seconds
 from harvey_ros2.middleware import Heard
 from harvey_ros2.node import RosNode, open_node
+from harvey_ros2.picture_message import retrieve_picture
 
 FIRST_S = 3.0
 """How long the first picture may take [s]."""
 NEXT_S = 1.0
 """Without a picture for so long the camera is unplugged [s]."""
-CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1}
-"""The raw pictures that are understood, with the bytes of a pixel."""
-TO_BGR = {"rgb8": cv2.COLOR_RGB2BGR, "rgba8": cv2.COLOR_RGBA2BGR, "bgra8": cv2.COLOR_BGRA2BGR}
 
 
 class RosCapture:
@@ -71,14 +67,8 @@ class RosCapture:
         message = self._taken
         if message is None:
             return False, None
-        if self._topic.type.endswith("CompressedImage"):
-            data = np.asarray(message.data, np.uint8)
-            if bytes(data[:2]) == b"\xff\xd8":
-                return True, data
-            image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
-            return image is not None, image
-        pixels = read_pixels(message)
-        return pixels is not None, pixels
+        got = retrieve_picture(message)
+        return (False, None) if isinstance(got, str) else (True, got)
 
     def get(self, property: int, /) -> float:
         """When the newest picture was taken [ms]; 0 for all else, and by a simulator's clock, which may be slow."""
@@ -99,18 +89,6 @@ class RosCapture:
         with self._arrived:
             self._newest = heard
             self._arrived.notify_all()
-
-
-def read_pixels(message: Any) -> NDArray[np.uint8] | None:
-    """The pixels (h, w[, 3]) of an Image, blue first; None where it is not whole, or of no kind that is understood."""
-    channels = CHANNELS.get(message.encoding)
-    height, width, step = int(message.height), int(message.width), int(message.step)
-    if channels is None or not height or step < width * channels or len(message.data) < height * step:
-        return None
-    rows = np.asarray(message.data, np.uint8)[:height * step].reshape(height, step)[:, :width * channels]
-    pixels = np.ascontiguousarray(rows.reshape(height, width, channels) if channels > 1 else rows)
-    code = TO_BGR.get(message.encoding)
-    return pixels if code is None else np.asarray(cv2.cvtColor(pixels, code), np.uint8)
 
 
 def open_ros2_camera(where: str) -> RosCapture:

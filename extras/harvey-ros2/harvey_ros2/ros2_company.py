@@ -145,5 +145,7 @@ def read_odometry(message: Any) -> Pose2 | None:
     if message is None:
         return None
     at, turn = message.pose.pose.position, message.pose.pose.orientation
+    if not abs(math.hypot(turn.x, turn.y, turn.z, turn.w) - 1.0) < 0.01:  # zeros are no turn
+        return None
     heading = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
     return Pose2(at.x, at.y, heading) if math.isfinite(at.x + at.y + heading) else None

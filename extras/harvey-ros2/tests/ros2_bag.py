@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,19 +12,28 @@ from typing import Any
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 
+from harvey_ros2.bag_reader import Bag
+from harvey_ros2.follow_command import build_robot, follow_bag
+from harvey_ros2.lens_watch import LensWatch
 from harvey_ros2.messages import message_types
+from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
 from harvey_ros2.robot_emulator import RobotEmulator, write_camera_info, write_mount, write_picture
-from harvey_ros2.run_messages import TimedMessage
+from harvey_ros2.run_messages import RunMessages, TimedMessage
 from sim.emulators.emulator import SimulatedGround
 from sim.faults.fault import Fault
 from sim.scenario import load_scenario
 from sim.stage import build_stage
 from world_models.camera import CameraMount
+from world_models.files.toml.mission import named_file
+from world_models.files.toml.source import WORLDS
 from world_models.frames import Pose2, wrap_angle
 
 TYPES = message_types("jazzy")
 TICK_S, PICTURE_S = 0.05, 0.2
 START = "(hallway (4,4,0))"
+WORLD = named_file("research_center", WORLDS, Path())
+REACH = 0.951
+OPTIONS = Namespace(calibration=None, base="base_link", reach=REACH, world="research_center")
 Truth = list[tuple[float, Pose2]]
 
 
@@ -66,6 +76,20 @@ def drive_bag(
                 record("camera/image_raw/compressed", write_picture(robot.time_s, body.picture()))
                 record("camera/camera_info", write_camera_info(robot.time_s, camera.camera))
     return truth
+
+
+def follow(bag: Path, guess: FirstGuess, out: Path | None = None) -> tuple[list[TimedMessage], Onlooker]:
+    """What is told of a recording."""
+    told: list[TimedMessage] = []
+    with Bag(bag) as recording:
+        known, robot = build_robot(recording, WORLD, OPTIONS)
+        messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
+        onlooker = Onlooker(build_onlooker_head("bag", WORLD, robot, guess), out, told.extend, messages=messages)
+        watch = LensWatch()
+        follow_bag(recording.items(), onlooker, recording.left_out, watch)
+        onlooker.close("the recording ends")
+    assert watch.find_fault() == "" and watch.offs  # each lens is as it is told
+    return told, onlooker
 
 
 def check_poses(told: list[TimedMessage], truth: Truth, began_s: float) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from argparse import Namespace
 from collections.abc import Iterator
 from itertools import pairwise
@@ -95,16 +96,17 @@ def follow(pictures: Path, calibration: Path, until_s: float = math.inf) -> list
     return told
 
 
-def test_a_video_has_its_rate_and_the_pictures_of_a_folder_come_in_the_order_of_their_names(tmp_path: Path) -> None:
+def test_a_video_has_its_rate_and_the_pictures_of_a_folder_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     grey = [np.full((48, 64, 3), 20 * number, np.uint8) for number in range(1, 7)]
     video = cv2.VideoWriter(str(tmp_path / "v.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 4.0, (64, 48))
     folder = tmp_path / "pictures"
     folder.mkdir()
     for number, picture in enumerate(grey):
         video.write(picture)
-        cv2.imwrite(str(folder / f"p{9 - number}.png"), picture)
+        jpeg = cv2.imencode(".jpg", picture)[1].tobytes()
+        (folder / f"p{12 - number}.jpg").write_bytes(jpeg + bytes(900) if number % 2 else jpeg)  # padded, as some are
     video.release()
-    (folder / "p5a.jpg").write_bytes(b"no picture")
+    (folder / "p8a.jpg").write_bytes(jpeg[:-2])
     (folder / "notes.txt").write_text("")
     assert is_film(tmp_path / "v.avi") and is_film(folder) and not is_film(tmp_path)
 
@@ -113,7 +115,9 @@ def test_a_video_has_its_rate_and_the_pictures_of_a_folder_come_in_the_order_of_
                 for item in film.items()]
 
     assert shades(Film(tmp_path / "v.avi")) == [(0.25 * number, number + 1) for number in range(6)]
-    assert shades(Film(folder, 2.0)) == [(0.0, 6), (0.5, 5), (1.5, 4), (2.0, 3), (2.5, 2), (3.0, 1)]
+    pictures = Film(folder, 2.0)
+    assert shades(pictures) == [(0.0, 6), (0.5, 5), (1.5, 4), (2.0, 3), (2.5, 2), (3.0, 1)]
+    assert pictures.left_out == {"pictures that are not whole": 1}
 
 
 def test_what_cannot_be_followed_is_one_line(
@@ -121,6 +125,7 @@ def test_what_cannot_be_followed_is_one_line(
 ) -> None:
     pictures, calibration, _ = film
     (tmp_path / "bad.mp4").write_bytes(b"no video at all")
+    os.mkfifo(tmp_path / "pipe.mp4")
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "1.jpg").write_bytes(b"no picture")
     small = tmp_path / "small.toml"
@@ -131,6 +136,7 @@ def test_what_cannot_be_followed_is_one_line(
         ((pictures, "--rate", "nan", *given), "--rate: expected how many pictures a second"),
         ((tmp_path / "bad.mp4", *given), "expected a video"),
         ((tmp_path / "none.mp4", *given), "expected a video"),
+        ((tmp_path / "pipe.mp4", *given), "no regular file"),
         ((tmp_path / "broken", "--rate", "5", *given), "expected pictures, got none that is whole"),
         ((pictures, "--rate", "5", "--world", "research_center"), "expected a camera file with a [mount]"),
         ((pictures, "--rate", "5", *given[:3], str(small), *given[4:]), "expected pictures of 500 x 512 px"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from argparse import Namespace
+from collections import Counter
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -12,38 +12,20 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ros2_bag import START, Truth, check_poses, drive_bag
+from ros2_bag import REACH, START, Truth, check_poses, drive_bag, follow
 from rosbags.rosbag2 import StoragePlugin
 
 from harvey.cli import main
-from harvey_ros2.bag_reader import Bag, BagItem, find_mount
-from harvey_ros2.follow_command import build_robot, follow_bag, pair_with_odometry
-from harvey_ros2.messages import message_types
-from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
-from harvey_ros2.run_messages import RunMessages, TimedMessage
+from harvey_ros2.bag_reader import BagItem, find_mount
+from harvey_ros2.follow_command import pair_with_odometry
+from harvey_ros2.onlooker import FirstGuess
+from harvey_ros2.run_messages import TimedMessage
 from sim.faults.built_in_faults import Kidnap
 from world_models.camera import CameraMount
 from world_models.entries.robot_state import CameraState
-from world_models.files.toml.mission import named_file
-from world_models.files.toml.source import WORLDS
 from world_models.frames import Pose, Pose2, wrap_angle
 
-WORLD = named_file("research_center", WORLDS, Path())
-REACH = 0.951
-OPTIONS = Namespace(calibration=None, base="base_link", reach=REACH, world="research_center")
 WAY = [(5.0, 1.3), (8.5, 0.9), (6.5, 1.2)]
-
-
-def follow(bag: Path, guess: FirstGuess, out: Path | None = None) -> tuple[list[TimedMessage], Onlooker]:
-    """What is told of a recording."""
-    told: list[TimedMessage] = []
-    with Bag(bag) as recording:
-        known, robot = build_robot(recording, WORLD, OPTIONS)
-        messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
-        onlooker = Onlooker(build_onlooker_head("bag", WORLD, robot, guess), out, told.extend, messages=messages)
-        follow_bag(recording.items(), onlooker)
-        onlooker.close("the recording ends")
-    return told, onlooker
 
 
 def list_states(told: list[TimedMessage]) -> list[tuple[float, str]]:
@@ -119,12 +101,17 @@ def test_a_camera_that_is_mounted_otherwise_than_the_recording_says_is_learnt_on
     assert abs(learnt.value.mount.tilt_rad) < math.radians(0.1) and abs(learnt.value.mount.height_m - 1.0) < 0.005
 
 
-def test_a_pose_comes_from_between_two_readings_of_the_odometry() -> None:
+def test_a_pose_comes_from_between_two_readings_of_the_odometry_and_others_are_counted() -> None:
+    left_out = Counter[str]()
     items = [BagItem(0.9, jpeg=b"early"), BagItem(1.0, Pose2(0.0, 0.0, 3.1)), BagItem(1.25, jpeg=b"a"),
-             BagItem(2.0, Pose2(4.0, 2.0, -3.1)), BagItem(2.5, jpeg=b"late")]
-    (time_s, pose, jpeg), = pair_with_odometry(items)
+             BagItem(2.0, Pose2(4.0, 2.0, -3.1)), BagItem(1.5, jpeg=b"astray"), BagItem(3.0, jpeg=b"paused"),
+             BagItem(5.0, Pose2(4.0, 2.0, -3.1)), BagItem(5.5, jpeg=b"late")]
+    (time_s, pose, jpeg), = pair_with_odometry(items, left_out)
     assert (time_s, jpeg) == (1.25, b"a") and (pose.x_m, pose.y_m) == (1.0, 0.5)
     assert abs(wrap_angle(pose.heading_rad - (3.1 + 0.25 * (2.0 * math.pi - 6.2)))) < 1e-9
+    assert sorted(left_out.values()) == [1, 1, 1, 1]
+    told = " ".join(sorted(left_out))
+    assert all(why in told for why in ("before the odometry begins", "later times", "too late", "pauses"))
 
 
 @given(st.floats(0.2, 2.0), st.floats(-0.5, 0.5), st.floats(-0.7, 0.7), st.floats(-1.0, 1.0), st.floats(-3.0, 3.0))
@@ -151,8 +138,8 @@ def test_what_cannot_be_used_is_one_line(
         return capsys.readouterr().err
 
     for text, expected in (
-        (said(tmp_path / "no.mcap", "--world", "research_center"), "expected a bag of ROS 2"),
-        (said(tmp_path / "none", "--world", "research_center"), "expected a bag of ROS 2"),
+        (said(tmp_path / "no.mcap", "--world", "research_center"), "expected a bag of ROS 1 or 2"),
+        (said(tmp_path / "none", "--world", "research_center"), "expected a bag of ROS 1 or 2"),
         (said(bag, "--world", "atlantis"), "atlantis"),
         (said(bag, "--world", "research_center", "--start", "(moon (1,1,0))"), "moon"),
         (said(bag, "--world", "research_center", "--odom", "/wheels"), "expected --odom to name one topic"),

@@ -118,6 +118,9 @@ def test_rosbags_and_rerun_open_it(recorded: Any, tmp_path: Path) -> None:
     export(recorded("office"), tmp_path / "run.mcap")
     with AnyReader([tmp_path / "run.mcap"]) as reader:
         assert reader.message_count > 20
+        kept = {one.topic: [profile.durability.name for profile in one.ext.offered_qos_profiles]
+                for one in reader.connections}
+    assert kept["/tf_static"] == ["TRANSIENT_LOCAL"] and kept["/odom"] == []
     program = shutil.which("rerun", path=str(Path(sys.executable).parent))
     assert program is not None
     check = subprocess.run([program, "mcap", "check", str(tmp_path / "run.mcap")], capture_output=True, text=True,

@@ -193,13 +193,30 @@ def picture_of(retrieved: Any) -> CapturedPicture | None:
 
 
 def _of_bytes(data: bytes) -> CapturedPicture | None:
-    # A picture that breaks off is filled up with grey by the decoder without a word: look for the end mark. Drivers
-    # fill their buffers up behind it.
-    data = data.rstrip(b"\0\xff")
-    if not data.startswith(b"\xff\xd8") or b"\xff\xd9" not in data[-64:]:
+    # A picture that breaks off is filled up with grey by the decoder without a word: look for the end mark.
+    data = data[:_find_end(data)]
+    if not data.startswith(b"\xff\xd8"):
         return None
     grey = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE)
     return None if grey is None else CapturedPicture(data, grey.shape[::-1], _is_black(grey))
+
+
+def _find_end(jpeg: bytes) -> int:
+    """Where a JPEG ends, behind its end mark; some cameras pad it. 0 where it breaks off.
+
+    Segments are skipped by their lengths: a small picture within one has an end mark too.
+    """
+    at = jpeg.find(b"\xff", 2)
+    while 0 <= at < len(jpeg) - 1:
+        mark = jpeg[at + 1]
+        if mark == 0xD9:
+            return at + 2
+        if mark == 0xFF:  # one that fills
+            at += 1
+            continue
+        bare = mark in (0x00, 0x01) or 0xD0 <= mark <= 0xD8  # a byte of the picture, or a mark without a length
+        at = jpeg.find(b"\xff", at + 2 + (0 if bare else int.from_bytes(jpeg[at + 2:at + 4], "big")))
+    return 0
 
 
 def _of_image(image: NDArray[np.uint8]) -> CapturedPicture | None:
