@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.generated.scenes import box_room
 from blackboard.board import Blackboard
 from blackboard.effect import Post
+from experiments.generated.scenes import box_room
 from harvey.runner.ports import MUST_CHANGE_M, STANDS_STILL, BodyPort, StillCamera
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
