@@ -116,7 +116,7 @@ class _Stream:
         self._node, self._fall_silent = node, fall_silent
         self._pictures: queue.SimpleQueue[Heard] = queue.SimpleQueue()
         self._newest_s, self._reader = 0.0, OdometryReader(node.types, node.late_s)
-        self._counted_s = time.monotonic()
+        self._late_since_s: float | None = None
         self.began_s: float | None = None
         node.look(self._pictures.put)
 
@@ -136,16 +136,22 @@ class _Stream:
                 except OdometryFault as fault:
                     print(f"odometry: {fault}", file=sys.stderr, flush=True)
                     continue
-                if counted is not None:
-                    there, self._counted_s = counted.odometry, counted.came_s
+                if counted is None:
+                    is_late = self._reader.is_late
+                    self._late_since_s = (self._late_since_s or time.monotonic()) if is_late else self._late_since_s
+                else:
+                    there, self._late_since_s = counted.odometry, None
                     yield BagItem(there.time_s, Pose2(there.x_m, there.y_m, there.heading_rad))
 
     def _find_silence(self) -> str:
-        age_s, drive = self._node.picture_age_s(), self._node.robot.drive
-        if age_s is not None and age_s > drive.pictures_s:
-            return f"no picture for {age_s:.0f} s"
-        silent_s = time.monotonic() - self._counted_s
-        return f"no odometry in time for {silent_s:.0f} s" if silent_s > SILENT_S else ""
+        age_s, pictures_s = self._node.picture_age_s(), self._node.robot.drive.pictures_s
+        if age_s is not None and age_s > pictures_s:
+            return f"no picture for {pictures_s:g} s"
+        heard_s, now_s = self._node.odometry_came_s, time.monotonic()
+        if heard_s is not None and now_s - heard_s > SILENT_S:
+            return f"no odometry for {SILENT_S:g} s"
+        is_late = self._late_since_s is not None and now_s - self._late_since_s > SILENT_S
+        return "odometry comes later and later" if is_late else ""
 
     def _read_pictures(self) -> Iterator[BagItem]:
         while not self._pictures.empty():

@@ -141,6 +141,11 @@ class RosNode:
         message = self.counted()
         return 0.0 if message is None else seconds(message.header.stamp)
 
+    @property
+    def odometry_came_s(self) -> float | None:
+        """When odometry last came, by ``time.monotonic()``; None where none has."""
+        return None if self._heard_odometry is None else self._heard_odometry.came_s
+
     def look(self, picture: Callable[[Heard], None] | None) -> None:
         """Hand over pictures from now on; None: nobody looks for a while. Raises OSError.
 

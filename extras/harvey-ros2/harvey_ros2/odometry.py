@@ -114,6 +114,11 @@ class OdometryReader:
             raise OdometryFault("two publish its odometry")
         return self._compare(last, found)
 
+    @property
+    def is_late(self) -> bool:
+        """Whether the newest that was not passed over otherwise came too late."""
+        return self._delay.above_s > self._late_s
+
     def forget(self) -> None:
         """Begin anew with the next message."""
         self._last = None
@@ -134,7 +139,8 @@ class OdometryReader:
         most = MOST_JUMP_M + MOST_SPEED_M_PER_S * later_s, MOST_JUMP_RAD + MOST_SPEED_RAD_PER_S * later_s
         if away_m > most[0] or turned > most[1]:
             raise OdometryFault(f"its odometry jumped by {away_m:.2f} m and {math.degrees(turned):.0f} degrees")
-        if self._delay.take(found.came_s, found.odometry.time_s) > self._late_s:
+        self._delay.take(found.came_s, found.odometry.time_s)
+        if self.is_late:
             self.passed_over["late"] += 1
             return None
         return found

@@ -184,8 +184,8 @@ class Onlooker:
         turned = np.array([arm_m * math.sin(heading), -arm_m * math.cos(heading), 1.0])  # about the camera
         pose, covariance = held.pose @ forward, held.covariance + yaw_variance * np.outer(turned, turned)
         c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return pose, covariance + (turn @ self._lag.widen() @ turn.T if self._counts else 0.0)
+        there = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return pose, covariance + (there @ self._lag.widen() @ there.T if self._counts else 0.0)
 
     def move(self, step: Pose2, time_s: float) -> None:
         """The wheels counted a motion until a time [s, of the run]: a pose in the frame of the one before."""
