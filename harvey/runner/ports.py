@@ -74,10 +74,7 @@ STANDS_STILL = "camera stands still"
 
 
 class StillCamera:
-    """Finds a camera that stands still: its picture, by bytes or by pixels, is the one before the wheels counted.
-
-    While nothing moves the same picture is as it should be. A picture has noise: no other is equal to the last pixel.
-    """
+    """Finds a camera that stands still: its picture, to the last pixel, is still the one before the wheels counted."""
 
     def __init__(self) -> None:
         self._jpeg = b""
@@ -208,7 +205,6 @@ class BodyPort:
         if request is None:  # the process that it was asked of is gone
             yield Revise(recovery, replace(tried, status="in vain", what="the request is gone"), (recovery,))
             return
-        wanted = request.value
         found = self._answer_again(request)
         if isinstance(found, BodyFault):
             vain = replace(tried, status="in vain", what=found.what, detail=found.detail)
@@ -216,7 +212,7 @@ class BodyPort:
             return
         del self._unanswered[asked.request]
         yield Revise(recovery, replace(tried, status="over", what="", detail=""), (recovery,))
-        if isinstance(wanted, MotorCommand | Course):
+        if isinstance(request.value, MotorCommand | Course):
             yield from self._take_contacts(request)
         yield from self._post_with_ranges(request, found)
 
