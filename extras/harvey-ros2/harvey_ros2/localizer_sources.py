@@ -69,7 +69,7 @@ MOST_OFF_M, MOST_OFF_RAD = 0.02, 0.03
 """Nor does it say anything up to here: the camera's mounting is learnt on the way."""
 
 
-class Step(NamedTuple):
+class WheelCorrection(NamedTuple):
     """A correction by a picture, and what the wheels counted since the one before.
 
     Attributes:
@@ -102,7 +102,7 @@ class WheelCheck:
     """
 
     reckoned: tuple[float, float, float]
-    steps: tuple[Step, ...] = ()
+    steps: tuple[WheelCorrection, ...] = ()
     gone_m: float = 0.0
     turned_rad: float = 0.0
     excess: str = ""
@@ -116,7 +116,7 @@ class WheelCheck:
         """After a picture; where a search has found the place, that is no correction."""
         by = Pose2(*self.reckoned).inverse() @ to
         moved = (0.0, 0.0, 0.0) if belief.basis in PLACED_BY or not self.steps else (by.x_m, by.y_m, by.heading_rad)
-        step = Step(self.gone_m, self.turned_rad, *moved, belief.sigma_m, belief.sigma_rad)
+        step = WheelCorrection(self.gone_m, self.turned_rad, *moved, belief.sigma_m, belief.sigma_rad)
         steps = (step,) if belief.basis in PLACED_BY else (*self.steps, step)
         while len(steps) > 2 and (math.fsum(one.gone_m for one in steps[2:]) >= WAY_M
                                   or math.fsum(one.turned_rad for one in steps[2:]) >= WAY_RAD):
@@ -131,7 +131,7 @@ class WheelCheck:
         return self.excess or f"{len(self.steps)} corrections by pictures are within what wheels can err"
 
 
-def _find_excess(steps: tuple[Step, ...]) -> str:
+def _find_excess(steps: tuple[WheelCorrection, ...]) -> str:
     """What is wrong with the corrections after the first of these; "" for nothing."""
     first, last, since = steps[0], steps[-1], steps[1:]
     gone_m, turned_rad = math.fsum(one.gone_m for one in since), math.fsum(one.turned_rad for one in since)

@@ -34,7 +34,7 @@ LATE_S, LATE_SIGMAS = 0.15, 3.0
 """Pictures that are older by so much, and surely so, are of no use."""
 
 
-class Place(NamedTuple):
+class DatedPose(NamedTuple):
     """Where the robot was at a time [s]."""
 
     time_s: float
@@ -46,14 +46,14 @@ class PictureLag:
 
     def __init__(self) -> None:
         self._log = np.zeros(len(LAGS_S))
-        self._counted = deque[Place](maxlen=400)
-        self._last: Place | None = None
-        self._pairs = deque[tuple[Place, Place]]()
+        self._counted = deque[DatedPose](maxlen=400)
+        self._last: DatedPose | None = None
+        self._pairs = deque[tuple[DatedPose, DatedPose]]()
 
     def count(self, time_s: float, counted: Pose2) -> None:
         """Where the wheels counted to be at a time."""
         if not self._counted or time_s > self._counted[-1].time_s:
-            self._counted.append(Place(time_s, counted))
+            self._counted.append(DatedPose(time_s, counted))
         while self._pairs and self._pairs[0][1].time_s - LAGS_S[0] <= time_s:
             self._compare(*self._pairs.popleft())
 
@@ -63,11 +63,11 @@ class PictureLag:
 
     def see(self, time_s: float, fix: Pose2) -> None:
         """Where a picture with this stamp says that the robot was."""
-        last, self._last = self._last, Place(time_s, fix)
+        last, self._last = self._last, DatedPose(time_s, fix)
         if last is not None:
             self._pairs.append((last, self._last))
 
-    def _compare(self, last: Place, now: Place) -> None:
+    def _compare(self, last: DatedPose, now: DatedPose) -> None:
         """Hold what two pictures say of the way between them against what was counted, where all of that is known."""
         if last.time_s - LAGS_S[-1] < self._counted[0].time_s:
             return
