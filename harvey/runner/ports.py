@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, Protocol
 
+import numpy as np
+
 from blackboard.change import Change, Posted, Retracted
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
+from knowledge_sources.methods.features.picture import read_picture
 from world_models.entries.body import (
     BodyFault,
     CameraPicture,
@@ -63,6 +67,44 @@ class Body(Protocol):
         ...
 
 
+MUST_CHANGE_M, MUST_CHANGE_RAD = 0.02, math.radians(1.0)
+"""After wheels that counted more, no picture is the same as the one before."""
+STANDS_STILL = "camera stands still"
+"""What the fault of a camera is called that delivers one picture for ever, whatever its stamps say."""
+
+
+class StillCamera:
+    """Finds a camera that stands still: its picture, to the last pixel, is still the one before the wheels counted."""
+
+    def __init__(self) -> None:
+        self._jpeg = b""
+        self._turned_rad = self._moved_m = 0.0
+
+    def move(self, turn_rad: float, move_m: float) -> None:
+        """The wheels counted a motion."""
+        self._turned_rad, self._moved_m = self._turned_rad + turn_rad, self._moved_m + move_m
+
+    def find(self, jpeg: bytes) -> str:
+        """What is wrong with a picture, in words; "" for nothing."""
+        if not jpeg or not _is_same(self._jpeg, jpeg):
+            self._jpeg, self._turned_rad, self._moved_m = jpeg, 0.0, 0.0
+            return ""
+        if abs(self._turned_rad) < MUST_CHANGE_RAD and abs(self._moved_m) < MUST_CHANGE_M:
+            return ""
+        return (f"its picture is the same as before the wheels counted {math.degrees(self._turned_rad):.0f} degrees and"
+                f" {self._moved_m:.2f} m")
+
+
+def _is_same(before: bytes, jpeg: bytes) -> bool:
+    """Whether two pictures are equal; pixels are compared where one may be the other with another head."""
+    if before == jpeg or abs(len(before) - len(jpeg)) > len(jpeg) // 50:
+        return before == jpeg
+    try:
+        return np.array_equal(read_picture(before).grey, read_picture(jpeg).grey)
+    except ValueError:
+        return False
+
+
 class BodyPort:
     """Carries out motor commands and takes pictures.
 
@@ -77,6 +119,7 @@ class BodyPort:
     def __init__(self, body: Body) -> None:
         self._body = body
         self._unanswered: dict[str, Entry[Any]] = {}
+        self._still, self._counted = StillCamera(), dict[str, MotionReport]()
 
     def remember(self, request: Entry[Any]) -> None:
         """Keep a request that another process did not answer: a recovery will ask for it here."""
@@ -90,10 +133,9 @@ class BodyPort:
         elif isinstance(change, Posted) and isinstance(entry.value, MotorCommand):
             yield from self._answer_motion(entry, (self._body.execute(entry.value),))
         elif not isinstance(change, Retracted) and isinstance(entry.value, Course):
-            found = self._body.steer(entry.value)
-            yield from self._answer_motion(entry, (found,) if isinstance(found, BodyFault) else found)
+            yield from self._answer_motion(entry, self._steer(entry))
         elif isinstance(change, Posted) and isinstance(entry.value, PictureRequest):
-            yield from self._post_with_ranges(entry, self._body.look(entry.value.purpose))
+            yield from self._post_with_ranges(entry, self._look(entry.value.purpose))
         elif isinstance(change, Posted) and isinstance(entry.value, Ride):
             yield self._post(entry, self._body.ride(entry.value))
 
@@ -105,6 +147,30 @@ class BodyPort:
         yield from touched
         for answer in found:
             yield from self._post_with_ranges(request, answer, touched if isinstance(answer, BodyFault) else ())
+
+    def _steer(self, request: Entry[Course]) -> tuple[MotionReport | CameraPicture | BodyFault, ...]:
+        """The next part of a motion; where the camera stands still, it comes to a stand, and that is a fault."""
+        found = self._body.steer(request.value)
+        if isinstance(found, BodyFault):
+            return (found,)
+        report, picture = found
+        self._still.move(report.turn_rad, report.move_m)
+        seen = self._check(picture)
+        if isinstance(seen, CameraPicture):
+            return report, seen
+        end = self._body.steer(replace(request.value, speed_m_per_s=0.0))
+        rest = end if isinstance(end, BodyFault) else end[0]
+        turn, move = report.turn_rad + (rest.turn_rad or 0.0), report.move_m + (rest.move_m or 0.0)
+        self._counted[request.id] = replace(report, turn_rad=turn, move_m=move)
+        return (replace(seen, turn_rad=turn, move_m=move),)
+
+    def _look(self, purpose: str) -> CameraPicture | BodyFault:
+        found = self._body.look(purpose)
+        return found if isinstance(found, BodyFault) else self._check(found)
+
+    def _check(self, picture: CameraPicture) -> CameraPicture | BodyFault:
+        wrong = self._still.find(picture.jpeg)
+        return BodyFault("camera", STANDS_STILL, wrong, "", picture.sim_time_s) if wrong else picture
 
     def _take_contacts(self, request: Entry[Any]) -> tuple[Effect, ...]:
         contact = self._body.take_contact()
@@ -124,6 +190,8 @@ class BodyPort:
         self, request: Entry[Any], found: MotionReport | CameraPicture | RideReport | BodyFault,
         why: tuple[Effect, ...] = (),
     ) -> Effect:
+        if isinstance(found, MotionReport | BodyFault) and isinstance(request.value, MotorCommand):
+            self._still.move(found.turn_rad or 0.0, found.move_m or 0.0)
         if isinstance(found, BodyFault):
             self._unanswered[request.id] = request
             return Post(replace(found, request=request.id), (request, *why))
@@ -137,22 +205,25 @@ class BodyPort:
         if request is None:  # the process that it was asked of is gone
             yield Revise(recovery, replace(tried, status="in vain", what="the request is gone"), (recovery,))
             return
-        wanted = request.value
-        found = self._answer_again(wanted)
+        found = self._answer_again(request)
         if isinstance(found, BodyFault):
             vain = replace(tried, status="in vain", what=found.what, detail=found.detail)
             yield Revise(recovery, vain, (recovery,))
             return
         del self._unanswered[asked.request]
         yield Revise(recovery, replace(tried, status="over", what="", detail=""), (recovery,))
-        if isinstance(wanted, MotorCommand | Course):
+        if isinstance(request.value, MotorCommand | Course):
             yield from self._take_contacts(request)
         yield from self._post_with_ranges(request, found)
 
     def _answer_again(
-        self, wanted: MotorCommand | Course | PictureRequest | Ride
+        self, request: Entry[MotorCommand | Course | PictureRequest | Ride]
     ) -> MotionReport | CameraPicture | RideReport | BodyFault:
         """The answer to a request now; a command is not carried out once more."""
+        wanted = request.value
+        if request.id in self._counted:  # only its picture was wrong
+            seen = self._look("track")
+            return seen if isinstance(seen, BodyFault) else self._counted.pop(request.id)
         if isinstance(wanted, Ride):
             return self._body.ride(wanted)
-        return self._body.claim() if isinstance(wanted, MotorCommand | Course) else self._body.look(wanted.purpose)
+        return self._body.claim() if isinstance(wanted, MotorCommand | Course) else self._look(wanted.purpose)

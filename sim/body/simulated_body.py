@@ -80,6 +80,7 @@ class SimulatedBody:
         self._touching_rad: float | None = None
         self._contact: Contact | None = None
         self._motion = ContinuousMotion()
+        self._frozen_until_s, self._delivered = 0.0, b""
         self._truth = Truth(start, locale=building.locale_at(start))
         there = self._draw_put_down(put_down_rng, put_down_sigma_m, put_down_sigma_rad)
         self._truth = Truth(there, locale=building.locale_at(there))
@@ -286,10 +287,17 @@ class SimulatedBody:
 
     def picture(self) -> bytes:
         """The JPEG bytes of a picture at this moment; it takes no time and is not counted."""
-        return self._camera.take_jpeg(self._building, self._truth, self._motion)
+        return self._deliver(self._camera.take_jpeg(self._building, self._truth, self._motion))
 
     def _take_frame(self, purpose: str) -> CameraPicture:
-        return self._camera.take_frame(self._building, self._truth, self._motion, purpose)
+        frame = self._camera.take_frame(self._building, self._truth, self._motion, purpose)
+        return replace(frame, jpeg=self._deliver(frame.jpeg))
+
+    def _deliver(self, jpeg: bytes) -> bytes:
+        """A picture as it leaves the camera: the last one again, where that is frozen."""
+        if self._truth.time_s >= self._frozen_until_s:
+            self._delivered = jpeg
+        return self._delivered or jpeg
 
     def _turn(self, turn_rad: float) -> None:
         done = self._wheels.sample_turn(turn_rad, self._wheel_rng)
@@ -384,6 +392,10 @@ class SimulatedBody:
     def turn_lights_off(self, duration_s: float) -> None:
         """Turn the building's lights off for a while."""
         self._dark_until_s = self._truth.time_s + duration_s
+
+    def freeze_camera(self, duration_s: float) -> None:
+        """Have the camera deliver its last picture for a while."""
+        self._frozen_until_s = self._truth.time_s + duration_s
 
     def add_occluder(self, occluder: Occluder) -> None:
         """Put something before the camera, until its time is over."""

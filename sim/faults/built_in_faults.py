@@ -263,6 +263,27 @@ class DroppedFrames(DeviceFault):
 
 
 @dataclass(frozen=True, slots=True)
+class CameraFrozen(Fault):
+    """The camera delivers its last picture again and again, as if it were new.
+
+    Attributes:
+        duration_s: for how long [s].
+    """
+
+    kind: ClassVar[str] = "camera_frozen"
+    bounds: ClassVar[Mapping[str, Bounds]] = {"duration_s": DURATION}
+
+    duration_s: float = 10.0
+
+    @property
+    def words(self) -> str:
+        return f"the camera delivers one picture for {self.duration_s:g} s"
+
+    def apply(self, body: FaultTarget) -> None:
+        body.freeze_camera(self.duration_s)
+
+
+@dataclass(frozen=True, slots=True)
 class CameraKnocked(Fault):
     """Something knocks against the camera: its mounting is turned, and stays so.
 

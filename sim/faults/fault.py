@@ -53,6 +53,10 @@ class FaultTarget(Protocol):
         """Put something before the camera, until its time is over."""
         ...
 
+    def freeze_camera(self, duration_s: float) -> None:
+        """Have the camera deliver its last picture from now on, for a while."""
+        ...
+
     def turn_camera(self, tilt_rad: float, roll_rad: float, yaw_rad: float) -> None:
         """Turn the camera's mounting from now on: downward, clockwise as it looks, to the left."""
         ...

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sim.faults.built_in_faults import (
     Bump,
+    CameraFrozen,
     CameraKnocked,
     CameraUnplugged,
     DroppedFrames,
@@ -24,7 +25,7 @@ GROUP = "harvey.faults"
 """Entry points of this group name fault classes; an entry point's name is the ``kind`` of its class."""
 BUILT_IN: tuple[type[Fault], ...] = (
     Bump, Kidnap, LightsOff, Occlusion, LinkLost, Nonsense, Stall, CameraUnplugged, LateFrames, DroppedFrames,
-    CameraKnocked,
+    CameraFrozen, CameraKnocked,
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import statistics
 import sys
@@ -82,25 +83,21 @@ def _run(args: Namespace) -> int:
         took_s = follow_bag(bag.items(), onlooker, bag.left_out, watch)
         for line in bag.tell():
             print(line)
-    return max(_tell_fault(watch, events), _end(onlooker, events, took_s, path, out))
+    return _end(onlooker, watch, events, took_s, path, out)
 
 
-def _tell_fault(watch: LensWatch, events: _Events) -> int:
-    """The exit code by what the pictures say of the lens: with another lens no certificate counts."""
-    if not (fault := watch.find_fault()):
-        return 0
-    print(fault)
-    events.certified = 0
-    return 1
-
-
-def _end(onlooker: Onlooker, events: _Events, took_s: list[float], path: Path, out: Path) -> int:
-    why = f"the recording ends; {'lost' if onlooker.is_lost else 'it knows where it is'}"
+def _end(
+    onlooker: Onlooker, watch: LensWatch, events: _Events, took_s: list[float], path: Path, out: Path
+) -> int:
+    onlooker.lens_fault = watch.find_fault()
+    knows, said = onlooker.judge()
+    certified = 0 if onlooker.lens_fault else onlooker.certified
+    why = f"the recording ends; {said}"
     onlooker.close(why)
-    print(f"{why}: {onlooker.pictures} pictures checked, {events.certified} certified, lost {events.lost} times\n"
+    print(f"{why}: {onlooker.pictures} pictures checked, {certified} certified, lost {events.lost} times\n"
           f"{_tell_times(took_s)}\n\nopen it with    harvey view {out}\nhave it told    harvey story {out}\n"
           f"for others      harvey export {out} --mcap {path.stem}.mcap")
-    return 1 if onlooker.is_lost else 0
+    return 0 if knows else 1
 
 
 def _run_film(args: Namespace, path: Path, world: Path, out: Path) -> int:
@@ -121,13 +118,14 @@ def _run_film(args: Namespace, path: Path, world: Path, out: Path) -> int:
     took_s = follow_film(film.items(), onlooker, watch)
     for what, number in sorted(film.left_out.items()):
         print(f"left out: {number} {what}")
-    return max(_tell_fault(watch, events), _end(onlooker, events, took_s, path, out))
+    return _end(onlooker, watch, events, took_s, path, out)
 
 
 def follow_film(items: Iterable[BagItem], onlooker: Onlooker, watch: LensWatch | None = None) -> list[float]:
     """Show pictures without odometry to an onlooker; returns how long each took [s]."""
     took_s: list[float] = []
     for item in items:
+        onlooker.heard_s = item.time_s
         if onlooker.wants(item.time_s):
             then = time.perf_counter()
             onlooker.look(item.jpeg, item.time_s)
@@ -146,10 +144,12 @@ def _run_live(args: Namespace) -> int:
     known, robot = build_robot(None, world, args)
     out = check_vacant(Path(args.out) if args.out else RUNS / "robot-follow")
     events = _Events()
-    is_lost = follow_robot(args.bag.partition(":")[2], world, known, robot, _guess(args, known), out, events.hear)
-    print(f"it was left {'lost' if is_lost else 'knowing where it is'}: {events.certified} pictures certified, lost "
-          f"{events.lost} times\n\nopen it with    harvey view {out}\nhave it told    harvey story {out}")
-    return 1 if is_lost else 0
+    onlooker = follow_robot(args.bag.partition(":")[2], world, known, robot, _guess(args, known), out, events.hear)
+    knows, said = onlooker.judge()
+    end = "knowing where it is" if knows else f"not knowing where it is ({said})"
+    print(f"it was left {end}: {onlooker.certified} pictures certified, lost {events.lost} times\n\n"
+          f"open it with    harvey view {out}\nhave it told    harvey story {out}")
+    return 0 if knows else 1
 
 
 def follow_bag(
@@ -159,10 +159,18 @@ def follow_bag(
     took_s: list[float] = []
     last: Pose2 | None = None
     began_s: float | None = None
-    for time_s, counted, jpeg in pair_with_odometry(items, left_out):
+    newest_s = -math.inf
+
+    def note_times() -> Iterator[BagItem]:
+        nonlocal newest_s
+        for item in items:
+            newest_s = max(newest_s, item.time_s)
+            yield item
+
+    for time_s, counted, jpeg in pair_with_odometry(note_times(), left_out):
         began_s = time_s if began_s is None else began_s
         if last is not None:
-            onlooker.move(last.inverse() @ counted)
+            onlooker.move(last.inverse() @ counted, time_s - began_s)
         last = onlooker.messages.odometry = counted
         if onlooker.wants(time_s - began_s):
             then = time.perf_counter()
@@ -170,6 +178,9 @@ def follow_bag(
             took_s.append(time.perf_counter() - then)
             if watch is not None:
                 watch.take(onlooker.scheduler.view)
+        else:
+            onlooker.pass_by(time_s - began_s)
+    onlooker.heard_s = newest_s - (newest_s if began_s is None else began_s)
     return took_s
 
 
@@ -248,8 +259,6 @@ def build_robot(bag: Bag | None, world: Path, args: Namespace) -> tuple[World, R
 
 
 def _guess(args: Namespace, world: World) -> FirstGuess:
-    import math
-
     from harvey_ros2.onlooker import FirstGuess
     from world_models.commands import parse_command
 
@@ -267,10 +276,10 @@ def _guess(args: Namespace, world: World) -> FirstGuess:
 
 
 class _Events:
-    """Prints when it is lost and found; counts."""
+    """Prints when it is lost and found; counts how often it was lost."""
 
     def __init__(self) -> None:
-        self.certified = self.lost = 0
+        self.lost = 0
         self._said = ""
 
     def hear(self, messages: Iterable[TimedMessage]) -> None:
@@ -278,7 +287,6 @@ class _Events:
             if item.topic != "/diagnostics":
                 continue
             status = item.message.status[0]
-            self.certified += status.values[0].value.startswith("verified")
             if status.message != self._said:
                 self.lost += status.level == 2
                 self._said = status.message
@@ -306,5 +314,5 @@ COMMAND = CliCommand(
     "long as that is so; rviz's 2D Pose Estimate begins anew; Ctrl-C ends it. The run is kept, with its journal:\n"
     "harvey replay, why and story work as for a mission. A video has no odometry: from one picture to the next the\n"
     "robot may have gone anywhere at about half a metre a second; once lost it is seldom found. Exit code 0: in the\n"
-    "end it knows where the robot is; 1: it is lost; 2: bad input.",
+    "end it knows where the robot is, by pictures; 1: it does not, or is lost; 2: bad input.",
 )

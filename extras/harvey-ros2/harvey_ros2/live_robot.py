@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -29,8 +30,8 @@ SILENT_S = 1.0
 
 def follow_robot(
     where: str, world: Path, known: World, robot: RobotModel, guess: FirstGuess, out: Path, hear: Tell
-) -> bool:
-    """Follow a robot until interrupted; whether it is lost then. Raises OSError and BadInput.
+) -> Onlooker:
+    """Follow a robot until interrupted; returns who did. Raises OSError and BadInput.
 
     Args:
         where: the robot's file, or the address of a router.
@@ -40,7 +41,16 @@ def follow_robot(
     try:
         company = RosCompany(node, known, robot)
         onlooker = _begin(company, world, robot, guess, out, hear)
-        stream = _Stream(node)
+
+        def fall_silent(why: str) -> None:
+            """What others drive by is withdrawn while a sense is silent, and comes back with it."""
+            told = list(company.messages.doubt("senses", why))
+            if told:
+                company.publish(told)
+                hear(told)
+                company.place(None, company.messages.odometry)
+
+        stream = _Stream(node, fall_silent)
         try:
             last: Pose2 | None = None
             for time_s, counted, jpeg in pair_with_odometry(stream.items()):
@@ -52,17 +62,19 @@ def follow_robot(
                     last, stream.began_s = None, None
                 if stream.began_s is None:
                     stream.began_s = company.messages.epoch_s = time_s
+                onlooker.heard_s = time_s - stream.began_s
                 if last is not None:
-                    onlooker.move(last.inverse() @ counted)
+                    onlooker.move(last.inverse() @ counted, onlooker.heard_s)
                 last = company.messages.odometry = counted
-                if stream.is_newest(time_s) and onlooker.wants(time_s - stream.began_s):
-                    onlooker.look(jpeg, time_s - stream.began_s)
+                onlooker.pass_by(onlooker.heard_s)
+                if stream.is_newest(time_s) and onlooker.wants(onlooker.heard_s):
+                    onlooker.look(jpeg, onlooker.heard_s)
                     believed, _ = onlooker.belief()
                     company.place(believed if company.messages.is_certified else None, counted)
         except KeyboardInterrupt:
             pass
         onlooker.close("it was interrupted")
-        return onlooker.is_lost
+        return onlooker
     finally:
         node.close()
 
@@ -99,10 +111,12 @@ class _Stream:
         began_s: stamp of the first picture of the run.
     """
 
-    def __init__(self, node: RosNode) -> None:
-        self._node = node
+    def __init__(self, node: RosNode, fall_silent: Callable[[str], None]) -> None:
+        """``fall_silent``: is told what does not come, or comes late, and "" while all does."""
+        self._node, self._fall_silent = node, fall_silent
         self._pictures: queue.SimpleQueue[Heard] = queue.SimpleQueue()
-        self._newest_s, self._reader = 0.0, OdometryReader(node.types)
+        self._newest_s, self._reader = 0.0, OdometryReader(node.types, node.late_s)
+        self._late_since_s: float | None = None
         self.began_s: float | None = None
         node.look(self._pictures.put)
 
@@ -114,6 +128,7 @@ class _Stream:
         """For ever."""
         while True:
             heard = self._node.receive(SILENT_S)
+            self._fall_silent(self._find_silence())
             yield from self._read_pictures()
             if heard is not None and heard[0] == "odom":
                 try:
@@ -121,9 +136,22 @@ class _Stream:
                 except OdometryFault as fault:
                     print(f"odometry: {fault}", file=sys.stderr, flush=True)
                     continue
-                if counted is not None:
-                    there = counted.odometry
+                if counted is None:
+                    is_late = self._reader.is_late
+                    self._late_since_s = (self._late_since_s or time.monotonic()) if is_late else self._late_since_s
+                else:
+                    there, self._late_since_s = counted.odometry, None
                     yield BagItem(there.time_s, Pose2(there.x_m, there.y_m, there.heading_rad))
+
+    def _find_silence(self) -> str:
+        age_s, pictures_s = self._node.picture_age_s(), self._node.robot.drive.pictures_s
+        if age_s is not None and age_s > pictures_s:
+            return f"no picture for {pictures_s:g} s"
+        heard_s, now_s = self._node.odometry_came_s, time.monotonic()
+        if heard_s is not None and now_s - heard_s > SILENT_S:
+            return f"no odometry for {SILENT_S:g} s"
+        is_late = self._late_since_s is not None and now_s - self._late_since_s > SILENT_S
+        return "odometry comes later and later" if is_late else ""
 
     def _read_pictures(self) -> Iterator[BagItem]:
         while not self._pictures.empty():

@@ -5,6 +5,8 @@ Base and camera of one mission share a node, so that the base knows how old the 
 
 from __future__ import annotations
 
+import math
+import struct
 import threading
 import time
 from collections import deque
@@ -13,10 +15,13 @@ from typing import Any, Protocol
 
 from harvey_ros2.messages import MessageError, MessageTypes, seconds
 from harvey_ros2.middleware import Heard, Topic
+from harvey_ros2.odometry import LeastDelay
 from harvey_ros2.robot_file import RobotFile, read_robot
 
 WAITING = 1000
 """RobotMessages that wait to be read, at most; older ones are forgotten."""
+ECHO_S = 1.0
+"""What we have said comes back to us within so long, if at all [s]."""
 
 
 class RobotMessages(Protocol):
@@ -49,7 +54,7 @@ class RobotMessages(Protocol):
         ...
 
     def picture_age_s(self) -> float | None:
-        """How long ago the newest picture came; None where nobody looks [s]."""
+        """How old the newest picture is; None where nobody has looked yet [s]."""
         ...
 
     def reopen(self) -> None: ...
@@ -71,6 +76,7 @@ class RosNode:
         self._arrived, self._waiting = threading.Condition(), deque[tuple[str, Heard]](maxlen=WAITING)
         self._heard_odometry: Heard | None = None
         self._picture_came_s: float | None = None
+        self._picture_delay, self._said = LeastDelay(), deque[tuple[float, bytes]]()
         self._picture: Callable[[Heard], None] | None = None
         self._is_looking = False
         self._clock: Heard | None = None
@@ -82,7 +88,11 @@ class RosNode:
 
     def send(self, key: str, message: Any) -> None:
         """Publish on one of the robot's topics. Raises OSError."""
-        self._middleware.publish(self.robot.topic(key), self.types.encode(message))
+        cdr, now_s = self.types.encode(message), time.monotonic()
+        while self._said and now_s - self._said[0][0] > ECHO_S:
+            self._said.popleft()
+        self._said.append((now_s, cdr))
+        self._middleware.publish(self.robot.topic(key), cdr)
 
     def publish(self, topic: Topic, message: Any) -> None:
         """Publish on any topic. Raises OSError."""
@@ -100,8 +110,10 @@ class RosNode:
             return self._waiting.popleft() if self._waiting else None
 
     def is_ours(self, key: str, heard: Heard) -> bool:
-        """Whether we sent a message; where the middleware does not tell who did, it is taken as ours."""
-        return not heard.sender or heard.sender == self._middleware.sender(self.robot.topic(key))
+        """Whether we sent a message; one of nobody's name is ours if it says what we have said lately."""
+        if heard.sender:
+            return heard.sender == self._middleware.sender(self.robot.topic(key))
+        return any(cdr == heard.cdr and heard.came_s - said_s <= ECHO_S for said_s, cdr in list(self._said))
 
     def now(self) -> float:
         return time.monotonic()
@@ -129,17 +141,32 @@ class RosNode:
         message = self.counted()
         return 0.0 if message is None else seconds(message.header.stamp)
 
+    @property
+    def odometry_came_s(self) -> float | None:
+        """When odometry last came, by ``time.monotonic()``; None where none has."""
+        return None if self._heard_odometry is None else self._heard_odometry.came_s
+
     def look(self, picture: Callable[[Heard], None] | None) -> None:
-        """Hand over pictures from now on; None: nobody looks any more. Raises OSError."""
-        self._picture, self._picture_came_s = picture, None
+        """Hand over pictures from now on; None: nobody looks for a while. Raises OSError.
+
+        Their age counts from when somebody first looked: a camera that is given up, and looked for again, stays silent.
+        """
+        self._picture = picture
+        if picture is not None and self._picture_came_s is None:
+            self._picture_came_s = time.monotonic()
         if picture is not None and not self._is_looking:
             self._is_looking = True
             self._middleware.subscribe(self.robot.topic("picture"), self._take_picture)
 
     def picture_age_s(self) -> float | None:
-        """How long ago the newest picture came [s]."""
+        """How old the newest picture is: since it came, and by how much later than the quickest it came [s]."""
         came_s = self._picture_came_s
-        return None if came_s is None else time.monotonic() - came_s
+        return None if came_s is None else time.monotonic() - came_s + self._picture_delay.above_s
+
+    @property
+    def late_s(self) -> float:
+        """Odometry that comes so much later than the quickest is stale [s]; a simulator's clock does not tell that."""
+        return math.inf if self.robot.sim_time else self.robot.drive.fresh_s
 
     def reopen(self) -> None:
         """Nothing to do: a middleware finds its peers again by itself."""
@@ -164,9 +191,11 @@ class RosNode:
         return take
 
     def _take_picture(self, heard: Heard) -> None:
-        picture = self._picture
+        picture, self._picture_came_s = self._picture, heard.came_s
+        if not self.robot.sim_time and len(heard.cdr) >= 12:  # the stamp is what a message begins with
+            sec, nanosec = struct.unpack_from("<iI" if heard.cdr[1] & 1 else ">iI", heard.cdr, 4)
+            self._picture_delay.take(heard.came_s, sec + 1e-9 * nanosec)
         if picture is not None:
-            self._picture_came_s = heard.came_s
             picture(heard)
 
     def _take_clock(self, heard: Heard) -> None:

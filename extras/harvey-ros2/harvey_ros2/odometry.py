@@ -25,6 +25,30 @@ SENDER_S = 1.0
 """Who was silent for so long is gone, and another may take over [s]."""
 
 
+DRIFT = 1e-3
+"""Two clocks go apart by less than such a part of the time."""
+
+
+class LeastDelay:
+    """How much later a message came than the quickest, by its stamp: two clocks are compared with themselves only.
+
+    Attributes:
+        above_s: of the newest message [s].
+    """
+
+    def __init__(self) -> None:
+        self._least_s, self._last_s = math.inf, 0.0
+        self.above_s = 0.0
+
+    def take(self, came_s: float, stamp_s: float) -> float:
+        """A message with its stamp; returns by how much it came later than the quickest [s]."""
+        drifted_s = DRIFT * max(0.0, came_s - self._last_s)
+        self._last_s = came_s
+        self._least_s = min(came_s - stamp_s, self._least_s + drifted_s)
+        self.above_s = came_s - stamp_s - self._least_s
+        return self.above_s
+
+
 class OdometryFault(Exception):
     """What could mislead, in words. The next message begins anew."""
 
@@ -53,11 +77,12 @@ class OdometryReader:
     """Reads one robot's odometry.
 
     Attributes:
-        passed_over: how many messages of each kind were: ``doubled``, ``out of order``, ``garbled``.
+        passed_over: how many messages of each kind were: ``doubled``, ``out of order``, ``garbled``, ``late``.
     """
 
-    def __init__(self, types: MessageTypes) -> None:
-        self._types = types
+    def __init__(self, types: MessageTypes, late_s: float = math.inf) -> None:
+        """``late_s``: what comes so much later than the quickest, by its stamp, tells nothing of now [s]."""
+        self._types, self._late_s, self._delay = types, late_s, LeastDelay()
         self._last: Counted | None = None
         self._newest: Counted | None = None
         self._sender, self._begin = "", Pose2(0.0, 0.0, 0.0)
@@ -82,11 +107,17 @@ class OdometryReader:
         found = replace(found, odometry=_moved(self._begin, found.odometry))
         if last is None:
             self._last = self._newest = found
-            self._sender = heard.sender
+            self._sender, self._delay = heard.sender, LeastDelay()
+            self._delay.take(found.came_s, found.odometry.time_s)
             return found
         if is_other:
             raise OdometryFault("two publish its odometry")
         return self._compare(last, found)
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the newest that was not passed over otherwise came too late."""
+        return self._delay.above_s > self._late_s
 
     def forget(self) -> None:
         """Begin anew with the next message."""
@@ -108,6 +139,10 @@ class OdometryReader:
         most = MOST_JUMP_M + MOST_SPEED_M_PER_S * later_s, MOST_JUMP_RAD + MOST_SPEED_RAD_PER_S * later_s
         if away_m > most[0] or turned > most[1]:
             raise OdometryFault(f"its odometry jumped by {away_m:.2f} m and {math.degrees(turned):.0f} degrees")
+        self._delay.take(found.came_s, found.odometry.time_s)
+        if self.is_late:
+            self.passed_over["late"] += 1
+            return None
         return found
 
 

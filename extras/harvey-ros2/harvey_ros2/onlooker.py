@@ -15,13 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.effect import Effect, Post
+from blackboard.effect import Effect, Post, Revise
 from blackboard.journal import Decision
 from blackboard.scheduler import Scheduler
 from harvey.agent import Agent, build_agent
 from harvey.errors import BadInput
+from harvey.runner.ports import STANDS_STILL, StillCamera
 from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.wiring import KNOWLEDGE_SOURCES
+from harvey_ros2.picture_lag import PictureLag
 from harvey_ros2.run_messages import KINDS, RunMessages, TimedMessage
 from knowledge_sources.action.travel_breaker import TravelBreaker
 from knowledge_sources.action.yaw_calibrator import YawCalibrator
@@ -38,16 +40,16 @@ from knowledge_sources.plan.matcher import Matcher
 from knowledge_sources.plan.med_r_and_t import MedRAndT
 from knowledge_sources.plan.milestone_judge import MilestoneJudge
 from knowledge_sources.plan.plan_adjuster import PlanAdjuster
-from knowledge_sources.questions import find_camera
+from knowledge_sources.questions import OPEN_FAULT, find_camera
 from knowledge_sources.settings import DEFAULT
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import RunRecorder
 from world_models.camera import YAW
 from world_models.commands import check_command
-from world_models.entries.body import CameraPicture, MotionReport
+from world_models.entries.body import BodyFault, CameraPicture, MotionReport
 from world_models.entries.location import diagonal
-from world_models.entries.task import Command, Outcome
+from world_models.entries.task import Certificate, Command, Outcome
 from world_models.files.toml.mission import Servo
 from world_models.frames import Pose2
 from world_models.plugins import GUESTS_GROUP, list_plugins
@@ -69,6 +71,8 @@ APART_M, APART_RAD = 0.3, math.radians(20.0)
 STANDING_M, STANDING_RAD = 0.02, math.radians(1.0)
 """A robot that has not moved so far since it was certified is not looked for again."""
 STILL_M, STILL_RAD = 2e-4, 2e-4
+BLIND_S, VOUCHED_M = 2.0, 1.0
+"""It knows where it is so long after the last picture with odometry, and so far from the last that was certified."""
 SIGMA_ANYWHERE_M, SIGMA_ANYWHERE_RAD = 5.0, math.pi
 
 
@@ -113,7 +117,9 @@ class Onlooker:
     Attributes:
         scheduler: its board, and who sits round it.
         messages: what is told of it; whether its belief is certified, and why it is lost.
-        pictures: how many were checked.
+        pictures: how many were checked; certified: how many of them vouched for the place.
+        lens_fault: what is wrong with the lens by all of them, which makes none of them count; "" where nothing is.
+        heard_s: when something last came of it, be it of use or not [s, of the run].
     """
 
     def __init__(
@@ -137,13 +143,36 @@ class Onlooker:
         self._settle()
         if HELD.find(self.scheduler.view) is None:
             raise BadInput("--start: expected a place in the building, got none that was understood")
+        self._counted = Pose2(0.0, 0.0, 0.0)
         self._moved, self._last_s, self._glimpsed = Pose2(0.0, 0.0, 0.0), -math.inf, Pose2(math.inf, 0.0, 0.0)
-        self._reported_s = 0.0
-        self.pictures = 0
+        self._reported_s = self._seen_s = self.heard_s = 0.0
+        self.pictures = self.certified = 0
+        self.lens_fault = ""
+        self._still, self._lag = StillCamera(), PictureLag()
+        self._vouched_m, self._vouched_s, self._verdict = math.inf, -math.inf, ""
 
     @property
     def is_lost(self) -> bool:
         return LOST.find(self.scheduler.view) is not None
+
+    def judge(self) -> tuple[bool, str]:
+        """Whether it knows where the robot is, by certificates, and that in words."""
+        if self.is_lost:
+            return False, "lost"
+        if self.lens_fault:
+            return False, f"it does not know where it is: {self.lens_fault}"
+        if not self.certified:
+            return False, f"was told where it is; 0 of {self.pictures} pictures said so"
+        if self.messages.unsure:
+            return False, f"it does not know where it is: {self.messages.unsure}"
+        if not self.messages.is_certified:
+            return False, "it does not know where it is: the last pictures do not say so"
+        if self.heard_s - (self._seen_s if self._counts else self._vouched_s) > BLIND_S:
+            return False, (f"it does not know where it is: pictures with odometry came, or said so, until"
+                           f" {self._seen_s if self._counts else self._vouched_s:.1f} s of {self.heard_s:.1f} s")
+        if self._vouched_m > VOUCHED_M:
+            return False, f"it does not know where it is: no picture said so on the last {self._vouched_m:.1f} m"
+        return True, "it knows where it is"
 
     def belief(self) -> tuple[Pose2, NDArray[np.float64]]:
         """Where the robot is believed to be, with all motion so far, and the covariance (3, 3) of the last report.
@@ -157,11 +186,21 @@ class Onlooker:
         yaw_variance = compute_camera_covariance(camera, DEFAULT.camera_state)[YAW, YAW]
         heading, arm_m = held.pose.heading_rad, camera.mount.forward_m
         turned = np.array([arm_m * math.sin(heading), -arm_m * math.cos(heading), 1.0])  # about the camera
-        return held.pose @ forward, held.covariance + yaw_variance * np.outer(turned, turned)
+        pose, covariance = held.pose @ forward, held.covariance + yaw_variance * np.outer(turned, turned)
+        c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+        there = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return pose, covariance + (there @ self._lag.widen() @ there.T if self._counts else 0.0)
 
-    def move(self, step: Pose2) -> None:
-        """The wheels counted a motion: a pose in the frame of the one before."""
-        self._moved = self._moved @ step
+    def move(self, step: Pose2, time_s: float) -> None:
+        """The wheels counted a motion until a time [s, of the run]: a pose in the frame of the one before."""
+        self._moved, self._counted = self._moved @ step, self._counted @ step
+        self._vouched_m += math.hypot(step.x_m, step.y_m)
+        self._still.move(step.heading_rad, step.x_m)
+        self._note_count(time_s)
+
+    def _note_count(self, time_s: float) -> None:
+        there, reach = self._counted, self._agent.robot.actuator.reach
+        self._lag.count(time_s, Pose2(there.x_m * reach, there.y_m * reach, there.heading_rad))
 
     def wants(self, time_s: float) -> bool:
         """Whether a picture of this time is of use now."""
@@ -176,8 +215,17 @@ class Onlooker:
             return False  # the same picture again tells nothing
         return time_s - self._last_s >= (EVERY_S if self.messages.is_certified else AGAIN_S)
 
+    def pass_by(self, time_s: float) -> None:
+        """A picture with its odometry came that is not wanted."""
+        self._seen_s = time_s
+
     def look(self, jpeg: bytes, time_s: float) -> None:
         """A picture, taken where the wheels have counted up to now [s, of the run]."""
+        self._seen_s = time_s
+        self._note_count(time_s)
+        if self._stands_still(jpeg, time_s):
+            self.tell_pose()
+            return
         lost = self.is_lost
         self._report(time_s)
         lost = lost or self.is_lost  # it may have become so by the report
@@ -187,7 +235,12 @@ class Onlooker:
             self._glimpsed = Pose2(0.0, 0.0, 0.0)
         effect = Post(picture)
         self._recorder.record_picture(effect)
+        self._verdict = ""
         self._post(effect)
+        if self._counts:
+            self._compare_with_wheels(time_s)
+        if self._verdict == "verified" and self.messages.is_certified:
+            self.certified, self._vouched_m, self._vouched_s = self.certified + 1, 0.0, time_s
         if not self.is_lost:
             self._glimpsed = Pose2(math.inf, 0.0, 0.0)
         self.tell_pose()
@@ -201,7 +254,7 @@ class Onlooker:
 
     def close(self, why: str) -> None:
         """End the run."""
-        kind = "lost" if self.is_lost else "reached"
+        kind = "lost" if self.is_lost else "reached" if self.judge()[0] else "failed"
         self._post(Post(Outcome(kind, why)))
         self._recorder.draw_end(kind, None)
         self._recorder.close()
@@ -209,6 +262,27 @@ class Onlooker:
             self._files.write_result({
                 "scenario": self._files.path.name, "seed": 0, "outcome": kind, "reason": why,
                 "decisions": self.scheduler.cycle, "pictures": self.pictures})
+
+    def _stands_still(self, jpeg: bytes, time_s: float) -> bool:
+        """Whether the camera stands still; a fault on the board says so, and the wheels go on being counted."""
+        wrong = self._still.find(jpeg)
+        fault = self.scheduler.view.newest(OPEN_FAULT, True)
+        if wrong and fault is None:
+            self._post(Post(BodyFault("camera", STANDS_STILL, wrong, "", time_s)))
+        elif not wrong and fault is not None:
+            self._post(Revise(fault, replace(fault.value, status="over")))
+        if wrong:
+            self._last_s = time_s
+            self._report(time_s)
+        return bool(wrong)
+
+    def _compare_with_wheels(self, time_s: float) -> None:
+        """Find out from a picture that tells the place how late pictures are."""
+        if self._verdict == "verified" and not self.is_lost:
+            self._lag.see(time_s, HELD.of(self.scheduler.view).pose)
+            self._tell(list(self.messages.doubt("stamps", self._lag.complaint)))
+        else:
+            self._lag.forget_place()
 
     def _report(self, time_s: float) -> None:
         """Post the motion since the last picture: a turn toward where it came, the way there, and a turn."""
@@ -243,5 +317,7 @@ class Onlooker:
     def _hear(self, decision: Decision) -> None:
         for change in (*decision.observed, *decision.made):
             value: Any = change.entry.value
+            if isinstance(value, Certificate):
+                self._verdict = value.verdict
             if isinstance(value, KINDS):
                 self._tell(list(self.messages.take(value)))  # even where nobody listens: certificates follow from it

@@ -56,7 +56,7 @@ class Ros2Base(LineDriver):
         """``scanner``: where its laser scanner is; None where it has none."""
         super().__init__(messages)
         self._messages, self._settings, self._scanner = messages, settings, scanner
-        self._reader = OdometryReader(messages.types)
+        self._reader = OdometryReader(messages.types, settings.fresh_s)
         self._newest: Counted | None = None
         self._other_s = -math.inf
         self._said_s = -math.inf
@@ -252,7 +252,7 @@ class AccompaniedRos2Base(Ros2Base):
 
     def __init__(self, node: RosNode) -> None:
         super().__init__(node, node.robot.drive, node.robot.scan if node.robot.topics.scan else None)
-        self._node = node
+        self._node, self._reader = node, OdometryReader(node.types, node.late_s)
 
     def accompany(self, world: World, robot: RobotModel) -> tuple[Sink, Tell]:
         """What publishes each decision, and what hands over goals."""

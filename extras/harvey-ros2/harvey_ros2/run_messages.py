@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from harvey.runner.ports import STANDS_STILL
+from harvey_ros2.localizer_sources import WheelCheck
 from harvey_ros2.messages import MessageTypes, stamp
 from harvey_ros2.middleware import LATCHED, SENSOR, Delivery, Topic, full_name
 from harvey_ros2.robot_file import FrameNames
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import CameraPicture, MotionReport
+from world_models.entries.body import BodyFault, CameraPicture, MotionReport
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Certificate, Milestone, PlanSketch
 from world_models.frames import Pose2
@@ -31,7 +33,7 @@ UNKNOWN = 1e6
 DOUBTFUL = 0.5
 """A picture by which the place is wrong with this probability ends the certainty until the next that verifies it."""
 KINDS: tuple[type[Any], ...] = (
-    MotionReport, CameraPicture, Hypothesis, Certificate, Milestone, PlanSketch, Discrepancy)
+    MotionReport, CameraPicture, Hypothesis, Certificate, Milestone, PlanSketch, Discrepancy, WheelCheck, BodyFault)
 """What is told of."""
 OK, WARN, ERROR = 0, 1, 2
 COLOURS: Mapping[str, tuple[float, float, float]] = {
@@ -83,6 +85,7 @@ class RunMessages:
         self.odometry = Pose2(0.0, 0.0, 0.0)
         self.is_certified, self.lost, self.time_s, self.epoch_s = False, "", 0.0, 0.0
         self._reason = "nothing was verified yet"
+        self._doubts: dict[str, str] = {}
 
     def begin(self) -> Iterator[TimedMessage]:
         """What is said once: where the camera is."""
@@ -114,6 +117,10 @@ class RunMessages:
             yield from self._tell_milestone(value)
         elif isinstance(value, PlanSketch):
             yield from self._tell_plan(value)
+        elif isinstance(value, WheelCheck):
+            yield from self.doubt("wheels", value.excess)
+        elif isinstance(value, BodyFault) and value.what == STANDS_STILL:
+            yield from self.doubt("camera", f"the {value.what}: {value.detail}" if value.is_open else "")
 
     def transform(self, believed: Pose2, counted: Pose2, height_m: float = 0.0) -> TimedMessage:
         """From map to odometry, by where the robot is in both."""
@@ -128,10 +135,24 @@ class RunMessages:
             "pose": {"position": {"x": believed.x_m, "y": believed.y_m, "z": height_m},
                      "orientation": _about_z(believed.heading_rad)}, "covariance": full.ravel()})
 
+    @property
+    def unsure(self) -> str:
+        """Why nothing is certified, whatever single pictures say; "" where nothing speaks against it."""
+        return "; ".join(self._doubts.values())
+
+    def doubt(self, part: str, why: str) -> Iterator[TimedMessage]:
+        """Tell that a part of the robot cannot be relied on, and by what; "" where that is over."""
+        if why != self._doubts.get(part, ""):
+            self._doubts = {**self._doubts, part: why} if why else {
+                other: said for other, said in self._doubts.items() if other != part}
+            self.is_certified = self.is_certified and not why
+            yield self.diagnosis()
+
     def diagnosis(self) -> TimedMessage:
         """Whether it knows where it is, and by what."""
         level, said = (ERROR, f"lost: {self.lost}") if self.lost else (
-            (OK, "certified") if self.is_certified else (WARN, "not certified"))
+            (OK, "certified") if self.is_certified else (
+                WARN, f"not certified: {self.unsure}" if self.unsure else "not certified"))
         status = {"level": level, "name": "harvey: place", "message": said, "hardware_id": "harvey",
                   "values": [self._types.build("diagnostic_msgs/msg/KeyValue", key="verdict", value=self._reason)]}
         return self._out("/diagnostics", header=self._header(""), status=[status])
@@ -169,7 +190,7 @@ class RunMessages:
     def _tell_verdict(self, verdict: Certificate) -> Iterator[TimedMessage]:
         self._reason = f"{verdict.verdict}: {verdict.reason}"
         vouched = self.is_certified and verdict.p_wrong < DOUBTFUL and verdict.verdict != "refuted"
-        self.is_certified = (vouched or verdict.verdict == "verified") and not self.lost
+        self.is_certified = (vouched or verdict.verdict == "verified") and not (self.lost or self._doubts)
         yield self.diagnosis()
 
     def _tell_doubt(self, doubt: Discrepancy) -> Iterator[TimedMessage]:

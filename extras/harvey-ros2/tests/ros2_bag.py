@@ -41,10 +41,12 @@ def drive_bag(
     folder: Path, way: Sequence[tuple[float, float]], *, seed: int = 0, scenario: str = "forty-foot-hallway",
     faults: tuple[Fault, ...] = (), storage: StoragePlugin = StoragePlugin.MCAP,
     mounted: Callable[[CameraMount], CameraMount] = lambda mount: mount,
+    seen: Callable[[float, bytes], tuple[float, bytes]] = lambda time_s, jpeg: (time_s, jpeg),
 ) -> Truth:
     """Drive along points [m, world] by pure pursuit on the truth, and record a bag; returns (time, true pose)s.
 
-    ``mounted``: what the bag says of the camera's mounting, by what is true.
+    ``mounted``: what the bag says of the camera's mounting, by what is true; ``seen``: stamp [s] and bytes of a picture
+    in the bag, by the true ones.
     """
     stage = build_stage(replace(load_scenario(scenario), faults=faults))
     body, camera = stage.body(seed), stage.scenario.camera
@@ -73,7 +75,7 @@ def drive_bag(
             due_s -= TICK_S
             if due_s <= 0.0:
                 due_s += PICTURE_S
-                record("camera/image_raw/compressed", write_picture(robot.time_s, body.picture()))
+                record("camera/image_raw/compressed", write_picture(*seen(robot.time_s, body.picture())))
                 record("camera/camera_info", write_camera_info(robot.time_s, camera.camera))
     return truth
 

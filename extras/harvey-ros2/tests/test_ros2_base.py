@@ -16,7 +16,8 @@ from ros2_values import plain
 
 from harvey.hardware.drivers.base_driver import BaseFault
 from harvey_ros2.messages import message_types, stamp
-from harvey_ros2.middleware import Heard
+from harvey_ros2.middleware import Heard, Topic
+from harvey_ros2.node import RosNode
 from harvey_ros2.odometry import OdometryFault, OdometryReader
 from harvey_ros2.robot_emulator import (
     CdrWriter,
@@ -26,6 +27,7 @@ from harvey_ros2.robot_emulator import (
     write_mount,
     write_picture,
 )
+from harvey_ros2.robot_file import RobotFile
 from harvey_ros2.ros2_base import SAY_S
 from sim.emulators.emulator import IdealGround
 from world_models.camera import Camera, CameraMount
@@ -102,6 +104,68 @@ def test_without_fresh_pictures_nothing_moves() -> None:
     with pytest.raises(BaseFault, match="no picture for") as caught:
         driver.move(2.0)
     assert caught.value.stopped and bench.ground.moved_m < 0.65
+
+
+def test_odometry_that_comes_later_and_later_is_stale_by_its_stamps() -> None:
+    bench = Bench()
+
+    def fill(time_s: float, _key: str, cdr: bytes) -> list[tuple[float, bytes, str]]:
+        return [(0.7 * max(0.0, time_s - 2.0), cdr, "robot")]
+
+    bench.spoil = fill
+    with pytest.raises(BaseFault, match=r"no odometry for 0\.4 s \(passed over so far: .*\d+ late") as caught:
+        bench.driver().move(3.0)
+    assert caught.value.kind == "silent" and bench.ground.moved_m < 0.3 * (2.0 + 0.4 / 0.7 + 0.4) + 0.2
+
+
+class Silent:
+    """A middleware of a node whose messages a test hands over itself."""
+
+    def __init__(self) -> None:
+        self.hear: dict[str, Callable[[Heard], None]] = {}
+
+    def publish(self, topic: Topic, cdr: bytes) -> None:
+        self.sent = topic, cdr
+
+    def subscribe(self, topic: Topic, heard: Callable[[Heard], None]) -> None:
+        self.hear[topic.name] = heard
+
+    def sender(self, _topic: Topic) -> str:
+        return "us"
+
+    def close(self) -> None: ...
+
+
+def test_pictures_age_from_when_somebody_looks_and_by_their_stamps_and_an_order_of_nobody_is_not_ours(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    network, now_s = Silent(), [100.0]
+    monkeypatch.setattr(RobotFile, "open", lambda _robot: network)
+    monkeypatch.setattr("harvey_ros2.node.time.monotonic", lambda: now_s[0])
+    node = RosNode(RobotFile())
+
+    def show(stamp_s: float) -> None:
+        header = {"stamp": {"sec": int(stamp_s), "nanosec": round(stamp_s % 1.0 * 1e9)}, "frame_id": "camera"}
+        cdr = TYPES.encode(TYPES.build("sensor_msgs/msg/CompressedImage", header=header, format="jpeg"))
+        network.hear["/camera/image_raw/compressed"](Heard(cdr, "robot", now_s[0]))
+
+    assert node.picture_age_s() is None
+    node.look(lambda _heard: None)
+    now_s[0] += 1.6
+    node.look(None)  # it is given up for unplugged, and looked for again
+    assert node.picture_age_s() == pytest.approx(1.6)
+    node.look(lambda _heard: None)
+    assert node.picture_age_s() == pytest.approx(1.6)
+    show(7.0)
+    assert node.picture_age_s() == 0.0
+    now_s[0] += 2.0
+    show(7.2)
+    assert node.picture_age_s() == pytest.approx(1.8, abs=0.01)
+    zero, fast = (TYPES.build("geometry_msgs/msg/Twist", linear={"x": speed}) for speed in (0.0, 0.2))
+    node.send("cmd_vel", zero)
+    assert [node.is_ours("cmd_vel", Heard(TYPES.encode(said), sender, now_s[0])) for said, sender in (
+        (zero, ""), (fast, ""), (fast, "us"), (zero, "joystick"))] == [True, False, True, False]
+    assert not node.is_ours("cmd_vel", Heard(TYPES.encode(zero), "", now_s[0] + 5.0))
 
 
 def test_who_else_drives_is_told_of_and_gets_no_quarrel() -> None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -99,6 +103,72 @@ def test_a_camera_that_is_mounted_otherwise_than_the_recording_says_is_learnt_on
     learnt = onlooker.scheduler.view.latest(CameraState)
     assert learnt is not None
     assert abs(learnt.value.mount.tilt_rad) < math.radians(0.1) and abs(learnt.value.mount.height_m - 1.0) < 0.005
+
+
+def repeat(change: bool) -> Callable[[float, bytes], tuple[float, bytes]]:
+    """From 5 s on one picture again and again with new stamps; or changed, by noise and compressed anew."""
+    kept: list[bytes] = []
+
+    def seen(time_s: float, jpeg: bytes) -> tuple[float, bytes]:
+        if time_s < 1005.0:
+            return time_s, jpeg
+        kept.append(jpeg)
+        if not change:
+            return time_s, kept[0]
+        pixels = cv2.imdecode(np.frombuffer(kept[0], np.uint8), cv2.IMREAD_COLOR)
+        noise = np.random.default_rng(len(kept)).normal(0.0, 2.0, pixels.shape)
+        noisy = np.clip(pixels + noise, 0.0, 255.0).astype(np.uint8)
+        return time_s, cv2.imencode(".jpg", noisy, [cv2.IMWRITE_JPEG_QUALITY, 92])[1].tobytes()
+
+    return seen
+
+
+@pytest.mark.parametrize(("change", "why"), [
+    (False, r"the camera stands still: its picture is the same as before the wheels counted 0 degrees and 0\.06 m"),
+    (True, r"pictures moved it by 0\.1\d m on 0\.1\d m of way, where wheels err by at most 0\.\d\d m")])
+def test_a_camera_that_freezes_is_noticed_within_two_decimetres_and_certifies_nothing(
+    change: bool, why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    truth = drive_bag(tmp_path / "bag", [(4.2, 1.22)], seen=repeat(change))
+    arguments = ["follow", str(tmp_path / "bag"), "--world", "research_center", "--reach", str(REACH), "--start", START]
+    assert main([*arguments, "--out", str(tmp_path / "run")]) == 1
+    said = capsys.readouterr().out
+    assert re.match(f"the recording ends; it does not know where it is: {why}", said), said
+    assert main(["replay", str(tmp_path / "run")]) == 0
+    told, _ = follow(tmp_path / "bag", FirstGuess(START))
+    assert check_poses(told, truth, truth[0][0]) >= 25
+    certain = [item.time_s for item in told if item.topic == "harvey/pose" and item.message.pose.covariance[0] < 1e6]
+    assert certain[-1] < 5.6
+
+
+@pytest.mark.parametrize("lag_s", [0.1, 0.3])
+def test_pictures_that_are_older_than_their_stamps_say_are_in_the_covariance_and_beyond_use_named(
+    lag_s: float, tmp_path: Path
+) -> None:
+    truth = drive_bag(tmp_path / "bag", [(3.5, 1.3), (3.0, 0.9)], seen=lambda time_s, jpeg: (time_s + lag_s, jpeg))
+    told, onlooker = follow(tmp_path / "bag", FirstGuess(START))
+    assert check_poses(told, truth, truth[0][0] + lag_s) >= 30
+    knows, said = onlooker.judge()
+    assert knows == (lag_s < 0.2)
+    assert knows or f"its pictures are {lag_s:.2f} s older than their stamps say, by its odometry" in said, said
+
+
+def test_who_was_only_told_where_it_is_knows_nothing_and_odometry_that_ends_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def noise(time_s: float, jpeg: bytes) -> tuple[float, bytes]:
+        pixels = np.random.default_rng(round(100 * time_s)).integers(0, 255, (480, 640), np.uint8)
+        return time_s, cv2.imencode(".jpg", pixels)[1].tobytes()
+
+    drive_bag(tmp_path / "bag", [(2.5, 1.22)], seen=noise)
+    arguments = ["follow", str(tmp_path / "bag"), "--world", "research_center", "--reach", str(REACH), "--start", START]
+    assert main([*arguments, "--out", str(tmp_path / "run")]) == 1
+    said = capsys.readouterr().out
+    assert re.match(r"the recording ends; (lost|was told where it is; 0 of \d+ pictures said so): ", said), said
+    drive_bag(tmp_path / "ahead", [(2.5, 1.22)], seen=lambda time_s, jpeg: (time_s + 3.0 * (time_s > 1003.0), jpeg))
+    arguments[1] = str(tmp_path / "ahead")
+    assert main([*arguments, "--out", str(tmp_path / "other")]) == 1
+    assert "pictures with odometry came, or said so, until 2" in capsys.readouterr().out
 
 
 def test_a_pose_comes_from_between_two_readings_of_the_odometry_and_others_are_counted() -> None:

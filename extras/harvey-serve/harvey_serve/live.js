@@ -2,6 +2,8 @@
 const plans = JSON.parse(document.getElementById("data").textContent).plans;
 const token = location.hash.slice(1);
 const source = new EventSource("/events");
+const STOP_WAITS_MS = 2000;
+const STOP_AGAIN_MS = 200;
 
 function byId(id) {
   return document.getElementById(id);
@@ -98,13 +100,28 @@ async function post(path, body, answer) {
   byId(answer).textContent = said.trim();
 }
 
+/** Stop is said again until somebody answers, or the run is over: a line that is lost, or a busy server, may eat it. */
+async function stop() {
+  for (let tries = 1; !byId("orders").hidden; tries += 1) {
+    const asked = { method: "POST", headers: { Authorization: `Bearer ${token}` }, signal: AbortSignal.timeout(STOP_WAITS_MS) };
+    const got = await fetch("/orders/stop", asked).catch(() => null);
+    if (got !== null && got.status < 500) {
+      byId("answer").textContent = (await got.text().catch(() => "it was heard")).trim();
+      return;
+    }
+    byId("answer").textContent = `nobody answered; Stop is said again, ${tries} times so far`;
+    await new Promise((done) => setTimeout(done, STOP_AGAIN_MS));
+  }
+}
+
 showPlans(null, [], [], []);
 byId("orders").hidden = token === "";
 byId("go").hidden = token === "";
 byId("only-watching").hidden = token !== "";
 document.addEventListener("click", (event) => {
   const order = event.target.closest("button[data-order]")?.dataset.order;
-  if (order !== undefined) post(`/orders/${order}`, null, "answer");
+  if (order === "stop") stop();
+  else if (order !== undefined) post(`/orders/${order}`, null, "answer");
 });
 byId("go").addEventListener("submit", (event) => {
   event.preventDefault();

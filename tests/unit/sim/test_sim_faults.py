@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from blackboard.board import Blackboard
+from blackboard.effect import Post
 from experiments.generated.scenes import box_room
+from harvey.runner.ports import MUST_CHANGE_M, STANDS_STILL, BodyPort, StillCamera
+from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
-from sim.faults.built_in_faults import Bump, Kidnap, LightsOff, Stall
+from sim.faults.built_in_faults import Bump, CameraFrozen, Kidnap, LightsOff, Stall
 from sim.faults.fault import Fault, FaultSchedule
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import MotorCommand
+from world_models.entries.body import BodyFault, CameraPicture, Course, MotorCommand, PictureRequest, Recovery
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)
@@ -87,3 +92,40 @@ def test_faults_do_not_change_the_noise() -> None:
     for robot in (sighted, blind):
         robot.look(), robot.look()
     assert sighted.look().jpeg == blind.look().jpeg
+
+
+def test_a_camera_that_stands_still_is_a_fault_once_the_wheels_counted_and_over_when_it_goes_on() -> None:
+    robot, board = body(CameraFrozen(after_s=0.15, duration_s=30.0)), Blackboard()
+    port = BodyPort(FaultyBody(robot))
+
+    def ask(value: Any) -> list[Any]:
+        (change,) = board.apply([Post(value)], author="test", cycle=0)
+        made = board.apply(port.answer(change), author="body", cycle=0)
+        return [one.entry.value for one in made]
+
+    assert [type(ask(PictureRequest("track"))[0]) for _ in range(4)] == [CameraPicture] * 4
+    ask(MotorCommand(0.0, 0.0))
+    assert isinstance(ask(PictureRequest("track"))[0], CameraPicture)  # nothing has moved
+    ask(MotorCommand(0.1, 0.0))
+    (fault,) = ask(PictureRequest("milestone"))
+    assert isinstance(fault, BodyFault) and (fault.part, fault.what) == ("camera", STANDS_STILL)
+    assert fault.detail == "its picture is the same as before the wheels counted 6 degrees and 0.00 m"
+    (broken,) = ask(Course("Leg-1", 0.4, 0.0))
+    path_m = robot.truth.path_m
+    assert broken.what == STANDS_STILL and broken.move_m > 0.0
+    assert ask(Recovery("", broken.request, 0.0, 1.0))[0].status == "in vain" and robot.truth.path_m == path_m
+    over, report = ask(Recovery("", broken.request, 0.0, 40.0))
+    assert over.status == "over" and report.move_m == broken.move_m
+    assert isinstance(ask(PictureRequest("track"))[0], CameraPicture)
+
+
+def test_the_same_pixels_with_another_head_are_the_same_picture_and_noise_is_none() -> None:
+    robot, still = body(), StillCamera()
+    first, again = robot.picture(), robot.picture()
+    commented = first[:2] + b"\xff\xfe\x00\x04ab" + first[2:]
+    told = []
+    for jpeg, move_m in ((first, 0.0), (first, 0.6 * MUST_CHANGE_M), (commented, 0.6 * MUST_CHANGE_M), (again, 1.0),
+                         (first, 1.0), (b"no picture", 1.0), (b"no picture", 0.0), (b"", 1.0)):
+        still.move(0.0, move_m)
+        told.append(bool(still.find(jpeg)))
+    assert told == [False, False, True, False, False, False, False, False]
