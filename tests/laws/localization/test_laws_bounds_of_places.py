@@ -35,7 +35,7 @@ from knowledge_sources.methods.localization.place_odds import (
     weigh_told,
 )
 from knowledge_sources.methods.localization.place_search import describe, find_far_action, prefer_reachable
-from knowledge_sources.methods.localization.refinement import PoseLikelihood
+from knowledge_sources.methods.localization.refinement import LookLikelihood, PoseLikelihood
 from knowledge_sources.place_believed import count_refuted, find_p_not_alias, find_p_there
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.while_lost import is_dark as is_picture_dark
@@ -123,6 +123,27 @@ def test_unlikely_places_are_dropped_and_refuted_ones_unless_they_look_alike() -
         assert rank(50.0, bound - SMALL, alike=True, looks=looks) == [50.0]
     many = [50.0 - SMALL * k for k in range(S.max_hypotheses + 3)]
     assert rank(*many) == many[:S.max_hypotheses]
+
+
+def test_one_look_of_which_half_is_missing_refutes_where_another_place_shows_it() -> None:
+    """Sums over looks hide it: as much is missing in a single look as in the whole at a wrong place."""
+    def seen(x_m: float, *looks: tuple[int, int, float]) -> PlaceCandidate:
+        shown = tuple(LookLikelihood(*look) for look in looks)
+        return replace(place(x_m), likelihood=replace(
+            place(log=sum(one.log_likelihood for one in shown)).likelihood, looks=shown))
+
+    def rank(*found: PlaceCandidate) -> list[float]:
+        return [c.world_from_robot.x_m for c in rank_candidates(found, lambda one, other: False, len(found))]
+
+    whole, half = seen(2.0, (20, 17, 14.0), (20, 17, 14.0)), seen(4.0, (20, 18, 16.0), (20, 10, 5.0))
+    assert rank(whole, half) == [2.0]
+    better = seen(4.0, (20, 20, 40.0), (20, 10, 5.0))
+    assert rank(whole, better) == [4.0, 2.0]  # the likeliest refutes no place that shows what itself does not
+    assert rank(seen(2.0, (20, 10, 4.0), (20, 17, 14.0)), better) == [4.0]
+    for others, missing in ((30, True), (20, False)):  # 83 % elsewhere; in bricks each look shows little more than half
+        is_odd = PoseLikelihood(57, others + 10, 40.0, 0.9, 0.5, (
+            LookLikelihood(36, others, 30.0), LookLikelihood(21, 9, 10.0))).contradicts_itself()
+        assert is_odd is missing
 
 
 HERE = StatedPlace(Pose2(2.0, 2.0, 0.0), np.diag([1e-4, 1e-4, 1e-5]), 0.5)
