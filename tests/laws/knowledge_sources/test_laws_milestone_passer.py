@@ -14,13 +14,14 @@ from blackboard.change import Change, Posted, Revised
 from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from generated_boards import Bench, all_reasons, plain_robot, reasons, wakes
+from generated_boards import Bench, all_reasons, made, plain_robot, reasons, wakes
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.plan.milestone_passer import MilestonePasser
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.sketching import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS, has_missed
 from sim.scenario import load_scenario
-from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries.body import MotionReport
+from world_models.entries.location import Hypothesis, Place, PlaceSearch, diagonal
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
 from world_models.entries.task import Goal, Impasse, Milestone, MilestoneStatus, PlanSketch, SketchStatus, Subgoal
 from world_models.files.world_files import WORLDS, load_world
@@ -159,11 +160,31 @@ def test_only_the_milestone_to_which_an_active_sketch_has_come_counts(
     assert acts == (status == "active" and index == 1 and has_belief)
 
 
+@pytest.mark.parametrize(("at", "gone_m", "tried", "does"), [
+    (1, 0.0, 0, "goes on"), (1, 0.05, 0, "goes on"), (1, 0.2, 0, ""), (2, 0.0, 0, ""), (2, 0.0, 2, "ends"),
+    (2, 0.2, 2, ""), (1, None, 0, "")])
+def test_what_tells_nothing_where_a_search_has_found_it_is_not_asked_again(
+    at: int, gone_m: float | None, tried: int, does: str
+) -> None:
+    bench = Bench(plain_robot())
+    bench.believe(Pose2(2.0, 2.0, 0.0), locale="hall")
+    if gone_m is not None:
+        bench.put(PlaceSearch("found", "it is here"))
+        bench.put(MotionReport(0.5, gone_m, 1.0, 1.0))
+    sketch = bench.sketch(*[Place("hall", 2.0, 2.0)] * 3, at=at, verified=False)
+    asked = bench.revise(bench.await_milestone(sketch.id, at), status="not testable", tried=(1.0,) * tried)
+    effects = bench.ask(MilestonePasser(DEFAULT), asked)
+    assert [(type(effect), effect.value.verified) for effect in effects or () if isinstance(effect, Revise)] == (
+        [(Revise, True)] if does == "goes on" else [])
+    assert [impasse.kind for impasse in made(effects, Impasse)] == ["blocked"] * (does == "ends")
+    assert not does or "PlaceSearch" in {ref.rstrip("-0123456789") for ref in all_reasons(effects)}
+
+
 @pytest.mark.parametrize("status", ["expected", "verified", "refuted", "not testable", "withdrawn"])
 def test_what_it_watches(status: MilestoneStatus) -> None:
     bench = Bench()
     milestone = bench.revise(bench.await_milestone(), status=status)
-    assert wakes(MilestonePasser(), Revised(milestone)) == (status == "verified")
+    assert wakes(MilestonePasser(), Revised(milestone)) == (status in ("verified", "not testable"))
     assert not wakes(MilestonePasser(), Posted(milestone))
 
 
