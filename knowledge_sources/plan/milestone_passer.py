@@ -51,10 +51,12 @@ class MilestonePasser(RobotKnowledgeSource):
         goal = None if sketch is None else view.get(sketch.value.goal)
         if sketch is None or goal is None or belief is None or not sketch.value.is_active:
             return None
-        found = () if milestone.value.status == "verified" else (find_search_here(view),)
-        is_next = sketch.value.at == milestone.value.index and None not in found
+        is_verified, here = milestone.value.status == "verified", find_search_here(view)
+        if sketch.value.at != milestone.value.index or not (is_verified or here is not None):
+            return None
+        found = () if is_verified or here is None else (here,)
         is_open = bool(found) and sketch.value.at_end and not is_last_look(milestone.value, self._settings.plan)
-        return Case(milestone, sketch, goal, belief, found) if is_next and not is_open else None
+        return None if is_open else Case(milestone, sketch, goal, belief, found)
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         milestone, sketch, goal, belief, found = case
