@@ -38,7 +38,8 @@ class CameraEstimate:
         pose_covariance: (3, 3) over (x, y, heading), the camera's uncertainty included.
         pose_slopes: (3, 7) by how much the pose moves with the camera's unknowns, as the lines hold.
         step: (7,) from the prior's camera to this one, :data:`CAMERA_UNKNOWNS`.
-        covariance: (7, 7) of it.
+        covariance: (7, 7) of it; no surer than the shift of the pose that comes with it: along a corridor a longer
+            focal length looks like a place further on, and pairs that are wrong alike make both.
         inliers: (n,) which lines agree.
         cost: truncated squared residuals over their variance, with the priors' shares.
         prior_chi2: squared distance of the step from the prior.
@@ -191,7 +192,9 @@ def _build_estimate(
     camera = FREE[POSE:] - POSE
     covariance[YAW, :] = covariance[:, YAW] = 0.0
     covariance[YAW, YAW] = camera_covariance[YAW, YAW]
-    covariance[np.ix_(camera, camera)] = joint[POSE:, POSE:]
+    apart = problem.from_prior(state)[:POSE]
+    moved = joint[POSE:, :POSE] @ np.linalg.solve(joint[:POSE, :POSE], apart)  # what the camera takes of that
+    covariance[np.ix_(camera, camera)] = joint[POSE:, POSE:] + np.outer(moved, moved)
     pose_slopes = np.zeros((POSE, len(CAMERA_UNKNOWNS)))
     pose_slopes[:, camera] = -np.linalg.solve(hessian[:POSE, :POSE], hessian[:POSE, POSE:])
     off = problem.from_prior(state)
