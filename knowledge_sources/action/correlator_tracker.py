@@ -28,6 +28,7 @@ from knowledge_sources.followed_landmarks import (
     with_anchors,
 )
 from knowledge_sources.methods.arrays import Image
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
 from knowledge_sources.methods.features.correlation import Template
 from knowledge_sources.methods.tracking.template_tracking import (
     TrackUpdate,
@@ -37,7 +38,7 @@ from knowledge_sources.methods.tracking.template_tracking import (
 )
 from knowledge_sources.methods.tracking.tolerance import action_px
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_robot, open_discrepancy
+from knowledge_sources.questions import find_camera, find_robot, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis
@@ -78,7 +79,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
             return
         if agreeing < s.action.min_agreeing_landmarks:
             corrected = None  # nothing bears out that it is not something else that looks the same
-        renewed = self._renew(case, image, followed, corrected or belief.value)
+        renewed = self._renew(view, case, image, followed, corrected or belief.value)
         tracked = post_or_revise(old, renewed.tracks, because)
         yield tracked
         if corrected is None and renewed.hypothesis is belief.value:
@@ -107,7 +108,9 @@ class CorrelatorTracker(RobotKnowledgeSource):
         motion = held.value.motion
         return Hypothesis.of_world(held.world, held.locale, pose, covariance, "tracks", motion=motion), agreeing
 
-    def _renew(self, case: Following, image: Image, followed: list[TrackUpdate], belief: Hypothesis) -> Renewed:
+    def _renew(
+        self, view: View, case: Following, image: Image, followed: list[TrackUpdate], belief: Hypothesis
+    ) -> Renewed:
         """Keep the landmarks that still serve, and take new ones where too few are left."""
         frame, old, robot = case.frame, case.old, case.belief.seeing
         anchors, taken = ((), 0) if old is None else (old.value.anchors, old.value.taken)
@@ -116,7 +119,8 @@ class CorrelatorTracker(RobotKnowledgeSource):
                      and f.track.template_frame in near)
         if len(kept) >= max(MIN_LANDMARKS, min(ENOUGH_LANDMARKS, MIN_REMAINING_PART * taken)):
             return Renewed(with_anchors(robot, frame.id, kept, anchors, belief, taken, self._settings), belief)
-        return take_new(robot, frame.id, image, kept, anchors, belief, self._settings)
+        camera = compute_camera_covariance(find_camera(view), self._settings.camera_state)
+        return take_new(robot, frame.id, image, kept, anchors, belief, camera, self._settings)
 
     def _post_discrepancy(
         self, view: View, what: str, magnitude_px: float, belief: Belief, tracks: list[Track],

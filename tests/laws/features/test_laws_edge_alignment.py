@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -20,10 +21,13 @@ from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
+from world_models.camera import YAW, move_camera
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines
 
+KNOWN = np.zeros((7, 7))
+"""A camera that is surely as told."""
 few = settings(max_examples=30, deadline=None)
 seeds = st.integers(0, 2**32 - 1)
 ROOMS = ("hallway", "robot-laboratory", "library", "allens-office", "conference-room", "machine-room")
@@ -68,10 +72,12 @@ def draw_belief(pose: Pose2, sigmas: tuple[float, float, float], rng: np.random.
     return Pose2(pose.x_m + away[0], pose.y_m + away[1], wrap_angle(pose.heading_rad + away[2])), covariance
 
 
-def align(belief: Pose2, covariance: Floats, image: Image) -> EdgeAlignment | None:
-    lines = visible_lines(robot().world, robot().camera, robot().camera_from_world(belief), min_length_px=16.0,
+def align(belief: Pose2, covariance: Floats, image: Image, camera: Floats = KNOWN, of: RobotModel | None = None
+          ) -> EdgeAlignment | None:
+    seen = of or robot()
+    lines = visible_lines(seen.world, seen.camera, seen.camera_from_world(belief), min_length_px=16.0,
                           min_contrast=0.05, max_distance_m=15.0)
-    return align_to_edges(robot(), image, lines.lines_world, belief, covariance)
+    return align_to_edges(seen, image, lines.lines_world, belief, covariance, camera)
 
 
 def difference(one: Pose2, other: Pose2) -> Floats:
@@ -108,6 +114,24 @@ def test_a_nearly_right_belief_is_corrected_to_a_millimetre_or_so() -> None:
     assert len(errors) >= 20
     x_m, y_m, heading_rad = np.median(errors, axis=0)
     assert math.hypot(x_m, y_m) < 0.001 and heading_rad < math.radians(0.03)
+
+
+def test_what_is_not_known_of_the_camera_is_not_known_of_the_pose() -> None:
+    """As far as a pose moves that is aligned with a camera that is one deviation otherwise."""
+    rng, sigmas = np.random.default_rng(3), np.array([2e-4, 2e-4, 0.1, 1e-3, 5e-4, 0.1, 0.1])
+    true = draw_pose(rng)
+    image, sure = render(true, rng), np.diag(np.square([0.003, 0.003, 0.003]))
+    known, unsure = (align(true, sure, image, np.diag(np.square(by * sigmas))) for by in (0.0, 1.0))
+    assert known is not None and unsure is not None and known.world_from_robot == unsure.world_from_robot
+    moved = [np.zeros((3, 3))]
+    for step in np.diag(sigmas)[[i for i in range(7) if i != YAW]]:
+        camera, mount = move_camera(robot().camera, robot().mount, step)
+        other = align(true, sure, image, of=replace(robot(), camera=camera, mount=mount))
+        assert other is not None
+        off = difference(other.world_from_robot, known.world_from_robot)
+        moved.append(np.outer(off, off))
+    grown = unsure.covariance - known.covariance
+    assert np.allclose(np.sqrt(np.diag(grown)), np.sqrt(np.diag(sum(moved))), rtol=0.3)
 
 
 @few
