@@ -66,8 +66,8 @@ def _refutes(view: View, doubt: Entry[Discrepancy]) -> bool:
 def find_search_here(view: View) -> Entry[PlaceSearch] | None:
     """The search that has found the place where the robot still stands, but for turns on the spot.
 
-    The looks of the search are the evidence of that place. A milestone that tells nothing there is no doubt of it: a
-    search would find the same place again, and the same milestone would tell nothing again.
+    Its looks are the evidence of that place. A milestone that tells nothing there is no doubt of it: a search would
+    find the same place again, and the milestone would tell nothing again.
     """
     found = view.latest(PlaceSearch)
     if found is None or found.value.status != "found":

@@ -38,9 +38,7 @@ def find_belief(view: View) -> Entry[Hypothesis] | None:
 
 
 def rests_on(view: View, entry: Entry[Any], picture: str, steps: int = 4) -> bool:
-    """Whether an entry rests on a picture by so few steps, as a belief on that of its milestone: fix, match, segments.
-
-    What was believed before does not count: a correction by a picture is one only once.
+    """Whether an entry rests on a picture by so few steps, as a belief on that of its milestone; not by older beliefs.
     """
     causes = (view.get(ref.id) for ref in entry.because if steps > 1)
     return any(ref.id == picture for ref in entry.because) or any(

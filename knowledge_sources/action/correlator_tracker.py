@@ -79,7 +79,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
             return
         if agreeing < s.action.min_agreeing_landmarks:
             corrected = None  # nothing bears out that it is not something else that looks the same
-        renewed = self._renew(view, case, image, followed, corrected or belief.value)
+        renewed = self._renew(case, image, followed, corrected or belief.value)
         tracked = post_or_revise(old, renewed.tracks, because)
         yield tracked
         if corrected is None and renewed.hypothesis is belief.value:
@@ -108,9 +108,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         motion = held.value.motion
         return Hypothesis.of_world(held.world, held.locale, pose, covariance, "tracks", motion=motion), agreeing
 
-    def _renew(
-        self, view: View, case: Following, image: Image, followed: list[TrackUpdate], belief: Hypothesis
-    ) -> Renewed:
+    def _renew(self, case: Following, image: Image, followed: list[TrackUpdate], belief: Hypothesis) -> Renewed:
         """Keep the landmarks that still serve, and take new ones where too few are left."""
         frame, old, robot = case.frame, case.old, case.belief.seeing
         anchors, taken = ((), 0) if old is None else (old.value.anchors, old.value.taken)
@@ -119,7 +117,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
                      and f.track.template_frame in near)
         if len(kept) >= max(MIN_LANDMARKS, min(ENOUGH_LANDMARKS, MIN_REMAINING_PART * taken)):
             return Renewed(with_anchors(robot, frame.id, kept, anchors, belief, taken, self._settings), belief)
-        camera = compute_camera_covariance(find_camera(view), self._settings.camera_state)
+        camera = compute_camera_covariance(find_camera(case.belief.view), self._settings.camera_state)
         return take_new(robot, frame.id, image, kept, anchors, belief, camera, self._settings)
 
     def _post_discrepancy(

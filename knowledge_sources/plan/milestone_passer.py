@@ -51,12 +51,11 @@ class MilestonePasser(RobotKnowledgeSource):
         goal = None if sketch is None else view.get(sketch.value.goal)
         if sketch is None or goal is None or belief is None or not sketch.value.is_active:
             return None
-        is_verified, here = milestone.value.status == "verified", find_search_here(view)
-        if sketch.value.at != milestone.value.index or not (is_verified or here is not None):
+        here = None if milestone.value.status == "verified" else find_search_here(view)
+        is_open = here is None or (sketch.value.at_end and not is_last_look(milestone.value, self._settings.plan))
+        if sketch.value.at != milestone.value.index or (milestone.value.status == "not testable" and is_open):
             return None
-        found = () if is_verified or here is None else (here,)
-        is_open = bool(found) and sketch.value.at_end and not is_last_look(milestone.value, self._settings.plan)
-        return None if is_open else Case(milestone, sketch, goal, belief, found)
+        return Case(milestone, sketch, goal, belief, () if here is None else (here,))
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         milestone, sketch, goal, belief, found = case

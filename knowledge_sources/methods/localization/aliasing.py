@@ -111,7 +111,7 @@ def find_fitting_poses(
     """Find the poses of a room, distinct from a pose, at which segments (k, 2, 2) fit best."""
     views = (CameraView(segments_px, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))),)
     candidates = find_pose_candidates(robot, views, (room,), MAX_FITTING_POSES, settings)
-    refined = (refine_to_likelier(robot, views, c.world_from_robot, settings).world_from_robot for c in candidates)
+    refined = (refine_to_likelier(robot, views, c.world_from_robot, settings)[0] for c in candidates)
     return [other for other in refined if are_distinct(other, pose)]
 
 

@@ -294,7 +294,7 @@ def rank_candidates(
 
 
 def _is_refuted(one: PoseLikelihood, best: PoseLikelihood, log_ratio: float) -> bool:
-    """Whether the likeliest refutes another candidate: by one look, where that is one-sided, else by all together."""
+    """Whether the likeliest refutes a candidate: by one look, where that is one-sided, else by all together."""
     by_a_look = one.is_refuted_by_a_look(best, log_ratio)
     if by_a_look is not best.is_refuted_by_a_look(one, log_ratio):
         return by_a_look

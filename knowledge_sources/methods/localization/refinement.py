@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -248,19 +248,6 @@ def _find_nearest(lines: Any, segments: Any, gate_px: float, sine: float, min_ov
     return out
 
 
-class LookLikelihood(NamedTuple):
-    """How well a pose explains one look: lines that should be in view, those that are found, and the log likelihood."""
-
-    visible: int
-    matched: int
-    log_likelihood: float
-
-    @property
-    def is_half_missing(self) -> bool:
-        """Whether half of the lines, or more, are missing, of enough to count."""
-        return self.visible >= MIN_VIEW_LINES and 2 * self.matched <= self.visible
-
-
 @dataclass(frozen=True, slots=True)
 class PoseLikelihood:
     """How well a pose explains all views.
@@ -271,7 +258,7 @@ class PoseLikelihood:
         log_likelihood: logarithm of the likelihood ratio of this pose to one drawn by chance.
         explained: part of the length of long segments that lies on a model line, 0..1.
         weakest_view: smallest matched part of the predicted lines of a view that has enough of them, 0..1.
-        looks: the same of each view.
+        looks: of each view the lines in view, those that are found, and the log likelihood.
     """
 
     visible: int
@@ -279,30 +266,25 @@ class PoseLikelihood:
     log_likelihood: float
     explained: float
     weakest_view: float
-    looks: tuple[LookLikelihood, ...] = ()
+    looks: tuple[tuple[int, int, float], ...] = ()
 
     def is_refuted_by_a_look(self, other: PoseLikelihood, log_ratio: float) -> bool:
         """Whether half of the lines of one look are missing, and another pose explains that look so much better."""
-        return any(own.is_half_missing and there.log_likelihood - own.log_likelihood >= log_ratio
-                   for own, there in zip(self.looks, other.looks, strict=True))
+        return any(_is_half_missing(visible, matched) and there - here >= log_ratio
+                   for (visible, matched, here), (_, _, there) in zip(self.looks, other.looks, strict=True))
 
     def contradicts_itself(self) -> bool:
-        """Whether half of the lines of one look are missing, of which the other looks show more than chance explains.
-
-        In a textured room each look shows little more than half, and this none the less than the others.
-        """
-        return any(
-            look.is_half_missing and compute_p_share(
-                look.matched, look.visible, self.matched - look.matched, self.visible - look.visible) < MIN_P_LOOK
-            for look in self.looks)
+        """Whether half of the lines of one look are missing, though others show more, as they do not among bricks."""
+        return any(_is_half_missing(visible, matched) and compute_p_share(
+            matched, visible, self.matched - matched, self.visible - visible) < MIN_P_LOOK
+            for visible, matched, _ in self.looks)
 
     def is_sufficient(self, settings: LocalizationSettings = DEFAULT.localization) -> bool:
         """Whether the pose can be accepted.
 
-        Enough lines must be matched, in every view about as many as in the others, and the segments be explained, or
-        else the log likelihood be so large that the model may lack much of what is seen, as bricks and planks: the
-        larger it is, the more lines may be missing, and in a single view all of them, as what stands before the camera
-        hides them.
+        Enough lines must be matched, in every view as in the others, and the segments be explained, or else the log
+        likelihood be so large that the model may lack much of what is seen, as bricks and planks: the larger it is, the
+        more lines may be missing, and in a single view all of them, as what stands before the camera hides them.
         """
         fraction = self.matched / max(self.visible, 1)
         enough = settings.sure_log_likelihood
@@ -320,29 +302,20 @@ class PoseLikelihood:
                 f" and {self.explained:.0%} of what is seen is in the model")
 
 
-class RefinedPose(NamedTuple):
-    """A pose (world), its covariance (3, 3) over (x, y, heading), and how likely all views are there."""
-
-    world_from_robot: Pose2
-    covariance: Floats
-    likelihood: PoseLikelihood
-
-
 def refine_to_likelier(
     robot: RobotModel, views: Sequence[CameraView], rough: Pose2, settings: Settings = DEFAULT
-) -> RefinedPose:
-    """Refine a rough pose of the robot now, or keep it: whichever makes all views likelier.
+) -> tuple[Pose2, Floats, PoseLikelihood]:
+    """Refine a rough pose of the robot now, or keep it: what makes all views likelier; with its covariance (3, 3).
 
-    Pairs of segment and line are chosen one view after the other, so that the last one may move a pose off the lines of
-    those before it. A pose that is kept is not known better than to where refining would have moved it.
+    The last view may move a pose off the lines of those before it. One that is kept is no surer than refining moves it.
     """
     refined, covariance = refine_pose(robot, views, rough, settings)
     off = rough.minus(refined)
     tried = []
     for pose, spread in ((refined, covariance), (rough, covariance + np.outer(off, off))):
         moved = refine_view_motions(robot, views, pose, spread, settings)
-        tried.append(RefinedPose(pose, spread, compute_pose_likelihood(robot, moved, pose, settings)))
-    return max(tried, key=lambda one: one.likelihood.log_likelihood)
+        tried.append((pose, spread, compute_pose_likelihood(robot, moved, pose, settings)))
+    return max(tried, key=lambda one: one[2].log_likelihood)
 
 
 def compute_pose_likelihood(
@@ -350,7 +323,7 @@ def compute_pose_likelihood(
 ) -> PoseLikelihood:
     """Compute the likelihood of the robot's pose now by all views; lines of an inexact model are displaced as they fit.
     """
-    looks, weakest, lengths, explained = list[LookLikelihood](), 1.0, 0.0, 0.0
+    looks, weakest, lengths, explained = list[tuple[int, int, float]](), 1.0, 0.0, 0.0
     for view in views:
         then = view.pose_then(world_from_now)
         shown = predict_lines(robot, then, settings.verification)
@@ -363,16 +336,19 @@ def compute_pose_likelihood(
         ) if errors.is_exact else check_lines(
             robot, shown.lines_world, view.segments_px, then, settings.verification, errors, settings.pose,
             list_names(shown)).agreement
-        counts = agreement.matched, agreement.visible
-        looks.append(LookLikelihood(agreement.visible, agreement.matched, compute_log_ratio(*counts, agreement.chance)))
+        found, expected = agreement.matched, agreement.visible
+        looks.append((expected, found, compute_log_ratio(found, expected, agreement.chance)))
         if agreement.visible >= MIN_VIEW_LINES:
             weakest = min(weakest, agreement.matched / agreement.visible)
         length, part = _explain(robot, view, then)
         lengths, explained = lengths + length, explained + part
     part = explained / lengths if lengths > 0.0 else 0.0
-    visible, matched = sum(look.visible for look in looks), sum(look.matched for look in looks)
-    total = math.fsum(look.log_likelihood for look in looks)
-    return PoseLikelihood(visible, matched, total, part, weakest, tuple(looks))
+    visible, matched, logs = zip(*looks, strict=True) if looks else ((), (), ())
+    return PoseLikelihood(sum(visible), sum(matched), math.fsum(logs), part, weakest, tuple(looks))
+
+
+def _is_half_missing(visible: int, matched: int) -> bool:
+    return visible >= MIN_VIEW_LINES and 2 * matched <= visible
 
 
 def _project(robot: RobotModel, lines_world: Floats, poses: Sequence[Pose2]) -> Floats:

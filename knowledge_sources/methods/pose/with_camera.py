@@ -38,8 +38,7 @@ class CameraEstimate:
         pose_covariance: (3, 3) over (x, y, heading), the camera's uncertainty included.
         pose_slopes: (3, 7) by how much the pose moves with the camera's unknowns, as the lines hold.
         step: (7,) from the prior's camera to this one, :data:`CAMERA_UNKNOWNS`.
-        covariance: (7, 7) of it; no surer than the shift of the pose that comes with it: along a corridor a longer
-            focal length looks like a place further on, and pairs that are wrong alike make both.
+        covariance: (7, 7) of it.
         inliers: (n,) which lines agree.
         cost: truncated squared residuals over their variance, with the priors' shares.
         prior_chi2: squared distance of the step from the prior.
@@ -169,6 +168,15 @@ class _Problem:
         return float(np.minimum(self.measure_squares(state), bound).sum() + off @ self.information @ off)
 
 
+def compute_pose_slopes(lines_world: Floats, camera: Camera, mount: CameraMount, pose: Pose2) -> Floats:
+    """(3, 7) by how much a pose moves with the camera's unknowns, if lines (n, 2, 3) stay where they are seen."""
+    seen, _ = camera.project_segments(lines_world, mount.camera_from_robot @ pose.lifted().inverse())
+    shown = np.isfinite(seen).all(axis=(1, 2))
+    problem = _Problem(lines_world[shown], seen[shown], camera, mount, 1.0, np.eye(UNKNOWNS), pose)
+    slopes = problem.measure(problem.start_at(pose))[1].reshape(-1, UNKNOWNS)
+    return np.asarray(np.linalg.lstsq(slopes[:, :POSE], -slopes[:, POSE:])[0])
+
+
 def _build_information(pose_covariance: Any, camera_covariance: Floats) -> Floats:
     """(10, 10) of both priors, 0 for the yaw, which is not estimated."""
     information = np.zeros((UNKNOWNS, UNKNOWNS))
@@ -192,9 +200,7 @@ def _build_estimate(
     camera = FREE[POSE:] - POSE
     covariance[YAW, :] = covariance[:, YAW] = 0.0
     covariance[YAW, YAW] = camera_covariance[YAW, YAW]
-    apart = problem.from_prior(state)[:POSE]
-    moved = joint[POSE:, :POSE] @ np.linalg.solve(joint[:POSE, :POSE], apart)  # what the camera takes of that
-    covariance[np.ix_(camera, camera)] = joint[POSE:, POSE:] + np.outer(moved, moved)
+    covariance[np.ix_(camera, camera)] = joint[POSE:, POSE:]
     pose_slopes = np.zeros((POSE, len(CAMERA_UNKNOWNS)))
     pose_slopes[:, camera] = -np.linalg.solve(hessian[:POSE, :POSE], hessian[:POSE, POSE:])
     off = problem.from_prior(state)

@@ -17,8 +17,8 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Image, Ints, Mask
 from knowledge_sources.methods.pose.planar import compute_point_jacobian, to_pose2
+from knowledge_sources.methods.pose.with_camera import compute_pose_slopes
 from knowledge_sources.settings import DEFAULT, TrackingSettings
-from world_models.camera import CAMERA_UNKNOWNS, YAW, move_camera
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
@@ -39,23 +39,17 @@ MAX_EDGE_RESIDUAL_PX = 1.2  # largest distance of an edge from its model line af
 PRIOR_SIGMA_M = 0.02  # standard deviation added to the believed place, as templates err together (experiment table1)
 PRIOR_SIGMA_RAD = 0.01
 """Standard deviation added to the believed heading, as templates err together (experiment table1)."""
-CAMERA_STEP = 1e-5
-"""Of the numeric derivatives by the camera's unknowns [rad, m, px]."""
 EDGE_ITERATIONS = 4  # steps of the reweighted least-squares fit
 MIN_EDGE_LINE_SHARE = 0.5  # least share of the lines with an edge near them that must agree with the fit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgeAlignment:
-    """A pose aligned to edges, its covariance (3, 3) in the world, and how many lines agree with it.
-
-    ``pose_slopes`` (3, 7): by how much the pose moves with the camera's unknowns, as the edges hold.
-    """
+    """A pose aligned to edges, its covariance (3, 3) in the world, and how many lines agree with it."""
 
     world_from_robot: Pose2
     covariance: Floats
     lines: int
-    pose_slopes: Floats
 
 
 def align_to_edges(
@@ -87,21 +81,17 @@ def align_to_edges(
         if found is None:
             return None
         pose, doubt = found.world_from_robot, found.covariance
-    if found is None:
-        return None
-    by_camera = found.pose_slopes @ camera_covariance @ found.pose_slopes.T
-    return replace(found, covariance=found.covariance + by_camera)
+    slopes = compute_pose_slopes(lines_world, robot.camera, robot.mount, pose)
+    return found and replace(found, covariance=doubt + slopes @ camera_covariance @ slopes.T)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Edges:
-    """Edges near model lines: signed distances (n,) [px], their derivatives by the pose (n, 3) and by the camera's
-    unknowns (n, 7), the line (n,) of each.
+    """Edges near model lines: signed distances (n,) [px], their derivatives by the pose (n, 3), the line (n,) of each.
     """
 
     offsets_px: Floats
     slopes: Floats
-    camera_slopes: Floats
     line: Ints
 
     def compute_sigmas(self, covariance: Floats) -> Floats:
@@ -111,7 +101,7 @@ class _Edges:
 
     def take(self, which: Mask) -> _Edges:
         """Those that a mask chooses."""
-        return _Edges(self.offsets_px[which], self.slopes[which], self.camera_slopes[which], self.line[which])
+        return _Edges(self.offsets_px[which], self.slopes[which], self.line[which])
 
 
 def _find_edges(robot: RobotModel, image: Image, lines: Floats, pose: Pose2, reach_px: float) -> _Edges | None:
@@ -129,19 +119,7 @@ def _find_edges(robot: RobotModel, image: Image, lines: Floats, pose: Pose2, rea
     offset, good = _find_steepest(image, at_px + np.array([camera.cx, camera.cy]), normal, reach_px)
     good &= p[:, 2] > 0.0
     slopes = np.einsum("ni,nij->nj", normal, jacobian)
-    by_camera = np.einsum("ni,kni->nk", normal, _move_by_camera(robot, world, pose))
-    return _Edges(offset[good], slopes[good], by_camera[good], line[good])
-
-
-def _move_by_camera(robot: RobotModel, points: Floats, pose: Pose2) -> Floats:
-    """(7, n, 2) by how much points (n, 3) move in the picture with the camera's unknowns, not at all with the yaw."""
-    def project(step: Floats) -> Floats:
-        lens, mount = move_camera(robot.camera, robot.mount, step)
-        return lens.project((mount.camera_from_robot @ pose.lifted().inverse()).apply(points))
-
-    steps = CAMERA_STEP * np.eye(len(CAMERA_UNKNOWNS))
-    steps[YAW] = 0.0
-    return np.array([project(step) for step in steps] - project(np.zeros(len(CAMERA_UNKNOWNS)))) / CAMERA_STEP
+    return _Edges(offset[good], slopes[good], line[good])
 
 
 def _choose_places(ends_px: Floats) -> tuple[Ints, Floats]:
@@ -209,6 +187,4 @@ def _solve(
     lines = len(np.unique(edges.line[np.abs(edges.offsets_px - edges.slopes @ step) <= cutoff_px]))
     if lines < max(settings.min_edge_lines, MIN_EDGE_LINE_SHARE * len(np.unique(edges.line))):
         return None
-    found = np.linalg.inv(hessian)
-    by_camera = found @ edges.slopes.T @ (w[:, None] * edges.camera_slopes)
-    return EdgeAlignment(to_pose2(at.vector + step), found, lines, by_camera)
+    return EdgeAlignment(to_pose2(at.vector + step), np.linalg.inv(hessian), lines)

@@ -39,8 +39,7 @@ OTHER_DIRECTIONS = Alike(step_m=math.inf, turn_rad=math.radians(65.0))
 """Looks from one place are independent where they show nothing in common: about the width of a picture."""
 
 
-MAX_P_UNMISTAKABLE = 2e-4
-"""Up to this probability of a wrong place, by belief and picture, the wheels may have slipped beyond what is stated."""
+MAX_P_UNMISTAKABLE = 2e-4  # up to it, by belief and picture, the wheels may have slipped beyond what is stated
 
 
 class Before(NamedTuple):
@@ -174,9 +173,9 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     tolerance_px, place = _find_tolerance_px(before, motion_px, p_after <= POSE_CONFIDENCE.accept, s), s.localization
     if p_after <= MAX_P_UNMISTAKABLE:  # as far as what a search finds is still the place where it was tracked to
         slipped = spread + np.diag(np.square([place.told_sigma_m, place.told_sigma_m, place.told_sigma_rad]))
-        sigmas = math.sqrt(place.max_told_chi2) / s.verification.motion_tolerance_sigmas
         slip_px = compute_motion_tolerance_px(robot, lines, before.pose, slipped, s.verification)
-        tolerance_px = max(tolerance_px, s.action.min_tolerance_px + sigmas * slip_px)
+        slip_px *= math.sqrt(place.max_told_chi2) / s.verification.motion_tolerance_sigmas
+        tolerance_px = max(tolerance_px, s.action.min_tolerance_px + slip_px)
     most = 1.0 - s.localization.min_p_believed if is_last_look(milestone, s.plan) else POSE_CONFIDENCE.accept
     return Weighed(
         robot=robot,
