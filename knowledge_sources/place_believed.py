@@ -63,14 +63,14 @@ def _refutes(view: View, doubt: Entry[Discrepancy]) -> bool:
     return True
 
 
-def find_search_here(view: View) -> Entry[PlaceSearch] | None:
+def find_search_here(view: View, sketch: str) -> Entry[PlaceSearch] | None:
     """The search that has found the place where the robot still stands, but for turns on the spot.
 
     Its looks are the evidence of that place. A milestone that tells nothing there is no doubt of it: a search would
-    find the same place again, and the milestone would tell nothing again.
+    find the same place again, and the milestone of this ``sketch`` would tell nothing again; a check of none may doubt.
     """
     found = view.latest(PlaceSearch)
-    if found is None or found.value.status != "found":
+    if found is None or found.value.status != "found" or not sketch:
         return None
     gone_m = math.fsum(abs(report.value.move_m) for report in view.since(MotionReport, found.cycle))
     return found if gone_m <= MAX_STANDING_M else None

@@ -71,8 +71,7 @@ class MilestoneJudge(RobotKnowledgeSource):
     fitted on rendered floors. The largest deviation is what the wheels can do since the belief was sure, for a place
     that is surely seen at least the matcher's window (§6.1.4); where the belief is in doubt, it is that window. Before
     the first milestone it is what the mission says of how the robot is put down. That landmarks were followed speaks
-    for the place only where the belief leaves little open in the picture: a place one door further on has much the same
-    landmarks. What is not testable where a search has just found the robot, is no doubt of that place.
+    for the place only where the belief leaves little open in the picture: one door further on it sees much the same.
     """
 
     level, priority = Level.PLAN, Priority.SEE
@@ -97,9 +96,8 @@ class MilestoneJudge(RobotKnowledgeSource):
         certificate = Post(certify((milestone.id, case.fix.id), weighed, verdict, case.fix.value), because)
         yield certificate
         yield Revise(milestone, replace(milestone.value, status=verdict.kind), (certificate,))
-        is_left = not is_last_look(milestone.value, self._settings.plan) or (
-            milestone.value.sketch != "" and find_search_here(view) is not None)
-        if verdict.kind == "not testable" and is_left:
+        more = not is_last_look(milestone.value, self._settings.plan) or find_search_here(view, milestone.value.sketch)
+        if verdict.kind == "not testable" and more:
             return
         most_px = max(self._settings.plan.max_deviation_px, weighed.tolerance_px)
         is_measured = verdict.kind == "verified" or weighed.shift_px > most_px

@@ -51,7 +51,7 @@ class MilestonePasser(RobotKnowledgeSource):
         goal = None if sketch is None else view.get(sketch.value.goal)
         if sketch is None or goal is None or belief is None or not sketch.value.is_active:
             return None
-        here = None if milestone.value.status == "verified" else find_search_here(view)
+        here = None if milestone.value.status == "verified" else find_search_here(view, sketch.id)
         is_open = here is None or (sketch.value.at_end and not is_last_look(milestone.value, self._settings.plan))
         if sketch.value.at != milestone.value.index or (milestone.value.status == "not testable" and is_open):
             return None
