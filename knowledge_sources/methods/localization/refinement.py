@@ -323,7 +323,8 @@ def compute_pose_likelihood(
 ) -> PoseLikelihood:
     """Compute the likelihood of the robot's pose now by all views; lines of an inexact model are displaced as they fit.
     """
-    looks, weakest, lengths, explained = list[tuple[int, int, float]](), 1.0, 0.0, 0.0
+    visible, matched, looks = 0, 0, list[tuple[int, int, float]]()
+    weakest, lengths, explained = 1.0, 0.0, 0.0
     for view in views:
         then = view.pose_then(world_from_now)
         shown = predict_lines(robot, then, settings.verification)
@@ -337,14 +338,14 @@ def compute_pose_likelihood(
             robot, shown.lines_world, view.segments_px, then, settings.verification, errors, settings.pose,
             list_names(shown)).agreement
         found, expected = agreement.matched, agreement.visible
+        visible, matched = visible + expected, matched + found
         looks.append((expected, found, compute_log_ratio(found, expected, agreement.chance)))
         if agreement.visible >= MIN_VIEW_LINES:
             weakest = min(weakest, agreement.matched / agreement.visible)
         length, part = _explain(robot, view, then)
         lengths, explained = lengths + length, explained + part
     part = explained / lengths if lengths > 0.0 else 0.0
-    visible, matched, logs = zip(*looks, strict=True) if looks else ((), (), ())
-    return PoseLikelihood(sum(visible), sum(matched), math.fsum(logs), part, weakest, tuple(looks))
+    return PoseLikelihood(visible, matched, math.fsum(look[2] for look in looks), part, weakest, tuple(looks))
 
 
 def _is_half_missing(visible: int, matched: int) -> bool:
