@@ -8,7 +8,7 @@ from typing import NamedTuple
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from knowledge_sources.conditions import Belief
-from knowledge_sources.methods.arrays import Image
+from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.features.picture import read_picture
 from knowledge_sources.methods.tracking.edge_alignment import align_to_edges
 from knowledge_sources.methods.tracking.template_tracking import select_landmarks
@@ -44,13 +44,14 @@ def rectify(robot: RobotModel, frame: Entry[CameraPicture]) -> Image:
 
 def take_new(
     seeing: RobotModel, frame: str, image: Image, kept: tuple[Track, ...], anchors: tuple[Anchor, ...],
-    belief: Hypothesis, settings: Settings,
+    belief: Hypothesis, camera_covariance: Floats | None, settings: Settings,
 ) -> Renewed:
     """Take new landmarks beside those that are kept, once the belief is aligned with the model's edges.
 
     Args:
         seeing: the robot on the floor of its locale, with what stands before its camera.
         frame: id of the picture; image: the picture, rectified.
+        camera_covariance: (7, 7); None where the belief rests on this very picture: it is not aligned by it again.
     """
     world = seeing.world
     pose = belief.world_from_robot(world)
@@ -59,9 +60,10 @@ def take_new(
         min_contrast=MIN_EDGE_CONTRAST, max_distance_m=MAX_EDGE_DISTANCE_M,
     )
     found = None
-    if find_errors(seeing, lines).is_exact:  # else the edges are not where the model has them
+    is_exact = find_errors(seeing, lines).is_exact  # else the edges are not where the model has them
+    if camera_covariance is not None and is_exact:
         found = align_to_edges(seeing, image, lines.lines_world, pose, belief.covariance_world(world),
-                               settings.tracking)
+                               camera_covariance, settings.tracking)
     if found is not None:
         pose = found.world_from_robot
         belief = Hypothesis.of_world(world, belief.locale, pose, found.covariance, "tracks", motion=belief.motion)

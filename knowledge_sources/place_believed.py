@@ -14,7 +14,8 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.localization.place_odds import compute_prior
 from knowledge_sources.questions import open_discrepancy
 from knowledge_sources.settings import LocalizationSettings
-from world_models.entries.location import Hypothesis, PlaceOdds, Travel, TwinOdds
+from world_models.entries.body import MotionReport
+from world_models.entries.location import Hypothesis, PlaceOdds, PlaceSearch, Travel, TwinOdds
 
 PLACED_BY = ("command", "relocalization")
 """Bases of a belief that no motion has followed yet."""
@@ -60,6 +61,19 @@ def _refutes(view: View, doubt: Entry[Discrepancy]) -> bool:
         if cause is not None and isinstance(cause.value, Discrepancy):
             return cause.value.magnitude is not None and math.isfinite(cause.value.magnitude)
     return True
+
+
+def find_search_here(view: View, sketch: str) -> Entry[PlaceSearch] | None:
+    """The search that has found the place where the robot still stands, but for turns on the spot.
+
+    Its looks are the evidence of that place. A milestone that tells nothing there is no doubt of it: a search would
+    find the same place again, and the milestone of this ``sketch`` would tell nothing again; a check of none may doubt.
+    """
+    found = view.latest(PlaceSearch)
+    if found is None or found.value.status != "found" or not sketch:
+        return None
+    gone_m = math.fsum(abs(report.value.move_m) for report in view.since(MotionReport, found.cycle))
+    return found if gone_m <= MAX_STANDING_M else None
 
 
 def has_only_turned(view: View, belief: Hypothesis) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
+from typing import Any
 
 from blackboard.board import Blackboard, View
 from blackboard.entry import Entry
@@ -34,6 +35,15 @@ OPEN_FAULT: Index[BodyFault] = Index(BodyFault, lambda f: f.is_open or None, "op
 def find_belief(view: View) -> Entry[Hypothesis] | None:
     """The hypothesis that is held: where the robot believes it is."""
     return view.newest(HELD, True)
+
+
+def rests_on(view: View, entry: Entry[Any], picture: str, steps: int = 4) -> bool:
+    """Whether an entry rests on a picture by so few steps, as a belief on that of its milestone; not by older beliefs.
+    """
+    causes = (view.get(ref.id) for ref in entry.because if steps > 1)
+    return any(ref.id == picture for ref in entry.because) or any(
+        rests_on(view, cause, picture, steps - 1) for cause in causes
+        if cause is not None and not isinstance(cause.value, Hypothesis))
 
 
 def find_camera(view: View) -> CameraState:

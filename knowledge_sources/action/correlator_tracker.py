@@ -28,6 +28,7 @@ from knowledge_sources.followed_landmarks import (
     with_anchors,
 )
 from knowledge_sources.methods.arrays import Image
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
 from knowledge_sources.methods.features.correlation import Template
 from knowledge_sources.methods.tracking.template_tracking import (
     TrackUpdate,
@@ -37,7 +38,7 @@ from knowledge_sources.methods.tracking.template_tracking import (
 )
 from knowledge_sources.methods.tracking.tolerance import action_px
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_robot, open_discrepancy
+from knowledge_sources.questions import find_camera, find_robot, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis
@@ -116,7 +117,8 @@ class CorrelatorTracker(RobotKnowledgeSource):
                      and f.track.template_frame in near)
         if len(kept) >= max(MIN_LANDMARKS, min(ENOUGH_LANDMARKS, MIN_REMAINING_PART * taken)):
             return Renewed(with_anchors(robot, frame.id, kept, anchors, belief, taken, self._settings), belief)
-        return take_new(robot, frame.id, image, kept, anchors, belief, self._settings)
+        camera = compute_camera_covariance(find_camera(case.belief.view), self._settings.camera_state)
+        return take_new(robot, frame.id, image, kept, anchors, belief, camera, self._settings)
 
     def _post_discrepancy(
         self, view: View, what: str, magnitude_px: float, belief: Belief, tracks: list[Track],

@@ -10,7 +10,9 @@ from blackboard.effect import Effect, Revise
 from blackboard.level import Level
 from knowledge_sources.conditions import HELD, MEASURED, NOT_LOST, PICTURE
 from knowledge_sources.followed_landmarks import Following, post_or_revise, rectify, take_new
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
 from knowledge_sources.priority import Priority
+from knowledge_sources.questions import find_camera, rests_on
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Tracks
@@ -18,7 +20,10 @@ from world_models.entries.robot_state import Drift
 
 
 class LandmarkChooser(RobotKnowledgeSource):
-    """Takes all landmarks anew after a milestone or a relocalization."""
+    """Takes all landmarks anew after a milestone or a relocalization.
+
+    The belief is aligned with the model's edges by a newer picture only: what a picture tells of the pose counts once.
+    """
 
     level, priority = Level.ACTION, Priority.CORRECT
     closes = Level.ACTION
@@ -32,7 +37,9 @@ class LandmarkChooser(RobotKnowledgeSource):
     def act(self, view: View, case: Following) -> Iterable[Effect]:
         frame, held, old = case
         belief, robot = held.entry, held.seeing
-        fresh = take_new(robot, frame.id, rectify(held.robot, frame), (), (), belief.value, self._settings)
+        camera = None if rests_on(view, belief, frame.id) else compute_camera_covariance(
+            find_camera(view), self._settings.camera_state)
+        fresh = take_new(robot, frame.id, rectify(held.robot, frame), (), (), belief.value, camera, self._settings)
         tracks = post_or_revise(old, fresh.tracks, (frame, belief))
         yield tracks
         drift = view.latest(Drift)

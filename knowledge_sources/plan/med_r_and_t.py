@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from knowledge_sources.methods.calibration.camera_state import (
     has_counted,
     loosen,
     to_tuples,
+    widen,
 )
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.methods.pose.estimate import PlanarEstimate
@@ -76,6 +78,7 @@ class MedRAndT(RobotKnowledgeSource):
             robot = find_robot(view, camera.moved(tuple(learnt.step.tolist()))).on_floor_of(locale)
         found = self._solve(robot, match.value, here, prior, m)
         covariance = found.covariance
+        learnt = learnt and replace(learnt, covariance=widen(learnt, here, belief.value.covariance_world(robot.world)))
         if learnt is not None:
             spread = learnt.covariance if moves else known
             covariance = covariance + learnt.pose_slopes @ spread @ learnt.pose_slopes.T

@@ -31,7 +31,7 @@ from knowledge_sources.methods.verification.weigh import (
     tell_odds,
     weigh_picture,
 )
-from knowledge_sources.place_believed import find_p_not_alias, has_only_turned
+from knowledge_sources.place_believed import find_p_not_alias, find_search_here, has_only_turned
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_camera, find_followed, find_robot_in, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -71,8 +71,7 @@ class MilestoneJudge(RobotKnowledgeSource):
     fitted on rendered floors. The largest deviation is what the wheels can do since the belief was sure, for a place
     that is surely seen at least the matcher's window (§6.1.4); where the belief is in doubt, it is that window. Before
     the first milestone it is what the mission says of how the robot is put down. That landmarks were followed speaks
-    for the place only where the belief leaves little open in the picture: a place one door further on has much the same
-    landmarks.
+    for the place only where the belief leaves little open in the picture: one door further on it sees much the same.
     """
 
     level, priority = Level.PLAN, Priority.SEE
@@ -97,7 +96,8 @@ class MilestoneJudge(RobotKnowledgeSource):
         certificate = Post(certify((milestone.id, case.fix.id), weighed, verdict, case.fix.value), because)
         yield certificate
         yield Revise(milestone, replace(milestone.value, status=verdict.kind), (certificate,))
-        if verdict.kind == "not testable" and not is_last_look(milestone.value, self._settings.plan):
+        more = not is_last_look(milestone.value, self._settings.plan) or find_search_here(view, milestone.value.sketch)
+        if verdict.kind == "not testable" and more:
             return
         most_px = max(self._settings.plan.max_deviation_px, weighed.tolerance_px)
         is_measured = verdict.kind == "verified" or weighed.shift_px > most_px

@@ -1,4 +1,4 @@
-"""Milestone passer (§3.3, §6): a milestone of a plan sketch is verified: on from it, or the same subgoal again."""
+"""Milestone passer (§3.3, §6): a milestone of a sketch holds: on from it, or the same subgoal again."""
 
 from __future__ import annotations
 
@@ -12,21 +12,24 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from knowledge_sources.methods.verification.weigh import is_last_look
+from knowledge_sources.place_believed import find_search_here
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_belief, find_building
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.sketching import has_missed, tell_missed
-from world_models.entries.location import Hypothesis, Place
+from world_models.entries.location import Hypothesis, Place, PlaceSearch
 from world_models.entries.task import Goal, Impasse, Milestone, PlanSketch
 
 
 class Case(NamedTuple):
-    """A verified milestone, the sketch that has come to it, the goal, and the belief."""
+    """A milestone, the sketch that has come to it, the goal, the belief, and by what it holds but by being verified."""
 
     milestone: Entry[Milestone]
     sketch: Entry[PlanSketch]
     goal: Entry[Goal]
     belief: Entry[Hypothesis]
+    found: tuple[Entry[PlaceSearch], ...]
 
 
 class MilestonePasser(RobotKnowledgeSource):
@@ -34,11 +37,12 @@ class MilestonePasser(RobotKnowledgeSource):
 
     A subgoal whose end was missed is repeated from where the robot turned out to be: plan-level servoing (§6). Where
     that is in vain for the first goal, the robot may be elsewhere, and the goal level looks; a later goal, which began
-    at a place that was just found, is given up.
+    at a place that was just found, is given up. One that is not testable where a search has just found the robot holds
+    by the looks of the search; but not the last one, which is what arriving means.
     """
 
     level, priority = Level.PLAN, Priority.ADVANCE
-    on = (Watch(Milestone, (Revised,), lambda m: m.status == "verified"),)
+    on = (Watch(Milestone, (Revised,), lambda m: m.status in ("verified", "not testable")),)
     writes = (PlanSketch, Discrepancy, Impasse)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
@@ -47,17 +51,25 @@ class MilestonePasser(RobotKnowledgeSource):
         goal = None if sketch is None else view.get(sketch.value.goal)
         if sketch is None or goal is None or belief is None or not sketch.value.is_active:
             return None
-        return Case(milestone, sketch, goal, belief) if sketch.value.at == milestone.value.index else None
+        here = None if milestone.value.status == "verified" else find_search_here(view, sketch.id)
+        is_open = here is None or (sketch.value.at_end and not is_last_look(milestone.value, self._settings.plan))
+        if sketch.value.at != milestone.value.index or (milestone.value.status == "not testable" and is_open):
+            return None
+        return Case(milestone, sketch, goal, belief, () if here is None else (here,))
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        milestone, sketch, goal, belief = case
+        milestone, sketch, goal, belief, found = case
         s = sketch.value
+        if found and s.at_end:
+            untold = f"{milestone.value.what} is not testable, where a search has found it"
+            yield Post(Impasse("blocked", untold, goal.id), (milestone, sketch, *found))
+            return
         if not has_missed(view, belief.value, s, is_inexact=bool(milestone.value.displacement_modes)):
             passed = replace(s, status="done") if s.at_end else replace(s, adjustments=0)
-            yield Revise(sketch, replace(passed, verified=True), (milestone, belief))
+            yield Revise(sketch, replace(passed, verified=True), (milestone, belief, *found))
             return
         if s.adjustments < self._settings.plan.max_adjustments:
-            yield Revise(sketch, _repeat(view, s, belief.value), (milestone, belief))
+            yield Revise(sketch, _repeat(view, s, belief.value), (milestone, belief, *found))
             return
         (in_vain, taking), is_first = tell_missed(view, belief.value, s), len(view.all(Goal)) == 1
         if is_first:

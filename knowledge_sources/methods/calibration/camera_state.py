@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.belief.places import compute_chi2
+from knowledge_sources.methods.pose.with_camera import CameraEstimate
 from knowledge_sources.settings import CameraStateSettings, Settings
 from world_models.camera import YAW, Camera
 from world_models.entries.robot_state import CameraState
@@ -74,6 +76,17 @@ def has_counted(camera: CameraState, pose: Pose2, settings: CameraStateSettings)
         math.hypot(pose.x_m - x, pose.y_m - y) < settings.min_move_m
         and abs(wrap_angle(pose.heading_rad - heading)) < settings.min_turn_rad
         for x, y, heading in camera.counted)
+
+
+def widen(found: CameraEstimate, believed: Pose2, covariance: Floats) -> Floats:
+    """(7, 7) of a camera that was found with a pose, no surer than how far that is from a belief and its covariance.
+
+    Along a corridor a longer focal length looks like a place further on, and pairs that are wrong alike make both.
+    """
+    sigmas = math.sqrt(compute_chi2(found.world_from_robot, believed, covariance + found.pose_covariance))
+    strange = max(0.0, 1.0 - 1.0 / max(sigmas, 1e-9)) * found.world_from_robot.minus(believed)
+    moved = found.covariance @ found.pose_slopes.T @ np.linalg.solve(found.pose_covariance, strange)
+    return np.asarray(found.covariance + np.outer(moved, moved))
 
 
 def learn(

@@ -19,7 +19,7 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.localization.next_view import SAME_LINE_PX, SAME_LINE_RAD
 from knowledge_sources.methods.localization.pose_candidates import are_distinct, find_pose_candidates
-from knowledge_sources.methods.localization.refinement import refine_pose
+from knowledge_sources.methods.localization.refinement import refine_to_likelier
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.pose.displacements import fit_displacements
 from knowledge_sources.methods.verification.line_check import (
@@ -111,7 +111,7 @@ def find_fitting_poses(
     """Find the poses of a room, distinct from a pose, at which segments (k, 2, 2) fit best."""
     views = (CameraView(segments_px, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))),)
     candidates = find_pose_candidates(robot, views, (room,), MAX_FITTING_POSES, settings)
-    refined = (refine_pose(robot, views, candidate.world_from_robot, settings)[0] for candidate in candidates)
+    refined = (refine_to_likelier(robot, views, c.world_from_robot, settings)[0] for c in candidates)
     return [other for other in refined if are_distinct(other, pose)]
 
 

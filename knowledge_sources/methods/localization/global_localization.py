@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
-from typing import NamedTuple
 
 import shapely
 
@@ -34,9 +33,7 @@ from knowledge_sources.methods.localization.pose_candidates import (
 )
 from knowledge_sources.methods.localization.refinement import (
     PoseLikelihood,
-    compute_pose_likelihood,
-    refine_pose,
-    refine_view_motions,
+    refine_to_likelier,
 )
 from knowledge_sources.methods.localization.views import CameraView, align_headings
 from knowledge_sources.methods.verification.line_check import predict_lines
@@ -101,14 +98,6 @@ class LocalizationResult:
     next_action: SensingAction | None = None
 
 
-class RefinedPose(NamedTuple):
-    """A refined candidate: the room in which it was found, the pose, and its covariance (3, 3)."""
-
-    room: str
-    world_from_robot: Pose2
-    covariance: Floats
-
-
 def localize(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT,
     guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (),
@@ -147,8 +136,8 @@ def find_candidates(
         return rank_candidates([*found, *known], look_alike, len(views), settings, found[0] if found else None)
     pictures = PictureSearch.from_views(robot, views[-MAX_VIEWS_OF_SEARCH:], settings)
     searched, likely = [*found], choose_rooms(robot, rooms, guess, found, p_guess, len(views), tuning)
-    for pose in _find_refined(robot, views, likely, settings, pictures):
-        _keep_likelier(searched, _build_candidate(robot, views, pose, settings))
+    for candidate in _find_refined(robot, views, likely, settings, pictures):
+        _keep_likelier(searched, candidate)
     first = None
     if found:  # the place of the guess, though the search may have found more exactly where it is
         first = min(searched, key=lambda c: c.world_from_robot.distance_to(found[0].world_from_robot))
@@ -158,7 +147,7 @@ def find_candidates(
     if len(kept) != 1 or not kept[0].is_accepted:
         return kept
     aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, settings, likely)
-    beside = [_build_candidate(robot, views, pose, settings) for pose in aliases]
+    beside = [_build_candidate(robot, views, c.room, c.world_from_robot, settings) for c in aliases]
     repeated = _sift(pictures, kept[0].room, kept[0].world_from_robot, _list_repetitions(robot, kept[0], rooms))
     beside += _build_distinct(robot, views, repeated, settings, [*kept, *beside])
     rivals = [_polish(robot, views, c, settings) for c in (*kept, *beside)]
@@ -207,9 +196,9 @@ def _build_distinct(
     """Candidates from rough poses in rooms, refined, that are none of those that are known, each once."""
     found: list[PlaceCandidate] = []
     for room, pose in rough:
-        refined = RefinedPose(room, *refine_pose(robot, views, pose, settings))
-        if all(are_distinct(refined.world_from_robot, c.world_from_robot) for c in (*known, *found)):
-            found.append(_build_candidate(robot, views, refined, settings))
+        candidate = _build_candidate(robot, views, room, pose, settings)
+        if all(are_distinct(candidate.world_from_robot, c.world_from_robot) for c in (*known, *found)):
+            found.append(candidate)
     return found
 
 
@@ -224,9 +213,8 @@ def _polish(
     robot: RobotModel, views: Sequence[CameraView], rough: PlaceCandidate, settings: Settings
 ) -> PlaceCandidate:
     """The candidate refined once more, from where it ended: what decides between two is not from where each began."""
-    again = refine_pose(robot, views, rough.world_from_robot, settings)
-    better = _build_candidate(robot, views, RefinedPose(rough.room, *again), settings)
-    return max((rough, better), key=lambda c: c.likelihood.log_likelihood)
+    again = _build_candidate(robot, views, rough.room, rough.world_from_robot, settings)
+    return max((rough, again), key=lambda c: c.likelihood.log_likelihood)
 
 
 def _list_repetitions(
@@ -240,7 +228,7 @@ def _list_repetitions(
 def find_aliases(
     robot: RobotModel, views: Sequence[CameraView], pose: Pose2, rooms: Sequence[str], settings: Settings = DEFAULT,
     likely: Sequence[str] | None = None,
-) -> tuple[RefinedPose, ...]:
+) -> tuple[PlaceCandidate, ...]:
     """Find the other places of these rooms that would look the same in all views, by the model alone.
 
     The pictures are not used: missed, hidden or additional lines may make one of two aliases much less likely than the
@@ -251,7 +239,7 @@ def find_aliases(
     lines = [predict_lines(robot, view.pose_then(pose), settings.verification) for view in views]
     predicted = [replace(view, segments_px=seen.segments_px) for view, seen in zip(views, lines, strict=True)]
     look_alike = make_alias_test(robot, [view.now_from_then for view in views], settings)
-    found: list[RefinedPose] = []
+    found: list[PlaceCandidate] = []
 
     def is_alias(other: Pose2) -> bool:
         known = (pose, *(alias.world_from_robot for alias in found))
@@ -264,7 +252,7 @@ def find_aliases(
     here = _find_room(robot, rooms[0], pose)
     for room, other in _sift(pictures, here, pose, find_repetitions(robot.world, here, pose, rooms)):
         if is_alias(other):
-            found.append(RefinedPose(room, *refine_pose(robot, predicted, other, settings)))
+            found.append(_build_candidate(robot, predicted, room, other, settings))
     return tuple(found)
 
 
@@ -285,16 +273,17 @@ def rank_candidates(
 ) -> tuple[PlaceCandidate, ...]:
     """Keep the likely candidates that the likeliest does not refute, with their weights, the likeliest first.
 
-    The likeliest refutes a candidate by the log likelihood ratio (Bayes factor). One that would look the same by the
-    model, chance may have made much less likely: it is refuted only by a ratio beyond the noise of all ``looks``, as if
-    all of it pointed one way. Where too many are left, ``first`` is none that is left out.
+    The likeliest refutes a candidate by the log likelihood ratio (Bayes factor) of all looks, or of a single one in
+    which half of the candidate's lines are missing; a candidate by which itself would be refuted in this way is kept.
+    One that would look the same by the model, chance may have made much less likely: it is refuted only by a ratio
+    beyond the noise of all ``looks``, as if all of it pointed one way. Where too many are left, ``first`` is none that
+    is left out.
     """
     tuning = settings.localization
     noise = tuning.alike_log_noise * looks
     order = sorted((c for c in found if c.likelihood.log_likelihood >= tuning.min_log_likelihood),
                    key=lambda c: -c.likelihood.log_likelihood)
-    kept = [c for c in order
-            if c.likelihood.log_likelihood >= order[0].likelihood.log_likelihood - tuning.refuting_log_ratio
+    kept = [c for c in order if not _is_refuted(c.likelihood, order[0].likelihood, tuning.refuting_log_ratio)
             or (c.likelihood.log_likelihood >= order[0].likelihood.log_likelihood - tuning.refuting_log_ratio - noise
                 and look_alike(order[0].world_from_robot, c.world_from_robot))]
     if first in kept[tuning.max_hypotheses:]:
@@ -302,6 +291,14 @@ def rank_candidates(
     kept = kept[:tuning.max_hypotheses]
     weights = normalize_log_likelihoods([c.likelihood.log_likelihood for c in kept])
     return tuple(replace(c, weight=weight) for c, weight in zip(kept, weights, strict=True))
+
+
+def _is_refuted(one: PoseLikelihood, best: PoseLikelihood, log_ratio: float) -> bool:
+    """Whether the likeliest refutes a candidate: by one look, where that is one-sided, else by all together."""
+    by_a_look = one.is_refuted_by_a_look(best, log_ratio)
+    if by_a_look is not best.is_refuted_by_a_look(one, log_ratio):
+        return by_a_look
+    return one.log_likelihood < best.log_likelihood - log_ratio
 
 
 def decide(
@@ -326,24 +323,24 @@ def decide(
 def _find_refined(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings,
     pictures: PictureSearch | None,
-) -> list[RefinedPose]:
+) -> list[PlaceCandidate]:
     """The best candidates by the last views, refined by all; not the same pose twice."""
-    found = list[RefinedPose]()
-    for candidate in () if pictures is None else pictures.find(rooms, MAX_CANDIDATES):
-        pose, covariance = refine_pose(robot, views, candidate.world_from_robot, settings)
+    found = list[PlaceCandidate]()
+    for rough in () if pictures is None else pictures.find(rooms, MAX_CANDIDATES):
+        new = _build_candidate(robot, views, rough.room, rough.world_from_robot, settings)
+        pose = new.world_from_robot
         if all(pose.distance_to(other.world_from_robot) > FINE_CLIMB_M
                or abs(wrap_angle(pose.heading_rad - other.world_from_robot.heading_rad)) > FINE_CLIMB_RAD
                for other in found):
-            found.append(RefinedPose(candidate.room, pose, covariance))
+            found.append(new)
     return found
 
 
 def _build_candidate(
-    robot: RobotModel, views: Sequence[CameraView], found: RefinedPose, settings: Settings
+    robot: RobotModel, views: Sequence[CameraView], room: str, rough: Pose2, settings: Settings
 ) -> PlaceCandidate:
-    room, pose, covariance = found
-    refined = refine_view_motions(robot, views, pose, covariance, settings)
-    likelihood = compute_pose_likelihood(robot, refined, pose, settings)
+    """A candidate from a rough pose, found in a room: refined, where that makes it likelier."""
+    pose, covariance, likelihood = refine_to_likelier(robot, views, rough, settings)
     is_accepted = likelihood.is_sufficient(settings.localization)
     return PlaceCandidate(_find_room(robot, room, pose), pose, covariance, likelihood, is_accepted)
 

@@ -26,6 +26,7 @@ from knowledge_sources.methods.verification.line_check import (
     compute_agreement,
     compute_coverage,
     compute_log_ratio,
+    compute_p_share,
     find_distinct,
     find_errors,
     list_names,
@@ -51,6 +52,7 @@ TURN_SEARCH_SIGMAS = 2.5  # reach of the search for an uncertain turn, in standa
 MAX_VIEW_SURPRISE = 11.3
 """Largest squared normalized error of a view by the others, with which they still agree; three unknowns, 99 %."""
 MIN_VIEW_LINES = 8  # fewest predicted lines by which a single view counts
+MIN_P_LOOK = 0.05  # least probability of how many lines a look shows at a pose, by what the others show there
 MIN_EXPLAINED_LENGTH_PX = 25.0  # shortest segment that should be explained by the model
 EXPLAINED_TOLERANCE_PX = 3.0  # distance of a segment from the model line that explains it
 MIN_EXPLAINING_LENGTH_PX = 4.0  # shortest model line that explains a segment
@@ -256,6 +258,7 @@ class PoseLikelihood:
         log_likelihood: logarithm of the likelihood ratio of this pose to one drawn by chance.
         explained: part of the length of long segments that lies on a model line, 0..1.
         weakest_view: smallest matched part of the predicted lines of a view that has enough of them, 0..1.
+        looks: of each view the lines in view, those that are found, and the log likelihood.
     """
 
     visible: int
@@ -263,21 +266,33 @@ class PoseLikelihood:
     log_likelihood: float
     explained: float
     weakest_view: float
+    looks: tuple[tuple[int, int, float], ...] = ()
+
+    def is_refuted_by_a_look(self, other: PoseLikelihood, log_ratio: float) -> bool:
+        """Whether half of the lines of one look are missing, and another pose explains that look so much better."""
+        return any(_is_half_missing(visible, matched) and there - here >= log_ratio
+                   for (visible, matched, here), (_, _, there) in zip(self.looks, other.looks, strict=True))
+
+    def contradicts_itself(self) -> bool:
+        """Whether half of the lines of one look are missing, though others show more, as they do not among bricks."""
+        return any(_is_half_missing(visible, matched) and compute_p_share(
+            matched, visible, self.matched - matched, self.visible - visible) < MIN_P_LOOK
+            for visible, matched, _ in self.looks)
 
     def is_sufficient(self, settings: LocalizationSettings = DEFAULT.localization) -> bool:
         """Whether the pose can be accepted.
 
-        Enough lines must be matched, in every view, and the segments be explained, or else the log likelihood be so
-        large that the model may lack much of what is seen, as bricks and planks: the larger it is, the more lines may
-        be missing, and in a single view all of them, as what stands before the camera hides them.
+        Enough lines must be matched, in every view as in the others, and the segments be explained, or else the log
+        likelihood be so large that the model may lack much of what is seen, as bricks and planks: the larger it is, the
+        more lines may be missing, and in a single view all of them, as what stands before the camera hides them.
         """
         fraction = self.matched / max(self.visible, 1)
         enough = settings.sure_log_likelihood
         is_sure = (self.log_likelihood >= enough
                    and fraction >= settings.sure_matched_fraction * enough / self.log_likelihood)
         is_explained = self.explained >= max(settings.min_explained_fraction, settings.min_fraction_sum - fraction)
-        is_clear = (self.weakest_view >= settings.min_view_fraction
-                    or self.log_likelihood >= settings.clear_log_likelihood)
+        is_clear = (self.log_likelihood >= settings.clear_log_likelihood
+                    or (self.weakest_view >= settings.min_view_fraction and not self.contradicts_itself()))
         return (self.matched >= settings.min_matched_lines
                 and self.matched >= settings.min_matched_fraction * self.visible
                 and is_clear and (is_explained or is_sure))
@@ -287,13 +302,29 @@ class PoseLikelihood:
                 f" and {self.explained:.0%} of what is seen is in the model")
 
 
+def refine_to_likelier(
+    robot: RobotModel, views: Sequence[CameraView], rough: Pose2, settings: Settings = DEFAULT
+) -> tuple[Pose2, Floats, PoseLikelihood]:
+    """Refine a rough pose of the robot now, or keep it: what makes all views likelier; with its covariance (3, 3).
+
+    The last view may move a pose off the lines of those before it. One that is kept is no surer than refining moves it.
+    """
+    refined, covariance = refine_pose(robot, views, rough, settings)
+    off = rough.minus(refined)
+    tried = []
+    for pose, spread in ((refined, covariance), (rough, covariance + np.outer(off, off))):
+        moved = refine_view_motions(robot, views, pose, spread, settings)
+        tried.append((pose, spread, compute_pose_likelihood(robot, moved, pose, settings)))
+    return max(tried, key=lambda one: one[2].log_likelihood)
+
+
 def compute_pose_likelihood(
     robot: RobotModel, views: Sequence[CameraView], world_from_now: Pose2, settings: Settings = DEFAULT
 ) -> PoseLikelihood:
     """Compute the likelihood of the robot's pose now by all views; lines of an inexact model are displaced as they fit.
     """
-    visible = matched = 0
-    terms, weakest, lengths, explained = [0.0], 1.0, 0.0, 0.0
+    visible, matched, looks = 0, 0, list[tuple[int, int, float]]()
+    weakest, lengths, explained = 1.0, 0.0, 0.0
     for view in views:
         then = view.pose_then(world_from_now)
         shown = predict_lines(robot, then, settings.verification)
@@ -306,14 +337,19 @@ def compute_pose_likelihood(
         ) if errors.is_exact else check_lines(
             robot, shown.lines_world, view.segments_px, then, settings.verification, errors, settings.pose,
             list_names(shown)).agreement
-        visible, matched = visible + agreement.visible, matched + agreement.matched
-        terms.append(compute_log_ratio(agreement.matched, agreement.visible, agreement.chance))
+        found, expected = agreement.matched, agreement.visible
+        visible, matched = visible + expected, matched + found
+        looks.append((expected, found, compute_log_ratio(found, expected, agreement.chance)))
         if agreement.visible >= MIN_VIEW_LINES:
             weakest = min(weakest, agreement.matched / agreement.visible)
         length, part = _explain(robot, view, then)
         lengths, explained = lengths + length, explained + part
     part = explained / lengths if lengths > 0.0 else 0.0
-    return PoseLikelihood(visible, matched, math.fsum(terms), part, weakest)
+    return PoseLikelihood(visible, matched, math.fsum(look[2] for look in looks), part, weakest, tuple(looks))
+
+
+def _is_half_missing(visible: int, matched: int) -> bool:
+    return visible >= MIN_VIEW_LINES and 2 * matched <= visible
 
 
 def _project(robot: RobotModel, lines_world: Floats, poses: Sequence[Pose2]) -> Floats:

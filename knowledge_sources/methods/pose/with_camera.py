@@ -168,6 +168,15 @@ class _Problem:
         return float(np.minimum(self.measure_squares(state), bound).sum() + off @ self.information @ off)
 
 
+def compute_pose_slopes(lines_world: Floats, camera: Camera, mount: CameraMount, pose: Pose2) -> Floats:
+    """(3, 7) by how much a pose moves with the camera's unknowns, if lines (n, 2, 3) stay where they are seen."""
+    seen, _ = camera.project_segments(lines_world, mount.camera_from_robot @ pose.lifted().inverse())
+    shown = np.isfinite(seen).all(axis=(1, 2))
+    problem = _Problem(lines_world[shown], seen[shown], camera, mount, 1.0, np.eye(UNKNOWNS), pose)
+    slopes = problem.measure(problem.start_at(pose))[1].reshape(-1, UNKNOWNS)
+    return np.asarray(np.linalg.lstsq(slopes[:, :POSE], -slopes[:, POSE:])[0])
+
+
 def _build_information(pose_covariance: Any, camera_covariance: Floats) -> Floats:
     """(10, 10) of both priors, 0 for the yaw, which is not estimated."""
     information = np.zeros((UNKNOWNS, UNKNOWNS))

@@ -10,13 +10,14 @@ C. Harris, C. Stennett, RAPID, BMVC 1990.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Image, Ints, Mask
 from knowledge_sources.methods.pose.planar import compute_point_jacobian, to_pose2
+from knowledge_sources.methods.pose.with_camera import compute_pose_slopes
 from knowledge_sources.settings import DEFAULT, TrackingSettings
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -53,7 +54,7 @@ class EdgeAlignment:
 
 def align_to_edges(
     robot: RobotModel, image: Image, lines_world: Floats, world_from_robot: Pose2, covariance: Floats,
-    settings: TrackingSettings = DEFAULT.tracking,
+    camera_covariance: Floats, settings: TrackingSettings = DEFAULT.tracking,
 ) -> EdgeAlignment | None:
     """Find the pose that moves model lines onto the edges of a picture.
 
@@ -61,6 +62,7 @@ def align_to_edges(
         image: (h, w) grey, without lens distortion.
         lines_world: (n, 2, 3) the visible pieces of model lines.
         world_from_robot, covariance: what is believed, (3, 3) over (x, y, heading), world.
+        camera_covariance: (7, 7) over ``CAMERA_UNKNOWNS``; the yaw is left out, as the heading is the camera's.
 
     Returns:
         None where too few lines agree, or where the belief is so loose that the nearest edge may belong to another
@@ -79,7 +81,8 @@ def align_to_edges(
         if found is None:
             return None
         pose, doubt = found.world_from_robot, found.covariance
-    return found
+    slopes = compute_pose_slopes(lines_world, robot.camera, robot.mount, pose)
+    return found and replace(found, covariance=doubt + slopes @ camera_covariance @ slopes.T)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

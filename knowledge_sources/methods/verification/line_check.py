@@ -143,6 +143,18 @@ def compute_log_ratio(matched: int, visible: int, chance: float) -> float:
     return float(betaln(a + found, b + missed) - betaln(a, b)) - found * math.log(p) - missed * math.log(1.0 - p)
 
 
+def compute_p_share(matched: int, visible: int, matched_before: int, visible_before: int) -> float:
+    """Compute the probability that a picture shows at most so many lines at the right pose.
+
+    The part that pictures show at the right pose is Beta distributed, and learnt from what others showed ``before``.
+    """
+    a, b = FOUND_AND_MISSED
+    a, b = a + LINE_INDEPENDENCE * matched_before, b + LINE_INDEPENDENCE * (visible_before - matched_before)
+    k = np.arange(matched + 1)
+    logs = betaln(a + k, b + visible - k) - betaln(a, b) - betaln(1 + k, 1 + visible - k)
+    return float(np.sum(np.exp(logs))) / (visible + 1)
+
+
 def find_distinct(
     lines_px: Floats, segments_px: Floats, settings: VerificationSettings = DEFAULT.verification
 ) -> Mask:

@@ -39,6 +39,9 @@ OTHER_DIRECTIONS = Alike(step_m=math.inf, turn_rad=math.radians(65.0))
 """Looks from one place are independent where they show nothing in common: about the width of a picture."""
 
 
+MAX_P_UNMISTAKABLE = 2e-4  # up to it, by belief and picture, the wheels may have slipped beyond what is stated
+
+
 class Before(NamedTuple):
     """What was believed before a look.
 
@@ -157,16 +160,22 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors, s)
     evidence = compute_evidence(pose, fix.covariance, before.pose, before.covariance, agreed, faces)
     p_false = max(POSE_CONFIDENCE.p_false(evidence), LEAST_P_FALSE)
-    motion_px = compute_motion_tolerance_px(
-        robot, lines, before.pose, before.covariance + fix.covariance, s.verification)
+    spread = before.covariance + fix.covariance
+    motion_px = compute_motion_tolerance_px(robot, lines, before.pose, spread, s.verification)
     followed = before.has_followed and motion_px <= s.plan.max_followed_px
     expected_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)[asked]
     if fix.camera_step:  # how far the robot is from where it was believed, not the camera
         expected_px = robot.camera.project_segments(lines, robot.camera_from_world(before.pose))[0]
-    believed = BelievedPlace(before.pose, before.covariance + fix.covariance,
+    believed = BelievedPlace(before.pose, spread,
                              1.0 - _find_prior(before, s.plan, followed=followed))
     by_looks = _sum_told(milestone) + to_log_odds(p_false)
     p_after = update(believed.compute_p_wrong(pose), by_looks)
+    tolerance_px, place = _find_tolerance_px(before, motion_px, p_after <= POSE_CONFIDENCE.accept, s), s.localization
+    if p_after <= MAX_P_UNMISTAKABLE:  # as far as what a search finds is still the place where it was tracked to
+        slipped = spread + np.diag(np.square([place.told_sigma_m, place.told_sigma_m, place.told_sigma_rad]))
+        slip_px = compute_motion_tolerance_px(robot, lines, before.pose, slipped, s.verification)
+        slip_px *= math.sqrt(place.max_told_chi2) / s.verification.motion_tolerance_sigmas
+        tolerance_px = max(tolerance_px, s.action.min_tolerance_px + slip_px)
     most = 1.0 - s.localization.min_p_believed if is_last_look(milestone, s.plan) else POSE_CONFIDENCE.accept
     return Weighed(
         robot=robot,
@@ -184,7 +193,7 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         p_wrong=p_after,
         most_p_wrong=most,
         shift_px=_median_shift(expected_px, plain_px),
-        tolerance_px=_find_tolerance_px(before, motion_px, p_after <= POSE_CONFIDENCE.accept, s),
+        tolerance_px=tolerance_px,
         is_weak=before.in_doubt or not followed,
         is_inexact=bool(milestone.displacement_modes),
         camera_chi2=fix.camera_chi2,

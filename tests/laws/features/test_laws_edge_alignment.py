@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -20,10 +21,12 @@ from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
+from world_models.camera import move_camera
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines
 
+KNOWN, TILT = np.zeros((7, 7)), np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 few = settings(max_examples=30, deadline=None)
 seeds = st.integers(0, 2**32 - 1)
 ROOMS = ("hallway", "robot-laboratory", "library", "allens-office", "conference-room", "machine-room")
@@ -68,10 +71,12 @@ def draw_belief(pose: Pose2, sigmas: tuple[float, float, float], rng: np.random.
     return Pose2(pose.x_m + away[0], pose.y_m + away[1], wrap_angle(pose.heading_rad + away[2])), covariance
 
 
-def align(belief: Pose2, covariance: Floats, image: Image) -> EdgeAlignment | None:
-    lines = visible_lines(robot().world, robot().camera, robot().camera_from_world(belief), min_length_px=16.0,
+def align(belief: Pose2, covariance: Floats, image: Image, camera: Floats = KNOWN, of: RobotModel | None = None
+          ) -> EdgeAlignment | None:
+    seen = of or robot()
+    lines = visible_lines(seen.world, seen.camera, seen.camera_from_world(belief), min_length_px=16.0,
                           min_contrast=0.05, max_distance_m=15.0)
-    return align_to_edges(robot(), image, lines.lines_world, belief, covariance)
+    return align_to_edges(seen, image, lines.lines_world, belief, covariance, camera)
 
 
 def difference(one: Pose2, other: Pose2) -> Floats:
@@ -108,6 +113,19 @@ def test_a_nearly_right_belief_is_corrected_to_a_millimetre_or_so() -> None:
     assert len(errors) >= 20
     x_m, y_m, heading_rad = np.median(errors, axis=0)
     assert math.hypot(x_m, y_m) < 0.001 and heading_rad < math.radians(0.03)
+
+
+def test_what_is_not_known_of_the_camera_is_not_known_of_the_pose() -> None:
+    """With another tilt it would be elsewhere, by as much as the covariance grows."""
+    rng = np.random.default_rng(3)
+    true = draw_pose(rng)
+    image, sure = render(true, rng), 0.003**2 * np.eye(3)
+    here, unsure = align(true, sure, image), align(true, sure, image, np.diag(np.square(TILT)))
+    other = align(true, sure, image, of=replace(robot(), mount=move_camera(robot().camera, robot().mount, TILT)[1]))
+    assert here is not None and unsure is not None and other is not None
+    off, grown = difference(other.world_from_robot, here.world_from_robot), unsure.covariance - here.covariance
+    assert unsure.world_from_robot == here.world_from_robot
+    assert 0.5 < math.sqrt(np.trace(grown[:2, :2])) / math.hypot(*off[:2]) < 2.0
 
 
 @few

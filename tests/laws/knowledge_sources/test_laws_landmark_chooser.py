@@ -24,7 +24,7 @@ from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
 from world_models.entries.body import CameraPicture
 from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.percepts import Anchor, Tracks
+from world_models.entries.percepts import Anchor, Segments, Tracks
 from world_models.entries.robot_state import Drift
 from world_models.frames import Pose2
 
@@ -62,7 +62,8 @@ class Chosen(NamedTuple):
     effects: tuple[Effect, ...] | None
 
 
-def choose(source: LandmarkChooser, *, off_rad: float = 0.0, has_old: bool = True, lost: Level | None = None) -> Chosen:
+def choose(source: LandmarkChooser, *, off_rad: float = 0.0, has_old: bool = True, lost: Level | None = None,
+           seen_in: str = "CameraPicture-1") -> Chosen:
     pose, jpeg = setting()
     bench = Bench(build_robot_model(stage().scenario))
     if has_old:
@@ -74,7 +75,8 @@ def choose(source: LandmarkChooser, *, off_rad: float = 0.0, has_old: bool = Tru
     bench.put(CameraPicture(jpeg, 1, 1.0, "milestone"))
     believed = Pose2(pose.x_m, pose.y_m, pose.heading_rad + off_rad)
     belief = bench.put(Hypothesis.of_world(stage().world, ROOM, believed, np.array(SURE), "odometry", motion="m"))
-    belief = bench.revise(belief, basis="milestone")
+    lines = bench.put(Segments(seen_in, "Milestone-1", np.zeros((0, 2, 2)), np.zeros(0), 40.0), bench.view[seen_in])
+    belief = bench.apply(Revise(belief, replace(belief.value, basis="milestone"), (lines, belief)))[0].entry
     if lost is not None:
         bench.doubt(lost)
     return Chosen(bench, bench.ask(source, belief))
@@ -127,6 +129,12 @@ def test_the_belief_is_aligned_with_the_edges_before_landmarks_are_cut() -> None
     assert (effect.value.basis, effect.value.motion, effect.value.locale) == ("tracks", "m", ROOM)
     assert reasons(effect) == {"CameraPicture-2", "Hypothesis-1", "Tracks"}
     assert made(effects, Drift)[0].heading_rad == pytest.approx(heading)
+
+
+def test_the_same_picture_twice_is_once() -> None:
+    """By the picture of its milestone the belief gets neither another pose nor surer; by a newer one it does."""
+    for picture, times in (("CameraPicture-1", 1), ("CameraPicture-2", 0)):
+        assert len(made(choose(LandmarkChooser(), off_rad=0.003, seen_in=picture).effects, Hypothesis)) == times
 
 
 @pytest.mark.parametrize(("level", "acts"), [

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from blackboard.change import Posted
 from blackboard.entry import Entry
 from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
-from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance, loosen
+from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance, loosen, widen
 from knowledge_sources.plan import med_r_and_t
 from knowledge_sources.plan.med_r_and_t import MedRAndT
 from knowledge_sources.plan.view_predictor import ViewPredictor
@@ -141,7 +141,9 @@ def test_the_camera_is_moved_by_a_picture_that_has_not_counted_and_adds_what_is_
     assert (fix.camera_covariance != ()) == moves and fix.camera_chi2 == (learnt.prior_chi2 if moves else 0.0)
     mount = (camera.moved(learnt.step.tolist()) if moves else camera).mount
     assert used[3].angle_to(mount.camera_from_robot) < 1e-9
-    open_of_it = learnt.covariance if moves else known
+    widened = widen(learnt, to_world(BELIEF), bench.view["Hypothesis-1"].value.covariance_world(ROBOT.world))
+    open_of_it = widened if moves else known
+    assert not moves or np.allclose(fix.camera_covariance, open_of_it)
     assert np.allclose(fix.covariance, planar.covariance + learnt.pose_slopes @ open_of_it @ learnt.pose_slopes.T)
 
 

@@ -34,6 +34,7 @@ from knowledge_sources.methods.calibration.camera_state import compute_camera_co
 from knowledge_sources.methods.localization.aliasing import Alias
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, compute_motion_tolerance_px
 from knowledge_sources.methods.verification.weigh import (
+    MAX_P_UNMISTAKABLE,
     Verdict,
     Weighed,
     _find_tolerance_px,
@@ -397,8 +398,12 @@ def test_how_far_the_lines_may_be_by_all_that_it_depends_on(
 
 
 def test_what_the_wheels_can_do_and_what_the_picture_leaves_open_count_together(judged: list[Judged]) -> None:
-    """Twice as unsure a solution leaves as much more open as twice as unsure a belief."""
-    asked, judge = 0, MilestoneJudge(tune(max_deviation_px=0.01))  # so small a window that it decides nothing
+    """Twice as unsure a solution leaves as much more open as twice as unsure a belief.
+
+    In an unmistakable place it is as much as what a search finds may be off, to be the place where it was tracked to.
+    """
+    asked, slipped, place = 0, 0, DEFAULT.localization
+    judge = MilestoneJudge(tune(max_deviation_px=0.01))  # so small a window that it decides nothing
     for one in judged:
         view = StateView(one.board, False, 9, 0.02)
         case = case_on(view, one.trigger)
@@ -407,12 +412,16 @@ def test_what_the_wheels_can_do_and_what_the_picture_leaves_open_count_together(
             entry: Any = SimpleNamespace(value=fix, id=case.fix.id)
             weighed = judge.weigh(view, case._replace(fix=entry))
             if weighed.p_false <= POSE_CONFIDENCE.accept:
-                open_px = compute_motion_tolerance_px(
+                slip, sigmas = np.zeros(3), VERIFICATION.motion_tolerance_sigmas
+                if weighed.p_wrong <= MAX_P_UNMISTAKABLE:
+                    slip = np.square([place.told_sigma_m, place.told_sigma_m, place.told_sigma_rad])
+                    sigmas = math.sqrt(place.max_told_chi2)
+                open_px = sigmas / VERIFICATION.motion_tolerance_sigmas * compute_motion_tolerance_px(
                     weighed.robot, np.array(case.milestone.value.expected), weighed.before,
-                    weighed.covariance + fix.covariance, VERIFICATION)
+                    weighed.covariance + fix.covariance + np.diag(slip), VERIFICATION)
                 assert weighed.tolerance_px == pytest.approx(DEFAULT.action.min_tolerance_px + open_px)
-                asked += 1
-    assert asked > 1
+                asked, slipped = asked + 1, slipped + bool(slip.any())
+    assert asked > 1 and slipped
 
 
 @pytest.mark.parametrize("more", [-0.5, 0.0, 3.0])

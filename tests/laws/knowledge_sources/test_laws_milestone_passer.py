@@ -11,7 +11,7 @@ import pytest
 from acting import answer
 from blackboard.board import Blackboard
 from blackboard.change import Change, Posted, Revised
-from blackboard.effect import Effect, Post, Revise
+from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from generated_boards import Bench, all_reasons, plain_robot, reasons, wakes
@@ -20,7 +20,8 @@ from knowledge_sources.plan.milestone_passer import MilestonePasser
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.sketching import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS, has_missed
 from sim.scenario import load_scenario
-from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries.body import MotionReport
+from world_models.entries.location import Hypothesis, Place, PlaceSearch, diagonal
 from world_models.entries.obstacle import Obstacle, ObstacleStatus
 from world_models.entries.task import Goal, Impasse, Milestone, MilestoneStatus, PlanSketch, SketchStatus, Subgoal
 from world_models.files.world_files import WORLDS, load_world
@@ -159,11 +160,29 @@ def test_only_the_milestone_to_which_an_active_sketch_has_come_counts(
     assert acts == (status == "active" and index == 1 and has_belief)
 
 
+@pytest.mark.parametrize(("at", "gone_m", "tried", "does"), [
+    (1, 0.05, 0, [PlanSketch]), (1, 0.2, 0, []), (2, 0.0, 0, []), (2, 0.0, 2, [Impasse]), (2, 0.2, 2, [])])
+def test_what_tells_nothing_where_it_was_just_found_is_not_asked_again(
+    at: int, gone_m: float, tried: int, does: list[type]
+) -> None:
+    bench = Bench(plain_robot())
+    bench.believe(Pose2(2.0, 2.0, 0.0), locale="hall")
+    bench.put(PlaceSearch("found", "it is here"))
+    bench.put(MotionReport(0.5, gone_m, 1.0, 1.0))
+    sketch = bench.sketch(*[Place("hall", 2.0, 2.0)] * 3, at=at, verified=False)
+    asked = bench.revise(bench.await_milestone(sketch.id, at), status="not testable", tried=(1.0,) * tried)
+    effects = bench.ask(MilestonePasser(DEFAULT), asked)
+    values = [effect.value for effect in effects or () if not isinstance(effect, Retract)]
+    assert [type(value) for value in values] == does
+    assert all(value.verified for value in values if isinstance(value, PlanSketch))
+    assert not does or "PlaceSearch-1" in all_reasons(effects)
+
+
 @pytest.mark.parametrize("status", ["expected", "verified", "refuted", "not testable", "withdrawn"])
 def test_what_it_watches(status: MilestoneStatus) -> None:
     bench = Bench()
     milestone = bench.revise(bench.await_milestone(), status=status)
-    assert wakes(MilestonePasser(), Revised(milestone)) == (status == "verified")
+    assert wakes(MilestonePasser(), Revised(milestone)) == (status in ("verified", "not testable"))
     assert not wakes(MilestonePasser(), Posted(milestone))
 
 

@@ -125,6 +125,24 @@ def test_unlikely_places_are_dropped_and_refuted_ones_unless_they_look_alike() -
     assert rank(*many) == many[:S.max_hypotheses]
 
 
+def test_one_look_of_which_half_is_missing_refutes_where_another_place_shows_it() -> None:
+    """Sums over looks hide it: as much is missing in a single look as in the whole at a wrong place."""
+    def seen(x_m: float, *looks: tuple[int, int, float]) -> PlaceCandidate:
+        return replace(place(x_m), likelihood=PoseLikelihood(40, 27, sum(look[2] for look in looks), 1.0, 0.5, looks))
+
+    def rank(*found: PlaceCandidate) -> list[float]:
+        return [c.world_from_robot.x_m for c in rank_candidates(found, lambda one, other: False, len(found))]
+
+    whole, half = seen(2.0, (20, 17, 14.0), (20, 17, 14.0)), seen(4.0, (20, 18, 16.0), (20, 10, 5.0))
+    assert rank(whole, half) == [2.0]
+    better = seen(4.0, (20, 20, 40.0), (20, 10, 5.0))
+    assert rank(whole, better) == [4.0, 2.0]  # the likeliest refutes no place that shows what itself does not
+    assert rank(seen(2.0, (20, 10, 4.0), (20, 17, 14.0)), better) == [4.0]
+    for others, missing in ((30, True), (20, False)):  # 83 % elsewhere; in bricks each look shows little more than half
+        looks = (36, others, 30.0), (21, 9, 10.0)
+        assert PoseLikelihood(57, others + 9, 40.0, 0.9, 0.5, looks).contradicts_itself() is missing
+
+
 HERE = StatedPlace(Pose2(2.0, 2.0, 0.0), np.diag([1e-4, 1e-4, 1e-5]), 0.5)
 
 

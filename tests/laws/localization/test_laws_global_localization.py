@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
+from knowledge_sources.methods.localization import refinement
 from knowledge_sources.methods.localization.global_localization import LocalizationStatus, find_aliases, localize
 from knowledge_sources.methods.localization.next_view import (
     PoseHypothesis,
@@ -317,8 +318,8 @@ def test_the_alias_of_a_place_is_found_from_the_model_alone(part: float, heading
     looks = [CameraView(nothing, Pose2(0.0, 0.0, a), np.diag([1e-5, 1e-5, 1e-4])) for a in (turn, turn + 1.0, 0.0)]
     turned = Pose2(*(low + high - pose.position), wrap_angle(heading + math.pi))
     assume(pose.distance_to(turned) > 0.5)
-    found = [other for _, other, _ in find_aliases(SYMMETRIC_ROBOT, looks, pose, list(SYMMETRIC.world.rooms))]
-    assert any(other.distance_to(turned) < 0.02 for other in found)
+    found = find_aliases(SYMMETRIC_ROBOT, looks, pose, list(SYMMETRIC.world.rooms))
+    assert any(c.world_from_robot.distance_to(turned) < 0.02 for c in found)
 
 
 @settings(deadline=None, max_examples=4)
@@ -352,6 +353,15 @@ def test_a_guess_beside_the_right_place_does_not_hide_it(
     assert told_best.likelihood.log_likelihood >= best.likelihood.log_likelihood - 1e-6
     for i, one in enumerate(told.candidates):
         assert all(are_distinct(one.world_from_robot, other.world_from_robot) for other in told.candidates[:i])
+
+
+def test_refining_that_makes_a_place_worse_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    pose, aside = Pose2(5.0, 1.0, 0.3), np.diag([1e-6, 1e-6, 1e-6])
+    views = views_from(CENTRE, pose, (math.pi / 2, 0.0), 3)
+    monkeypatch.setattr(refinement, "refine_pose", lambda r, v, p, s: (p @ Pose2(0.05, 0.0, 0.03), aside))
+    told = localize(CENTRE, views, ["hallway"], guess=("hallway", pose))
+    (kept,) = [c for c in told.candidates if c.world_from_robot == pose]
+    assert kept.covariance[0, 0] > 0.04**2  # and known no better than to where it would move
 
 
 def is_sufficient(visible: int, matched: int, log_likelihood: float, explained: float, weakest: float) -> bool:

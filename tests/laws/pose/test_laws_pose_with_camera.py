@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
+from knowledge_sources.methods.calibration.camera_state import widen
 from knowledge_sources.methods.localization.camera_matching import compute_space_covariance
 from knowledge_sources.methods.pose.with_camera import (
     FREE,
@@ -137,6 +138,16 @@ def test_a_camera_that_is_known_better_stays_nearer_to_what_was_believed(seed: i
     found = estimate(lines, segments, camera_covariance=tight)
     assert np.all(np.abs(found.step) < 5.0 * part * 1e-2 * CAMERA_SIGMA)
     assert np.all(np.diag(found.covariance) <= np.diag(tight) * (1.0 + 1e-6))
+
+
+def test_a_camera_is_no_surer_than_the_shift_that_comes_with_it_and_that_the_belief_does_not_leave_open() -> None:
+    """Pairs that are wrong alike show a place further on, and with it another focal length."""
+    found = estimate(*observe(np.zeros(7), 5)[:2])
+    here = found.world_from_robot
+    grown = [widen(found, Pose2(here.x_m - off_m, here.y_m, here.heading_rad), sigma**2 * np.eye(3))[4, 4]
+             for off_m, sigma in ((0.0, 0.005), (0.05, 0.2), (0.05, 0.005), (-0.05, 0.005))]
+    plain = found.covariance[4, 4]
+    assert grown[:2] == pytest.approx([plain, plain]) and min(grown[2:]) > 2.0 * plain, np.array(grown) / plain
 
 
 def test_the_yaw_is_left_as_it_was() -> None:
