@@ -36,7 +36,7 @@ from knowledge_sources.while_lost import locate_contact
 from world_models.building.locales import EXTRA_KIND, Thing
 from world_models.entries.body import CameraPicture, MotionReport, MotorCommand, RideReport
 from world_models.entries.floor import FreeFloor
-from world_models.entries.location import Hypothesis
+from world_models.entries.location import Hypothesis, PlaceSearch
 from world_models.entries.obstacle import AROUND_SIGMA_RAD, Contact, Obstacle
 from world_models.entries.task import Goal, Leg, PlanSketch
 from world_models.frames import Pose2, wrap_angle
@@ -354,11 +354,14 @@ def limit_move(unseen: Sweep, move_m: float, settings: ActionSettings) -> Cautio
 
 
 def _find_scans(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> tuple[Entry[FreeFloor], ...]:
-    """What the robot saw of the floor that it is on, the oldest first."""
+    """What the robot saw of the floor that it is on, the oldest first; only since it was last found, as it was seen
+    from elsewhere before.
+    """
     now_s = _tell_time_s(view)
-    ride = view.latest(RideReport)
+    ride, found = view.latest(RideReport), view.latest(PlaceSearch, lambda search: search.status == "found")
     since_s = max(now_s - settings.max_seen_age_s, -math.inf if ride is None else ride.value.sim_time_s)
-    return tuple(entry for entry in view.all(FreeFloor)
+    since = -1 if found is None else found.cycle
+    return tuple(entry for entry in view.since(FreeFloor, since)
                  if entry.value.seen_s >= since_s and _is_of(entry, belief))
 
 

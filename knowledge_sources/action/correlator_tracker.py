@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
+from itertools import islice
 from statistics import median
 
 import numpy as np
@@ -15,6 +17,7 @@ import numpy as np
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
+from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import HELD, MEASURED, NOT_LOST, PICTURE, Belief
@@ -40,6 +43,7 @@ from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_robot, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import CameraPicture
+from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Anchor, Track, Tracks
 from world_models.entries.robot_state import Drift
@@ -47,11 +51,16 @@ from world_models.entries.robot_state import Drift
 MIN_LANDMARKS = 5  # with fewer tracked landmarks than this, new ones are always taken
 ENOUGH_LANDMARKS = 9  # with this many tracked landmarks or more, no new ones are taken
 MIN_REMAINING_PART = 0.5  # between these two, new landmarks are taken below this part of those at the last renewal
+MAX_UNSEEN = 3  # after so many pictures without a landmark, and as many looks at no free floor, the place is in doubt
 MIN_DRIFT_STRETCH_M = 0.3  # shortest stretch of way from which the drift of the wheels is learnt (§3.2)
 
 
 class CorrelatorTracker(RobotKnowledgeSource):
-    """Follows landmarks from frame to frame, corrects the belief by them, and posts the size of the correction."""
+    """Follows landmarks from frame to frame, corrects the belief by them, and posts the size of the correction.
+
+    Landmarks that are not where they are expected put the belief in doubt. So do pictures without any landmark, while
+    the floor is nowhere seen free where the model has floor: the robot may be elsewhere.
+    """
 
     level, priority = Level.ACTION, Priority.CORRECT
     closes = Level.ACTION
@@ -70,16 +79,21 @@ class CorrelatorTracker(RobotKnowledgeSource):
         because = (frame, belief) if old is None else (frame, belief, old)
         corrected, agreeing = self._correct(held, seen, old.value.anchors) if seen and old is not None else (None, 0)
         expected = sum(1 for f in followed if f.expected)
+        unseen = 0 if seen or old is None else old.value.unseen + 1
+        bare = _find_missing_floors(view) if unseen >= MAX_UNSEEN else ()
+        what = "" if not bare else (
+            f"no landmark was found in {unseen} pictures, and none of the floor is seen free where it should be")
         if expected >= s.action.min_expected_landmarks and agreeing < s.action.min_agreeing_part * expected:
             what = f"{expected - agreeing} of {expected} landmarks are not where they were expected{_furthest(seen)}"
+        if what:
             tracks = [f.track for f in followed]
-            yield from self._post_discrepancy(view, what, math.inf, held, tracks, because)
+            yield from self._post_discrepancy(view, what, math.inf, held, tracks, (*because, *bare))
             yield post_or_revise(old, Tracks(frame.id, s.tracking.template_half_px, ()), because)
             return
         if agreeing < s.action.min_agreeing_landmarks:
             corrected = None  # nothing bears out that it is not something else that looks the same
         renewed = self._renew(case, image, followed, corrected or belief.value)
-        tracked = post_or_revise(old, renewed.tracks, because)
+        tracked = post_or_revise(old, replace(renewed.tracks, unseen=unseen), because)
         yield tracked
         if corrected is None and renewed.hypothesis is belief.value:
             return
@@ -129,6 +143,12 @@ class CorrelatorTracker(RobotKnowledgeSource):
         last = open_discrepancy(view, Level.ACTION)
         if last is None or not last.value.exceeds:  # one beyond its bound is the discrepancy raiser's
             yield Post(found, because) if last is None else Revise(last, found, because)
+
+
+def _find_missing_floors(view: View) -> tuple[Entry[FreeFloor], ...]:
+    """The last looks at the floor, where each of them shows none of it free where the model has floor; else none."""
+    looks = tuple(islice((f for f in view.newest_first(FreeFloor) if f.value.sense == "camera"), MAX_UNSEEN))
+    return looks if len(looks) == MAX_UNSEEN and all(look.value.is_missing for look in looks) else ()
 
 
 def _learn_drift(view: View, before: Belief, belief: Hypothesis, correction: Revise) -> Iterable[Effect]:

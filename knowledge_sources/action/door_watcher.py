@@ -45,7 +45,7 @@ class DoorWatcher(RobotKnowledgeSource):
     It looks at pictures as long as the belief is trusted: at those that track landmarks, and at those by which a
     milestone was verified. An opening shows what the model has beyond, or a leaf. That adds to the log odds of the
     door; at stated odds, by pictures from two places at least, the door is shut, and the sketcher draws another way.
-    One that is believed to be shut and shows what is beyond is open again.
+    One that is believed to be shut and shows what is beyond is open again. A dark picture tells nothing of doors.
     """
 
     level, priority = Level.ACTION, Priority.SEE
@@ -66,6 +66,8 @@ class DoorWatcher(RobotKnowledgeSource):
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         picture = read_picture(case.frame.value.jpeg)
+        if picture.is_dark(self._settings.goal):
+            return
         for watched in case.doors:
             yield from self._watch(view, watched, case.belief, case.frame, picture.half)
 

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
 from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, to_say
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Revise, to_say
 from blackboard.entry import Entry
 from blackboard.level import Level
+from knowledge_sources.methods.doors.belief import without_pictures
+from knowledge_sources.methods.floor.fixed_boxes import enclose, find_fixed, is_behind
+from knowledge_sources.methods.floor.found_things import may_be_there
 from knowledge_sources.methods.localization.views import CameraView, update_obstruction
+from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import active_goal, find_robot, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import Settings
 from world_models.camera import Camera
-from world_models.entries.obstacle import Obstruction
+from world_models.entries.door_state import DoorState
+from world_models.entries.floor import FreeFloor
+from world_models.entries.obstacle import Obstacle, Obstruction
 from world_models.entries.percepts import Segments
 from world_models.frames import Pose2
 
@@ -29,23 +36,34 @@ MIN_OBSTRUCTION_PART = 0.04  # smallest part of the picture that an obstruction 
 class ObstructionFinder(RobotKnowledgeSource):
     """Finds what is at the same place in pictures taken in several directions: it is before the camera.
 
-    It acts when a milestone was not testable or the belief is in doubt, before the new picture is judged. While the
-    robot is lost, the panorama builder does the same with its own pictures.
+    It acts when a milestone was not testable or the belief is in doubt, before the new picture is judged; and when what
+    seems to stand on the floor keeps its place in the picture. While the robot is lost, the panorama builder does the
+    same with its own pictures. What was seen there alone is taken back: things on the floor, and pictures of doors.
     """
 
     level, priority = Level.PLAN, Priority.REVISE
-    on = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
-    writes = (Obstruction,)
+    on = (
+        Watch(Segments, (Posted,), lambda s: s.milestone != ""),
+        Watch(FreeFloor, (Posted,), lambda f: f.sense == "camera" and bool(f.things)),
+        Watch(Obstruction, (Posted, Revised)),
+    )
+    writes = (Obstruction, Obstacle, DoorState)
 
-    def bind(self, view: View, trigger: Change) -> Effect | None:
-        """The change of what the board says of an obstruction; None where there is none."""
-        milestone = view.get(trigger.entry.value.milestone)
-        if milestone is None or not (milestone.value.tried or unmeasured_doubt(view) is not None):
-            return None
-        return self._find_change(view)
+    def bind(self, view: View, trigger: Change) -> tuple[Effect, ...] | None:
+        """The change of what the board says of an obstruction, or of what was seen in it; None where there is none."""
+        value, change = trigger.entry.value, None
+        if isinstance(value, Obstruction):
+            return tuple(_take_back(view, trigger.entry)) or None
+        if isinstance(value, FreeFloor):
+            change = _find_fixed_box(view, trigger.entry)
+        else:
+            milestone = view.get(value.milestone)
+            if milestone is not None and (milestone.value.tried or unmeasured_doubt(view) is not None):
+                change = self._find_change(view)
+        return None if change is None else (change,)
 
-    def act(self, view: View, case: Effect) -> Iterable[Effect]:
-        yield case
+    def act(self, view: View, case: tuple[Effect, ...]) -> Iterable[Effect]:
+        yield from case
 
     def _find_change(self, view: View) -> Effect | None:
         """The obstruction in the last looks, as an effect where the board does not say it."""
@@ -57,6 +75,36 @@ class ObstructionFinder(RobotKnowledgeSource):
         camera = find_robot(view).camera
         now = _find_in_last_looks(views, camera, None if known is None else known.value, self._settings)
         return to_say(known, now, (*(s for s, _ in looks), *(() if known is None else (known,))))
+
+
+def _find_fixed_box(view: View, now: Entry[FreeFloor]) -> Effect | None:
+    """The obstruction that a look at the floor shows with earlier ones, where the board does not say it."""
+    known, camera = view.latest(Obstruction), find_robot(view).camera
+    looks = [entry for entry in view.newest_first(FreeFloor) if entry.value.sense == "camera" and entry is not now]
+    for thing in now.value.things:
+        fixed = find_fixed(thing, (look.value.things for look in looks), camera)
+        if fixed and (known is None or not is_behind(thing.box_px, known.value)):
+            found = enclose([thing.box_px, *(box for _, box in fixed)], None if known is None else known.value)
+            because = (now, *(looks[number] for number, _ in fixed), *(() if known is None else (known,)))
+            return to_say(known, found, because)
+    return None
+
+
+def _take_back(view: View, found: Entry[Obstruction]) -> Iterable[Effect]:
+    """What rests on nothing but sights within an obstruction: a thing is gone, and a picture of a door does not count.
+    """
+    told = f"all that was seen of it is {found.ref}, which is before the camera"
+    for entry in view.where(Obstacle, lambda o: may_be_there(o) and o.by == "camera" and o.touched_s is None):
+        polygon = build_polygon(entry.value.footprint)
+        sights = [(look, thing.box_px) for look in view.all(FreeFloor) for thing in look.value.things
+                  if build_polygon(thing.footprint).intersects(polygon)]
+        if sights and all(is_behind(box, found.value) for _, box in sights):
+            gone = replace(entry.value, status="gone", certainty=0.0, evidence=told)
+            yield Revise(entry, gone, (found, entry, *dict.fromkeys(look for look, _ in sights)))
+    for door in view.all(DoorState):
+        now = without_pictures(door.value, lambda picture: is_behind(picture.box_px, found.value))
+        if now != door.value:
+            yield Revise(door, now, (found, door))
 
 
 def _find_in_last_looks(
