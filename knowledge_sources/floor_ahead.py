@@ -16,6 +16,7 @@ from blackboard.board import View
 from blackboard.entry import Entry
 from knowledge_sources.conditions import Belief
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor.door_beside import take_as_jamb
 from knowledge_sources.methods.floor.seen_floor import (
     SPACING_M,
     Costs,
@@ -33,6 +34,7 @@ from knowledge_sources.methods.motion.increments import MAX_LOOK_ERROR_RAD, plan
 from knowledge_sources.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings import ActionSettings, Settings
 from knowledge_sources.while_lost import locate_contact
+from world_models.building.building import Building
 from world_models.building.locales import EXTRA_KIND, Thing
 from world_models.entries.body import CameraPicture, MotionReport, MotorCommand, RideReport
 from world_models.entries.floor import FreeFloor
@@ -91,7 +93,7 @@ class FloorAhead:
         found = [shapely.Polygon(thing.footprint_world) for name in self._locales
                  for thing in self._robot.world.things_of(name) if thing.kind == EXTRA_KIND]
         self._asked = shapely.buffer(shapely.union_all([self._floor, *found]), -NEAR_MODEL_M)
-        self._suspected = _list_what_may_stand(view)
+        self._suspected = _list_what_may_stand(view, self._robot.world)
         self._touches = _list_touches(view, self._here)
         self._scans = _find_scans(view, belief, settings)
         self._discs = list_free_discs(view, self._robot, self._here, self._scans)
@@ -149,21 +151,18 @@ class FloorAhead:
         """
         here, (x_m, y_m) = self._here, self._way[1]
         aim_rad = math.atan2(y_m - here.y_m, x_m - here.x_m)
-        rim_m = min(self._robot.radius_m, self._measure_to_model_m(here.position))
+        walls = shapely.boundary(self._floor)
+        rim_m = min(self._robot.radius_m, shapely.distance(walls, shapely.Point(here.position)))
         for turn_rad in sorted(np.arange(-math.pi, math.pi, AWAY_STEP_RAD).tolist(), key=abs):
             heading_rad = aim_rad + turn_rad
             there = here.x_m + AWAY_M * math.cos(heading_rad), here.y_m + AWAY_M * math.sin(heading_rad)
             aside = copy.copy(self)
             aside._way = [self._way[0], there]
-            if self._measure_to_model_m(there) >= rim_m and aside.limit_move(AWAY_M).move_m >= AWAY_M:
+            if shapely.distance(walls, shapely.Point(there)) >= rim_m and aside.limit_move(AWAY_M).move_m >= AWAY_M:
                 turned_rad = wrap_angle(heading_rad - here.heading_rad)
                 move_m = self._robot.actuator.compute_command_m(AWAY_M)
                 return MotorCommand(turned_rad, move_m, self._settings.creep_speed_m_per_s)
         return None
-
-    def _measure_to_model_m(self, point: Any) -> float:
-        """How far a point of the floor is from where the model has none [m]."""
-        return float(shapely.distance(shapely.boundary(self._floor), shapely.Point(point)))
 
     @property
     def wary_m_per_s(self) -> float:
@@ -262,12 +261,14 @@ def _list_taken(thing: Thing, overhang_m: float) -> Floats:
     return np.asarray(shapely.get_coordinates(wide)[:-1])
 
 
-def _list_what_may_stand(view: View) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
+def _list_what_may_stand(view: View, world: Building) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
     """What the robot does not creep into: all that what is suspected may take; of what is there what was seen of it,
-    as the sketcher leads through the rest only where nothing else is left.
+    as the sketcher leads through the rest only where nothing else is left. It does creep to what may be a jamb.
     """
     found = [(entry, entry.value) for entry in view.where(Obstacle, lambda o: o.status != "gone")]
-    return [(entry, build_polygon(o.core if o.is_there and o.core else o.footprint)) for entry, o in found]
+    taken = [(entry, o, take_as_jamb(world, o)) for entry, o in found]
+    return [(entry, build_polygon(jamb.core if jamb.core and (o.is_there or jamb is not o) else o.footprint))
+            for entry, o, jamb in taken]
 
 
 def _list_touches(view: View, here: Pose2) -> list[tuple[Entry[Contact], shapely.Point]]:

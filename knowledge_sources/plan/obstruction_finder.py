@@ -13,7 +13,6 @@ from blackboard.change import Change, Posted, Revised, Watch
 from blackboard.effect import Effect, Revise, to_say
 from blackboard.entry import Entry
 from blackboard.level import Level
-from knowledge_sources.methods.doors.belief import without_pictures
 from knowledge_sources.methods.floor.fixed_boxes import enclose, find_fixed, is_behind
 from knowledge_sources.methods.floor.found_things import may_be_there
 from knowledge_sources.methods.localization.views import CameraView, update_obstruction
@@ -23,7 +22,6 @@ from knowledge_sources.questions import active_goal, find_robot, unmeasured_doub
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import Settings
 from world_models.camera import Camera
-from world_models.entries.door_state import DoorState
 from world_models.entries.floor import FreeFloor
 from world_models.entries.obstacle import Obstacle, Obstruction
 from world_models.entries.percepts import Segments
@@ -38,7 +36,7 @@ class ObstructionFinder(RobotKnowledgeSource):
 
     It acts when a milestone was not testable or the belief is in doubt, before the new picture is judged; and when what
     seems to stand on the floor keeps its place in the picture. While the robot is lost, the panorama builder does the
-    same with its own pictures. What was seen there alone is taken back: things on the floor, and pictures of doors.
+    same with its own pictures. Things on the floor that were seen nowhere but there are taken back.
     """
 
     level, priority = Level.PLAN, Priority.REVISE
@@ -47,7 +45,7 @@ class ObstructionFinder(RobotKnowledgeSource):
         Watch(FreeFloor, (Posted,), lambda f: f.sense == "camera" and bool(f.things)),
         Watch(Obstruction, (Posted, Revised)),
     )
-    writes = (Obstruction, Obstacle, DoorState)
+    writes = (Obstruction, Obstacle)
 
     def bind(self, view: View, trigger: Change) -> tuple[Effect, ...] | None:
         """The change of what the board says of an obstruction, or of what was seen in it; None where there is none."""
@@ -84,15 +82,14 @@ def _find_fixed_box(view: View, now: Entry[FreeFloor]) -> Effect | None:
     for thing in now.value.things:
         fixed = find_fixed(thing, (look.value.things for look in looks), camera)
         if fixed and (known is None or not is_behind(thing.box_px, known.value)):
-            found = enclose([thing.box_px, *(box for _, box in fixed)], None if known is None else known.value)
-            because = (now, *(looks[number] for number, _ in fixed), *(() if known is None else (known,)))
+            found = enclose([thing.box_px, *fixed.values()], None if known is None else known.value)
+            because = (now, *(looks[number] for number in fixed), *(() if known is None else (known,)))
             return to_say(known, found, because)
     return None
 
 
 def _take_back(view: View, found: Entry[Obstruction]) -> Iterable[Effect]:
-    """What rests on nothing but sights within an obstruction: a thing is gone, and a picture of a door does not count.
-    """
+    """Things that rest on nothing but sights within an obstruction are gone."""
     told = f"all that was seen of it is {found.ref}, which is before the camera"
     for entry in view.where(Obstacle, lambda o: may_be_there(o) and o.by == "camera" and o.touched_s is None):
         polygon = build_polygon(entry.value.footprint)
@@ -101,10 +98,6 @@ def _take_back(view: View, found: Entry[Obstruction]) -> Iterable[Effect]:
         if sights and all(is_behind(box, found.value) for _, box in sights):
             gone = replace(entry.value, status="gone", certainty=0.0, evidence=told)
             yield Revise(entry, gone, (found, entry, *dict.fromkeys(look for look, _ in sights)))
-    for door in view.all(DoorState):
-        now = without_pictures(door.value, lambda picture: is_behind(picture.box_px, found.value))
-        if now != door.value:
-            yield Revise(door, now, (found, door))
 
 
 def _find_in_last_looks(

@@ -6,7 +6,6 @@ It is log odds of its not being open.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,18 +83,6 @@ def touch_door(known: DoorState, when_s: float) -> DoorState:
     state = _name_state(log_odds, known.pictures + 1, known)
     return replace(known, state=state, certainty=to_probability(log_odds), log_odds=log_odds, prior=prior,
                    views=known.views or (known.last,), touched_s=when_s)
-
-
-def without_pictures(known: DoorState, is_void: Callable[[DoorPicture], bool]) -> DoorState:
-    """What is believed of a door without some of its pictures: what is left of them tells whether it is shut."""
-    views = tuple(view for view in known.views if not is_void(view))
-    if views == known.views:
-        return known
-    looks = [Look(_pose(view), view.log_ratio) for view in views]
-    log_odds = min(max(known.prior + add_looks(looks, SAME_PLACE), -MAX_LOG_ODDS), MAX_LOG_ODDS)
-    state, p_shut = _name_state(log_odds, len(views) + (known.touched_s is not None), None), to_probability(log_odds)
-    certainty = 1.0 - p_shut if state == "open" else p_shut
-    return replace(known, state=state, certainty=certainty, log_odds=log_odds, pictures=len(views), views=views)
 
 
 def is_in_opening(doorway: Doorway, locale: str, at: Floats, margin_m: float) -> bool:

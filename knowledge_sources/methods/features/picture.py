@@ -60,11 +60,6 @@ class Picture:
         """(h, w, 3) colors, red first; decoded every time, as no method asks twice."""
         return _decode_color(self._jpeg, cv2.IMREAD_COLOR)
 
-    def is_dark(self, settings: GoalSettings) -> bool:
-        """Whether so little light and contrast is in it that it tells nothing."""
-        brightness, contrast = compute_mean_and_deviation(self.grey)
-        return is_dark(brightness, contrast, settings)
-
     def rectified(self, lens: Camera, pinhole: Camera) -> Image:
         """(h, w) grey levels as ``pinhole`` would have taken them, which has no distortion."""
         if lens.distortion is None:

@@ -1,4 +1,4 @@
-"""What keeps its place in the picture while it would have to move on the floor: it is on the lens, or before it (§4)."""
+"""What keeps its place in the picture, and would have to move on the floor for that: it is before the camera (§4)."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from world_models.entries.obstacle import Obstruction
 
 MIN_FIXED_LOOKS = 3  # in two looks something may be at one place of the picture by chance
 FIXED_PX = 6.0  # sides that are no further apart are one: the floor is looked at every second pixel
-BORDER_PX = 4.0  # a side so near to the picture's border tells nothing
-MIN_FIXED_SIDES = 2  # fewest sides that tell: the upper one never does, as there the floor ends
+BORDER_PX = 4.0  # a side so near to the picture's border tells nothing; nor does the upper one: there the floor ends
 MIN_MOVED_M = 0.3  # so far it would have moved on the floor from each look to each other one
 MIN_HIDDEN = 0.8  # least part of a box within an obstruction, by which what was seen in it is of that
 ROUND_PX = 8.0  # so far round an obstruction it may reach: its outline is not known better
@@ -23,23 +22,20 @@ ROUND_PX = 8.0  # so far round an obstruction it may reach: its outline is not k
 Box = tuple[float, float, float, float]
 
 
-def find_fixed(thing: FloorThing, earlier: Iterable[tuple[FloorThing, ...]], camera: Camera) -> list[tuple[int, Box]]:
-    """The earlier looks (their numbers), with the boxes in them, that show a thing at the same place of the picture and
-    elsewhere on the floor; none where they are too few.
-
-    Args:
-        earlier: the things in each earlier look, the newest first.
+def find_fixed(thing: FloorThing, earlier: Iterable[Sequence[FloorThing]], camera: Camera) -> dict[int, Box]:
+    """The boxes in earlier looks (the newest first), by their numbers, that show a thing at the same place of the
+    picture and elsewhere on the floor; none where they are too few.
     """
-    found: list[tuple[int, Box]] = []
-    places = [_find_middle(thing)]
+    found, places = dict[int, Box](), [build_polygon(thing.footprint).centroid]
     for number, things in enumerate(earlier):
-        same = next((one for one in things if _is_same(one.box_px, thing.box_px, camera)), None)
-        if same is not None and min(shapely.distance(_find_middle(same), places)) >= MIN_MOVED_M:
-            found.append((number, same.box_px))
-            places.append(_find_middle(same))
+        for same in (one for one in things if _is_same(one.box_px, thing.box_px, camera)):
+            place = build_polygon(same.footprint).centroid
+            if number not in found and min(shapely.distance(place, places)) >= MIN_MOVED_M:
+                found[number] = same.box_px
+                places.append(place)
         if len(places) == MIN_FIXED_LOOKS:
             return found
-    return []
+    return {}
 
 
 def enclose(boxes: Sequence[Box], known: Obstruction | None) -> Obstruction:
@@ -58,12 +54,7 @@ def is_behind(box: Box, obstruction: Obstruction) -> bool:
 
 
 def _is_same(box: Box, now: Box, camera: Camera) -> bool:
-    """Whether two boxes have all sides in common that tell anything."""
-    most = camera.width - 1.0, camera.height - 1.0
-    telling = [abs(box[i] - now[i]) for i, end in ((0, most[0]), (2, most[0]), (3, most[1]))
-               if BORDER_PX < now[i] < end - BORDER_PX]
-    return len(telling) >= MIN_FIXED_SIDES and max(telling) <= FIXED_PX
-
-
-def _find_middle(thing: FloorThing) -> shapely.Point:
-    return shapely.Point(np.mean(thing.footprint, axis=0))
+    """Whether two boxes have all sides in common that tell anything, two at least."""
+    off_px = [abs(box[i] - now[i]) for i, end in ((0, camera.width), (2, camera.width), (3, camera.height))
+              if BORDER_PX < now[i] < end - BORDER_PX]
+    return len(off_px) >= 2 and max(off_px) <= FIXED_PX

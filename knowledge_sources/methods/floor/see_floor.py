@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats, Ints
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.features.picture import compute_mean_and_deviation, is_dark, read_picture
 from knowledge_sources.methods.floor.appearance import (
     MAX_CHROMA_ERROR,
     compute_looks,
@@ -125,7 +125,7 @@ def see_free_floor(
     grid = build_floor_grid(robot.camera, robot.mount, height_m, SIGHT_PART * SIGHT_M)
     eye = pose @ Pose2(robot.mount.forward_m, 0.0, 0.0)
     shown = read_picture(jpeg)
-    if grid is None or shown.is_dark(settings.goal):
+    if grid is None or is_dark(*compute_mean_and_deviation(shown.grey), settings.goal):
         return _blind(locale, eye, seen_s), ()
     sigma_rad = math.sqrt(max(float(covariance[2, 2]), 0.0))
     margin_px = MODEL_MARGIN_PX + 2.0 * sigma_rad * robot.camera.fx
