@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import islice
 
@@ -20,8 +20,6 @@ from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import active_goal, find_robot, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.settings import Settings
-from world_models.camera import Camera
 from world_models.entries.floor import FreeFloor
 from world_models.entries.obstacle import Obstacle, Obstruction
 from world_models.entries.percepts import Segments
@@ -64,14 +62,16 @@ class ObstructionFinder(RobotKnowledgeSource):
         yield from case
 
     def _find_change(self, view: View) -> Effect | None:
-        """The obstruction in the last looks, as an effect where the board does not say it."""
+        """The obstruction in all of the last looks, or in fewer, as it may be new; to be said, or None."""
         looks, known = _list_last_looks(view, self._settings.plan.max_obstruction_looks), view.latest(Obstruction)
         views = [CameraView(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
                  for s, heading_rad in looks]
         if len(views) < MIN_OBSTRUCTION_LOOKS:
             return None
-        camera = find_robot(view).camera
-        now = _find_in_last_looks(views, camera, None if known is None else known.value, self._settings)
+        camera, before = find_robot(view).camera, None if known is None else known.value
+        found = (update_obstruction(views[:number], camera, before, MIN_OBSTRUCTION_PART)
+                 for number in range(len(views), MIN_OBSTRUCTION_LOOKS - 1, -1))
+        now = next((one for one in found if one is not None), None)
         return to_say(known, now, (*(s for s, _ in looks), *(() if known is None else (known,))))
 
 
@@ -98,18 +98,6 @@ def _take_back(view: View, found: Entry[Obstruction]) -> Iterable[Effect]:
         if sights and all(is_behind(box, found.value) for _, box in sights):
             gone = replace(entry.value, status="gone", certainty=0.0, evidence=told)
             yield Revise(entry, gone, (found, entry, *dict.fromkeys(look for look, _ in sights)))
-
-
-def _find_in_last_looks(
-    views: Sequence[CameraView], camera: Camera, known: Obstruction | None, settings: Settings
-) -> Obstruction | None:
-    """The obstruction that all looks show; else that fewer of the last ones show, as it may be new."""
-    for number in range(len(views), MIN_OBSTRUCTION_LOOKS - 1, -1):
-        found = update_obstruction(
-            views[:number], camera, known, MIN_OBSTRUCTION_PART)
-        if found is not None:
-            return found
-    return None
 
 
 def _list_last_looks(view: View, most: int) -> list[tuple[Entry[Segments], float]]:

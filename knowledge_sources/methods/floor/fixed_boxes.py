@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import numpy as np
 import shapely
 
 from knowledge_sources.methods.motion.footprints import build_polygon
@@ -39,18 +38,17 @@ def find_fixed(thing: FloorThing, earlier: Iterable[Sequence[FloorThing]], camer
 
 
 def enclose(boxes: Sequence[Box], known: Obstruction | None) -> Obstruction:
-    """The obstruction that takes all of the boxes, and what is known of it where that is beside them."""
-    whole = shapely.box(*np.min(boxes, axis=0)[:2], *np.max(boxes, axis=0)[2:])
-    if known is not None and shapely.distance(whole, build_polygon(known.outline_px)) <= ROUND_PX:
-        whole = shapely.convex_hull(shapely.union(whole, build_polygon(known.outline_px)))
+    """The obstruction that takes all of the boxes, and what is known of it."""
+    corners = [(u, v) for left, top, right, bottom in boxes for u in (left, right) for v in (top, bottom)]
+    whole = build_polygon([*corners, *(() if known is None else known.outline_px)])
     return Obstruction(tuple((float(u), float(v)) for u, v in shapely.get_coordinates(whole)[:-1]))
 
 
 def is_behind(box: Box, obstruction: Obstruction) -> bool:
     """Whether a box of the picture lies within what is before the camera."""
     left, top, right, bottom = box
-    points = np.stack(np.meshgrid(np.linspace(left, right, 9), np.linspace(top, bottom, 9)), axis=-1)
-    return bool(np.mean(obstruction.covers(points, ROUND_PX)) >= MIN_HIDDEN)
+    across = [[(left, top), (right, bottom)], [(left, bottom), (right, top)]]
+    return bool(obstruction.hidden_part(across, ROUND_PX).mean() >= MIN_HIDDEN)
 
 
 def _is_same(box: Box, now: Box, camera: Camera) -> bool:

@@ -37,7 +37,6 @@ from knowledge_sources.methods.floor.standing_regions import (
     drop_specks,
     find_footprint,
     find_regions,
-    is_on_the_lens,
     measure_height,
 )
 from knowledge_sources.settings import DEFAULT, FloorSettings, Settings
@@ -390,7 +389,7 @@ def _build_thing(
     region: StandingRegion, grid: FloorGrid, robot: RobotModel, pose: Pose2, covariance: Floats,
     reliefs: Sequence[Relief], unlike: NDArray[np.bool_], settings: FloorSettings,
 ) -> FloorThing | None:
-    """What stands where a region is; None where it is lower than what is rolled over, or no thing but on the lens."""
+    """What stands where a region is; None where it is lower than what is rolled over."""
     height_m, sigma_height_m = measure_height(region, grid)
     if height_m < MAX_ROLLED_OVER_M and math.isfinite(sigma_height_m):
         return None
@@ -400,8 +399,6 @@ def _build_thing(
     odds = p_before / (1.0 - p_before)
     how = "it looks like the floor" if looks_like_floor else "it does not look like the floor"
     if reliefs:
-        if is_on_the_lens(region, reliefs[0]):
-            return None
         asked = reliefs if looks_like_floor else reliefs[:1]
         told = math.prod(compute_parallax_odds(region, relief, grid) for relief in asked)
         odds *= told
