@@ -58,8 +58,7 @@ MIN_DRIFT_STRETCH_M = 0.3  # shortest stretch of way from which the drift of the
 class CorrelatorTracker(RobotKnowledgeSource):
     """Follows landmarks from frame to frame, corrects the belief by them, and posts the size of the correction.
 
-    Landmarks that are not where they are expected put the belief in doubt. So do pictures without any landmark, while
-    the floor is nowhere seen free where the model has floor: the robot may be elsewhere.
+    Pictures without any landmark put the belief in doubt, where none of the model's floor is seen free in them either.
     """
 
     level, priority = Level.ACTION, Priority.CORRECT

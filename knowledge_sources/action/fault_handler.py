@@ -14,9 +14,9 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import NOT_GIVEN_UP
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import OPEN_FAULT, find_stop
+from knowledge_sources.questions import EMERGENCY_STOPS, OPEN_FAULT, find_stop, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import STOP_KEY, BodyFault, Course, MotorCommand, Recovery, Ride
+from world_models.entries.body import STOP_KEY, BodyFault, Course, MotorCommand, PictureRequest, Recovery, Ride
 from world_models.entries.obstacle import Contact
 from world_models.entries.task import Impasse
 from world_models.entries.user_reports import GO_ON, Redirection
@@ -45,10 +45,11 @@ class FaultHandler(RobotKnowledgeSource):
     """
 
     level = Level.ACTION
-    on = (Watch(BodyFault, (Posted, Revised)), Watch(Recovery, (Revised,), lambda r: r.status != "asked"),
-          Watch(Contact, (Posted,)), Watch(Redirection, (Revised,), lambda asked: asked.text == GO_ON))
+    on = (Watch(BodyFault, (Posted,)), Watch(BodyFault, (Revised,), lambda f: f.what in EMERGENCY_STOPS),
+          Watch(Recovery, (Revised,), lambda r: r.status != "asked"), Watch(Contact, (Posted,)),
+          Watch(Redirection, (Revised,), lambda asked: asked.text == GO_ON))
     needs = (NOT_GIVEN_UP,)
-    writes = (BodyFault, Recovery, Discrepancy, Impasse)
+    writes = (BodyFault, Recovery, Discrepancy, Impasse, PictureRequest)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         """An open fault for which nobody waits, the oldest of them; else the stop after which nobody said go on."""
@@ -66,7 +67,7 @@ class FaultHandler(RobotKnowledgeSource):
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         (fault, recovery), s = case, self._settings.action
         if not case.is_of_fault:
-            yield _wait_for_word(fault, recovery, self._settings.plan.max_deviation_px)
+            yield _wait_for_word(view, fault, recovery, self._settings.plan.max_deviation_px)
             return
         f, asked = fault.value, None if recovery is None else recovery.value
         because = (fault,) if recovery is None else (fault, recovery)
@@ -107,9 +108,11 @@ class FaultHandler(RobotKnowledgeSource):
                        " commanded")
 
 
-def _wait_for_word(stop: Entry[Any], wait: Entry[Recovery] | None, bound_px: float) -> Effect:
-    """A wait for somebody to say go on; where it was said, a doubt."""
+def _wait_for_word(view: View, stop: Entry[Any], wait: Entry[Recovery] | None, bound_px: float) -> Effect:
+    """A wait for somebody to say go on; where it was said, a doubt, or of a robot that is lost the next look."""
     if isinstance(stop.value, Redirection):
+        if open_discrepancy(view, Level.GOAL) is not None:
+            return Post(PictureRequest("probe"), (stop,))
         return Post(Discrepancy(Level.PLAN, "it was told to go on", None, (bound_px, bound_px), "px"), (stop,))
     if wait is None:
         return Post(Recovery(stop.id, "", stop.value.when_s, WORD_WAIT_S), (stop,))

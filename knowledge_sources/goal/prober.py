@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from blackboard.board import View
-from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.level import Level
@@ -17,7 +17,6 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.while_lost import WHILE_LOST
 from world_models.entries.body import MotorCommand
 from world_models.entries.location import PlaceSearch
-from world_models.entries.user_reports import GO_ON, Redirection
 
 
 class Case(NamedTuple):
@@ -32,15 +31,12 @@ class Prober(RobotKnowledgeSource):
 
     level = closes = Level.GOAL
     priority = Priority.RECOVER
-    on = (Watch(PlaceSearch, (Posted,)), Watch(Redirection, (Revised,), lambda asked: asked.text == GO_ON))
+    on = (Watch(PlaceSearch, (Posted,), lambda search: search.status == "probe" and search.probe is not None),)
     needs = (*WHILE_LOST, SOUND)
     writes = (MotorCommand,)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        search, last = view.latest(PlaceSearch), view.latest(MotorCommand)
-        if search is None or search.value.probe is None or (last is not None and search.ref in last.because):
-            return None
-        return Case(search, LOST.of(view))
+    def bind(self, view: View, trigger: Change) -> Case:
+        return Case(trigger.entry, LOST.of(view))
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         s, (turn_rad, move_m) = self._settings.action, case.search.value.probe or (0.0, 0.0)

@@ -330,8 +330,7 @@ def test_after_a_touch_that_the_model_explains_it_moves_away_from_it_once(
     """The way leads along a wall; the robot touched, and has turned since."""
     pose, bench = Pose2(3.0, 0.36, 0.0), Bench(plain_robot())
     belief, leg = bench.believe(pose), bench.leg(bench.sketch(Place(HALL, 1.5, 0.36), Place(HALL, 6.5, 0.36)))
-    command, _ = bench.move(0.0, 0.3)
-    contact = bench.put(Contact("bumper", math.radians(direction_deg), 0.15, 1.0), command)
+    contact = bench.put(Contact("bumper", math.radians(direction_deg), 0.15, 1.0), bench.move(0.0, 0.3)[0])
     for turn_rad, move_m in ((turned_rad, 0.0), (-turned_rad, gone_m)):
         bench.revise(bench.view["Hypothesis-1"], motion=bench.move(turn_rad, move_m)[1].id)
     bench.put(scan_floor(find_floor(house(), [HALL]), to_world(pose), HALL, near_m=0.05, forward_m=0.0, half_rad=3.1,
