@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from itertools import islice
 from statistics import median
 
 import numpy as np
@@ -17,17 +16,18 @@ import numpy as np
 from blackboard.board import View
 from blackboard.change import Change, Posted, Watch
 from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import HELD, MEASURED, NOT_LOST, PICTURE, Belief
 from knowledge_sources.followed_landmarks import (
     Following,
     Renewed,
+    find_missing_floors,
     find_near_frames,
     post_or_revise,
     rectify,
     take_new,
+    tell_worst,
     with_anchors,
 )
 from knowledge_sources.methods.arrays import Image
@@ -43,7 +43,6 @@ from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_robot, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries.body import CameraPicture
-from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Anchor, Track, Tracks
 from world_models.entries.robot_state import Drift
@@ -51,15 +50,11 @@ from world_models.entries.robot_state import Drift
 MIN_LANDMARKS = 5  # with fewer tracked landmarks than this, new ones are always taken
 ENOUGH_LANDMARKS = 9  # with this many tracked landmarks or more, no new ones are taken
 MIN_REMAINING_PART = 0.5  # between these two, new landmarks are taken below this part of those at the last renewal
-MAX_UNSEEN = 3  # after so many pictures without a landmark, and as many looks at no free floor, the place is in doubt
 MIN_DRIFT_STRETCH_M = 0.3  # shortest stretch of way from which the drift of the wheels is learnt (§3.2)
 
 
 class CorrelatorTracker(RobotKnowledgeSource):
-    """Follows landmarks from frame to frame, corrects the belief by them, and posts the size of the correction.
-
-    Pictures without any landmark put the belief in doubt, where none of the model's floor is seen free in them either.
-    """
+    """Follows landmarks from frame to frame, corrects the belief by them, and posts the size of the correction."""
 
     level, priority = Level.ACTION, Priority.CORRECT
     closes = Level.ACTION
@@ -79,11 +74,10 @@ class CorrelatorTracker(RobotKnowledgeSource):
         corrected, agreeing = self._correct(held, seen, old.value.anchors) if seen and old is not None else (None, 0)
         expected = sum(1 for f in followed if f.expected)
         unseen = 0 if seen or old is None else old.value.unseen + 1
-        bare = _find_missing_floors(view) if unseen >= MAX_UNSEEN else ()
-        what = "" if not bare else (
-            f"no landmark was found in {unseen} pictures, and none of the floor is seen free where it should be")
+        bare = find_missing_floors(view, unseen)
+        what = f"no landmark in {unseen} pictures, and the floor is nowhere free where it should be" if bare else ""
         if expected >= s.action.min_expected_landmarks and agreeing < s.action.min_agreeing_part * expected:
-            what = f"{expected - agreeing} of {expected} landmarks are not where they were expected{_furthest(seen)}"
+            what = f"{expected - agreeing} of {expected} landmarks are not where they were expected{tell_worst(seen)}"
         if what:
             tracks = [f.track for f in followed]
             yield from self._post_discrepancy(view, what, math.inf, held, tracks, (*because, *bare))
@@ -144,12 +138,6 @@ class CorrelatorTracker(RobotKnowledgeSource):
             yield Post(found, because) if last is None else Revise(last, found, because)
 
 
-def _find_missing_floors(view: View) -> tuple[Entry[FreeFloor], ...]:
-    """The last looks at the floor, where each of them shows none of it free where the model has floor; else none."""
-    looks = tuple(islice((f for f in view.newest_first(FreeFloor) if f.value.sense == "camera"), MAX_UNSEEN))
-    return looks if len(looks) == MAX_UNSEEN and all(look.value.is_missing for look in looks) else ()
-
-
 def _learn_drift(view: View, before: Belief, belief: Hypothesis, correction: Revise) -> Iterable[Effect]:
     """Learn how the wheels drift, when the robot has gone far enough to tell."""
     drift = view.latest(Drift)
@@ -158,9 +146,3 @@ def _learn_drift(view: View, before: Belief, belief: Hypothesis, correction: Rev
     heading = belief.world_from_robot(before.world).heading_rad
     learnt = drift.value.update(before.robot.actuator, heading, math.sqrt(2.0) * belief.sigma_rad)
     yield Revise(drift, learnt, (drift, correction))
-
-
-def _furthest(seen: list[Track]) -> str:
-    """The landmark that is furthest from where it was expected, in words."""
-    off = [(math.dist(t.predicted_px, t.found_px), t.landmark) for t in seen if t.found_px is not None]
-    return f" ({max(off)[1]} is {max(off)[0]:.1f} px off)" if off else " (none of them is found)"

@@ -56,9 +56,9 @@ class FaultHandler(RobotKnowledgeSource):
         asked = {entry.value.fault: entry for entry in view.all(Recovery)}
         waiting = {id for id, entry in asked.items() if entry.value.status == "asked"}
         fault = next((entry for entry in view.having(OPEN_FAULT, True) if entry.id not in waiting), None)
-        stop = fault or find_stop(view)
-        if stop is None and isinstance(trigger.entry.value, Redirection):
-            return Case(trigger.entry, None)
+        stop, told = fault or find_stop(view), view.latest(Redirection, lambda asked: asked.text == GO_ON)
+        if stop is None and told is not None and told is trigger.entry:
+            return Case(told, None)
         return None if stop is None or stop.id in waiting else Case(stop, asked.get(stop.id))
 
     def rate(self, case: Case) -> float:
@@ -114,9 +114,8 @@ def _wait_for_word(view: View, stop: Entry[Any], wait: Entry[Recovery] | None, b
         if open_discrepancy(view, Level.GOAL) is not None:
             return Post(PictureRequest("probe"), (stop,))
         return Post(Discrepancy(Level.PLAN, "it was told to go on", None, (bound_px, bound_px), "px"), (stop,))
-    if wait is None:
-        return Post(Recovery(stop.id, "", stop.value.when_s, WORD_WAIT_S), (stop,))
-    return Revise(wait, replace(wait.value, status="asked"), (stop, wait))
+    return Post(Recovery(stop.id, "", stop.value.when_s, WORD_WAIT_S), (stop,)) if wait is None else Revise(
+        wait, replace(wait.value, status="asked"), (stop, wait))
 
 
 def _were_all_broken_off(view: View, times: int) -> bool:

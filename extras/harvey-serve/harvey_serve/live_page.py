@@ -45,7 +45,7 @@ class LivePage:
         return GatedBody(body, self.gate, tick)
 
     def ask(self, text: str) -> None:
-        """Send the robot elsewhere, in words, or after a stop on. Raises ValueError where it is ended or there is no such place."""
+        """Send the robot elsewhere, or on after a stop. Raises ValueError: it has ended, or no such place."""
         if self.live.ended:
             raise ValueError("expected a run that goes on, got one that has ended")
         if text.strip().lower() == GO_ON:
