@@ -82,8 +82,9 @@ def _find_new_touch(view: View) -> tuple[Entry[Contact], float, tuple[Entry[Moto
     contact = view.latest(Contact)
     if contact is None or any(o.value.touched_s == contact.value.when_s for o in view.all(Obstacle)):
         return None
-    since = view.since(MotorCommand, contact.cycle)
-    is_known = view.get(contact.because[0].id) is not None and not view.since(Course, contact.cycle)
-    if not is_known or any(command.value.move_m != 0.0 for command in since):
+    asked = contact.because[0].id  # of the same cycle as the contact, or the one before
+    since = tuple(command for command in view.since(MotorCommand, contact.cycle) if command.id != asked)
+    has_rolled = any(course.id != asked for course in view.since(Course, contact.cycle))
+    if view.get(asked) is None or has_rolled or any(command.value.move_m != 0.0 for command in since):
         return None
     return contact, math.fsum(command.value.turn_rad for command in since), since
