@@ -24,6 +24,7 @@ from knowledge_sources.questions import (
     find_building,
     find_robot,
     find_robot_in,
+    find_stop,
     is_given_up,
     is_in_doubt,
     is_over,
@@ -31,7 +32,6 @@ from knowledge_sources.questions import (
     is_up_to_date,
     open_discrepancies,
     open_discrepancy,
-    open_fault,
     open_milestone,
     rolling_course,
     unmeasured_doubt,
@@ -141,7 +141,7 @@ NOT_LOST = Condition("not lost", _none_open(_find_lost), _tell_open(_find_lost, 
 NO_DOUBT_ABOVE = Condition("no doubt above", lambda view: not _list_doubts_above(view), lambda view: (
     f"{', '.join(str(entry.ref) for entry in _list_doubts_above(view))} was open"))
 LOST = Condition("lost", _find_lost, "nothing was open at the goal level")
-SOUND = Condition("no fault", _none_open(open_fault), _tell_open(open_fault, "open"))
+SOUND = Condition("no fault", _none_open(find_stop), _tell_open(find_stop, "not over, or nobody has said go on since"))
 MILESTONE = Condition("a milestone awaited", open_milestone, "none was")
 NO_MILESTONE = Condition("no milestone awaited", _none_open(open_milestone), _tell_open(open_milestone, "awaited"))
 GOAL = Condition("a goal", active_goal, "none was pursued")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,6 +16,7 @@ from blackboard.board import View
 from blackboard.entry import Entry
 from knowledge_sources.conditions import Belief
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor.door_beside import take_as_jamb
 from knowledge_sources.methods.floor.seen_floor import (
     SPACING_M,
     Costs,
@@ -31,11 +33,13 @@ from knowledge_sources.methods.motion.footprints import build_free_floor, build_
 from knowledge_sources.methods.motion.increments import MAX_LOOK_ERROR_RAD, plan_turn
 from knowledge_sources.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings import ActionSettings, Settings
+from knowledge_sources.while_lost import locate_contact
+from world_models.building.building import Building
 from world_models.building.locales import EXTRA_KIND, Thing
 from world_models.entries.body import CameraPicture, MotionReport, MotorCommand, RideReport
 from world_models.entries.floor import FreeFloor
-from world_models.entries.location import Hypothesis
-from world_models.entries.obstacle import Obstacle
+from world_models.entries.location import Hypothesis, PlaceSearch
+from world_models.entries.obstacle import AROUND_SIGMA_RAD, Contact, Obstacle
 from world_models.entries.task import Goal, Leg, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
@@ -48,6 +52,9 @@ MIN_CREEP_M = 0.05  # shortest move into floor that was not seen to be free
 UNSURE_GAP_M = 0.3  # nearer to what is only suspected it creeps: what was seen of it may be a part of it
 TOUCHED_GAP_M = 0.02  # what was touched is not come so near to again
 TOUCHED_AWAY = 0.2  # nearer to it than that a move must lead away from it by this part of the way
+TOUCH_HOLDS_M = 0.5  # after so much of the way a touch that is no obstacle tells no more where not to go
+AWAY_M = 0.15  # length of the move away from what was touched
+AWAY_STEP_RAD = math.radians(15.0)  # of the directions that are tried for it
 MAX_DRIVEN_GAP_M = 0.8  # between two pictures that are no further apart the robot drove straight
 LOOK_AHEAD_M = 1.1  # so much of the way beyond a leg is looked at before it ends: what is too near to be seen then
 LOOK_FROM_M = 3.0  # distance from the end of a leg from which that begins
@@ -86,7 +93,8 @@ class FloorAhead:
         found = [shapely.Polygon(thing.footprint_world) for name in self._locales
                  for thing in self._robot.world.things_of(name) if thing.kind == EXTRA_KIND]
         self._asked = shapely.buffer(shapely.union_all([self._floor, *found]), -NEAR_MODEL_M)
-        self._suspected = _list_what_may_stand(view)
+        self._suspected = _list_what_may_stand(view, self._robot.world)
+        self._touches = _list_touches(view, self._here)
         self._scans = _find_scans(view, belief, settings)
         self._discs = list_free_discs(view, self._robot, self._here, self._scans)
         self._told = dict[str, Entry[Any]]()
@@ -130,11 +138,31 @@ class FloorAhead:
         wanted_m = actuator.reach * command.move_m
         caution = self.limit_move(wanted_m)
         if caution.creeps and caution.move_m < min(MIN_CREEP_M, wanted_m):
-            return leg, None
+            return leg, self._lead_away() if self._touches else None
         move_m = min(command.move_m, actuator.compute_command_m(caution.move_m))
         s = self._settings
         slowly = s.creep_speed_m_per_s if caution.creeps else None if caution.is_told else self.wary_m_per_s
         return leg, MotorCommand(command.turn_rad, move_m, slowly)
+
+    def _lead_away(self) -> MotorCommand | None:
+        """A turn and a short move away from what was touched, as near as may be to the way; None: there is no room.
+
+        So the next motion never repeats the one that ended in a touch, also where the model explains it.
+        """
+        here, (x_m, y_m) = self._here, self._way[1]
+        aim_rad = math.atan2(y_m - here.y_m, x_m - here.x_m)
+        walls = shapely.boundary(self._floor)
+        rim_m = min(self._robot.radius_m, shapely.distance(walls, shapely.Point(here.position)))
+        for turn_rad in sorted(np.arange(-math.pi, math.pi, AWAY_STEP_RAD).tolist(), key=abs):
+            heading_rad = aim_rad + turn_rad
+            there = here.x_m + AWAY_M * math.cos(heading_rad), here.y_m + AWAY_M * math.sin(heading_rad)
+            aside = copy.copy(self)
+            aside._way = [self._way[0], there]
+            if shapely.distance(walls, shapely.Point(there)) >= rim_m and aside.limit_move(AWAY_M).move_m >= AWAY_M:
+                turned_rad = wrap_angle(heading_rad - here.heading_rad)
+                move_m = self._robot.actuator.compute_command_m(AWAY_M)
+                return MotorCommand(turned_rad, move_m, self._settings.creep_speed_m_per_s)
+        return None
 
     @property
     def wary_m_per_s(self) -> float:
@@ -158,9 +186,9 @@ class FloorAhead:
         along = np.arange(0.0, most_m + step_m, step_m)
         points = shapely.line_interpolate_point(way, along)
         free_m = most_m
-        for entry, polygon in self._suspected:
-            if (touched and entry.value.touched_s is None) or (gap_m and entry.value.is_there):
-                continue
+        stands = [(entry, polygon) for entry, polygon in self._suspected
+                  if not ((touched and entry.value.touched_s is None) or (gap_m and entry.value.is_there))]
+        for entry, polygon in [*stands, *(self._touches if touched else ())]:
             gaps = shapely.distance(points, polygon)
             near_m, away_m = (TOUCHED_GAP_M, TOUCHED_AWAY * step_m) if touched else (gap_m, -1e-9)
             met = np.flatnonzero((gaps[1:] < self._robot.radius_m + near_m) & (gaps[1:] < gaps[:-1] + away_m))
@@ -170,8 +198,9 @@ class FloorAhead:
         return free_m
 
     def measure_free_m(self, most_m: float) -> float:
-        """How far towards the leg's end the floor is seen to be free."""
-        return measure_free_m(self._find_unseen(self._sweep(self._way, most_m)), most_m)
+        """How far towards the leg's end the floor is seen to be free, and leads not against what was touched."""
+        free_m = self._measure_to_things_m(most_m, touched=True)
+        return measure_free_m(self._find_unseen(self._sweep(self._way, free_m)), free_m)
 
     def choose_look(self) -> Lookout | None:
         """A look from here at floor that is needed behind the end of this leg, where it is the best place for that."""
@@ -232,12 +261,26 @@ def _list_taken(thing: Thing, overhang_m: float) -> Floats:
     return np.asarray(shapely.get_coordinates(wide)[:-1])
 
 
-def _list_what_may_stand(view: View) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
+def _list_what_may_stand(view: View, world: Building) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
     """What the robot does not creep into: all that what is suspected may take; of what is there what was seen of it,
-    as the sketcher leads through the rest only where nothing else is left.
+    as the sketcher leads through the rest only where nothing else is left. It does creep to what may be a jamb.
     """
     found = [(entry, entry.value) for entry in view.where(Obstacle, lambda o: o.status != "gone")]
-    return [(entry, build_polygon(o.core if o.is_there and o.core else o.footprint)) for entry, o in found]
+    taken = [(entry, o, take_as_jamb(world, o)) for entry, o in found]
+    return [(entry, build_polygon(jamb.core if jamb.core and (o.is_there or jamb is not o) else o.footprint))
+            for entry, o, jamb in taken]
+
+
+def _list_touches(view: View, here: Pose2) -> list[tuple[Entry[Contact], shapely.Point]]:
+    """Where something was touched on the last of the way, and is no obstacle: the model explains it, or may [world]."""
+    known = {obstacle.value.touched_s for obstacle in view.all(Obstacle)}
+    found = []
+    for contact in view.where(Contact, lambda touch: touch.sigma_rad < AROUND_SIGMA_RAD):
+        gone_m = math.fsum(report.value.move_m for report in view.since(MotionReport, contact.cycle)
+                           if report.because != contact.because)
+        if gone_m < TOUCH_HOLDS_M and contact.value.when_s not in known:
+            found.append((contact, shapely.Point(here.apply(locate_contact(view, contact)))))
+    return found
 
 
 def find_swept_next(belief: Belief, leg: Leg, settings: ActionSettings) -> shapely.Geometry:
@@ -312,11 +355,14 @@ def limit_move(unseen: Sweep, move_m: float, settings: ActionSettings) -> Cautio
 
 
 def _find_scans(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> tuple[Entry[FreeFloor], ...]:
-    """What the robot saw of the floor that it is on, the oldest first."""
+    """What the robot saw of the floor that it is on, the oldest first; only since it was last found, as it was seen
+    from elsewhere before.
+    """
     now_s = _tell_time_s(view)
-    ride = view.latest(RideReport)
+    ride, found = view.latest(RideReport), view.latest(PlaceSearch, lambda search: search.status == "found")
     since_s = max(now_s - settings.max_seen_age_s, -math.inf if ride is None else ride.value.sim_time_s)
-    return tuple(entry for entry in view.all(FreeFloor)
+    since = -1 if found is None else found.cycle
+    return tuple(entry for entry in view.since(FreeFloor, since)
                  if entry.value.seen_s >= since_s and _is_of(entry, belief))
 
 

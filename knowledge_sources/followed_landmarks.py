@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from itertools import islice
 from typing import NamedTuple
 
+from blackboard.board import View
 from blackboard.effect import Effect, Post, Revise
 from blackboard.entry import Entry
 from knowledge_sources.conditions import Belief
@@ -15,6 +17,7 @@ from knowledge_sources.methods.tracking.template_tracking import select_landmark
 from knowledge_sources.methods.verification.line_check import find_errors
 from knowledge_sources.settings import Settings
 from world_models.entries.body import CameraPicture
+from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis, covariance_tuple
 from world_models.entries.percepts import Anchor, Track, Tracks
 from world_models.frames import Pose2
@@ -28,6 +31,7 @@ MAX_TEMPLATE_DISTANCE_ROLLING_M = 0.8  # the same on the move, where many pictur
 MIN_EDGE_LENGTH_PX = 16.0  # shortest projected model edge that the belief is aligned with before templates are cut
 MIN_EDGE_CONTRAST = 0.05  # smallest contrast of such an edge
 MAX_EDGE_DISTANCE_M = 15.0  # largest distance of such an edge
+MAX_UNSEEN = 3  # after so many pictures without a landmark, and as many looks at no free floor, the place is in doubt
 
 
 class Renewed(NamedTuple):
@@ -99,3 +103,17 @@ class Following(NamedTuple):
     frame: Entry[CameraPicture]
     belief: Belief
     old: Entry[Tracks] | None
+
+
+def find_missing_floors(view: View, unseen: int) -> tuple[Entry[FreeFloor], ...]:
+    """The last looks at the floor, where each shows none of it free where the model has some, and no picture of as many
+    showed a landmark; else none.
+    """
+    looks = tuple(islice((f for f in view.newest_first(FreeFloor) if f.value.sense == "camera"), MAX_UNSEEN))
+    return looks if min(len(looks), unseen) >= MAX_UNSEEN and all(look.value.is_missing for look in looks) else ()
+
+
+def tell_worst(seen: list[Track]) -> str:
+    """The landmark that is furthest from where it was expected, in words."""
+    off = [(math.dist(t.predicted_px, t.found_px), t.landmark) for t in seen if t.found_px is not None]
+    return f" ({max(off)[1]} is {max(off)[0]:.1f} px off)" if off else " (none of them is found)"

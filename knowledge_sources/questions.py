@@ -18,7 +18,8 @@ from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Contact, Obstruction
 from world_models.entries.percepts import Tracks
 from world_models.entries.robot_state import CameraState, Footprint, Wheels
-from world_models.entries.task import Goal, Impasse, Leg, Milestone, Outcome, PlanSketch
+from world_models.entries.task import Command, Goal, Impasse, Leg, Milestone, Outcome, PlanSketch
+from world_models.entries.user_reports import GO_ON, Redirection
 from world_models.frame_building import FrameBuilding
 from world_models.robot import RobotModel
 
@@ -29,6 +30,8 @@ ACTIVE_SKETCH: Index[PlanSketch] = Index(PlanSketch, lambda s: s.goal if s.is_ac
 NOWHERE = FrameBuilding(Blackboard().view)
 """A building of which nothing is known."""
 
+EMERGENCY_STOPS = ("stopped", "base refuses")
+"""What drivers call a fault that a person may have made by the robot's stop."""
 OPEN_FAULT: Index[BodyFault] = Index(BodyFault, lambda f: f.is_open or None, "open")
 
 
@@ -198,9 +201,16 @@ def is_in_doubt(view: View) -> bool:
     return action is not None and action.value.exceeds
 
 
-def open_fault(view: View) -> Entry[BodyFault] | None:
-    """The fault of the body that is open; the robot does not move while there is one."""
-    return view.newest(OPEN_FAULT, True)
+def find_stop(view: View) -> Entry[Contact] | Entry[BodyFault] | None:
+    """Why the robot does not move: a fault of the body that is open; or, where the mission asks for that, a contact or
+    an emergency stop after which nobody has said go on yet.
+    """
+    fault, command = view.newest(OPEN_FAULT, True), view.latest(Command)
+    if fault is not None or command is None or not command.value.asks_to_restart:
+        return fault
+    told = view.latest(Redirection, lambda asked: asked.text == GO_ON)
+    stops = view.latest(Contact), view.latest(BodyFault, lambda fault: fault.what in EMERGENCY_STOPS)
+    return next((stop for stop in stops if stop is not None and (told is None or stop.cycle > told.cycle)), None)
 
 
 def is_over(view: View) -> bool:

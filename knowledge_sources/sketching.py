@@ -11,6 +11,7 @@ import shapely
 from blackboard.board import View
 from blackboard.effect import Effect, Revise
 from blackboard.entry import Entry
+from knowledge_sources.methods.floor.door_beside import take_as_jamb
 from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
 from knowledge_sources.questions import find_building, find_robot
@@ -30,14 +31,17 @@ Way = tuple[Subgoal, ...]
 
 
 def list_planners(view: View, settings: PlanSettings) -> list[SubgoalPlanner]:
-    """Planners in the order in which they are asked: round all that obstacles may take, then what is seen of them.
+    """Planners in the order in which they are asked: round all that obstacles may take, then what is seen of them, then
+    as if slivers in doorways were the jambs, which may stand a little beside: nothing so narrow blocks a way.
 
     Where the feet of an obstacle were not seen, the floor round it may be free: the robot drives as if it were, and
     only into what it then sees to be free.
     """
     robot, obstacles = find_robot(view), [entry.value for entry in find_obstacles(view)]
     ways = [False, *([True] if any(obstacle.core for obstacle in obstacles) else [])]
-    return [SubgoalPlanner(robot, settings, obstacles, by_cores=by_cores) for by_cores in ways]
+    planners = [SubgoalPlanner(robot, settings, obstacles, by_cores=by_cores) for by_cores in ways]
+    as_jambs = [take_as_jamb(robot.world, obstacle) for obstacle in obstacles]
+    return planners if as_jambs == obstacles else [*planners, SubgoalPlanner(robot, settings, as_jambs, by_cores=True)]
 
 
 def find_way(planners: Iterable[SubgoalPlanner], ask: Callable[[SubgoalPlanner], Way | None]) -> Way | None:

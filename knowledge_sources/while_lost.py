@@ -14,6 +14,7 @@ from blackboard.entry import Entry
 from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import GOING_ON, HELD, LOST, STANDING
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.features import picture
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.questions import find_robot
 from knowledge_sources.settings import GoalSettings
@@ -66,8 +67,8 @@ def locate_contact(view: View, contact: Entry[Contact]) -> Floats:
 
 
 def is_dark(segments: Segments, settings: GoalSettings) -> bool:
-    """Whether a picture is dark; a bright one without contrast shows a bare wall."""
-    return segments.contrast < settings.min_contrast and segments.brightness < settings.min_brightness
+    """Whether the picture of these segments is dark."""
+    return picture.is_dark(segments.brightness, segments.contrast, settings)
 
 
 def _has_just_ridden(view: View) -> bool:

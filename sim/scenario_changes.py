@@ -21,6 +21,7 @@ from world_models.building.locales import Doorway
 from world_models.building.world import World
 from world_models.commands import parse_destination
 from world_models.entries.location import Place
+from world_models.entries.user_reports import GO_ON
 from world_models.files.toml.settings_reader import suggest_keys
 from world_models.files.world_files import WorldError, load_world
 from world_models.units import FOOT_M
@@ -28,7 +29,7 @@ from world_models.units import FOOT_M
 
 def find_named_locales(scenario: Scenario, world: World) -> list[str]:
     """The locales that a scenario's faults name, and those where it is asked to go on the way."""
-    asked = [parse_destination(telling.goal, world).locale for telling in scenario.told if telling.goal]
+    asked = [parse_destination(told.goal, world).locale for told in scenario.told if told.goal not in ("", GO_ON)]
     return [*(name for fault in scenario.faults for _, name in _locale_keys(fault)), *asked]
 
 

@@ -16,7 +16,6 @@ from typing import Any, Protocol, runtime_checkable
 from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.journal import Sink
-from blackboard.scheduler import Scheduler
 from harvey.agent import build_agent
 from harvey.agent_settings import Pairs
 from harvey.errors import BadInput
@@ -30,13 +29,14 @@ from harvey.runner.replay import Live, ignore
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import Remains, continue_run
 from harvey.runner.run import Run
-from harvey.runner.teller import Tell, tell_nothing
+from harvey.runner.teller import LiveTeller, Tell, tell_each, tell_nothing
 from logs.records import EntryRecord, read_records
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import Extent, RunRecorder
 from world_models.building.world import World
 from world_models.entries.body import BodyFault, CameraPicture
+from world_models.entries.user_reports import GO_ON
 from world_models.robot import RobotModel
 
 Around = Callable[[HardwareBody, Callable[[], None]], Body]
@@ -73,16 +73,11 @@ def drive(
                       scenario=mission.source.data, folder=str(mission.folder.resolve()), constants=settings)
     files = RunDirectory(out)
     eye = WatchedCamera(camera, clock, mission.camera.rate_hz)
-    tells = [tell]
     if isinstance(base, AccompaniedBase):
         sink, told = base.accompany(head.load_world(), robot)
-        sinks, tells = (*sinks, sink), [tell, told]
+        sinks, tell = (*sinks, sink), tell_each(tell, told)
 
-    def tell_all(scheduler: Scheduler) -> None:
-        for one in tells:
-            one(scheduler)
-
-    with _hardware_run(mission, head, base, eye, clock, files, sinks, live, around=around, tell=tell_all) as run:
+    with _hardware_run(mission, head, base, eye, clock, files, sinks, live, around=around, tell=tell) as run:
         return run.drive(files)
 
 
@@ -112,13 +107,13 @@ def _hardware_run(
     tell: Tell = tell_nothing,
 ) -> Iterator[Run]:
     """A run whose body can be stopped by a key, and whose base hears a heartbeat; closes the base."""
-    body = HardwareBody(base, eye, clock=clock, ranges=mission.ranges.read)
+    body, person = HardwareBody(base, eye, clock=clock, ranges=mission.ranges.read), LiveTeller()
     try:
         agent = build_agent(head)
-        with stop_key(body.stop_for_good), Heartbeat(base) as heartbeat:
+        with stop_key(body.stop_for_good, go_on=lambda: person.hear(GO_ON)), Heartbeat(base) as heartbeat:
             recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, whole=whole, sync=True)
             yield Run(head, agent, around(body, heartbeat.tick), recorder, limits=mission.limits, clock=clock,
-                      sinks=sinks, told=mission.told, tell=tell, before_cycle=heartbeat.tick)
+                      sinks=sinks, told=mission.told, tell=tell_each(person.tell, tell), before_cycle=heartbeat.tick)
     finally:
         base.close()
 

@@ -81,8 +81,10 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
-def stop_key(stop: Callable[[str], None], terminal: int | None = None) -> Iterator[None]:
-    """Calls ``stop`` with the reason, from a thread of its own, at a key or a signal.
+def stop_key(
+    stop: Callable[[str], None], terminal: int | None = None, go_on: Callable[[], None] = lambda: None
+) -> Iterator[None]:
+    """Calls ``stop`` with the reason, from a thread of its own, at a key or a signal; ``go_on`` at the key g.
 
     The terminal gives single keys meanwhile, and is restored afterwards. A signal that comes a second time has its
     usual effect. Only the main thread can receive signals.
@@ -92,7 +94,7 @@ def stop_key(stop: Callable[[str], None], terminal: int | None = None) -> Iterat
     """
     fd = terminal if terminal is not None else _standard_input()
     wake_out, wake_in = os.pipe()
-    listener = threading.Thread(target=_listen, args=(fd, wake_out, stop), name="stop key", daemon=True)
+    listener = threading.Thread(target=_listen, args=(fd, wake_out, stop, go_on), name="stop key", daemon=True)
     with _single_keys(fd), _signals(wake_in):
         listener.start()
         try:
@@ -104,7 +106,7 @@ def stop_key(stop: Callable[[str], None], terminal: int | None = None) -> Iterat
         os.close(end)
 
 
-def _listen(fd: int | None, wake: int, stop: Callable[[str], None]) -> None:
+def _listen(fd: int | None, wake: int, stop: Callable[[str], None], go_on: Callable[[], None]) -> None:
     """Until a zero byte comes down the pipe; a signal sends its number."""
     ends = [wake] if fd is None else [wake, fd]
     while True:
@@ -118,6 +120,8 @@ def _listen(fd: int | None, wake: int, stop: Callable[[str], None]) -> None:
             data = os.read(fd, 1)
             if not data:
                 ends.remove(fd)
+            elif data == b"g":
+                go_on()
             elif (key := KEYS.get(data.decode("latin-1"))) is not None:
                 stop(f"stopped by the {key} key")
 

@@ -20,6 +20,14 @@ def tell_nothing(_scheduler: Scheduler) -> None:
     """Nobody tells anything."""
 
 
+def tell_each(*tells: Tell) -> Tell:
+    """One after the other."""
+    def tell_all(scheduler: Scheduler) -> None:
+        for tell in tells:
+            tell(scheduler)
+    return tell_all
+
+
 class Teller:
     """Puts what is due on the board. How much was told the board itself says, so a run that goes on tells the rest."""
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from statistics import median
 
 import numpy as np
@@ -21,10 +22,12 @@ from knowledge_sources.conditions import HELD, MEASURED, NOT_LOST, PICTURE, Beli
 from knowledge_sources.followed_landmarks import (
     Following,
     Renewed,
+    find_missing_floors,
     find_near_frames,
     post_or_revise,
     rectify,
     take_new,
+    tell_worst,
     with_anchors,
 )
 from knowledge_sources.methods.arrays import Image
@@ -71,16 +74,20 @@ class CorrelatorTracker(RobotKnowledgeSource):
         because = (frame, belief) if old is None else (frame, belief, old)
         corrected, agreeing = self._correct(held, seen, old.value.anchors) if seen and old is not None else (None, 0)
         expected = sum(1 for f in followed if f.expected)
+        unseen = 0 if seen or old is None else old.value.unseen + 1
+        bare = find_missing_floors(view, unseen)
+        what = f"no landmark in {unseen} pictures, and the floor is nowhere free where it should be" if bare else ""
         if expected >= s.action.min_expected_landmarks and agreeing < s.action.min_agreeing_part * expected:
-            what = f"{expected - agreeing} of {expected} landmarks are not where they were expected{_furthest(seen)}"
+            what = f"{expected - agreeing} of {expected} landmarks are not where they were expected{tell_worst(seen)}"
+        if what:
             tracks = [f.track for f in followed]
-            yield from self._post_discrepancy(view, what, math.inf, held, tracks, because)
+            yield from self._post_discrepancy(view, what, math.inf, held, tracks, (*because, *bare))
             yield post_or_revise(old, Tracks(frame.id, s.tracking.template_half_px, ()), because)
             return
         if agreeing < s.action.min_agreeing_landmarks:
             corrected = None  # nothing bears out that it is not something else that looks the same
         renewed = self._renew(case, image, followed, corrected or belief.value)
-        tracked = post_or_revise(old, renewed.tracks, because)
+        tracked = post_or_revise(old, replace(renewed.tracks, unseen=unseen), because)
         yield tracked
         if corrected is None and renewed.hypothesis is belief.value:
             return
@@ -141,9 +148,3 @@ def _learn_drift(view: View, before: Belief, belief: Hypothesis, correction: Rev
     heading = belief.world_from_robot(before.world).heading_rad
     learnt = drift.value.update(before.robot.actuator, heading, math.sqrt(2.0) * belief.sigma_rad)
     yield Revise(drift, learnt, (drift, correction))
-
-
-def _furthest(seen: list[Track]) -> str:
-    """The landmark that is furthest from where it was expected, in words."""
-    off = [(math.dist(t.predicted_px, t.found_px), t.landmark) for t in seen if t.found_px is not None]
-    return f" ({max(off)[1]} is {max(off)[0]:.1f} px off)" if off else " (none of them is found)"

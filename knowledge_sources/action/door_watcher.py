@@ -22,7 +22,7 @@ from knowledge_sources.doors_in_view import (
 from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.doors.belief import update_door
 from knowledge_sources.methods.doors.leaf import describe, measure_opening, predict_opening, weigh_leaf
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.features.picture import compute_mean_and_deviation, is_dark, read_picture
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -45,7 +45,7 @@ class DoorWatcher(RobotKnowledgeSource):
     It looks at pictures as long as the belief is trusted: at those that track landmarks, and at those by which a
     milestone was verified. An opening shows what the model has beyond, or a leaf. That adds to the log odds of the
     door; at stated odds, by pictures from two places at least, the door is shut, and the sketcher draws another way.
-    One that is believed to be shut and shows what is beyond is open again.
+    One that is believed to be shut and shows what is beyond is open again. A dark picture tells nothing of doors.
     """
 
     level, priority = Level.ACTION, Priority.SEE
@@ -66,6 +66,8 @@ class DoorWatcher(RobotKnowledgeSource):
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         picture = read_picture(case.frame.value.jpeg)
+        if is_dark(*compute_mean_and_deviation(picture.grey), self._settings.goal):
+            return
         for watched in case.doors:
             yield from self._watch(view, watched, case.belief, case.frame, picture.half)
 

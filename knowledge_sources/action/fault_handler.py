@@ -14,41 +14,61 @@ from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.conditions import NOT_GIVEN_UP
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import OPEN_FAULT
+from knowledge_sources.questions import EMERGENCY_STOPS, OPEN_FAULT, find_stop, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import STOP_KEY, BodyFault, Course, MotorCommand, Recovery, Ride
+from world_models.entries.body import STOP_KEY, BodyFault, Course, MotorCommand, PictureRequest, Recovery, Ride
+from world_models.entries.obstacle import Contact
 from world_models.entries.task import Impasse
+from world_models.entries.user_reports import GO_ON, Redirection
+
+WORD_WAIT_S = 1.0  # so long it waits before it looks again whether somebody has said go on
 
 
 class Case(NamedTuple):
-    """A fault, and the recovery that was in vain so far or has ended it; None where none was asked for yet."""
+    """A fault, a stop, or the word to go on after it; and the recovery in vain so far, or that has ended it, if any."""
 
-    fault: Entry[BodyFault]
+    fault: Entry[Any]
     recovery: Entry[Recovery] | None
+
+    @property
+    def is_of_fault(self) -> bool:
+        return isinstance(self.fault.value, BodyFault) and self.fault.value.is_open
 
 
 class FaultHandler(RobotKnowledgeSource):
     """Asks for recovery from a fault of the body, each time after twice the pause; closes one that is over.
 
     After the stop key, and after ``max_fault_s``, there is no way on. An elevator that does not come is no fault of the
-    robot: then it is blocked. A motion that was broken off puts the belief in doubt: a milestone must be verified
-    before the robot moves on. After ``max_broken_motions`` motions in a row that were broken off there is no way on.
+    robot: then it is blocked. After a contact or an emergency stop it waits to be told to go on, if the mission wants
+    that; then, as after a motion that was broken off, the belief is in doubt: a milestone must be verified before the
+    robot moves on. After ``max_broken_motions`` motions in a row that were broken off there is no way on.
     """
 
-    level, priority = Level.ACTION, Priority.ENTER
-    on = (Watch(BodyFault, (Posted,)), Watch(Recovery, (Revised,), lambda r: r.status != "asked"))
+    level = Level.ACTION
+    on = (Watch(BodyFault, (Posted,)), Watch(BodyFault, (Revised,), lambda f: f.what in EMERGENCY_STOPS),
+          Watch(Recovery, (Revised,), lambda r: r.status != "asked"), Watch(Contact, (Posted,)),
+          Watch(Redirection, (Revised,), lambda asked: asked.text == GO_ON))
     needs = (NOT_GIVEN_UP,)
-    writes = (BodyFault, Recovery, Discrepancy, Impasse)
+    writes = (BodyFault, Recovery, Discrepancy, Impasse, PictureRequest)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
-        """An open fault for which nobody waits, the oldest of them."""
+        """An open fault for which nobody waits, the oldest of them; else the stop after which nobody said go on."""
         asked = {entry.value.fault: entry for entry in view.all(Recovery)}
         waiting = {id for id, entry in asked.items() if entry.value.status == "asked"}
         fault = next((entry for entry in view.having(OPEN_FAULT, True) if entry.id not in waiting), None)
-        return None if fault is None else Case(fault, asked.get(fault.id))
+        stop, told = fault or find_stop(view), view.latest(Redirection, lambda asked: asked.text == GO_ON)
+        if stop is None and told is not None and told is trigger.entry:
+            return Case(told, None)
+        return None if stop is None or stop.id in waiting else Case(stop, asked.get(stop.id))
+
+    def rate(self, case: Case) -> float:
+        return Priority.ENTER if case.is_of_fault else Priority.MOVE  # it waits when nothing else is left to do
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         (fault, recovery), s = case, self._settings.action
+        if not case.is_of_fault:
+            yield _wait_for_word(view, fault, recovery, self._settings.plan.max_deviation_px)
+            return
         f, asked = fault.value, None if recovery is None else recovery.value
         because = (fault,) if recovery is None else (fault, recovery)
         if recovery is not None and asked is not None and asked.status == "over":
@@ -86,6 +106,16 @@ class FaultHandler(RobotKnowledgeSource):
                            f" come: {why}; it was called for {tried.waited_s:.0f} s")
         return Impasse("failed", f"{fault.what}, and it was not over after {tried.waited_s:.0f} s; nothing more is"
                        " commanded")
+
+
+def _wait_for_word(view: View, stop: Entry[Any], wait: Entry[Recovery] | None, bound_px: float) -> Effect:
+    """A wait for somebody to say go on; where it was said, a doubt, or of a robot that is lost the next look."""
+    if isinstance(stop.value, Redirection):
+        if open_discrepancy(view, Level.GOAL) is not None:
+            return Post(PictureRequest("probe"), (stop,))
+        return Post(Discrepancy(Level.PLAN, "it was told to go on", None, (bound_px, bound_px), "px"), (stop,))
+    return Post(Recovery(stop.id, "", stop.value.when_s, WORD_WAIT_S), (stop,)) if wait is None else Revise(
+        wait, replace(wait.value, status="asked"), (stop, wait))
 
 
 def _were_all_broken_off(view: View, times: int) -> bool:

@@ -46,7 +46,8 @@ class FloorWatcher(RobotKnowledgeSource):
     It says how far the floor is free in each direction, and what ends it: something of the model, or a thing that the
     model lacks. What the floor of a locale looks like it learns from where the robot has just driven. Some pictures are
     kept to compare later ones with: what stands up from the floor moves otherwise than the floor. While the robot's
-    place is in doubt, or not known well, it does not look: it could not tell a wall from a thing.
+    place is in doubt, or not known well, it does not look: it could not tell a wall from a thing. In the dark it sees
+    none of the floor, and no thing.
     """
 
     level, priority = Level.ACTION, Priority.SEE
@@ -90,7 +91,7 @@ class FloorWatcher(RobotKnowledgeSource):
         for appearance in learnt:
             old, because = known.get(appearance.locale), (frame, belief, *earlier)
             yield Post(appearance, because) if old is None else Revise(old, appearance, (*because, old))
-        if not kept or not _is_like(kept[0].value, pose):
+        if seen.bearings_rad and (not kept or not _is_like(kept[0].value, pose)):
             yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,
                                  frame.value.sim_time_s, belief.value.sigma_m, belief.value.sigma_rad,
                                  belief.value.motion), (frame, belief))

@@ -18,7 +18,7 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.commands import read_destination
 from world_models.entries.location import Place
 from world_models.entries.task import Goal, Milestone
-from world_models.entries.user_reports import Redirection
+from world_models.entries.user_reports import GO_ON, Redirection
 
 
 class Case(NamedTuple):
@@ -54,6 +54,9 @@ class GoalChanger(RobotKnowledgeSource):
         building = find_building(view)
         for earlier in overtaken:
             yield Revise(earlier, replace(earlier.value, answer="but was asked again since"), (earlier, asked))
+        if asked.value.text == GO_ON:
+            yield Revise(asked, replace(asked.value, answer="and does"), (asked,))
+            return
         try:
             destination = read_destination(asked.value.text, building, building.find_rooms)
         except ValueError as error:

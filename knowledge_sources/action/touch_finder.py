@@ -21,9 +21,8 @@ from knowledge_sources.methods.floor.weigh_touch import (
 )
 from knowledge_sources.methods.motion.routes import find_nearest
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import last_motion
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import MotorCommand
+from world_models.entries.body import Course, MotorCommand
 from world_models.entries.location import Hypothesis
 from world_models.entries.obstacle import Contact, Obstacle
 
@@ -55,11 +54,12 @@ class TouchFinder(RobotKnowledgeSource):
     def bind(self, view: View, trigger: Change) -> Case | None:
         """The newest contact, where its direction is known well enough and the model does not explain it."""
         touch, belief, s = _find_new_touch(view), HELD.of(view), self._settings.action
-        if touch is None or touch.contact.value.sigma_rad > MAX_TOUCH_SIGMA_RAD:
+        if touch is None or touch[0].value.sigma_rad > MAX_TOUCH_SIGMA_RAD:
             return None
-        radius_m, b, because = belief.robot.radius_m, belief.value, (*touch.because, belief.entry)
-        touched = locate_touch(belief.pose, radius_m, touch.contact.value, touch.turned_rad)
-        sigma_m = math.hypot(b.sigma_m, radius_m * math.hypot(b.sigma_rad, touch.contact.value.sigma_rad))
+        contact, turned_rad, turns = touch
+        radius_m, b, because = belief.robot.radius_m, belief.value, (contact, *turns, belief.entry)
+        touched = locate_touch(belief.pose, radius_m, contact.value, turned_rad)
+        sigma_m = math.hypot(b.sigma_m, radius_m * math.hypot(b.sigma_rad, contact.value.sigma_rad))
         reach_m = TOUCH_MARGIN_M + 3.0 * b.sigma_m
         obstacles = {entry.id: entry for entry in view.all(Obstacle)}
         id = find_touched({id: o.value for id, o in obstacles.items()}, touched, reach_m + 3.0 * sigma_m)
@@ -75,32 +75,16 @@ class TouchFinder(RobotKnowledgeSource):
         yield Post(found, because) if known is None else Revise(known, found, because)
 
 
-class _Touch(NamedTuple):
-    """A contact, and what the robot has turned since.
-
-    Attributes:
-        because: the contact and the turns.
+def _find_new_touch(view: View) -> tuple[Entry[Contact], float, tuple[Entry[MotorCommand], ...]] | None:
+    """The newest contact, if no obstacle rests on it yet and the robot stands where it touched: it has only turned; by
+    how much [rad], and by which commands.
     """
-
-    contact: Entry[Contact]
-    turned_rad: float
-    because: tuple[Entry[Any], ...]
-
-
-def _find_new_touch(view: View) -> _Touch | None:
-    """The newest contact, if no obstacle rests on it yet and the robot stands where it touched: it has only turned."""
-    contact, last = view.latest(Contact), last_motion(view)
-    if contact is None or last is None or any(o.value.touched_s == contact.value.when_s for o in view.all(Obstacle)):
+    contact = view.latest(Contact)
+    if contact is None or any(o.value.touched_s == contact.value.when_s for o in view.all(Obstacle)):
         return None
-    turned_rad, because = 0.0, list[Entry[Any]]([contact])
-    if last.id != contact.because[0].id:
-        for command in view.newest_first(MotorCommand):
-            if command.id == contact.because[0].id:
-                break
-            if command.value.move_m != 0.0:
-                return None
-            turned_rad += command.value.turn_rad
-            because.append(command)
-        else:
-            return None
-    return _Touch(contact, turned_rad, tuple(because))
+    asked = contact.because[0].id  # of the same cycle as the contact, or the one before
+    since = tuple(command for command in view.since(MotorCommand, contact.cycle) if command.id != asked)
+    has_rolled = any(course.id != asked for course in view.since(Course, contact.cycle))
+    if view.get(asked) is None or has_rolled or any(command.value.move_m != 0.0 for command in since):
+        return None
+    return contact, math.fsum(command.value.turn_rad for command in since), since

@@ -11,7 +11,7 @@ from blackboard.effect import Effect, Post
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
-from knowledge_sources.conditions import LOST
+from knowledge_sources.conditions import LOST, SOUND
 from knowledge_sources.priority import Priority
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.while_lost import WHILE_LOST
@@ -32,7 +32,7 @@ class Prober(RobotKnowledgeSource):
     level = closes = Level.GOAL
     priority = Priority.RECOVER
     on = (Watch(PlaceSearch, (Posted,), lambda search: search.status == "probe" and search.probe is not None),)
-    needs = WHILE_LOST
+    needs = (*WHILE_LOST, SOUND)
     writes = (MotorCommand,)
 
     def bind(self, view: View, trigger: Change) -> Case:

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
 from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, to_say
+from blackboard.change import Change, Posted, Revised, Watch
+from blackboard.effect import Effect, Revise, to_say
 from blackboard.entry import Entry
 from blackboard.level import Level
+from knowledge_sources.methods.floor.fixed_boxes import enclose, find_fixed, is_behind
+from knowledge_sources.methods.floor.found_things import may_be_there
 from knowledge_sources.methods.localization.views import CameraView, update_obstruction
+from knowledge_sources.methods.motion.footprints import build_polygon
 from knowledge_sources.priority import Priority
 from knowledge_sources.questions import active_goal, find_robot, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.settings import Settings
-from world_models.camera import Camera
-from world_models.entries.obstacle import Obstruction
+from world_models.entries.floor import FreeFloor
+from world_models.entries.obstacle import Obstacle, Obstruction
 from world_models.entries.percepts import Segments
 from world_models.frames import Pose2
 
@@ -29,46 +32,72 @@ MIN_OBSTRUCTION_PART = 0.04  # smallest part of the picture that an obstruction 
 class ObstructionFinder(RobotKnowledgeSource):
     """Finds what is at the same place in pictures taken in several directions: it is before the camera.
 
-    It acts when a milestone was not testable or the belief is in doubt, before the new picture is judged. While the
-    robot is lost, the panorama builder does the same with its own pictures.
+    It acts when a milestone was not testable or the belief is in doubt, before the new picture is judged; and when what
+    seems to stand on the floor keeps its place in the picture. While the robot is lost, the panorama builder does the
+    same with its own pictures. Things on the floor that were seen nowhere but there are taken back.
     """
 
     level, priority = Level.PLAN, Priority.REVISE
-    on = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
-    writes = (Obstruction,)
+    on = (
+        Watch(Segments, (Posted,), lambda s: s.milestone != ""),
+        Watch(FreeFloor, (Posted,), lambda f: f.sense == "camera" and bool(f.things)),
+        Watch(Obstruction, (Posted, Revised)),
+    )
+    writes = (Obstruction, Obstacle)
 
-    def bind(self, view: View, trigger: Change) -> Effect | None:
-        """The change of what the board says of an obstruction; None where there is none."""
-        milestone = view.get(trigger.entry.value.milestone)
-        if milestone is None or not (milestone.value.tried or unmeasured_doubt(view) is not None):
-            return None
-        return self._find_change(view)
+    def bind(self, view: View, trigger: Change) -> tuple[Effect, ...] | None:
+        """The change of what the board says of an obstruction, or of what was seen in it; None where there is none."""
+        value, change = trigger.entry.value, None
+        if isinstance(value, Obstruction):
+            return tuple(_take_back(view, trigger.entry)) or None
+        if isinstance(value, FreeFloor):
+            change = _find_fixed_box(view, trigger.entry)
+        else:
+            milestone = view.get(value.milestone)
+            if milestone is not None and (milestone.value.tried or unmeasured_doubt(view) is not None):
+                change = self._find_change(view)
+        return None if change is None else (change,)
 
-    def act(self, view: View, case: Effect) -> Iterable[Effect]:
-        yield case
+    def act(self, view: View, case: tuple[Effect, ...]) -> Iterable[Effect]:
+        yield from case
 
     def _find_change(self, view: View) -> Effect | None:
-        """The obstruction in the last looks, as an effect where the board does not say it."""
+        """The obstruction in all of the last looks, or in fewer, as it may be new; to be said, or None."""
         looks, known = _list_last_looks(view, self._settings.plan.max_obstruction_looks), view.latest(Obstruction)
         views = [CameraView(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
                  for s, heading_rad in looks]
         if len(views) < MIN_OBSTRUCTION_LOOKS:
             return None
-        camera = find_robot(view).camera
-        now = _find_in_last_looks(views, camera, None if known is None else known.value, self._settings)
+        camera, before = find_robot(view).camera, None if known is None else known.value
+        found = (update_obstruction(views[:number], camera, before, MIN_OBSTRUCTION_PART)
+                 for number in range(len(views), MIN_OBSTRUCTION_LOOKS - 1, -1))
+        now = next((one for one in found if one is not None), None)
         return to_say(known, now, (*(s for s, _ in looks), *(() if known is None else (known,))))
 
 
-def _find_in_last_looks(
-    views: Sequence[CameraView], camera: Camera, known: Obstruction | None, settings: Settings
-) -> Obstruction | None:
-    """The obstruction that all looks show; else that fewer of the last ones show, as it may be new."""
-    for number in range(len(views), MIN_OBSTRUCTION_LOOKS - 1, -1):
-        found = update_obstruction(
-            views[:number], camera, known, MIN_OBSTRUCTION_PART)
-        if found is not None:
-            return found
+def _find_fixed_box(view: View, now: Entry[FreeFloor]) -> Effect | None:
+    """The obstruction that a look at the floor shows with earlier ones, where the board does not say it."""
+    known, camera = view.latest(Obstruction), find_robot(view).camera
+    looks = [entry for entry in view.newest_first(FreeFloor) if entry.value.sense == "camera" and entry is not now]
+    for thing in now.value.things:
+        fixed = find_fixed(thing, (look.value.things for look in looks), camera)
+        if fixed and (known is None or not is_behind(thing.box_px, known.value)):
+            found = enclose([thing.box_px, *fixed.values()], None if known is None else known.value)
+            because = (now, *(looks[number] for number in fixed), *(() if known is None else (known,)))
+            return to_say(known, found, because)
     return None
+
+
+def _take_back(view: View, found: Entry[Obstruction]) -> Iterable[Effect]:
+    """Things that rest on nothing but sights within an obstruction are gone."""
+    told = f"all that was seen of it is {found.ref}, which is before the camera"
+    for entry in view.where(Obstacle, lambda o: may_be_there(o) and o.by == "camera" and o.touched_s is None):
+        polygon = build_polygon(entry.value.footprint)
+        sights = [(look, thing.box_px) for look in view.all(FreeFloor) for thing in look.value.things
+                  if build_polygon(thing.footprint).intersects(polygon)]
+        if sights and all(is_behind(box, found.value) for _, box in sights):
+            gone = replace(entry.value, status="gone", certainty=0.0, evidence=told)
+            yield Revise(entry, gone, (found, entry, *dict.fromkeys(look for look, _ in sights)))
 
 
 def _list_last_looks(view: View, most: int) -> list[tuple[Entry[Segments], float]]:

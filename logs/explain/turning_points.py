@@ -187,7 +187,7 @@ def _turn(value: Any, is_new: bool, cycle: int, get: Get, believed: Believed, wa
     elif isinstance(value, Resumed):
         yield TurningPoint(cycle, "resumed", f"after cycle {value.after_cycle}, where the run was cut off")
     elif isinstance(value, UserReport | Redirection) and value.answer:
-        said = f"{value.what} is {value.state}" if isinstance(value, UserReport) else f"to go elsewhere: {value.text}"
+        said = f"{value.what} is {value.state}" if isinstance(value, UserReport) else value.asked
         yield TurningPoint(cycle, "told", f"{said}; {value.answer}")
     elif isinstance(value, Outcome):
         yield TurningPoint(cycle, "the end", f"{value.kind}: {value.reason}")

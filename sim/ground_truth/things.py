@@ -106,9 +106,6 @@ SHAPES: Mapping[str, tuple[Piece, ...]] = {
 }
 
 
-ROLLED_OVER = ("mat",)
-"""What is so low that it stops nobody."""
-
 
 def build_thing(
     kind: str, name: str, locale: str, world_from_thing: Pose, colour: tuple[float, ...] = ()

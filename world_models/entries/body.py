@@ -249,7 +249,7 @@ class Recovery:
     """The wish that a fault be over: wait, then try to have the request answered after all.
 
     Attributes:
-        fault: id of the fault entry; request: id of the request that it kept from being answered.
+        fault: id of the fault, or of a stop; request: id of the request that was not answered, "" after a stop.
         since_s: when the fault was noticed, by the body's clock.
         wait_s: how long to wait before the next try.
         tries: how many there were.
@@ -269,6 +269,8 @@ class Recovery:
     detail: str = ""
 
     def sentence(self) -> str:
+        if not self.request:
+            return f"waits for somebody to say go on after {self.fault}, {self.waited_s:.1f} s so far"
         if self.status == "asked":
             tries = words.count(self.tries, "try", "tries")
             return f"waits {self.wait_s:.2f} s and tries again; to have {self.request} answered, {tries} so far"

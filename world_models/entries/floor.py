@@ -81,6 +81,12 @@ class FreeFloor:
     light: Light | None = None
     told_m: tuple[float, ...] = ()
 
+    @property
+    def is_missing(self) -> bool:
+        """Whether the model has floor in most of the directions that were looked in, and none of it is seen free."""
+        is_free = any(far > near for near, far in zip(self.near_m, self.far_m, strict=True))
+        return not is_free and 2 * sum(end != "model" for end in self.ends) > len(self.ends)
+
     def sentence(self) -> str:
         far = [far for near, far in zip(self.near_m, self.far_m, strict=True) if far > near]
         free = "nowhere seen to be free"

@@ -109,6 +109,7 @@ class Tracks:
         items: the tracks.
         anchors: one for each frame in which templates of these tracks were cut.
         taken: how many there were when new ones were last taken.
+        unseen: in how many pictures, the last ones, none was found.
     """
 
     frame: str
@@ -116,6 +117,7 @@ class Tracks:
     items: tuple[Track, ...]
     anchors: tuple[Anchor, ...] = ()
     taken: int = 0
+    unseen: int = 0
 
     def sentence(self) -> str:
         cut = [track for track in self.items if track.template_frame == self.frame]

@@ -40,12 +40,14 @@ class Command:
         start_heading_rad: heading in the first locale's frame.
         arrival_heading_rad: heading wanted at the end, in the last locale's frame; None for any.
         start_covariance: how well it was put down, in the first locale's frame.
+        asks_to_restart: whether after a contact or an emergency stop somebody has to say go on.
     """
 
     text: str
     start_heading_rad: float
     arrival_heading_rad: float | None
     start_covariance: Covariance
+    asks_to_restart: bool = False
 
     def sentence(self) -> str:
         arrival = "" if self.arrival_heading_rad is None else (

@@ -30,13 +30,17 @@ class UserReport:
         return f"was told that {self.what} is {self.state}" + f"; {self.answer}" * bool(self.answer)
 
 
+GO_ON = "go on"
+"""What somebody says who asks for no other goal, but lets the robot start again after a stop."""
+
+
 @observation()
 @dataclass(frozen=True, slots=True)
 class Redirection:
-    """Somebody asks the robot, on its way, to go elsewhere.
+    """Somebody asks the robot, on its way, to go elsewhere, or after a stop to go on.
 
     Attributes:
-        text: where to: "Go to the library", "library", or ``(library (6,10,0))``, feet in the locale's frame.
+        text: where to: "Go to the library", "library", ``(library (6,10,0))``, feet in the locale's frame; or "go on".
         by: who asks: "user" where the mission's file says so, "live page" while the run goes on.
         answer: what became of it, in words; "" until it was taken up.
     """
@@ -45,5 +49,9 @@ class Redirection:
     by: str = "user"
     answer: str = ""
 
+    @property
+    def asked(self) -> str:
+        return f"to {GO_ON}" if self.text == GO_ON else f"to go elsewhere: {self.text}"
+
     def sentence(self) -> str:
-        return f"was asked to go elsewhere: {self.text}" + f"; {self.answer}" * bool(self.answer)
+        return f"was asked {self.asked}" + f"; {self.answer}" * bool(self.answer)

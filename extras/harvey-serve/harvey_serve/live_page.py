@@ -19,6 +19,7 @@ from harvey_serve.server import bind, serving
 from world_models.building.world import World
 from world_models.camera import Camera
 from world_models.commands import parse_destination
+from world_models.entries.user_reports import GO_ON
 
 
 @dataclass(frozen=True)
@@ -44,9 +45,12 @@ class LivePage:
         return GatedBody(body, self.gate, tick)
 
     def ask(self, text: str) -> None:
-        """Send the robot elsewhere, in words. Raises ValueError where it is ended or there is no such place."""
+        """Send the robot elsewhere, or on after a stop. Raises ValueError: it has ended, or no such place."""
         if self.live.ended:
             raise ValueError("expected a run that goes on, got one that has ended")
+        if text.strip().lower() == GO_ON:
+            self.teller.hear(GO_ON)
+            return
         place = parse_destination(text, self.world)
         if self.part and self.part not in self.world.path_of(place.locale):
             raise ValueError(f"expected a room in {self.part}, as only that is simulated here, got {place.locale}")

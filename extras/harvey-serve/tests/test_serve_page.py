@@ -197,6 +197,8 @@ def test_where_it_cannot_go_it_is_not_sent(text: str, part: str, wanted: str) ->
                     load_world(FLAT), part)
     with pytest.raises(ValueError, match=wanted):
         live.ask(text)
+    live.ask(" Go on")
+    assert teller._said.get_nowait().text == "go on"
     ended = LivePage(page.live, page.gate, teller, load_world(FLAT))
     page.live.take()
     with pytest.raises(ValueError, match="one that has ended"):

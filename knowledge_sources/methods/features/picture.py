@@ -19,6 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats32, Image
+from knowledge_sources.settings import GoalSettings
 from world_models.camera import Camera
 
 NOISE_ROWS = 64  # rows of an image, about, on which its pixel noise is estimated
@@ -148,6 +149,11 @@ def compute_mean_and_deviation(image: Image) -> tuple[float, float]:
     """Mean and standard deviation of the grey levels of an image (h, w)."""
     mean, deviation = cv2.meanStdDev(image)
     return float(mean[0, 0]), float(deviation[0, 0])
+
+
+def is_dark(brightness: float, contrast: float, settings: GoalSettings) -> bool:
+    """Whether a picture of this mean and deviation is dark; a bright one without contrast shows a bare wall."""
+    return contrast < settings.min_contrast and brightness < settings.min_brightness
 
 
 def estimate_noise_sigma(image: Floats32) -> float:

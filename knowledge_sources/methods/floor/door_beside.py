@@ -6,17 +6,21 @@ sight in the directions of such an end alone is that end, and not anything from 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.motion.footprints import build_polygon, measure_common_directions
+from knowledge_sources.methods.motion.footprints import build_polygon, list_corners, measure_common_directions
 from world_models.building.building import Building
 from world_models.building.locales import Doorway
+from world_models.entries.obstacle import Obstacle
 
+JAMB_M = 0.002  # a jamb that stands where the model has it reaches no further into the opening
 MAX_BESIDE_M = 0.15  # a jamb stands at most so far beside: 10 cm, with its casing
+MAX_SLIVER_M = 0.3  # what is narrower, at a jamb, may be the jamb itself, until it is touched
 MIN_EXPLAINED = 0.8  # least part of the directions of a sight that such a jamb explains
 
 
@@ -48,10 +52,25 @@ def find_jamb_beside(
     return None if best is None else best[1]
 
 
-def _list_ends(doorway: Doorway, locale: str) -> list[shapely.Polygon]:
+def take_as_jamb(world: Building, obstacle: Obstacle) -> Obstacle:
+    """An obstacle that is seen to take no more than the model's jamb does, where it may be a jamb that stands beside;
+    else the obstacle as it is.
+    """
+    if obstacle.width_m >= MAX_SLIVER_M or obstacle.touched_s is not None:
+        return obstacle
+    shape = build_polygon(obstacle.footprint)
+    for doorway in world.doorways_of(obstacle.locale):
+        ends = (_list_ends(doorway, obstacle.locale, into_m) for into_m in (MAX_BESIDE_M, JAMB_M))
+        for beside, jamb in zip(*ends, strict=True):
+            if beside.intersects(shape):
+                return replace(obstacle, core=list_corners(jamb))
+    return obstacle
+
+
+def _list_ends(doorway: Doorway, locale: str, into_m: float = MAX_BESIDE_M) -> list[shapely.Polygon]:
     """Both ends of the wall, as far as they may reach into an opening, through the wall."""
     near, far = doorway.threshold_of(locale), doorway.threshold_of(doorway.other(locale))[::-1]
-    into = MAX_BESIDE_M / doorway.width_m * (near[1] - near[0])
+    into = into_m / doorway.width_m * (near[1] - near[0])
     return [build_polygon([a, a + step, b + step, b])
             for a, b, step in ((near[0], far[0], into), (near[1], far[1], -into))]
 

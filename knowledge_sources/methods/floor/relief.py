@@ -22,7 +22,7 @@ from world_models.camera import NEAR_PLANE_M, Camera, CameraMount
 from world_models.frames import Pose2
 
 Grey = NDArray[np.float32]
-UNTOLD, FLAT, STANDING, FIXED = range(4)
+UNTOLD, FLAT, STANDING = range(3)
 
 HALF = 3
 """Patches are squares of 2 HALF + 1 pixels of the reduced picture."""
@@ -149,8 +149,7 @@ class Relief:
     """What an earlier picture tells of the pixels of a grid.
 
     Attributes:
-        kinds: (rows, columns) UNTOLD, FLAT (on the floor, or mirrored in it, or of the model), STANDING, or FIXED (on
-            the lens).
+        kinds: (rows, columns) UNTOLD, FLAT (on the floor, or mirrored in it, or of the model), or STANDING.
         parts: (rows, columns) how far what stands is, as a part of the distance of the floor that it hides; above 1
             what is mirrored in the floor; else 1.
         gains_px: (rows, columns) what is at a part p of that distance was ``gain * (1 / p - 1)`` from where the floor
@@ -236,12 +235,8 @@ def find_relief(
         least = max(MIN_AGREEING * np.count_nonzero(asked & ~stands), MIN_BESIDE_THINGS * np.count_nonzero(asked))
     if agreeing < least:
         return None
-    still = _shifted(np.eye(3), np.array([0.0, both.grid.top]))
-    fixed = sweep.compare(still)
-    fixed[_measure_apart(sweep.place(still) - flat) < MIN_APART_PX] = -1.0
     kinds = np.zeros(sweep.shape, np.uint8)
-    for kind, own, other in ((FLAT, lying, np.maximum(standing, fixed)), (STANDING, standing, np.maximum(lying, fixed)),
-                             (FIXED, fixed, np.maximum(lying, standing))):
+    for kind, own, other in ((FLAT, lying, standing), (STANDING, standing, lying)):
         kinds[sweep.tells & (own >= MIN_ALIKE) & (own - other >= MIN_LEAD)] = kind
     kinds[(kinds == STANDING) & (sweep.measure_texture_along(away) < MIN_ALONG)] = UNTOLD
     if modelled is not None:

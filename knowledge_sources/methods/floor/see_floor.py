@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats, Ints
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.features.picture import compute_mean_and_deviation, is_dark, read_picture
 from knowledge_sources.methods.floor.appearance import (
     MAX_CHROMA_ERROR,
     compute_looks,
@@ -37,7 +37,6 @@ from knowledge_sources.methods.floor.standing_regions import (
     drop_specks,
     find_footprint,
     find_regions,
-    is_on_the_lens,
     measure_height,
 )
 from knowledge_sources.settings import DEFAULT, FloorSettings, Settings
@@ -60,6 +59,7 @@ MIN_TINTED_SHARE = 0.6  # share of what should be floor that must look alike, to
 MAX_TINT = 0.12  # largest difference from the floor's colour, in its parts of red and blue, in a tinted picture
 MODEL_MARGIN_PX = 3.0  # pixels so near to an edge of the model tell nothing; the belief's uncertainty comes on top
 P_SEEN_ONCE = 0.7  # probability that what does not look like the floor stands on it, before parallax tells
+MAX_P_SEEN_ONCE = 0.95  # no picture alone makes a thing more certain, whatever it shows
 P_LIKE_FLOOR = 0.015  # the same of what looks like the floor, and seems to stand up from it
 MIN_UNLIKE_SHARE = 0.2  # of a region of which less than that does not look like the floor, all is said to look like it
 TOLD_HEIGHT_M = 0.3  # what looks like the floor is said to be told where something so high would be
@@ -123,14 +123,15 @@ def see_free_floor(
     height_m = robot.mount.height_m - floor_m
     grid = build_floor_grid(robot.camera, robot.mount, height_m, SIGHT_PART * SIGHT_M)
     eye = pose @ Pose2(robot.mount.forward_m, 0.0, 0.0)
-    if grid is None:
+    shown = read_picture(jpeg)
+    if grid is None or is_dark(*compute_mean_and_deviation(shown.grey), settings.goal):
         return _blind(locale, eye, seen_s), ()
     sigma_rad = math.sqrt(max(float(covariance[2, 2]), 0.0))
     margin_px = MODEL_MARGIN_PX + 2.0 * sigma_rad * robot.camera.fx
     sigma_m = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0))
     model = predict_model_floor(
         robot, pose, grid, floor_m, MAX_ROLLED_OVER_M, margin_px, 2.0 * sigma_m * robot.camera.fx)
-    picture = read_picture(jpeg).rectified_half(robot.lens, robot.camera)
+    picture = shown.rectified_half(robot.lens, robot.camera)
     known = appearances.get(locale)
     if robot.camera.obstruction is not None:  # its looks are those of no floor
         model = model.behind(robot.camera.obstruction.covers(grid.pixels, MODEL_MARGIN_PX))
@@ -388,7 +389,7 @@ def _build_thing(
     region: StandingRegion, grid: FloorGrid, robot: RobotModel, pose: Pose2, covariance: Floats,
     reliefs: Sequence[Relief], unlike: NDArray[np.bool_], settings: FloorSettings,
 ) -> FloorThing | None:
-    """What stands where a region is; None where it is lower than what is rolled over, or no thing but on the lens."""
+    """What stands where a region is; None where it is lower than what is rolled over."""
     height_m, sigma_height_m = measure_height(region, grid)
     if height_m < MAX_ROLLED_OVER_M and math.isfinite(sigma_height_m):
         return None
@@ -398,8 +399,6 @@ def _build_thing(
     odds = p_before / (1.0 - p_before)
     how = "it looks like the floor" if looks_like_floor else "it does not look like the floor"
     if reliefs:
-        if is_on_the_lens(region, reliefs[0]):
-            return None
         asked = reliefs if looks_like_floor else reliefs[:1]
         told = math.prod(compute_parallax_odds(region, relief, grid) for relief in asked)
         odds *= told
@@ -421,7 +420,8 @@ def _build_thing(
     return FloorThing(
         footprint=tuple((round(float(x), 3), round(float(y), 3)) for x, y in world),
         sigma_m=round(math.hypot(spread, own), 4),
-        height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3), p_thing=round(odds / (1.0 + odds), 4),
+        height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3),
+        p_thing=min(MAX_P_SEEN_ONCE, round(odds / (1.0 + odds), 4)),
         box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut,
         is_alike=looks_like_floor)
 
@@ -451,5 +451,5 @@ def _learn(
 
 
 def _blind(locale: str, eye: Pose2, seen_s: float) -> FreeFloor:
-    """Nothing is seen of the floor: the camera looks over it."""
+    """Nothing is seen of the floor: the camera looks over it, or it is dark."""
     return FreeFloor("camera", locale, eye.x_m, eye.y_m, (), (), (), (), (), (), seen_s)

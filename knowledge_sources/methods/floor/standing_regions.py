@@ -15,7 +15,7 @@ from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.methods.floor.model_floor import SIGHT_M, FloorGrid
-from knowledge_sources.methods.floor.relief import FIXED, FLAT, STANDING, UNTOLD, Relief
+from knowledge_sources.methods.floor.relief import FLAT, STANDING, UNTOLD, Relief
 
 MIN_THING_PIXELS = 10  # smallest region, in pixels of half the picture's size
 SEEN_DEPTH_M = 0.05  # depth of a foot
@@ -227,7 +227,6 @@ CLEAR, FEW, MOST_CLEAR = 20, 6, 1.5
 MIN_STANDING_SHARE, MIN_FLAT_SHARE = 0.6, 0.8
 """Least shares of the pixels that tell, by which a region is said to stand or to lie flat."""
 LOW_TOP_M = 0.08  # the top of what is low, but not rolled over
-MIN_FIXED = 6  # fewest pixels that stay in the picture, by which a region is on the lens
 
 
 def compute_parallax_odds(region: StandingRegion, relief: Relief, grid: FloorGrid) -> float:
@@ -249,16 +248,6 @@ def compute_parallax_odds(region: StandingRegion, relief: Relief, grid: FloorGri
         return 1.0
     odds = (P_TOLD / (1.0 - P_TOLD)) ** min(MOST_CLEAR, told / CLEAR)
     return float(odds if stand > flat else 1.0 / odds)
-
-
-def is_on_the_lens(region: StandingRegion, relief: Relief) -> bool:
-    """Whether a region stayed where it is in the picture while the robot moved: it is on the lens or before it.
-
-    So it must be told from what lies on the floor there and from what stands there, by most of its border that tells.
-    """
-    kinds = relief.kinds[_widen(region.mask)]
-    fixed = np.count_nonzero(kinds == FIXED)
-    return bool(fixed >= MIN_FIXED and fixed > 2 * np.count_nonzero((kinds == FLAT) | (kinds == STANDING)))
 
 
 def _widen(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -53,11 +53,6 @@ class Why(Logger):
             stream.log(WHY, rr.TextDocument, text=[text])
 
 
-def thoughts(board: View) -> str:
-    """The text, as markdown: a headline, then a short paragraph a theme, none where there is nothing to say."""
-    return compose({title: tell(board) for title, (tell, *_) in THOUGHTS.items()})
-
-
 def compose(told: Mapping[str, str]) -> str:
     """Paragraphs in the order of the themes; the beginning of each is its title."""
     parts = [f"**{title}** {text.removeprefix(title.lower()).lstrip()}" if title else f"### {text}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard.entry import Entry
-from generated_boards import HALL, HOUSE, STUDY, Bench, plain_robot, to_world
+from generated_boards import HALL, HOUSE, STUDY, Bench, house, plain_robot, to_world
+from ideal_floor_watcher import scan_floor
 from knowledge_sources import floor_ahead
 from knowledge_sources.floor_ahead import (
     LOOK_FROM_M,
@@ -23,12 +25,12 @@ from knowledge_sources.floor_ahead import (
     _find_way_beyond,
     list_free_discs,
 )
-from knowledge_sources.methods.floor.seen_floor import Lookout
+from knowledge_sources.methods.floor.seen_floor import Lookout, find_floor
 from knowledge_sources.questions import find_robot
 from knowledge_sources.settings import DEFAULT
 from world_models.building.locales import EXTRA_KIND
 from world_models.entries.floor import FloorSense, FreeFloor
-from world_models.entries.location import Place
+from world_models.entries.location import Place, PlaceSearch
 from world_models.entries.task import Subgoal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
@@ -145,6 +147,16 @@ def test_from_so_near_it_looks_at_what_is_behind_the_end_so_often(
         found = FloorAhead(bench.view, leg, belief, DEFAULT).choose_look()
         assert bool(asked) == asks
         assert (found is look) == (asks and (is_new or looked == 0))
+
+
+@pytest.mark.parametrize(("status", "is_free"), [("probe", True), ("found", False)])
+def test_floor_that_was_seen_before_it_was_found_elsewhere_tells_nothing(status: Any, is_free: bool) -> None:
+    bench, here = Bench(ROBOT), Pose2(3.0, 2.0, 0.0)
+    belief, leg = bench.believe(here), bench.leg(bench.sketch(Place(HALL, 1.0, 2.0), Place(HALL, 6.0, 2.0)))
+    scan = scan_floor(find_floor(house(), [HALL]), to_world(here), HALL, near_m=0.05, forward_m=0.0, half_rad=1.5)
+    for value, free in ((scan, True), (PlaceSearch(status, ""), is_free), (scan, True)):
+        bench.put(value, belief)
+        assert (FloorAhead(bench.view, leg.value, belief, DEFAULT).measure_free_m(1.0) == 1.0) == free
 
 
 RIDE = Subgoal(Place(HALL, 5.0, 2.0), Place(STUDY, 3.0, 2.0), primitive=False, passage="lift")

@@ -40,6 +40,7 @@ from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
 from world_models.entries.body import CameraPicture
+from world_models.entries.floor import FreeFloor
 from world_models.entries.location import Hypothesis, covariance_tuple, diagonal
 from world_models.entries.percepts import Anchor, Track, Tracks
 from world_models.entries.robot_state import Drift
@@ -102,7 +103,7 @@ def place_px(robot: RobotModel, pose: Pose2, track: Track) -> tuple[float, float
 
 def follow(
     found: int, hidden: int = 0, misses: int = 0, *, drift: Drift | None = None, doubt: Discrepancy | None = None,
-    taken: int | None = None,
+    taken: int | None = None, unseen: int = 0, floors: Sequence[FreeFloor] = (),
 ) -> list[Effect]:
     """What the tracker does where so many landmarks are followed and so many of them are not to be found."""
     seen = setting()
@@ -128,8 +129,8 @@ def follow(
           Post(CameraPicture(seen.before, 0, 0.0)))
     anchor = Anchor("CameraPicture-1", seen.start.x_m, seen.start.y_m, covariance_tuple(np.array(SURE)))
     apply(Post(Tracks("CameraPicture-1", DEFAULT.tracking.template_half_px, tuple(tracks), (anchor,),
-                      len(tracks) if taken is None else taken)))
-    for value in (drift, doubt):
+                      len(tracks) if taken is None else taken, unseen)))
+    for value in (drift, doubt, *floors):
         if value is not None:
             apply(Post(value))
     (picture,) = apply(Post(CameraPicture(compress_jpeg(image, 95), 1, 1.0, "track")))
@@ -165,6 +166,21 @@ def test_tracking_has_failed_where_enough_landmarks_are_expected_and_none_is_fou
     found = discrepancies(follow(0, hidden))
     has_failed = hidden >= ACTION.min_expected_landmarks
     assert [one.level for one in found if one.magnitude == math.inf] == [Level.ACTION] * has_failed
+
+
+BARE = FreeFloor("camera", ROOM, 0.0, 0.0, (0.0, 0.1), (1.0,) * 2, (0.0,) * 2, ("thing",) * 2, (0.1,) * 2, (), 1.0)
+DARK = replace(BARE, bearings_rad=(), near_m=(), far_m=(), ends=(), sigma_m=())
+
+
+@pytest.mark.parametrize(("found", "unseen", "last", "doubts"), [
+    (0, 2, BARE, True), (0, 1, BARE, False), (2, 2, BARE, False), (0, 2, DARK, False),
+    (0, 2, replace(BARE, far_m=(0.0, 2.0)), False), (0, 2, replace(BARE, ends=("model",) * 2), False)])
+def test_no_landmark_in_three_pictures_and_no_floor_where_it_should_be_is_a_doubt(
+    found: int, unseen: int, last: FreeFloor, doubts: bool
+) -> None:
+    effects = follow(found, unseen=unseen, floors=(BARE, BARE, last))
+    raised = [reasons(one) for one in effects if isinstance(one.value, Discrepancy) and one.value.exceeds]
+    assert [found >= {"FreeFloor-1", "FreeFloor-2", "FreeFloor-3"} for found in raised] == [True] * doubts
 
 
 def test_tracking_has_failed_where_too_small_a_part_of_them_agrees() -> None:

@@ -16,6 +16,7 @@ from blackboard.effect import Effect, Post, Revise
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from knowledge_sources.action.door_watcher import DoorWatcher
+from knowledge_sources.action.floor_watcher import FloorWatcher
 from knowledge_sources.doors_in_view import MAX_SIGMA_M, MAX_SIGMA_RAD
 from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_PICTURES, PRIOR_LOG_ODDS
 from sim.body.simulated_building import SimulatedBuilding
@@ -60,11 +61,11 @@ def stand(hall: Hall, away_m: float, aside_m: float, sigma_m: float = 0.01, sigm
     return pose
 
 
-def look(hall: Hall, building: SimulatedBuilding, pose: Pose2, time_s: float = 1.0) -> Any:
+def look(hall: Hall, building: SimulatedBuilding, pose: Pose2, time_s: float = 1.0, *, lights_on: bool = True) -> Any:
     """A picture from a pose."""
     radiance = building.renderer.radiance(hall.robot.lens, hall.robot.camera_from_world(pose))
     sensor = SensorParameters()
-    jpeg = compress_jpeg(expose(radiance, sensor, np.random.default_rng(1)), sensor.jpeg_quality)
+    jpeg = compress_jpeg(expose(radiance, sensor, np.random.default_rng(1), lights_on=lights_on), sensor.jpeg_quality)
     return hall.put(CameraPicture(jpeg, 0, time_s, "track"))
 
 
@@ -95,6 +96,17 @@ def test_it_looks_while_the_belief_is_sharp_and_not_in_doubt(
     for end in (Discrepancy(Level.PLAN, "elsewhere", None, (4.0, 30.0), "px"), Outcome("failed", "")):
         hall.put(end)
         assert ask(hall, frame) is None
+
+
+def test_in_the_dark_nothing_is_told_of_doors_nor_of_the_floor(
+    world: World, buildings: dict[bool, SimulatedBuilding]
+) -> None:
+    for lights_on in (False, True):
+        hall = Hall(world, ())
+        frame = look(hall, buildings[True], stand(hall, *PLACES[0]), lights_on=lights_on)
+        assert bool(ask(hall, frame)) == lights_on
+        scan, *views = [e.value for e in answer(FloorWatcher(), hall.board.view, Posted(frame)) or ()]
+        assert (bool(scan.bearings_rad), bool(views)) == (lights_on, lights_on) and not scan.things
 
 
 def test_what_is_as_it_is_believed_to_be_is_not_said(world: World, buildings: dict[bool, SimulatedBuilding]) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, get_args
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,7 +19,9 @@ from blackboard.effect import Post, Revise
 from blackboard.entry import Entry
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
+from generated_boards import Bench, made, plain_robot
 from knowledge_sources.action.fault_handler import FaultHandler
+from knowledge_sources.action.motor import Motor
 from knowledge_sources.settings import DEFAULT
 from world_models.entries.body import (
     STOP_KEY,
@@ -30,7 +33,10 @@ from world_models.entries.body import (
     RecoveryStatus,
     Ride,
 )
-from world_models.entries.task import Impasse, Outcome
+from world_models.entries.location import diagonal
+from world_models.entries.obstacle import Contact
+from world_models.entries.task import Command, Impasse, Outcome
+from world_models.entries.user_reports import GO_ON, Redirection
 
 SOURCE, S = FaultHandler(), DEFAULT.action
 MOST = S.max_broken_motions
@@ -60,6 +66,27 @@ def test_it_wakes_by_a_new_fault_and_by_a_try_in_vain() -> None:
     (change,) = board.apply([Post(BodyFault("base", "link lost", "", "", 1.0))], author="test", cycle=1)
     assert any(w.sees(Posted(change.entry)) for w in SOURCE.on)
     assert not any(w.sees(Revised(change.entry)) for w in SOURCE.on)
+
+
+@pytest.mark.parametrize("asks", [False, True])
+@pytest.mark.parametrize("stop", [
+    Contact("bumper", 0.0, 0.2, 3.0), BodyFault("base", "stopped", "", "", 3.0, status="over")])
+def test_after_a_stop_it_waits_until_somebody_says_go_on(asks: bool, stop: Any) -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    bench.put(Command("", 0.0, None, diagonal(0.01, 0.01), asks))
+    found, leg = bench.put(stop), bench.leg(bench.sketch())
+    effects = bench.ask(SOURCE, found)
+    assert (effects is not None) == asks and (bench.ask(Motor(), leg) is None) == asks
+    if effects is not None:
+        (wait,) = bench.apply(*effects)
+        assert wait.entry.value == Recovery(found.id, "", 3.0, 1.0) and bench.ask(SOURCE, found) is None
+        again = bench.ask(SOURCE, bench.revise(wait.entry, status="in vain"))
+        assert [value.status for value in made(again, Recovery)] == ["asked"]
+        told = bench.revise(bench.put(Redirection(GO_ON)), answer="and does")
+        assert [(d.level, d.magnitude) for d in made(bench.ask(SOURCE, told), Discrepancy)] == [(Level.PLAN, None)]
+        bench.doubt()
+        assert made(bench.ask(SOURCE, told), PictureRequest) == [PictureRequest("probe")]
 
 
 @given(faults, ends)

@@ -33,7 +33,7 @@ from generated_boards import (
 )
 from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.motor import Motor
-from knowledge_sources.floor_ahead import MIN_INCREMENT_M, UNSURE_GAP_M
+from knowledge_sources.floor_ahead import MIN_INCREMENT_M, TOUCH_HOLDS_M, UNSURE_GAP_M, FloorAhead
 from knowledge_sources.methods.floor.seen_floor import find_floor
 from knowledge_sources.methods.motion.increments import MAX_HEADING_ERROR_RAD, count_increment, plan_increment
 from knowledge_sources.methods.motion.pure_pursuit import MAX_START_OFFSET_M
@@ -41,7 +41,7 @@ from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.entries.body import MotorCommand
 from world_models.entries.location import Place
-from world_models.entries.obstacle import Obstacle
+from world_models.entries.obstacle import Contact, Obstacle
 from world_models.entries.robot_state import Drift
 from world_models.entries.task import Leg, Milestone, MilestoneStatus
 from world_models.frames import Pose2
@@ -319,6 +319,30 @@ def test_it_creeps_past_what_is_only_suspected_though_the_floor_is_seen_free(sus
     move_m, before_m = ACTUATOR.reach * command.move_m, suspected - 0.1 - plain_robot().radius_m
     assert (command.speed_m_per_s is None) == (before_m - UNSURE_GAP_M >= MIN_INCREMENT_M)
     assert move_m <= max(before_m - UNSURE_GAP_M, 0.0 if command.speed_m_per_s is None else before_m) + 0.05 + SMALL
+
+
+@pytest.mark.parametrize("direction_deg", [-100.0, -60.0, 0.0, 60.0])
+@pytest.mark.parametrize("turned_rad", [0.0, 0.4])
+@pytest.mark.parametrize("gone_m", [0.0, TOUCH_HOLDS_M])
+def test_after_a_touch_that_the_model_explains_it_moves_away_from_it_once(
+    direction_deg: float, turned_rad: float, gone_m: float
+) -> None:
+    """The way leads along a wall; the robot touched, and has turned since."""
+    pose, bench = Pose2(3.0, 0.36, 0.0), Bench(plain_robot())
+    belief, leg = bench.believe(pose), bench.leg(bench.sketch(Place(HALL, 1.5, 0.36), Place(HALL, 6.5, 0.36)))
+    contact = bench.put(Contact("bumper", math.radians(direction_deg), 0.15, 1.0), bench.move(0.0, 0.3)[0])
+    for turn_rad, move_m in ((turned_rad, 0.0), (-turned_rad, gone_m)):
+        bench.revise(bench.view["Hypothesis-1"], motion=bench.move(turn_rad, move_m)[1].id)
+    bench.put(scan_floor(find_floor(house(), [HALL]), to_world(pose), HALL, near_m=0.05, forward_m=0.0, half_rad=3.1,
+                         count=400), belief)
+    effects = bench.ask(Motor(), leg)
+    found, is_on = command_of(effects), abs(direction_deg) > 90.0 or gone_m > 0.0
+    free_m = FloorAhead(bench.view, leg.value, bench.view["Hypothesis-1"], DEFAULT).measure_free_m(1.0)
+    assert found is not None and free_m == (1.0 if is_on else 0.0)
+    assert found.is_creeping != is_on and (contact.id in reasons(effect_on(effects, MotorCommand))) != is_on
+    if not is_on:
+        assert math.cos(found.turn_rad - math.radians(direction_deg)) < -0.1 and found.move_m > 0.1
+        assert 0.36 + 0.15 * math.sin(found.turn_rad) > 0.35  # not against the wall
 
 
 def test_what_it_watches() -> None:

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from blackboard.change import Posted
+from blackboard.effect import Post
 from blackboard.entry import Entry
 from blackboard.level import Level
 from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
 from knowledge_sources.plan.obstruction_finder import MIN_OBSTRUCTION_LOOKS, ObstructionFinder
-from world_models.entries.obstacle import Obstruction
+from world_models.entries.floor import FloorThing, FreeFloor
+from world_models.entries.obstacle import Obstacle, Obstruction
 from world_models.entries.percepts import Segments
 
 SOURCE = ObstructionFinder()
@@ -71,6 +73,30 @@ def test_what_the_last_looks_show_counts(first: str) -> None:
     shown = [FRAME, FRAME, FRAME, bare, bare] if first == "with it" else [bare, bare, FRAME, FRAME, FRAME]
     last = [look(bench, number, sides) for number, sides in enumerate(shown)][-1]
     assert bool(made(bench.ask(SOURCE, last), Obstruction)) == (first == "without it")
+
+
+LENS = FloorThing((), 0.1, 0.4, 0.1, 0.95, (60.0, 90.0, 251.0, 200.0), "unlike the floor")
+
+
+@pytest.mark.parametrize("shifts", [(0.0, 4.0, -1.0), (0.0, 12.0, 12.0)])
+@pytest.mark.parametrize("moved_m", [0.35, 0.1])
+def test_what_keeps_its_box_while_it_would_have_moved_is_before_the_camera_and_no_thing(
+    shifts: tuple[float, ...], moved_m: float
+) -> None:
+    """The right side is the picture's border; the box shifts by so many pixels."""
+    bench = Bench(plain_robot())
+    held = bench.stand(2.0, 2.0, 0.2, 0.2, by="camera")
+    for number, shift_px in enumerate(shifts):
+        footprint = tuple((x + number * moved_m, y) for x, y in held.value.footprint)
+        left, *rest = LENS.box_px
+        thing = replace(LENS, footprint=footprint, box_px=(left + shift_px, *rest))
+        scan = bench.put(FreeFloor("camera", "hall", 0.0, 0.0, (), (), (), (), (), (thing,), 1.0))
+    effects = bench.ask(SOURCE, scan)
+    assert bool(effects) == (shifts[1] < 6.0 and moved_m > 0.3)
+    for shows in (*(effects or ()), Post(Obstruction(((0.0, 0.0), (90.0, 0.0), (90.0, 90.0))))):
+        (found,) = bench.apply(shows)[:1]
+        taken = made(bench.ask(SOURCE, found.entry), Obstacle)
+        assert [thing.status for thing in taken] == ["gone"] * (shows in (effects or ()))
 
 
 def test_what_was_known_is_a_reason_of_what_is_known_now() -> None:

@@ -33,9 +33,9 @@ def world() -> World:
 
 
 def touch(hall: Hall, contact: Contact, *motions: MotorCommand) -> list[str]:
-    """Something is touched in a move, and other motions follow; the ids of contact and motions."""
-    asked = hall.put(MotorCommand(0.0, 0.5))
-    return [hall.put(contact, asked).id, *(hall.put(motion).id for motion in motions)]
+    """Something is touched in a move, in one cycle, and other motions follow; the ids of contact and motions."""
+    asked = Post(MotorCommand(0.0, 0.5))
+    return [hall.apply(asked, Post(contact, (asked,)))[1].entry.id, *(hall.put(motion).id for motion in motions)]
 
 
 def verify(hall: Hall, pose: Pose2 = HERE, sigma_m: float = 0.01, basis: str = "milestone") -> Revised:

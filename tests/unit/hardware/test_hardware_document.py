@@ -18,6 +18,7 @@ from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.actuator import ActuatorModel
+from world_models.files.toml.mission import Safety
 from world_models.files.world_files import load_world
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -59,7 +60,9 @@ def test_what_goes_into_a_missions_file_may_stand_there(tmp_path: Path) -> None:
     for block in blocks("toml"):
         (tmp_path / "m.toml").write_text((FLAT / "mission.toml").read_text() + block)
         mission = load_mission(tmp_path / "m.toml", {})
-        assert mission.actuator == ActuatorModel(**tomllib.loads(block)["actuator"])
+        told = tomllib.loads(block)
+        assert mission.actuator == ActuatorModel(**told.get("actuator", {}))
+        assert mission.safety == Safety(**told.get("safety", {}))
 
 
 @pytest.mark.parametrize("word", [w for w in (*CAMERA_WORDS.values(), *BASE_WORDS.values())

@@ -1,6 +1,6 @@
 """What the recorder says in words: sentences, levels, the tree's labels and the story."""
 
-from blackboard.board import Blackboard
+from blackboard.board import Blackboard, View
 from blackboard.change import Retracted
 from blackboard.effect import Post
 from blackboard.entry import Ref
@@ -9,7 +9,7 @@ from logs.mirror import Mirror
 from logs.recording.loggers.decisions import COLUMNS, Messages, log_level, row, sentence
 from logs.recording.loggers.lanes import activity
 from logs.recording.loggers.plan import NO_SKETCH, outline
-from logs.recording.loggers.why_panel import thoughts
+from logs.recording.loggers.why_panel import THOUGHTS, compose
 from scripted_mission import play
 from world_models.entries.body import BodyFault, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis
@@ -69,6 +69,10 @@ def faulty(status: str) -> Mirror:
                               author="body", cycle=20):
         mirror.take(change)
     return mirror
+
+
+def thoughts(board: View) -> str:
+    return compose({title: tell(board) for title, (tell, *_) in THOUGHTS.items()})
 
 
 def test_a_fault_of_the_body_is_the_headline() -> None:

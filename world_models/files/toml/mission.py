@@ -16,7 +16,7 @@ from world_models.building.world import World
 from world_models.commands import check_command, check_destination, parse_destination
 from world_models.entries.location import diagonal
 from world_models.entries.task import Command
-from world_models.entries.user_reports import DOOR_STATES, Redirection, ReportedState, UserReport
+from world_models.entries.user_reports import DOOR_STATES, GO_ON, Redirection, ReportedState, UserReport
 from world_models.files.packed import SUFFIXES
 from world_models.files.toml.settings_reader import (
     MAX_NUMBER,
@@ -80,7 +80,7 @@ class Telling(Bounded):
         at_s: when, by the time of the run.
         what: name of a door or thing, as ``library-door`` or ``allens-office/desk``.
         state: shut or open (a door), gone or there (a thing).
-        goal: where to go instead, as "Go to the library"; then ``what`` and ``state`` are left out.
+        goal: where to go instead, as "Go to the library", or "go on"; then ``what`` and ``state`` are left out.
     """
 
     at_s: float = bounded(0.0, 0.0, MAX_NUMBER)
@@ -93,7 +93,8 @@ class Telling(Bounded):
         if self.goal:
             if self.what or self.state:
                 raise ValueError("expected either goal, or what and state, got both")
-            check_destination(self.goal)
+            if self.goal != GO_ON:
+                check_destination(self.goal)
             return
         if not self.what:
             raise ValueError("expected what = the name of a door or thing, got none")
@@ -112,7 +113,7 @@ class Telling(Bounded):
         """What is wrong where a world has no such door, thing or room, in words; "" where it has."""
         if self.goal:
             try:
-                parse_destination(self.goal, world)
+                _ = self.goal == GO_ON or parse_destination(self.goal, world)
             except ValueError as error:
                 return str(error)
             return ""
@@ -164,8 +165,23 @@ class Limits(Bounded):
     max_cycles: int = bounded(20000, 0, MAX_NUMBER, above=True)
 
 
+@dataclass(frozen=True, slots=True)
+class Safety:
+    """What a person has to do with a robot that has stopped.
+
+    Attributes:
+        restart: after a contact or an emergency stop: automatic, or asked: not before it is told to go on (ISO 3691-4).
+    """
+
+    restart: str = "automatic"
+
+    def __post_init__(self) -> None:
+        if self.restart not in ("automatic", "asked"):
+            raise ValueError(f"expected restart = automatic or asked, got {self.restart!r}")
+
+
 TABLES: Mapping[str, type[Any]] = {
-    "start": Start, "arrival": Arrival, "servo": Servo, "motion": Motion, "limits": Limits}
+    "start": Start, "arrival": Arrival, "servo": Servo, "motion": Motion, "safety": Safety, "limits": Limits}
 """The tables that every mission may have."""
 TEXTS = ("description", "world", "goal")
 
@@ -191,6 +207,7 @@ class Mission:
     arrival: Arrival
     servo: Servo
     motion: Motion
+    safety: Safety
     limits: Limits
     told: tuple[Telling, ...] = ()
     folder: Path
@@ -201,7 +218,8 @@ class Mission:
         """What the user asks for, and how the robot is put down."""
         s = self.start
         covariance = diagonal(max(s.put_down_sigma_m, MIN_SIGMA), max(s.put_down_sigma_rad, MIN_SIGMA))
-        return Command(self.goal, s.heading_rad, self.arrival.heading_rad if self.arrival.matters else None, covariance)
+        return Command(self.goal, s.heading_rad, self.arrival.heading_rad if self.arrival.matters else None, covariance,
+                       self.safety.restart == "asked")
 
 
 @dataclass(frozen=True, slots=True)
