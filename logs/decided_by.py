@@ -20,6 +20,7 @@ import platform
 import sys
 from collections.abc import Mapping
 from functools import cache
+from importlib.metadata import Distribution
 from pathlib import Path
 
 import blackboard
@@ -74,7 +75,20 @@ NO_AVX512: Mapping[str, str] = {
 COMMON = "x86-64 with AVX2"
 """The name of the arithmetic that all such processors share."""
 CALCULATE = ("numpy", "scipy", "cv2")
+LIBRARIES = ("numpy", "opencv-python-headless", "scipy", "numba", "shapely")
+"""Their packages, and those of others that decide: another version may add in another order."""
 CPUINFO = Path("/proc/cpuinfo")
+
+
+@cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    found = {name: distribution.version for name in LIBRARIES for distribution in Distribution.discover(name=name)}
+    return tuple(found.items())
+
+
+def calculating_libraries() -> dict[str, str]:
+    """The versions of :data:`LIBRARIES` that are installed, by name."""
+    return dict(_versions())
 
 
 def settle() -> None:

@@ -30,10 +30,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """How much of a run's files is whole [bytes]."""
+    """How much of a run's files is whole, and how long its journal was then [bytes]."""
 
     journal: int = 0
     camera: int = 0
+    found: int | None = None
 
 
 class RunRecorder:
@@ -68,12 +69,12 @@ class RunRecorder:
         drawing = run.recording if run is not None else drawing
         with ExitStack() as opened:
             if run is not None:
-                if whole is None:
-                    run.path.mkdir(parents=True, exist_ok=True)
-                    head.write(run.path)
+                run.path.mkdir(parents=True, exist_ok=True)
                 keep = whole or Extent()
-                self._journal = JournalFile(run.journal, keep=keep.journal, sync=sync)
+                self._journal = JournalFile(run.journal, keep=keep.journal, found=keep.found, sync=sync)
                 opened.callback(self._journal.close)
+                if whole is None:  # now that the journal is ours
+                    head.write(run.path)
                 self._camera = MjpegFile(run.camera, keep=keep.camera, sync=sync)
                 opened.callback(self._camera.close)
                 if sync:

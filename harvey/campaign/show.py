@@ -20,10 +20,11 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from harvey.campaign.engine import CAMPAIGN, KILLED, RESULT, RESULTS, read_results, read_times
+from harvey.campaign.engine import CAMPAIGN, KILLED, RESULT, RESULTS, is_number, read_results, read_times
 from harvey.errors import BadInput
-from logs.run_directory import RUNS
+from logs.run_directory import MOST_JSON_BYTES, RUNS
 from logs.tables import table
+from world_models.files.regular_files import read_regular
 from world_models.words import count
 
 PICTURE = "progress.png"
@@ -91,17 +92,23 @@ def find_campaign(text: str) -> Path:
 def read_progress(folder: Path) -> CampaignProgress:
     """Read it; a campaign may be under way. Raises BadInput."""
     try:
-        about = json.loads((folder / CAMPAIGN).read_text(encoding="utf-8"))
+        about = json.loads(read_regular(folder / CAMPAIGN, MOST_JSON_BYTES))
     except FileNotFoundError:
         about = {}
-    except ValueError as error:
+    except OSError as error:
+        raise BadInput(f"{folder / CAMPAIGN}: expected a readable file, got: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
         raise BadInput(f"{folder / CAMPAIGN}: expected JSON, got: {error}") from None
     _, records = read_results(folder / RESULTS)
+    about = about if isinstance(about, dict) else {}
+    if not (is_number(total := about.get("total", 0)) and isinstance(about.get("unit", ""), str)):
+        raise BadInput(f"{folder / CAMPAIGN}: expected a number as total and a text as unit, got {total!r} and "
+                       f"{about.get('unit')!r}")
     return CampaignProgress(
-        folder, about if isinstance(about, dict) else {},
+        folder, about,
         {case: record[RESULT] for case, record in records.items() if RESULT in record},
         {case: record[KILLED] for case, record in records.items() if RESULT not in record and KILLED in record},
-        [record for record in read_times(folder) if isinstance(record.get("at"), float | int)])
+        [record for record in read_times(folder) if is_number(record.get("at")) and is_number(record.get("took_s", 0))])
 
 
 def format_progress(progress: CampaignProgress) -> str:
@@ -165,6 +172,7 @@ def draw_progress(progress: CampaignProgress) -> Path:
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, fontsize=9)
     path = progress.folder / PICTURE
+    path.unlink(missing_ok=True)  # it may be a link to somebody's file
     figure.savefig(path, format="png")
     return path
 

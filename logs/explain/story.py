@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -20,7 +19,7 @@ from logs.explain.turning_points import (
     turn_lines,
 )
 from logs.records import EntryRecord, is_a
-from logs.run_directory import RunDirectory
+from logs.run_directory import RunDirectory, read_head
 from logs.run_errors import BadInput
 from logs.tables import table
 from logs.timeline import Timeline
@@ -132,7 +131,7 @@ class RunStory:
 
 def run_name(run: RunDirectory) -> str:
     """``hallway-kidnap, seed 0``; the directory's name where its head cannot be read."""
-    head = _head(run)
+    head = read_head(run.path)
     name, seed = head.get("name"), head.get("seed")
     if not isinstance(name, str):
         return run.path.resolve().name
@@ -141,7 +140,7 @@ def run_name(run: RunDirectory) -> str:
 
 def levels_off(run: RunDirectory) -> Iterator[str]:
     """Which servo levels were switched off, as run.json says; nothing where it does not."""
-    head = _head(run)
+    head = read_head(run.path)
     try:
         set_since = {key: value == "on" for key, value in head["constants"] if key.startswith("servo.")}
         servo = {**head["servo"], **{key.removeprefix("servo."): is_on for key, is_on in set_since.items()}}
@@ -150,14 +149,6 @@ def levels_off(run: RunDirectory) -> Iterator[str]:
     for level, is_on in servo.items():
         if is_on is False:
             yield f"The {level} level of servoing was off in this run: {WITHOUT.get(level, 'nobody closed it')}."
-
-
-def _head(run: RunDirectory) -> dict[str, Any]:
-    try:
-        head = json.loads((run.path / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return head if isinstance(head, dict) else {}
 
 
 def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
