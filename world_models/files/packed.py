@@ -41,6 +41,8 @@ create table word (word text not null, number integer not null, name text not nu
 """
 INDICES = "create index frame_name on frame (name, layer); create index frame_number on frame (layer, number, name);"
 """Made at the end, which is faster."""
+MOST_UNPACKED_BYTES = 100_000_000
+"""Of one frame."""
 NOT_PACKED = ("changes", "filed", "memo")
 """Fields of a frame that no file has."""
 
@@ -70,10 +72,21 @@ def unpack_frame(packed: bytes) -> LocaleFrame:
     Raises:
         ValueError, TypeError, LookupError, zlib.error: the bytes are something else.
     """
-    data = zlib.decompress(packed)
+    data = _decompress(packed)
     end = 4 + int.from_bytes(data[:4], "little")
     frame: LocaleFrame = _unpack(LocaleFrame, json.loads(data[4:end]), _Numbers(data, end))
     return frame
+
+
+def _decompress(packed: bytes) -> bytes:
+    """As zlib.decompress; a few bytes that stand for more than may be are refused."""
+    unpacked = zlib.decompressobj()
+    data = unpacked.decompress(packed, MOST_UNPACKED_BYTES)
+    if unpacked.unconsumed_tail:
+        raise ValueError(f"more than {MOST_UNPACKED_BYTES} bytes in one piece")
+    if not unpacked.eof:
+        raise ValueError("a piece that is cut off")
+    return data
 
 
 class _Numbers:
@@ -173,6 +186,19 @@ def _digest_of(names: Iterable[str]) -> str:
     return hashlib.sha256("\n".join(names).encode()).hexdigest()
 
 
+def _tables(file: sqlite3.Connection) -> set[str]:
+    """How its tables and views are made: a view in the place of a table could go on for ever."""
+    made = file.execute("select sql from sqlite_master where type in ('table', 'view')")
+    return {" ".join(str(sql).split()) for sql, in made}
+
+
+@cache
+def _tables_made() -> set[str]:
+    with closing(sqlite3.connect(":memory:")) as file:
+        file.executescript(SCHEMA)
+        return _tables(file)
+
+
 class PackedFrames(Mapping[str, LocaleFrame]):
     """The frames of a compiled world by name, each unpacked when it is first asked for.
 
@@ -190,6 +216,8 @@ class PackedFrames(Mapping[str, LocaleFrame]):
         try:
             expect_regular(path)
             self._file = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, check_same_thread=False)
+            if _tables(self._file) != _tables_made():
+                raise ValueError("other tables")
             found = self._file.execute("select format, sha256, about from meta").fetchall()
         except OSError as error:
             raise WorldError(f"{path}: expected a readable file, got: {error.strerror}") from None
@@ -198,7 +226,7 @@ class PackedFrames(Mapping[str, LocaleFrame]):
         if (written := found[0][0] if found else None) != FORMAT:
             raise WorldError(f"{path.name}: expected {FORMAT!r}, got {written!r}: compile it anew")
         with self.world_errors():
-            self.sha256, self.about = str(found[0][1]), json.loads(zlib.decompress(found[0][2]))
+            self.sha256, self.about = str(found[0][1]), json.loads(_decompress(found[0][2]))
         if details and list(details) != self.about["details"]:
             raise WorldError(f"{path.name}: expected the details that it was compiled with "
                              f"({', '.join(self.about['details']) or 'none'}), got {', '.join(details)}")
@@ -211,8 +239,20 @@ class PackedFrames(Mapping[str, LocaleFrame]):
             yield
         except WorldError:
             raise
-        except (sqlite3.Error, zlib.error, ValueError, TypeError, LookupError) as error:
+        except (sqlite3.Error, zlib.error, ValueError, TypeError, LookupError, AttributeError, ArithmeticError,
+                RecursionError, MemoryError) as error:
             raise WorldError(f"{self._path.name}: expected a sound compiled world, got: {error!r}") from None
+
+    def verify(self) -> None:
+        """Compare the contents with their digest. Raises WorldError where they are others."""
+        with self.world_errors():
+            said = hashlib.sha256(_decompress(self._file.execute("select about from meta").fetchone()[0]))
+            known: dict[str, bytes] = {}
+            for name, packed in self._file.execute("select name, packed from frame order by number, layer"):
+                known[name] = hashlib.sha256(packed).digest()
+            said.update(b"".join(known.values()))
+            if said.hexdigest() != self.sha256:
+                raise ValueError("other contents than were compiled")
 
     def rows(self, query: str, *values: Any) -> list[tuple[Any, ...]]:
         """The answer to a query of the file. Raises WorldError."""
