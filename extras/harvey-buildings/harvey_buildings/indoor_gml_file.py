@@ -52,7 +52,9 @@ class _Builder:
         try:
             parser.Parse(data, True)
             return self._builder.close()
-        except (expat.ExpatError, UnicodeDecodeError, LookupError, AssertionError) as error:
+        except BuildingError:
+            raise
+        except (expat.ExpatError, ValueError, LookupError, AssertionError) as error:
             raise BuildingError(f"{self._name}: expected XML, got: {error}") from None
 
     def _refuse(self, *_: object) -> None:
