@@ -26,6 +26,8 @@ from world_models.files.world_files import fingerprint, load_world
 from world_models.plugins import SOURCES_GROUP, list_plugins
 from world_models.robot import RobotModel
 
+MOST_IN_HEAD = 1_000
+"""Letters of a name, and constants."""
 SIMULATOR, HARDWARE = "simulator", "hardware"
 PARTS: Mapping[str, type[Any]] = {
     "camera": Camera, "mount": CameraMount, "actuator": ActuatorModel, "deviation": CameraDeviation}
@@ -108,6 +110,8 @@ class RunHead:
         try:
             older = {"code": "", "arithmetic": "", "plugins": {}, "libraries": {}, "journal_version": 1}
             head: RunHead = decode({**older, **data} if isinstance(data, dict) else data, RunHead)
+            if (many := max(len(head.name), len(head.constants))) > MOST_IN_HEAD:
+                raise ValueError(f"expected a name and constants of at most {MOST_IN_HEAD}, got {many}")
         except (ValueError, TypeError) as error:
             raise BadInput(f"{path}: {error}") from None
         refuse_version(folder, head.journal_version)
