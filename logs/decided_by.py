@@ -81,14 +81,9 @@ CPUINFO = Path("/proc/cpuinfo")
 
 
 @cache
-def _versions() -> tuple[tuple[str, str], ...]:
-    found = {name: distribution.version for name in LIBRARIES for distribution in Distribution.discover(name=name)}
-    return tuple(found.items())
-
-
-def calculating_libraries() -> dict[str, str]:
+def calculating_libraries() -> Mapping[str, str]:
     """The versions of :data:`LIBRARIES` that are installed, by name."""
-    return dict(_versions())
+    return {name: found.version for name in LIBRARIES for found in Distribution.discover(name=name)}
 
 
 def settle() -> None:

@@ -25,21 +25,17 @@ class Appended:
     after :meth:`sync` they are on the disk, so that they outlive a power cut too.
     """
 
-    def __init__(self, path: Path, what: str, *, keep: int | None = 0, found: int | None = None) -> None:
+    def __init__(self, path: Path, what: str, *, keep: int | None = 0) -> None:
         """Begin a file, or go on with one behind its first ``keep`` bytes; what it holds beyond them is dropped.
 
-        Args:
-            what: names the file in messages.
-            keep: None for all that there is.
-            found: how long it was when it was looked at, if it was [bytes].
-
-        Raises OSError where it cannot be opened, is a link or a pipe, somebody writes it, or it was written since.
+        ``what`` names the file in messages; to keep None keeps all. Raises OSError where it cannot be opened, is a link
+        or a pipe, or somebody writes it.
         """
         self._path, self._what = path, what
         self._file = no_follow(path, os.O_WRONLY | os.O_CREAT)
         self._size = 0
         if stat.S_ISREG(os.fstat(self._file).st_mode):
-            self._lock(found)
+            self._lock()
             if keep is not None:
                 os.ftruncate(self._file, keep)
             self._size = os.lseek(self._file, 0, os.SEEK_END)
@@ -66,12 +62,11 @@ class Appended:
         """No more bytes."""
         os.close(self._file)
 
-    def _lock(self, found: int | None) -> None:
+    def _lock(self) -> None:
         """Nobody else may write it meanwhile; the lock goes with the process, however that ends."""
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            mine, there = os.fstat(self._file), os.lstat(self._path)
-            if mine.st_ino == there.st_ino and found in (None, mine.st_size):
+            if os.fstat(self._file).st_ino == os.lstat(self._path).st_ino:  # else it was deleted meanwhile
                 return
         except (BlockingIOError, FileNotFoundError):
             pass

@@ -30,11 +30,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """How much of a run's files is whole, and how long its journal was then [bytes]."""
+    """How much of a run's files is whole [bytes]."""
 
     journal: int = 0
     camera: int = 0
-    found: int | None = None
 
 
 class RunRecorder:
@@ -71,7 +70,7 @@ class RunRecorder:
             if run is not None:
                 run.path.mkdir(parents=True, exist_ok=True)
                 keep = whole or Extent()
-                self._journal = JournalFile(run.journal, keep=keep.journal, found=keep.found, sync=sync)
+                self._journal = JournalFile(run.journal, keep=keep.journal, sync=sync)
                 opened.callback(self._journal.close)
                 if whole is None:  # now that the journal is ours
                     head.write(run.path)

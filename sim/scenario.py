@@ -28,7 +28,6 @@ from world_models.files.toml.source import Key, Source, WorldError
 from world_models.units import Bounded, bounded
 
 MOST_DETAILS = 100
-"""Files of details of one building."""
 MAX_DISTORTION = 1e4
 """Largest distortion coefficient: those of real lenses are about 1, of long ones some hundreds."""
 

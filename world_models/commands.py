@@ -68,14 +68,10 @@ GRID_POINTS = 21
 NUMBERS: Mapping[int, str] = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
 
 
-def _expect_short(text: str) -> None:
-    if len(text) > MOST_LETTERS:
-        raise ValueError(f"expected a command of at most {MOST_LETTERS} letters, got {len(text)}")
-
-
 def check_command(text: str) -> None:
     """Raises ValueError for a text that is no command in any world."""
-    _expect_short(text)
+    if len(text) > MOST_LETTERS:
+        raise ValueError(f"expected at most {MOST_LETTERS} letters, got {len(text)}")
     if text.lstrip().startswith("("):
         parse_ptrans(text)
     else:
@@ -93,7 +89,6 @@ def read_places(
     Raises:
         ValueError: the text is not understood, or no room, or more than one, answers to its words.
     """
-    _expect_short(text)
     if text.lstrip().startswith("("):
         places = parse_ptrans(text)
         for place in places:
@@ -110,7 +105,8 @@ def parse_command(text: str, world: World) -> tuple[Place, Place]:
 
 def check_destination(text: str) -> None:
     """Raises ValueError for a text that is no destination in any world."""
-    _expect_short(text)
+    if len(text) > MOST_LETTERS:
+        raise ValueError(f"expected at most {MOST_LETTERS} letters, got {len(text)}")
     if text.lstrip().startswith("("):
         parse_place(text)
     else:
@@ -123,7 +119,6 @@ def read_destination(text: str, building: Building, find_rooms: Callable[[tuple[
     Raises:
         ValueError: as :func:`read_places` does.
     """
-    _expect_short(text)
     if text.lstrip().startswith("("):
         place = parse_place(text)
         building.locale(place.locale)

@@ -51,20 +51,20 @@ class Remains:
 
 def find_remains(run: RunDirectory) -> Remains:
     """Look at a run without touching it. Raises BadInput where it cannot be used at all."""
-    there, found = camera_bytes(run), run.journal.stat().st_size if run.journal.is_file() else 0
+    there = camera_bytes(run)
     decisions, outcome = _count_decisions(run) if run.journal.is_file() else (0, None)
     if decisions == 0:
         _check_not_lost(run, there)
     if not run.journal.is_file():
-        return Remains(Extent(found=found), 0, None, ())
+        return Remains(Extent(), 0, None, ())
     whole, pictures = _whole_lines(run.journal), open_pictures(run)
     end = pictures.end if isinstance(pictures, Pictures) else 0
     dropped = []
-    if found > whole:
+    if run.journal.stat().st_size > whole:
         dropped.append(f"decision {decisions + 1}, which was cut off while it was written")
     if there > end:
         dropped.append(f"{there - end} bytes of a picture that no decision had seen")
-    return Remains(Extent(whole, end, found), decisions, outcome, tuple(dropped))
+    return Remains(Extent(whole, end), decisions, outcome, tuple(dropped))
 
 
 def _check_not_lost(run: RunDirectory, pictures: int) -> None:

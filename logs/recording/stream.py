@@ -18,6 +18,7 @@ import pyarrow as pa
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from logs.disk import no_follow
 from logs.run_errors import RecordingError
 
 pa.set_memory_pool(pa.system_memory_pool())  # arrow's own keeps 20 MB that a mission's recording gave back
@@ -86,7 +87,8 @@ class RecordingStream:
         self._stream.set_log_tick_enabled(False)
         sinks: list[Any] = [*([rr.FileSink(path)] if path is not None else []),
                  *([rr.GrpcServerSink(bind_ip=LOCALHOST, port=live_port)] if live else [])]
-        self._try(lambda: _expect_file(path))
+        if path is not None:
+            self._try(lambda: os.close(no_follow(path, os.O_WRONLY | os.O_CREAT)))
         self._try(lambda: self._stream.set_sinks(*sinks, default_blueprint=blueprint))
         self._stream.send_recording_name(viewable(title))
         self._cycles, self._flush_cycles = 0, LIVE_FLUSH_CYCLES if live else FLUSH_CYCLES
@@ -136,7 +138,6 @@ class RecordingStream:
         if self._lost:
             raise RecordingError(self._lost)
         self._try(lambda: self._send(rows))
-        self._try(lambda: self._stream.flush(timeout_sec=MOST_S))
 
     def close(self) -> None:
         """End the recording with its footer. Raises RecordingError as :meth:`flush`."""
@@ -149,6 +150,7 @@ class RecordingStream:
             index = [rr.TimeColumn("cycle", sequence=cycles), rr.TimeColumn("sim_time", duration=times_s)]
             columns = chain.from_iterable(_columns(kind, name, [batch[name] for batch in batches]) for name in names)
             self._stream.send_columns(path, index, columns)
+        self._stream.flush(timeout_sec=MOST_S)
 
     def _disconnect(self) -> None:
         ending = Thread(target=self._stream.disconnect, daemon=True)  # it knows no time limit
@@ -170,12 +172,6 @@ def _let_go(stream: rr.RecordingStream) -> None:
     """A stream that failed is neither flushed nor closed any more, also not at exit: either may wait for ever."""
     rr.unregister_shutdown()
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(stream))
-
-
-def _expect_file(path: Path | None) -> None:
-    """The library would follow a link to somebody's file, and wait for the reader of a pipe. Raises OSError."""
-    if path is not None:
-        os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666))
 
 
 def _columns(kind: Columnar, name: str, batches: Sequence[Batch]) -> Iterable[Any]:
