@@ -67,12 +67,7 @@ class RunDirectory:
         """The result; empty where the run has none (it was cut off). Raises BadInput where it is malformed."""
         if not self.result.exists():
             return {}
-        try:
-            data = json.loads(read_regular(self.result, MOST_JSON_BYTES))
-        except OSError as error:
-            raise BadInput(f"{self.result}: expected a readable file, got: {error.strerror}") from None
-        except (ValueError, RecursionError) as error:
-            raise BadInput(f"{self.result}: expected JSON, got: {error}") from None
+        data = read_json(self.result)
         if not isinstance(data, dict):
             raise BadInput(f"{self.result}: expected a JSON object, got {type(data).__name__}")
         for key, (kind, named) in RESULT.items():
@@ -98,10 +93,20 @@ def check_version(folder: Path) -> None:
 def read_head(folder: Path) -> dict[str, Any]:
     """What ``run.json`` says; nothing where it cannot be read."""
     try:
-        head = json.loads(read_regular(folder / "run.json", MOST_JSON_BYTES))
-    except (OSError, ValueError, RecursionError):
+        head = read_json(folder / "run.json")
+    except BadInput:
         return {}
     return head if isinstance(head, dict) else {}
+
+
+def read_json(path: Path, what: str = "a readable file") -> Any:
+    """What a file of a run or a campaign says. Raises BadInput where it cannot be read, or is no JSON."""
+    try:
+        return json.loads(read_regular(path, MOST_JSON_BYTES))
+    except OSError as error:
+        raise BadInput(f"{path}: expected {what}, got: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise BadInput(f"{path}: expected JSON, got: {error}") from None
 
 
 def refuse_version(folder: Path, version: object) -> None:
@@ -166,12 +171,6 @@ def expect_unwritten(path: Path) -> Path:
     if is_being_written(path / "journal.jsonl"):
         raise BadInput(f"{path}: expected a run that has ended, got one that another process is writing")
     return path
-
-
-def find_free(path: Path) -> Path:
-    """The same where no run is there, else the first beside it without: ``runs/try-2``."""
-    names = (path, *(path.with_name(f"{path.name}-{number}") for number in range(2, 10_000)))
-    return next((there for there in names if not (there / "journal.jsonl").exists()), path)
 
 
 def _free_beside(path: Path) -> Path:

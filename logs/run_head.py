@@ -14,13 +14,12 @@ from blackboard.decoding import MisfitError, decode, fields_of
 from blackboard.journal import plain
 from logs.decided_by import arithmetic, calculating_libraries, deciding_code
 from logs.disk import write_whole
-from logs.run_directory import JOURNAL_VERSION, MOST_JSON_BYTES, refuse_version
+from logs.run_directory import JOURNAL_VERSION, read_json, refuse_version
 from logs.run_errors import BadInput
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import NOT_STATED, Camera, CameraDeviation, CameraMount
 from world_models.entries.task import Command
-from world_models.files.regular_files import read_regular
 from world_models.files.toml.mission import ROOT, Servo
 from world_models.files.world_files import fingerprint, load_world
 from world_models.plugins import SOURCES_GROUP, list_plugins
@@ -101,12 +100,7 @@ class RunHead:
     def read(folder: Path) -> RunHead:
         """Raises BadInput where ``run.json`` is missing or malformed, or the journal of another version."""
         path = folder / "run.json"
-        try:
-            data = json.loads(read_regular(path, MOST_JSON_BYTES))
-        except OSError as error:
-            raise BadInput(f"{path}: expected the head of a run, got: {error.strerror}") from None
-        except (ValueError, RecursionError) as error:
-            raise BadInput(f"{path}: expected JSON, got: {error}") from None
+        data = read_json(path, "the head of a run")
         try:
             older = {"code": "", "arithmetic": "", "plugins": {}, "libraries": {}, "journal_version": 1}
             head: RunHead = decode({**older, **data} if isinstance(data, dict) else data, RunHead)

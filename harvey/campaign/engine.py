@@ -61,7 +61,7 @@ class ResultsFile:
             self._append(self._head)
             records = {}
         else:
-            self._file.truncate(_whole(self.path))
+            self._file.truncate(self.path.read_bytes().rfind(b"\n") + 1)  # up to the end of the last whole line
         self.known = {case: record[RESULT] for case, record in records.items() if RESULT in record}
 
     def add(self, case: int, result: Mapping[str, Any], times: Mapping[str, Any]) -> None:
@@ -145,11 +145,6 @@ def _read_lines(path: Path) -> Iterator[dict[str, Any]]:
             continue
         if isinstance(record, dict):
             yield record
-
-
-def _whole(path: Path) -> int:
-    """Bytes up to the end of the last line that is whole."""
-    return path.read_bytes().rfind(b"\n") + 1
 
 
 def _line(record: Mapping[str, Any]) -> bytes:

@@ -10,7 +10,6 @@ otherwise is no proof that there is no difference.
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -22,9 +21,8 @@ from typing import Any
 
 from harvey.campaign.engine import CAMPAIGN, KILLED, RESULT, RESULTS, is_number, read_results, read_times
 from harvey.errors import BadInput
-from logs.run_directory import MOST_JSON_BYTES, RUNS
+from logs.run_directory import RUNS, read_json
 from logs.tables import table
-from world_models.files.regular_files import read_regular
 from world_models.words import count
 
 PICTURE = "progress.png"
@@ -91,14 +89,7 @@ def find_campaign(text: str) -> Path:
 
 def read_progress(folder: Path) -> CampaignProgress:
     """Read it; a campaign may be under way. Raises BadInput."""
-    try:
-        about = json.loads(read_regular(folder / CAMPAIGN, MOST_JSON_BYTES))
-    except FileNotFoundError:
-        about = {}
-    except OSError as error:
-        raise BadInput(f"{folder / CAMPAIGN}: expected a readable file, got: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
-        raise BadInput(f"{folder / CAMPAIGN}: expected JSON, got: {error}") from None
+    about = read_json(folder / CAMPAIGN) if (folder / CAMPAIGN).exists() else {}
     _, records = read_results(folder / RESULTS)
     about = about if isinstance(about, dict) else {}
     if not (is_number(total := about.get("total", 0)) and isinstance(about.get("unit", ""), str)):

@@ -10,7 +10,7 @@ from pathlib import Path
 from harvey.campaign.campaign import Task, make_room, parse_pairs, parse_seeds
 from harvey.commands.command import CliCommand
 from harvey.errors import BadInput
-from logs.run_directory import RUNS, check_vacant, find_free
+from logs.run_directory import RUNS, check_vacant
 
 PORT = 8750
 
@@ -40,12 +40,18 @@ def _run(args: Namespace) -> int:
     seeds = parse_seeds(args.seed)
     if len(seeds) > 1:
         raise BadInput(f"--seed: expected one seed, got {len(seeds)}")
-    wanted = Path(args.out) if args.out else find_free(RUNS / f"{Path(args.scenario).stem}-{seeds[0]}")
+    wanted = Path(args.out) if args.out else _find_free(RUNS / f"{Path(args.scenario).stem}-{seeds[0]}")
     if (wanted / "journal.jsonl").exists():  # what was told on its page cannot be said again
         raise BadInput(f"--out {wanted}: expected a directory without a run, got one with a run")
     task = Task(args.scenario, parse_pairs(args.settings), seeds[0], check_vacant(wanted))
     task.load()  # what is wrong with it is said first
     return _serve(task, args, wanted)
+
+
+def _find_free(path: Path) -> Path:
+    """The same where no run is there, else the first beside it without: ``runs/try-2``."""
+    names = (path, *(path.with_name(f"{path.name}-{number}") for number in range(2, 10_000)))
+    return next((there for there in names if not (there / "journal.jsonl").exists()), path)
 
 
 def _serve(task: Task, args: Namespace, wanted: Path) -> int:

@@ -12,7 +12,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal, Protocol, get_args
 
 import serial
@@ -167,8 +166,6 @@ class SerialLink:
         scheme, slashes, more = self._url.partition("://")
         if slashes and (scheme not in SCHEMES or "://" in more):  # spy://loop://?file=NAME would empty that file
             raise OSError(f"{self._url}: expected a serial port, or a URL of {', '.join(SCHEMES)}, got {scheme}://")
-        if not slashes and Path(self._url).exists() and not Path(self._url).is_char_device():
-            raise OSError(f"{self._url}: expected a serial port, got no device")
         try:
             return serial.serial_for_url(self._url, baudrate=self._baud, timeout=0.1, write_timeout=0.5)
         except ValueError as error:
