@@ -10,9 +10,11 @@ import atexit
 import errno
 import gc
 import os
+import re
 import sys
 from argparse import Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 from io import TextIOWrapper
 from typing import Any
 
@@ -28,12 +30,15 @@ harvey COMMAND --help tells more and gives examples."""
 
 GC_THRESHOLDS = 50_000, 20, 100
 """A board's entries are many and form no reference cycles, so Python looks for them seldom: the robot waits for it."""
+LACK = "llocate memory|failed to map segment|start new thread"
+"""In what the system says where memory is short, whatever the kind of the error."""
 INTERRUPTED, OUTPUT_CLOSED, TERMINATED = 130, 141, 143
 """Exit codes as a shell has them: 128 and the number of the signal."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
+    _occupy_streams()
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal may not know every letter
     gc.set_threshold(*GC_THRESHOLDS)
@@ -43,6 +48,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as stop:
         _print_error("interrupted", stop)
         return INTERRUPTED
+
+
+def _occupy_streams() -> None:
+    """What is printed goes nowhere where nobody listens: else the first file of a run would be standard output."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+        if getattr(sys, name) is None:
+            stream = open(number, "r+" if name == "stdin" else "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+            setattr(sys, name, stream)
 
 
 class _PrintVersion(Action):
@@ -73,10 +90,10 @@ def parser(name: str | None = None) -> ArgumentParser:
 
 def _run(argv: Sequence[str] | None) -> int:
     """The imports are here, not at the top: Ctrl-C is answered while they go on."""
-    from harvey.errors import Terminated, terminable
+    from harvey.errors import PlainOutput, Terminated, terminable
 
     try:
-        with terminable():
+        with terminable(), redirect_stdout(PlainOutput(sys.stdout)):
             return _answer(argv)
     except Terminated as stop:
         _print_error("terminated", stop)
@@ -121,6 +138,11 @@ def _answer(argv: Sequence[str] | None) -> int:
         return 2
     except (BadInput, WorldError, RecordingError, PluginError) as error:
         _print_error(str(error), error)
+        return 2
+    except (MemoryError, ImportError, RuntimeError) as error:
+        if not (isinstance(error, MemoryError) or re.search(LACK, str(error))):
+            raise
+        _print_error(f"expected more memory than there is, got: {error or 'none'}", error)
         return 2
 
 

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 from logs.run_errors import BadInput
 
@@ -22,9 +23,30 @@ class Terminated(BaseException):
 
 def in_one_line(text: str, most: int = MOST_LETTERS) -> str:
     """A text for a terminal: control characters are spelled out, and what is long is left out of its middle."""
-    plain = "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode()
-                    for letter in re.sub(r"\s*\n\s*", " ", text[:100 * most]))
+    plain = spell_out(re.sub(r"\s*\n\s*", " ", text[:100 * most]))
     return _without_middle(re.sub(r"\S+", lambda word: _without_middle(word[0], MOST_OF_A_WORD), plain), most)
+
+
+def spell_out(text: str, but: str = "") -> str:
+    """A text whose control characters are spelled out, ``but`` some: it moves no cursor, and turns no line round."""
+    if text.isprintable():
+        return text
+    return "".join(letter if letter.isprintable() or letter in but else letter.encode("unicode_escape").decode()
+                   for letter in text)
+
+
+class PlainOutput:
+    """Standard output, on which what others wrote in a file is only text."""
+
+    def __init__(self, out: Any) -> None:
+        self._out = out
+
+    def write(self, text: str) -> int:
+        """Write a text, its control characters spelled out."""
+        return int(self._out.write(spell_out(text, "\n\t")))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._out, name)
 
 
 def _without_middle(text: str, most: int) -> str:

@@ -20,6 +20,7 @@ import platform
 import sys
 from collections.abc import Mapping
 from functools import cache
+from importlib.metadata import Distribution
 from pathlib import Path
 
 import blackboard
@@ -74,7 +75,15 @@ NO_AVX512: Mapping[str, str] = {
 COMMON = "x86-64 with AVX2"
 """The name of the arithmetic that all such processors share."""
 CALCULATE = ("numpy", "scipy", "cv2")
+LIBRARIES = ("numpy", "opencv-python-headless", "scipy", "numba", "shapely")
+"""Their packages, and those of others that decide: another version may add in another order."""
 CPUINFO = Path("/proc/cpuinfo")
+
+
+@cache
+def calculating_libraries() -> Mapping[str, str]:
+    """The versions of :data:`LIBRARIES` that are installed, by name."""
+    return {name: found.version for name in LIBRARIES for found in Distribution.discover(name=name)}
 
 
 def settle() -> None:

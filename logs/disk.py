@@ -8,6 +8,11 @@ import os
 import stat
 from pathlib import Path
 
+from world_models.files.regular_files import open_regular
+
+MOST_JOURNAL_BYTES = 4_000_000_000
+"""Of a journal that is read."""
+
 
 class CannotWriteError(OSError):
     """A file of a run cannot be written any more, as when the disk is full; what was written before stays valid."""
@@ -20,17 +25,19 @@ class Appended:
     after :meth:`sync` they are on the disk, so that they outlive a power cut too.
     """
 
-    def __init__(self, path: Path, what: str, *, keep: int = 0) -> None:
+    def __init__(self, path: Path, what: str, *, keep: int | None = 0) -> None:
         """Begin a file, or go on with one behind its first ``keep`` bytes; what it holds beyond them is dropped.
 
-        ``what`` names the file in messages. Raises OSError where it cannot be opened, or somebody writes it.
+        ``what`` names the file in messages; to keep None keeps all. Raises OSError where it cannot be opened, is a link
+        or a pipe, or somebody writes it.
         """
         self._path, self._what = path, what
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        self._file = no_follow(path, os.O_WRONLY | os.O_CREAT)
         self._size = 0
         if stat.S_ISREG(os.fstat(self._file).st_mode):
             self._lock()
-            os.ftruncate(self._file, keep)
+            if keep is not None:
+                os.ftruncate(self._file, keep)
             self._size = os.lseek(self._file, 0, os.SEEK_END)
 
     def append(self, data: bytes) -> None:
@@ -59,10 +66,13 @@ class Appended:
         """Nobody else may write it meanwhile; the lock goes with the process, however that ends."""
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            os.close(self._file)
-            message = f"cannot write the {self._what}: another process is writing it"
-            raise CannotWriteError(error.errno, message, str(self._path)) from None
+            if os.fstat(self._file).st_ino == os.lstat(self._path).st_ino:  # else it was deleted meanwhile
+                return
+        except (BlockingIOError, FileNotFoundError):
+            pass
+        os.close(self._file)
+        message = f"cannot write the {self._what}: another process is writing it"
+        raise CannotWriteError(errno.EAGAIN, message, str(self._path))
 
     def _undo(self) -> None:
         """Take back what was written of the last bytes; a file that cannot be cut is left for the reader to mend."""
@@ -78,12 +88,32 @@ class Appended:
 
 def is_being_written(path: Path) -> bool:
     """Whether a process, this one included, has the file as :class:`Appended` now. Raises OSError."""
-    with path.open("rb") as file:
-        try:
+    try:
+        with open_regular(path, MOST_JOURNAL_BYTES) as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
+    except FileNotFoundError:
+        return False
+    except BlockingIOError:
+        return True
     return False
+
+
+def no_follow(path: Path | str, flags: int) -> int:
+    """Opens a file that is not somebody else's: no link leads to it, and nobody waits for a pipe. Raises OSError."""
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file; an older one stays as it is until the new one is whole. Raises OSError."""
+    part = path.with_name(f"{path.name}.part")
+    try:
+        part.unlink(missing_ok=True)
+        with open(part, "x", encoding="utf-8") as out:
+            out.write(text)
+        os.replace(part, path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def sync_folder(path: Path) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from logs.disk import Appended
+from world_models.files.regular_files import MOST_BYTES, open_regular
 
 
 class MjpegFile:
@@ -62,7 +63,7 @@ class Pictures(Mapping[int, bytes]):
     def __getitem__(self, number: int) -> bytes:
         """The picture's bytes, fewer where the file is too short. Raises KeyError, OSError."""
         start, size = self._places[number]
-        with self.path.open("rb") as file:
+        with open_regular(self.path, self.end + MOST_BYTES) as file:
             file.seek(start)
             return file.read(size)
 

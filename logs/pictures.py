@@ -11,6 +11,7 @@ from logs.records import DecisionRecord, EntryRecord, is_a, read_records
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
 from world_models.entries.body import CameraPicture
+from world_models.files.regular_files import MOST_BYTES
 
 
 def open_pictures(run: RunDirectory) -> Mapping[int, bytes]:
@@ -41,7 +42,10 @@ def _sizes(decisions: Iterable[DecisionRecord]) -> Iterator[tuple[int, int]]:
     """(number, bytes) of every picture that was seen, in the order in which they came."""
     for record in (record for decision in decisions for record in decision.observed if is_a(record, CameraPicture)):
         try:
-            yield int(record.fields["number"]), int(record.fields["jpeg"]["bytes"])
+            number, size = int(record.fields["number"]), int(record.fields["jpeg"]["bytes"])
+            if not 0 <= size <= MOST_BYTES:
+                raise ValueError
+            yield number, size
         except (KeyError, TypeError, ValueError):
             raise BadInput(f"{record.ref}: expected a picture's number and length, got {record.fields!r}") from None
 

@@ -27,6 +27,7 @@ from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref
 from blackboard.kinds import Registry
 from blackboard.servoing import Discrepancy
+from logs.disk import MOST_JOURNAL_BYTES
 from logs.mjpeg_file import Pictures
 from logs.run_directory import check_version
 from logs.run_errors import BadInput
@@ -34,6 +35,7 @@ from world_models import words
 from world_models.building.locale_frame import FrameReference, FrameRequest, LocaleFrame
 from world_models.entries.body import CameraPicture
 from world_models.entries.entry_kinds import KINDS
+from world_models.files.regular_files import open_regular
 
 if TYPE_CHECKING:  # an explanation starts fast only where no world is imported that it does not need
     from world_models.frame_store import FrameStore
@@ -269,7 +271,7 @@ def read_records(path: Path) -> Iterator[DecisionRecord]:
     """
     check_version(path.parent)
     try:
-        with path.open("rb") as file:
+        with open_regular(path, MOST_JOURNAL_BYTES) as file:
             for number, line in enumerate(file, 1):
                 if not line.endswith(b"\n"):
                     return

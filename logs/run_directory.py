@@ -9,18 +9,22 @@ from __future__ import annotations
 
 import difflib
 import json
-import os
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+from logs.disk import Appended, is_being_written, write_whole
 from logs.run_errors import BadInput
+from world_models.files.regular_files import read_regular
 
 RUNS = Path("runs")
 """Where runs are kept unless ``--out`` says otherwise."""
 FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json", "camera.toml")
+MOST_JSON_BYTES = 20_000_000
+"""Of the files of a run that are read as a whole."""
 JOURNAL_VERSION = 2
 """Of the names in journals; one that is older calls kinds, fields and knowledge sources otherwise (CHANGELOG.md)."""
 RESULT: Mapping[str, tuple[Any, str]] = {
@@ -63,12 +67,7 @@ class RunDirectory:
         """The result; empty where the run has none (it was cut off). Raises BadInput where it is malformed."""
         if not self.result.exists():
             return {}
-        try:
-            data = json.loads(self.result.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise BadInput(f"{self.result}: expected a readable file, got: {error.strerror}") from None
-        except (ValueError, RecursionError) as error:
-            raise BadInput(f"{self.result}: expected JSON, got: {error}") from None
+        data = read_json(self.result)
         if not isinstance(data, dict):
             raise BadInput(f"{self.result}: expected a JSON object, got {type(data).__name__}")
         for key, (kind, named) in RESULT.items():
@@ -78,27 +77,36 @@ class RunDirectory:
 
     def write_camera(self, text: str) -> None:
         """Write ``camera.toml``: the camera at the end, where it is otherwise than told. Raises OSError."""
-        (self.path / "camera.toml").write_text(text, encoding="utf-8")
+        write_whole(self.path / "camera.toml", text)
 
     def write_result(self, record: Mapping[str, Any]) -> None:
         """Write ``result.json``; an older one stays as it is until the new one is whole. Raises OSError."""
-        part = self.path / "result.json.part"
-        try:
-            part.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
-            os.replace(part, self.result)
-        except OSError:
-            part.unlink(missing_ok=True)
-            raise
+        write_whole(self.result, json.dumps(record, indent=2) + "\n")
 
 
 def check_version(folder: Path) -> None:
     """Raises BadInput where a run's journal is of another version; where nothing tells, it is read as it is."""
-    try:
-        head = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return
-    if isinstance(head, dict) and "world" in head:
+    if "world" in (head := read_head(folder)):
         refuse_version(folder, head.get("journal_version", 1))
+
+
+def read_head(folder: Path) -> dict[str, Any]:
+    """What ``run.json`` says; nothing where it cannot be read."""
+    try:
+        head = read_json(folder / "run.json")
+    except BadInput:
+        return {}
+    return head if isinstance(head, dict) else {}
+
+
+def read_json(path: Path, what: str = "a readable file") -> Any:
+    """What a file of a run or a campaign says. Raises BadInput where it cannot be read, or is no JSON."""
+    try:
+        return json.loads(read_regular(path, MOST_JSON_BYTES))
+    except OSError as error:
+        raise BadInput(f"{path}: expected {what}, got: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise BadInput(f"{path}: expected JSON, got: {error}") from None
 
 
 def refuse_version(folder: Path, version: object) -> None:
@@ -126,21 +134,26 @@ def check_vacant(path: Path) -> Path:
 def prepare_directory(path: Path, name: str, seed: int) -> tuple[Path, Path | None]:
     """Make room for a run of a scenario and seed.
 
-    An older run of the same is deleted; one of another scenario or seed is moved aside.
+    An older run of the same is deleted; one of another scenario or seed is moved aside, and so is any on hardware,
+    which nobody can make again.
 
     Returns:
         where the run may be written, and where the older one is now, if it is kept.
 
-    Raises BadInput where the directory cannot be used.
+    Raises BadInput where the directory cannot be used, or a run there goes on.
     """
+    journal = path / "journal.jsonl"
     try:
         check_vacant(path).mkdir(parents=True, exist_ok=True)
         aside = None if _is_of(path, name, seed) else _free_beside(path)
-        if aside is not None:
-            path.rename(aside)
-            path.mkdir()
-        for file in FILES:
-            (path / file).unlink(missing_ok=True)
+        with closing(Appended(journal, "journal", keep=None)):  # nobody else writes it meanwhile: so it goes last
+            if aside is not None:
+                path.rename(aside)
+                path.mkdir()
+            for file in FILES:
+                if file != journal.name:
+                    (path / file).unlink(missing_ok=True)
+            journal.unlink(missing_ok=True)
     except OSError as error:
         raise BadInput(f"--out {path}: expected a directory to write to, got: {error.strerror}") from None
     return path, aside
@@ -148,11 +161,16 @@ def prepare_directory(path: Path, name: str, seed: int) -> tuple[Path, Path | No
 
 def _is_of(path: Path, name: str, seed: int) -> bool:
     """Whether what is there may be deleted: an older run of this scenario and seed, or no run at all."""
-    try:
-        head = json.loads((path / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+    if not (head := read_head(path)):
         return not (path / "journal.jsonl").exists()
-    return isinstance(head, dict) and (head.get("name"), head.get("seed")) == (name, seed)
+    return head.get("kind") != "hardware" and (head.get("name"), head.get("seed")) == (name, seed)
+
+
+def expect_unwritten(path: Path) -> Path:
+    """The same; raises BadInput where a run there goes on, OSError where its journal cannot be read."""
+    if is_being_written(path / "journal.jsonl"):
+        raise BadInput(f"{path}: expected a run that has ended, got one that another process is writing")
+    return path
 
 
 def _free_beside(path: Path) -> Path:

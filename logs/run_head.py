@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from functools import lru_cache
@@ -13,8 +12,9 @@ from typing import Any, TypeVar, cast
 
 from blackboard.decoding import MisfitError, decode, fields_of
 from blackboard.journal import plain
-from logs.decided_by import arithmetic, deciding_code
-from logs.run_directory import JOURNAL_VERSION, refuse_version
+from logs.decided_by import arithmetic, calculating_libraries, deciding_code
+from logs.disk import write_whole
+from logs.run_directory import JOURNAL_VERSION, read_json, refuse_version
 from logs.run_errors import BadInput
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
@@ -25,6 +25,8 @@ from world_models.files.world_files import fingerprint, load_world
 from world_models.plugins import SOURCES_GROUP, list_plugins
 from world_models.robot import RobotModel
 
+MOST_IN_HEAD = 1_000
+"""Letters of a name, and constants."""
 SIMULATOR, HARDWARE = "simulator", "hardware"
 PARTS: Mapping[str, type[Any]] = {
     "camera": Camera, "mount": CameraMount, "actuator": ActuatorModel, "deviation": CameraDeviation}
@@ -53,6 +55,7 @@ class RunHead:
             "" in a run that is older than that.
         plugins: the knowledge sources of other packages that decide too: name -> package and version.
         arithmetic: how the libraries calculated, as :func:`logs.decided_by.arithmetic` tells; "" in an older run.
+        libraries: versions of those that calculate, by name; none in an older run.
         journal_version: of the names in its journal; only this program's own is read.
     """
 
@@ -73,6 +76,7 @@ class RunHead:
     code: str = field(default_factory=deciding_code)
     arithmetic: str = field(default_factory=arithmetic)
     plugins: Mapping[str, str] = field(default_factory=lambda: dict(list_plugins(SOURCES_GROUP)))
+    libraries: Mapping[str, str] = field(default_factory=calculating_libraries)
     journal_version: int = JOURNAL_VERSION
 
     @staticmethod
@@ -85,28 +89,23 @@ class RunHead:
         if robot.deviation == NOT_STATED:
             del known["deviation"]
         return RunHead(
-            kind, name, seed, _portable(world), fingerprint(world), plain(known), asdict(servo), plain(command), **more
+            kind, name, seed, portable(world), fingerprint(world), plain(known), asdict(servo), plain(command), **more
         )
 
     def write(self, folder: Path) -> None:
         """Write ``run.json``. Raises OSError."""
-        part = folder / "run.json.part"
-        part.write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
-        os.replace(part, folder / "run.json")
+        write_whole(folder / "run.json", json.dumps(asdict(self), indent=2) + "\n")
 
     @staticmethod
     def read(folder: Path) -> RunHead:
         """Raises BadInput where ``run.json`` is missing or malformed, or the journal of another version."""
         path = folder / "run.json"
+        data = read_json(path, "the head of a run")
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise BadInput(f"{path}: expected the head of a run, got: {error.strerror}") from None
-        except (ValueError, RecursionError) as error:
-            raise BadInput(f"{path}: expected JSON, got: {error}") from None
-        try:
-            older = {"code": "", "arithmetic": "", "plugins": {}, "journal_version": 1}
+            older = {"code": "", "arithmetic": "", "plugins": {}, "libraries": {}, "journal_version": 1}
             head: RunHead = decode({**older, **data} if isinstance(data, dict) else data, RunHead)
+            if (many := max(len(head.name), len(head.constants))) > MOST_IN_HEAD:
+                raise ValueError(f"expected a name and constants of at most {MOST_IN_HEAD}, got {many}")
         except (ValueError, TypeError) as error:
             raise BadInput(f"{path}: {error}") from None
         refuse_version(folder, head.journal_version)
@@ -114,12 +113,13 @@ class RunHead:
 
     def is_like(self, other: RunHead) -> bool:
         """Whether both runs began alike, whichever program decides."""
-        one, two = (replace(head, code="", arithmetic="") for head in (self, other))
+        one, two = (replace(head, code="", arithmetic="", libraries={}) for head in (self, other))
         return json.dumps(asdict(one)) == json.dumps(asdict(two))
 
     def here(self) -> RunHead:
         """The same, for a run that this program decides."""
-        return replace(self, harvey=version("harvey"), code=deciding_code(), arithmetic=arithmetic())
+        return replace(self, harvey=version("harvey"), code=deciding_code(), arithmetic=arithmetic(),
+                       libraries=calculating_libraries())
 
     def decided_elsewhere(self) -> str:
         """What to say of a run that another program or processor decided than this; "" where none is known of."""
@@ -132,6 +132,9 @@ class RunHead:
         for name, package in self.plugins.items():
             if name in installed and installed[name] != package:
                 return f"was decided with {name} of {package}, and here it is of {installed[name]}"
+        for name, theirs in self.libraries.items():
+            if theirs != (ours := here.libraries.get(name, "not installed")):
+                return f"was calculated by {name} {theirs}, and here it is {ours}"
         if self.arithmetic and self.arithmetic != here.arithmetic:
             return f"was calculated on another processor ({self.arithmetic}, and this is {here.arithmetic})"
         return ""
@@ -173,7 +176,7 @@ def load_known_world(path: Path) -> World:
 
     Raises WorldError, OSError.
     """
-    return _world(ROOT / _portable(path), fingerprint(path))
+    return _world(ROOT / portable(path), fingerprint(path))
 
 
 @lru_cache(maxsize=1)  # with all that was computed of it: some 100 MB for a large floor
@@ -200,7 +203,7 @@ def _whole(value: Any, kind: type[T]) -> T:
     return kind(**fields_of(value, kind))
 
 
-def _portable(path: Path) -> str:
+def portable(path: Path) -> str:
     """A path that also holds where the project lies elsewhere."""
     there = path.resolve()
     return str(there.relative_to(ROOT)) if there.is_relative_to(ROOT) else str(there)

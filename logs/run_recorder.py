@@ -68,12 +68,12 @@ class RunRecorder:
         drawing = run.recording if run is not None else drawing
         with ExitStack() as opened:
             if run is not None:
-                if whole is None:
-                    run.path.mkdir(parents=True, exist_ok=True)
-                    head.write(run.path)
+                run.path.mkdir(parents=True, exist_ok=True)
                 keep = whole or Extent()
                 self._journal = JournalFile(run.journal, keep=keep.journal, sync=sync)
                 opened.callback(self._journal.close)
+                if whole is None:  # now that the journal is ours
+                    head.write(run.path)
                 self._camera = MjpegFile(run.camera, keep=keep.camera, sync=sync)
                 opened.callback(self._camera.close)
                 if sync:

@@ -18,6 +18,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from logs.disk import MOST_JOURNAL_BYTES
 from logs.records import Candidate, DecisionRecord, EntryRecord, check_step, decision_at, is_a
 from logs.run_directory import check_version
 from logs.run_errors import BadInput
@@ -25,6 +26,7 @@ from world_models.building.locale_frame import FrameReference, LocaleFrame
 from world_models.entries.location import Hypothesis
 from world_models.entries.percepts import Tracks
 from world_models.entries.task import Outcome
+from world_models.files.regular_files import read_regular
 
 K = TypeVar("K")
 PLAIN = re.compile(rb'\{"cycle":(\d{1,15}),"')
@@ -46,7 +48,7 @@ class Timeline:
         """Raises BadInput where the file cannot be read, or is of another version."""
         check_version(path.parent)
         try:
-            self._data = path.read_bytes()
+            self._data = read_regular(path, MOST_JOURNAL_BYTES)
         except OSError as error:
             raise BadInput(f"{path}: expected a readable journal, got: {error.strerror}") from None
         self._path = path

@@ -27,6 +27,7 @@ from world_models.files.toml.settings_reader import MAX_NUMBER, read_all, read_s
 from world_models.files.toml.source import Key, Source, WorldError
 from world_models.units import Bounded, bounded
 
+MOST_DETAILS = 100
 MAX_DISTORTION = 1e4
 """Largest distortion coefficient: those of real lenses are about 1, of long ones some hundreds."""
 
@@ -193,6 +194,8 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
 def _scenario(source: Source, name: str, folder: Path) -> Scenario:
     shared, node = FORMAT.read(source, name, folder), source.root
     details = [item.text() for item in node["details"].items()] if "details" in node else []
+    if len(details) > MOST_DETAILS:
+        raise node["details"].fail(f"at most {MOST_DETAILS} files", str(len(details)))
     return Scenario(
         details=tuple(named_file(text, ROOT / "sim" / "buildings", folder) for text in details),
         faults=tuple(read_fault(item) for item in node["faults"].items()) if "faults" in node else (),

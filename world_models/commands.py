@@ -18,7 +18,9 @@ from world_models.entries.location import Place
 from world_models.units import FOOT_M
 
 MAX_COORDINATE_FT = 1e6
-_NUMBER = r"\s*([-+]?\d+(?:\.\d*)?)\s*"
+MOST_LETTERS = 1_000
+"""Of a command: nobody says more in a sentence."""
+_NUMBER = r"\s*([-+]?[0-9]+(?:\.[0-9]*)?)\s*"
 _PLACE = rf"\(\s*([\w'-]+)\s+\({_NUMBER},{_NUMBER},{_NUMBER}\)\s*\)"
 _DESTINATION = re.compile(rf"\s*{_PLACE}\s*")
 _GOAL = re.compile(rf"\s*\(\s*ptrans\s+{_PLACE}\s*{_PLACE}\s*\)\s*")
@@ -68,6 +70,8 @@ NUMBERS: Mapping[int, str] = {2: "two", 3: "three", 4: "four", 5: "five", 6: "si
 
 def check_command(text: str) -> None:
     """Raises ValueError for a text that is no command in any world."""
+    if len(text) > MOST_LETTERS:
+        raise ValueError(f"expected at most {MOST_LETTERS} letters, got {len(text)}")
     if text.lstrip().startswith("("):
         parse_ptrans(text)
     else:
@@ -101,6 +105,8 @@ def parse_command(text: str, world: World) -> tuple[Place, Place]:
 
 def check_destination(text: str) -> None:
     """Raises ValueError for a text that is no destination in any world."""
+    if len(text) > MOST_LETTERS:
+        raise ValueError(f"expected at most {MOST_LETTERS} letters, got {len(text)}")
     if text.lstrip().startswith("("):
         parse_place(text)
     else:

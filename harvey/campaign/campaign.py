@@ -215,7 +215,7 @@ def drive_missions(
     stage = tasks[0].stage()
     from harvey.simulation.simulated_run import build_head
 
-    head = replace(build_head(stage, 0, tasks[0].body, tasks[0].agent_settings), code="", arithmetic="")
+    head = replace(build_head(stage, 0, tasks[0].body, tasks[0].agent_settings), code="", arithmetic="", libraries={})
     by_seed = {task.seed: task for task in tasks}
     if not tasks[0].go_on:
         _remove_results(folder)

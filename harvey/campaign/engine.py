@@ -26,6 +26,8 @@ from typing import Any, Generic, TypeVar
 from harvey.campaign.case_work import CaseAnswer, Killed, check_origin, map_locally, origin
 from harvey.campaign.workers import Workers, chosen_workers, find_cluster
 from harvey.errors import BadInput
+from logs.disk import MOST_JOURNAL_BYTES, no_follow, sync_folder, write_whole
+from world_models.files.regular_files import read_regular
 
 RESULTS, TIMES = "results.jsonl", "times.jsonl"
 CASE, RESULT, KILLED = "case", "result", "killed"
@@ -44,7 +46,7 @@ class ResultsFile:
     def __init__(self, folder: Path, head: Mapping[str, Any]) -> None:
         """Open or begin it; use :func:`open_results`."""
         self.path, self._head = folder / RESULTS, dict(head)
-        self._file = open(self.path, "a+b")  # noqa: SIM115 (it stays open; open_results closes it)
+        self._file = open(self.path, "a+b", opener=no_follow)  # noqa: SIM115 (open_results closes it)
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -59,12 +61,12 @@ class ResultsFile:
             self._append(self._head)
             records = {}
         else:
-            self._file.truncate(_whole(self.path))
+            self._file.truncate(self.path.read_bytes().rfind(b"\n") + 1)  # up to the end of the last whole line
         self.known = {case: record[RESULT] for case, record in records.items() if RESULT in record}
 
     def add(self, case: int, result: Mapping[str, Any], times: Mapping[str, Any]) -> None:
         """Append what was found of a case; on the disk when this returns."""
-        with self._times.open("a", encoding="utf-8") as out:
+        with open(self._times, "a", encoding="utf-8", opener=no_follow) as out:
             out.write(_line({CASE: case, **times}).decode())
         self._append({CASE: case, RESULT: result})
         self.known[case] = dict(result)
@@ -78,12 +80,12 @@ class ResultsFile:
         _, records = read_results(self.path)
         lines = [self._head, *(records[case] for case in sorted(records))]
         part = self.path.with_suffix(".part")
-        with part.open("wb") as out:
+        with open(part, "wb", opener=no_follow) as out:
             out.writelines(map(_line, lines))
             out.flush()
             os.fsync(out.fileno())
         os.replace(part, self.path)
-        _sync_folder(self.path.parent)
+        sync_folder(self.path.parent)
 
     def close(self) -> None:
         """Let others work on it."""
@@ -109,13 +111,16 @@ def open_results(folder: Path, head: Mapping[str, Any]) -> Iterator[ResultsFile]
 def read_results(path: Path) -> tuple[dict[str, Any], Records]:
     """The head, and the line of each case in the order of the cases; lines that cannot be read are left out.
 
-    Of two results of a case the first counts; that it was given up counts only until there is a result.
+    Of two results of a case the first counts; that it was given up counts only until there is a result. Raises BadInput
+    for a result that is no object.
     """
     records = list(_read_lines(path))
     head = records[0] if records and CASE not in records[0] else {}
     found: Records = {}
     for record in records[1:]:
-        case = record.get(CASE)
+        case, result, kills = record.get(CASE), record.get(RESULT, {}), record.get(KILLED, 0)
+        if not (isinstance(result, dict) and is_number(kills)):
+            raise BadInput(f"{path}: case {case}: expected a JSON object as result, got {record.get(RESULT, kills)!r}")
         if isinstance(case, int) and (case not in found or RESULT not in found[case]):
             found[case] = record
     return head, {case: found[case] for case in sorted(found)}
@@ -123,34 +128,27 @@ def read_results(path: Path) -> tuple[dict[str, Any], Records]:
 
 def read_times(folder: Path) -> list[dict[str, Any]]:
     """What was measured, in the order in which the cases were done."""
-    return [record for record in _read_lines(folder / TIMES) if isinstance(record.get(CASE), int)]
+    return [record for record in _read_lines(folder / TIMES)
+            if isinstance(record.get(CASE), int) and isinstance(record.get("measured", {}), dict)]
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of JSON is a number that can be counted with."""
+    return isinstance(value, int | float) and -1e15 < value < 1e15
 
 
 def _read_lines(path: Path) -> Iterator[dict[str, Any]]:
-    for line in path.read_bytes().split(b"\n")[:-1] if path.is_file() else []:
+    for line in read_regular(path, MOST_JOURNAL_BYTES).split(b"\n")[:-1] if path.is_file() else []:
         try:
             record = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
         if isinstance(record, dict):
             yield record
 
 
-def _whole(path: Path) -> int:
-    """Bytes up to the end of the last line that is whole."""
-    return path.read_bytes().rfind(b"\n") + 1
-
-
 def _line(record: Mapping[str, Any]) -> bytes:
     return json.dumps(record).encode() + b"\n"
-
-
-def _sync_folder(folder: Path) -> None:
-    number = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(number)
-    finally:
-        os.close(number)
 
 
 T = TypeVar("T")
@@ -247,7 +245,7 @@ def _describe(campaign: Campaign[Any, Any], workers: Workers, dashboard: str | N
     """Write what ``harvey campaign show`` needs beside the results."""
     about = {"name": campaign.name, "unit": campaign.unit, "total": len(campaign.cases), "workers": workers.text,
              "dashboard": dashboard, "began": datetime.now(UTC).isoformat(timespec="seconds")}
-    (campaign.folder / CAMPAIGN).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+    write_whole(campaign.folder / CAMPAIGN, json.dumps(about, indent=2) + "\n")
 
 
 def _split_measured(record: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -10,7 +10,6 @@ otherwise is no proof that there is no difference.
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -20,9 +19,9 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from harvey.campaign.engine import CAMPAIGN, KILLED, RESULT, RESULTS, read_results, read_times
+from harvey.campaign.engine import CAMPAIGN, KILLED, RESULT, RESULTS, is_number, read_results, read_times
 from harvey.errors import BadInput
-from logs.run_directory import RUNS
+from logs.run_directory import RUNS, read_json
 from logs.tables import table
 from world_models.words import count
 
@@ -90,18 +89,17 @@ def find_campaign(text: str) -> Path:
 
 def read_progress(folder: Path) -> CampaignProgress:
     """Read it; a campaign may be under way. Raises BadInput."""
-    try:
-        about = json.loads((folder / CAMPAIGN).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        about = {}
-    except ValueError as error:
-        raise BadInput(f"{folder / CAMPAIGN}: expected JSON, got: {error}") from None
+    about = read_json(folder / CAMPAIGN) if (folder / CAMPAIGN).exists() else {}
     _, records = read_results(folder / RESULTS)
+    about = about if isinstance(about, dict) else {}
+    if not (is_number(total := about.get("total", 0)) and isinstance(about.get("unit", ""), str)):
+        raise BadInput(f"{folder / CAMPAIGN}: expected a number as total and a text as unit, got {total!r} and "
+                       f"{about.get('unit')!r}")
     return CampaignProgress(
-        folder, about if isinstance(about, dict) else {},
+        folder, about,
         {case: record[RESULT] for case, record in records.items() if RESULT in record},
         {case: record[KILLED] for case, record in records.items() if RESULT not in record and KILLED in record},
-        [record for record in read_times(folder) if isinstance(record.get("at"), float | int)])
+        [record for record in read_times(folder) if is_number(record.get("at")) and is_number(record.get("took_s", 0))])
 
 
 def format_progress(progress: CampaignProgress) -> str:
@@ -165,6 +163,7 @@ def draw_progress(progress: CampaignProgress) -> Path:
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, fontsize=9)
     path = progress.folder / PICTURE
+    path.unlink(missing_ok=True)  # it may be a link to somebody's file
     figure.savefig(path, format="png")
     return path
 

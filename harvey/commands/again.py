@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from harvey.campaign.campaign import parse_pairs
 from harvey.commands.command import CliCommand
 from harvey.errors import BadInput
-from logs.run_directory import RunDirectory, check_vacant, open_run
+from logs.run_directory import RunDirectory, check_vacant, expect_unwritten, open_run
 from world_models.words import count
 
 if TYPE_CHECKING:
@@ -170,6 +170,7 @@ def _add_resume_arguments(parser: ArgumentParser) -> None:
 
 def _run_resume(args: Namespace) -> int:
     run = open_run(args.run, "run.json")
+    expect_unwritten(run.path)
     from harvey.campaign.summary import format_result
     from harvey.runner.resume import find_remains
     from logs.run_head import HARDWARE, RunHead
@@ -255,6 +256,7 @@ def _run_repair(args: Namespace) -> int:
     from harvey.simulation.simulated_run import redraw
 
     run = open_run(args.run)
+    expect_unwritten(run.path)
     with tqdm(unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
         decisions = redraw(run, (lambda _decision: bar.update(),))
     print(f"{run.recording} was drawn anew from {count(decisions, 'decision')} of the journal")

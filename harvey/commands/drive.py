@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from harvey.commands.command import CliCommand
 from harvey.errors import BadInput
-from logs.run_directory import RUNS, check_vacant
+from logs.run_directory import RUNS, check_vacant, expect_unwritten
 
 if TYPE_CHECKING:
     from blackboard.journal import Decision
@@ -67,7 +67,7 @@ def _run(args: Namespace) -> int:
     page = None if args.serve is None else find_page("--serve")
     settings, numbers = split_settings(dict(parse_pairs(args.settings)), FORMAT.keys())
     mission = _mission(args, settings)
-    out = check_vacant(Path(args.out) if args.out else RUNS / f"{mission.name}-drive")
+    out = expect_unwritten(check_vacant(Path(args.out) if args.out else RUNS / f"{mission.name}-drive"))
     began = time.monotonic()
 
     def clock() -> float:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from harvey.commands.command import CliCommand
 from harvey.errors import BadInput
 from logs.run_directory import RunDirectory, open_run
+from logs.run_errors import reading
 from world_models.words import count
 
 if TYPE_CHECKING:
@@ -56,7 +57,8 @@ def build_run_page(run: RunDirectory) -> str:
     from harvey.report.page import build_page
     from logs.timeline import Timeline
 
-    return build_page(run, Timeline(run.journal))
+    with reading(run.journal):
+        return build_page(run, Timeline(run.journal))
 
 
 def _title(named: Sequence[str], missions: Sequence[MissionSummary]) -> str:
@@ -134,7 +136,8 @@ def _run_export(args: Namespace) -> int:
         raise BadInput(f"{run.journal}: expected at least one decision, got none")
     if exporter is not None:
         print(f"{args.mcap}: {count(exporter.write(run, Path(args.mcap)), 'message')}")
-    tables = list(read_tables(run, history)) if wanted or args.tum is not None else []
+    with reading(run.journal):
+        tables = list(read_tables(run, history)) if wanted or args.tum is not None else []
     for kind, folder in wanted.items():
         for path, table in zip(write_tables(tables, kind, folder), tables, strict=True):
             print(f"{path}: {count(len(table.rows), 'row')}")

@@ -23,7 +23,7 @@ class BaseSettings:
 
     Attributes:
         port: ``denning:/dev/ttyUSB0``, ``p2os:...`` or ``create2:...``; what follows the colon is a device, or a URL
-            that pyserial knows; of ``ros2:`` a robot's file, or a router's address.
+            of ``socket://``, ``rfc2217://`` or ``loop://``; of ``ros2:`` a robot's file, or a router's address.
         radius_m: of the robot's disc.
     """
 

@@ -73,8 +73,6 @@ def _of_campaign(folder: Path) -> Iterator[MissionSummary]:
     cases = progress.results | {case: {"outcome": GIVEN_UP} for case in progress.given_up}
     for case in sorted(cases):
         result, run = cases[case], RunDirectory(folder / str(case))
-        if not isinstance(result, dict):
-            raise BadInput(f"{folder / RESULTS}: case {case}: expected a JSON object as result, got {result!r}")
         scenario, seed = result.get("scenario"), result.get("seed")
         name = f"{scenario}, seed {seed}" if isinstance(scenario, str) and seed is not None else f"case {case}"
         yield MissionSummary(name, run if run.journal.is_file() else None, result)

@@ -24,7 +24,7 @@ from harvey.simulation.referee import Referee
 from harvey.simulation.serial_body import IN_PROCESS, open_body
 from harvey.wiring import knowledge_sources
 from logs.run_directory import RunDirectory
-from logs.run_head import HARDWARE, SIMULATOR, RunHead, load_known_world
+from logs.run_head import HARDWARE, SIMULATOR, RunHead, load_known_world, portable
 from logs.run_recorder import RunRecorder
 from sim.scenario import Scenario, ScenarioError, scenario_from_tables
 from sim.stage import Stage, build_stage
@@ -136,7 +136,7 @@ def build_head(stage: Stage, seed: int, body: str = IN_PROCESS, settings: Pairs 
     s = stage.scenario
     robot = build_robot_model(s, load_known_world(s.world))
     return RunHead.of(SIMULATOR, s.name, seed, s.world, robot, s.servo, s.command, scenario=s.source.data,
-                      folder=str(s.folder), body=body, constants=settings)
+                      folder=portable(s.folder), body=body, constants=settings)
 
 
 def rebuild_stage(head: RunHead) -> Stage:

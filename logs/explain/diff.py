@@ -10,9 +10,10 @@ from dataclasses import asdict, dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
-from logs.explain.phrases import UNREADABLE, sentence
+from logs.explain.phrases import sentence
 from logs.records import Candidate, DecisionRecord, EntryRecord, as_line, is_a
 from logs.run_directory import RunDirectory
+from logs.run_errors import UNREADABLE
 from logs.tables import table
 from logs.timeline import Timeline
 from world_models import words

@@ -25,8 +25,6 @@ from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, T
 from world_models.entries.task import Certificate, Goal, Leg, Milestone, PlanSketch
 from world_models.words import count, degrees, landmark, listed, metres, point, quantity, size, turn
 
-UNREADABLE = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
-"""What reading a value raises that has other fields than this version writes."""
 MAX_LISTED = 4
 WIDTH = 120
 """Of a line of text [characters]."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -11,7 +10,7 @@ from typing import Any
 
 from blackboard.servoing import Discrepancy
 from logs.explain import phrases, turning_points
-from logs.explain.phrases import UNREADABLE, capital, named, plainly, sentence, wrap
+from logs.explain.phrases import capital, named, plainly, sentence, wrap
 from logs.explain.turning_points import (
     TurningPoint,
     read_collisions,
@@ -20,8 +19,8 @@ from logs.explain.turning_points import (
     turn_lines,
 )
 from logs.records import EntryRecord, is_a
-from logs.run_directory import RunDirectory
-from logs.run_errors import BadInput
+from logs.run_directory import RunDirectory, read_head
+from logs.run_errors import BadInput, reading
 from logs.tables import table
 from logs.timeline import Timeline
 from world_models.building.locale_frame import LocaleFrame
@@ -132,7 +131,7 @@ class RunStory:
 
 def run_name(run: RunDirectory) -> str:
     """``hallway-kidnap, seed 0``; the directory's name where its head cannot be read."""
-    head = _head(run)
+    head = read_head(run.path)
     name, seed = head.get("name"), head.get("seed")
     if not isinstance(name, str):
         return run.path.resolve().name
@@ -141,7 +140,7 @@ def run_name(run: RunDirectory) -> str:
 
 def levels_off(run: RunDirectory) -> Iterator[str]:
     """Which servo levels were switched off, as run.json says; nothing where it does not."""
-    head = _head(run)
+    head = read_head(run.path)
     try:
         set_since = {key: value == "on" for key, value in head["constants"] if key.startswith("servo.")}
         servo = {**head["servo"], **{key.removeprefix("servo."): is_on for key, is_on in set_since.items()}}
@@ -152,14 +151,6 @@ def levels_off(run: RunDirectory) -> Iterator[str]:
             yield f"The {level} level of servoing was off in this run: {WITHOUT.get(level, 'nobody closed it')}."
 
 
-def _head(run: RunDirectory) -> dict[str, Any]:
-    try:
-        head = json.loads((run.path / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return head if isinstance(head, dict) else {}
-
-
 def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
     """Which run it is, how it ended, and what went wrong on the way: the first lines of a story.
 
@@ -168,7 +159,7 @@ def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
     if not history.cycles:
         history.verify()
         raise BadInput(f"{history.source}: expected at least one decision, got none")
-    try:
+    with reading(history.source):
         outcome = _outcome(history)
         cycle = history.cycles[-1] if outcome is None else outcome.cycle
         time_s = history.time_at(cycle)
@@ -176,8 +167,6 @@ def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
         yield f"{run_name(run)}: {'cut off' if outcome is None else outcome.value.kind} {when}."
         yield from levels_off(run)
         yield from turn_lines(history, run.read_result(), is_whole=outcome is not None)
-    except UNREADABLE as error:
-        raise _strange(history, error) from error
 
 
 def first_lines(path: Path | None) -> tuple[str, ...]:
@@ -191,19 +180,13 @@ def first_lines(path: Path | None) -> tuple[str, ...]:
 def tell_run(run: RunDirectory, history: Timeline) -> RunStory:
     """The story of a run. Raises BadInput where journal or ``result.json`` cannot be read as this version's."""
     first, result = tuple(opening(run, history)), run.read_result()
-    try:
+    with reading(history.source):
         turns = tuple(read_turning_points(history))
         sections = (
             tell_errand(history), tell_happenings(history, result), tell_plans(history), tell_lost(history),
             tell_contacts(history, turns, result),
             tell_things(turns), tell_camera(history), tell_end(history, result))
         return RunStory(first, turns, sections, read_milestones(history))
-    except UNREADABLE as error:
-        raise _strange(history, error) from error
-
-
-def _strange(history: Timeline, error: Exception) -> BadInput:
-    return BadInput(f"{history.source}: expected entries as this version writes them, got others ({error!r})")
 
 
 def _said(history: Timeline, text: str, record: EntryRecord[Any], *others: EntryRecord[Any] | None) -> Sentence:

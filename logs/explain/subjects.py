@@ -10,11 +10,11 @@ from typing import Any
 from blackboard.servoing import Discrepancy
 from logs.explain import phrases
 from logs.explain.model import MAX_LISTED, WorldFile, tell_changes, tell_model_lines, tell_source
-from logs.explain.phrases import UNREADABLE, capital, sentence
+from logs.explain.phrases import capital, sentence
 from logs.explain.web import find_refs
 from logs.explain.why import Step, Story, step, story_of, tell_stories
 from logs.records import WHAT_IF, EntryRecord
-from logs.run_errors import BadInput
+from logs.run_errors import UNREADABLE, BadInput
 from logs.timeline import Timeline
 from world_models import words
 from world_models.building.locale_frame import FrameReference, FrameRequest

@@ -15,9 +15,9 @@ from blackboard.change import Quiescence
 from blackboard.servoing import Discrepancy
 from logs.explain import model, phrases
 from logs.explain.model import WorldFile, tell_source
-from logs.explain.phrases import UNREADABLE, capital, describe_decision, named, plainly, sentence, tell_answer, wrap
+from logs.explain.phrases import capital, describe_decision, named, plainly, sentence, tell_answer, wrap
 from logs.records import EntryRecord, is_a
-from logs.run_errors import BadInput
+from logs.run_errors import UNREADABLE, BadInput
 from logs.timeline import Timeline
 from world_models import words
 from world_models.building.locale_frame import FrameRequest, LocaleFrame

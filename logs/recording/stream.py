@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
 import socket
 import string
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
+from threading import Thread
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,6 +18,7 @@ import pyarrow as pa
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from logs.disk import no_follow
 from logs.run_errors import RecordingError
 
 pa.set_memory_pool(pa.system_memory_pool())  # arrow's own keeps 20 MB that a mission's recording gave back
@@ -22,6 +27,8 @@ APPLICATION = "harvey"
 FLUSH_CYCLES, LIVE_FLUSH_CYCLES = 128, 4
 """A crash loses at most so many cycles of the recording (the journal loses none, so they can be drawn again); a live
 viewer sees it so late."""
+MOST_S = 5.0
+"""So long it may take to bring what was logged to the disk: where that is full, the library may wait for ever [s]."""
 LOCALHOST, LIVE_PORT = "127.0.0.1", 9876
 BATCHING = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1 << 30, flush_num_rows=1 << 40)
 """The stream itself never flushes: what is in a chunk then follows from the cycles alone, and equal runs are equal."""
@@ -61,7 +68,8 @@ class Mixed:
 class RecordingStream:
     """One recording: a file, a live server for a viewer, or both.
 
-    Rows are kept and sent as columns once in a while: that costs a tenth of logging them one by one.
+    Rows are kept and sent as columns once in a while: that costs a tenth of logging them one by one. It is only a
+    drawing: once it cannot be written, it ends there, and nobody waits for it.
     """
 
     def __init__(
@@ -72,13 +80,15 @@ class RecordingStream:
             raise ValueError("expected a path or live=True, got neither")
         if live:
             _expect_free_port(live_port)
-        self._path = path
+        self._path, self._lost = path, ""
         self._stream = rr.RecordingStream(
             APPLICATION, recording_id=recording_id, send_properties=False, batcher_config=BATCHING)
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
         sinks: list[Any] = [*([rr.FileSink(path)] if path is not None else []),
                  *([rr.GrpcServerSink(bind_ip=LOCALHOST, port=live_port)] if live else [])]
+        if path is not None:
+            self._try(lambda: os.close(no_follow(path, os.O_WRONLY | os.O_CREAT)))
         self._try(lambda: self._stream.set_sinks(*sinks, default_blueprint=blueprint))
         self._stream.send_recording_name(viewable(title))
         self._cycles, self._flush_cycles = 0, LIVE_FLUSH_CYCLES if live else FLUSH_CYCLES
@@ -94,6 +104,8 @@ class RecordingStream:
 
         Of a text the signs are left out that the viewer cannot show.
         """
+        if self._lost:
+            return
         shown = {name: [viewable(text) for text in batch]
                  if isinstance(batch, list | tuple) and batch and isinstance(batch[0], str) else batch
                  for name, batch in components.items()}
@@ -101,44 +113,65 @@ class RecordingStream:
 
     def fix(self, path: str, *what: Any) -> None:
         """Log archetypes that hold at all times."""
-        self._stream.log(path, what[0], *what[1:], static=True)
+        if not self._lost:
+            self._stream.log(path, what[0], *what[1:], static=True)
 
     def tell(self, **values: str | int | float) -> None:
         """Properties of the whole recording, by which a catalog of runs is searched: ``property:harvey:outcome``."""
-        self._stream.send_property(APPLICATION, rr.AnyValues(True, **values))
+        if not self._lost:
+            self._stream.send_property(APPLICATION, rr.AnyValues(True, **values))
 
     def copy(self, recording: Path, content: str) -> None:
         """Take over what another recording holds at all times, as ``/world/building/**``."""
         self._stream.send_chunks(RrdReader(recording).stream().filter(content=content, is_static=True))
 
     def end_cycle(self) -> None:
-        """Bring what was logged to the disk once in a while. Raises RecordingError where the disk is full or gone."""
+        """Bring what was logged to the disk once in a while; where that fails, :meth:`close` tells."""
         self._cycles += 1
         if self._cycles % self._flush_cycles == 0:
-            self.flush()
+            with suppress(RecordingError):
+                self.flush()
 
     def flush(self) -> None:
-        """Bring what was logged to the disk; raises RecordingError where that fails."""
-        for (path, kind, names), rows in self._rows.items():
+        """Bring what was logged to the disk; raises RecordingError where that fails, or takes longer than MOST_S."""
+        rows, self._rows = self._rows, {}
+        if self._lost:
+            raise RecordingError(self._lost)
+        self._try(lambda: self._send(rows))
+
+    def close(self) -> None:
+        """End the recording with its footer. Raises RecordingError as :meth:`flush`."""
+        self.flush()
+        self._try(self._disconnect)
+
+    def _send(self, kept: dict[tuple[str, Columnar, tuple[str, ...]], list[Row]]) -> None:
+        for (path, kind, names), rows in kept.items():
             cycles, times_s, batches = zip(*rows, strict=True)
             index = [rr.TimeColumn("cycle", sequence=cycles), rr.TimeColumn("sim_time", duration=times_s)]
             columns = chain.from_iterable(_columns(kind, name, [batch[name] for batch in batches]) for name in names)
             self._stream.send_columns(path, index, columns)
-        self._rows.clear()
-        self._try(self._stream.flush)
+        self._stream.flush(timeout_sec=MOST_S)
 
-    def close(self) -> None:
-        """End the recording with its footer."""
-        try:
-            self.flush()
-        finally:
-            self._stream.disconnect()
+    def _disconnect(self) -> None:
+        ending = Thread(target=self._stream.disconnect, daemon=True)  # it knows no time limit
+        ending.start()
+        ending.join(MOST_S)
+        if ending.is_alive():
+            raise OSError(f"it takes longer than {MOST_S:.0f} s")
 
-    def _try(self, act: Any) -> None:
+    def _try(self, act: Callable[[], None]) -> None:
         try:
             act()
         except (RuntimeError, OSError, ValueError) as error:
-            raise RecordingError(f"{self._path or 'live recording'}: cannot be written: {error}") from None
+            self._lost = f"{self._path or 'live recording'}: cannot be written: {error}"
+            _let_go(self._stream)
+            raise RecordingError(self._lost) from None
+
+
+def _let_go(stream: rr.RecordingStream) -> None:
+    """A stream that failed is neither flushed nor closed any more, also not at exit: either may wait for ever."""
+    rr.unregister_shutdown()
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(stream))
 
 
 def _columns(kind: Columnar, name: str, batches: Sequence[Batch]) -> Iterable[Any]:

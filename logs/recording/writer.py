@@ -86,7 +86,7 @@ class RecordingWriter:
         self._differences.append(Difference(added, gone))
 
     def __call__(self, decision: Decision) -> None:
-        """Draw one decision. Raises RecordingError where the recording cannot be written any more."""
+        """Draw one decision, as long as the recording can be written."""
         self._mirror.take(*decision.observed, *decision.made)
         belief = find_belief(self._mirror)
         if belief is None:
@@ -113,5 +113,5 @@ class RecordingWriter:
         self._stream.flush()
 
     def close(self) -> None:
-        """End the recording. Raises RecordingError where its last part cannot be written."""
+        """End the recording. Raises RecordingError where a part of it could not be written."""
         self._stream.close()

@@ -41,6 +41,9 @@ create table word (word text not null, number integer not null, name text not nu
 """
 INDICES = "create index frame_name on frame (name, layer); create index frame_number on frame (layer, number, name);"
 """Made at the end, which is faster."""
+MOST_UNPACKED_BYTES = 100_000_000
+"""Of one frame."""
+VIEWS = "select 1 from sqlite_master where type = 'view' or sql like 'create virtual%' or sql like '%generated%'"
 NOT_PACKED = ("changes", "filed", "memo")
 """Fields of a frame that no file has."""
 
@@ -70,10 +73,19 @@ def unpack_frame(packed: bytes) -> LocaleFrame:
     Raises:
         ValueError, TypeError, LookupError, zlib.error: the bytes are something else.
     """
-    data = zlib.decompress(packed)
+    data = _decompress(packed)
     end = 4 + int.from_bytes(data[:4], "little")
     frame: LocaleFrame = _unpack(LocaleFrame, json.loads(data[4:end]), _Numbers(data, end))
     return frame
+
+
+def _decompress(packed: bytes) -> bytes:
+    """As zlib.decompress; a few bytes that stand for more than may be are refused."""
+    unpacked = zlib.decompressobj()
+    data = unpacked.decompress(packed, MOST_UNPACKED_BYTES)
+    if not unpacked.eof:
+        raise ValueError(f"a piece that is cut off, or of more than {MOST_UNPACKED_BYTES} bytes")
+    return data
 
 
 class _Numbers:
@@ -190,6 +202,8 @@ class PackedFrames(Mapping[str, LocaleFrame]):
         try:
             expect_regular(path)
             self._file = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, check_same_thread=False)
+            if self._file.execute(VIEWS).fetchone() is not None:
+                raise ValueError("a view in the place of a table, which could go on for ever")
             found = self._file.execute("select format, sha256, about from meta").fetchall()
         except OSError as error:
             raise WorldError(f"{path}: expected a readable file, got: {error.strerror}") from None
@@ -198,7 +212,7 @@ class PackedFrames(Mapping[str, LocaleFrame]):
         if (written := found[0][0] if found else None) != FORMAT:
             raise WorldError(f"{path.name}: expected {FORMAT!r}, got {written!r}: compile it anew")
         with self.world_errors():
-            self.sha256, self.about = str(found[0][1]), json.loads(zlib.decompress(found[0][2]))
+            self.sha256, self.about = str(found[0][1]), json.loads(_decompress(found[0][2]))
         if details and list(details) != self.about["details"]:
             raise WorldError(f"{path.name}: expected the details that it was compiled with "
                              f"({', '.join(self.about['details']) or 'none'}), got {', '.join(details)}")
@@ -211,8 +225,20 @@ class PackedFrames(Mapping[str, LocaleFrame]):
             yield
         except WorldError:
             raise
-        except (sqlite3.Error, zlib.error, ValueError, TypeError, LookupError) as error:
+        except (sqlite3.Error, zlib.error, ValueError, TypeError, LookupError, AttributeError, ArithmeticError,
+                RecursionError, MemoryError) as error:
             raise WorldError(f"{self._path.name}: expected a sound compiled world, got: {error!r}") from None
+
+    def verify(self) -> None:
+        """Compare the contents with their digest. Raises WorldError where they are others."""
+        with self.world_errors():
+            said = hashlib.sha256(_decompress(self._file.execute("select about from meta").fetchone()[0]))
+            known: dict[str, bytes] = {}
+            for name, packed in self._file.execute("select name, packed from frame order by number, layer"):
+                known[name] = hashlib.sha256(packed).digest()
+            said.update(b"".join(known.values()))
+            if said.hexdigest() != self.sha256:
+                raise ValueError("other contents than were compiled")
 
     def rows(self, query: str, *values: Any) -> list[tuple[Any, ...]]:
         """The answer to a query of the file. Raises WorldError."""

@@ -6,6 +6,7 @@ import errno
 import os
 from pathlib import Path
 from stat import S_ISREG
+from typing import BinaryIO
 
 MOST_BYTES = 200_000_000
 IRREGULAR = "no regular file, but a device, a pipe or a folder"
@@ -17,15 +18,22 @@ def expect_regular(path: Path) -> None:
         raise OSError(errno.EINVAL, IRREGULAR, str(path))
 
 
-def read_regular(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
-    """The bytes of a file. Raises OSError where it cannot be read, is larger, or is a device, a pipe or a folder."""
+def open_regular(path: Path, most_bytes: int = MOST_BYTES) -> BinaryIO:
+    """A file to read. Raises OSError where it cannot be read, is larger, or is a device, a pipe or a folder."""
     if "\0" in str(path):
         raise OSError(errno.EINVAL, "a name with a NUL in it", str(path))
     expect_regular(path)  # first: to open a device may do something to it
-    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-        if not S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise OSError(errno.EINVAL, IRREGULAR, str(path))
-        data = file.read(most_bytes + 1) or b""
-    if len(data) > most_bytes:
+    file = open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb")  # noqa: SIM115 (who calls closes it)
+    found = os.fstat(file.fileno())
+    if S_ISREG(found.st_mode) and found.st_size <= most_bytes:
+        return file
+    file.close()
+    if S_ISREG(found.st_mode):
         raise OSError(errno.EFBIG, f"more than {most_bytes} bytes", str(path))
-    return data
+    raise OSError(errno.EINVAL, IRREGULAR, str(path))
+
+
+def read_regular(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
+    """The bytes of a file. Raises OSError as :func:`open_regular`."""
+    with open_regular(path, most_bytes) as file:
+        return file.read() or b""

@@ -235,4 +235,4 @@ class Names:
 
 def slug(text: str) -> str:
     """Lower-case words joined by hyphens; letters of any script are kept."""
-    return "-".join(re.findall(r"\w+", text.lower().replace("'", "").replace("_", " ")))[:60].strip("-")
+    return "-".join(re.findall(r"\w+", text[:1000].lower().replace("'", "").replace("_", " ")))[:60].strip("-")

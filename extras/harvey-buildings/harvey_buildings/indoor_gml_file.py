@@ -23,6 +23,8 @@ from world_models.files.regular_files import read_regular
 
 MAX_BYTES = 200_000_000
 MAX_DEPTH = 200
+MOST_OF_A_NAME = 1000
+"""Letters of a cell's name that are read."""
 
 
 def read_xml(path: Path) -> ET.Element:
@@ -52,7 +54,9 @@ class _Builder:
         try:
             parser.Parse(data, True)
             return self._builder.close()
-        except (expat.ExpatError, UnicodeDecodeError, LookupError, AssertionError) as error:
+        except BuildingError:
+            raise
+        except (expat.ExpatError, ValueError, LookupError, AssertionError) as error:
             raise BuildingError(f"{self._name}: expected XML, got: {error}") from None
 
     def _refuse(self, *_: object) -> None:
@@ -118,7 +122,7 @@ def positions(element: ET.Element, origin: Floats) -> Floats:
     rows: list[list[float]] = []
     try:
         for child in elements(element, "pos", "posList"):
-            flat = [float(word) for word in (child.text or "").split()]
+            flat = [float(word) for word in (child.text or "").encode("ascii").split()]  # no digits of other scripts
             size = _dimension(child, len(flat))
             rows += [[*flat[i : i + size], 0.0, 0.0, 0.0][:3] for i in range(0, len(flat) - size + 1, size)]
     except ValueError:
@@ -219,7 +223,7 @@ def _describe(element: ET.Element, floor: shapely.Geometry, low: float, high: fl
     names, description = texts(element, "name"), " ".join(texts(element, "description"))
     said = dict(re.findall(r'(\w+)\s*=\s*"?([\w.-]+)', description))
     key, kind = identifier(element), local_name(element)
-    label = names[0] if names else key
+    label = (names[0] if names else key)[:MOST_OF_A_NAME]
     is_door = (slug(key).startswith("door") or slug(label).startswith("door") or said.get("indoor") == "door"
                or kind in ("ConnectionSpace", "AnchorSpace", "Door"))
     is_solid = kind == "NonNavigableSpace" or said.get("indoor") == "wall" or slug(label).startswith("wall")

@@ -222,12 +222,18 @@ def find_turn(sides: Floats) -> float:
     """The angle [rad], within 45 degrees, between most of these sides (n, 2) and the axes; 0 where none prevails."""
     quarter = math.pi / 2
     length, angle = np.linalg.norm(sides, axis=1), np.mod(np.arctan2(sides[:, 1], sides[:, 0]), quarter)
-    away = np.abs(np.mod(angle[:, None] - angle + quarter / 2, quarter) - quarter / 2) < math.radians(1.0)
-    best = int(np.argmax(away @ length))
-    if length[away[best]].sum() < 0.25 * length.sum():
+    order, near_rad = np.argsort(angle, kind="stable"), math.radians(1.0)
+    upward = angle[order]
+    around = np.concatenate([upward - quarter, upward, upward + quarter])
+    before = np.concatenate([[0.0], np.cumsum(np.tile(length[order], 3))])
+    within = before[np.searchsorted(around, upward + near_rad)] - before[
+        np.searchsorted(around, upward - near_rad, "right")]
+    best = upward[int(np.argmax(np.round(within, 9)))]
+    off = np.mod(angle - best + quarter / 2, quarter) - quarter / 2
+    alike = np.abs(off) < near_rad
+    if length[alike].sum() < 0.25 * length.sum():
         return 0.0
-    off = np.mod(angle[away[best]] - angle[best] + quarter / 2, quarter) - quarter / 2
-    turn = float(np.average(off, weights=length[away[best]]) + angle[best])
+    turn = float(np.average(off[alike], weights=length[alike]) + best)
     turn = (turn + quarter / 2) % quarter - quarter / 2
     return turn if abs(turn) > MIN_TURN_RAD else 0.0
 

@@ -144,7 +144,7 @@ def _number(path: Path, keys: dict[str, tuple[str, int]], key: str, otherwise: f
 
 def _finite(path: Path, line: int, key: str, value: str) -> float:
     try:
-        number = float(value)
+        number = float(value.encode("ascii"))  # no digits of other scripts
     except ValueError:
         raise BuildingError(f"{path.name}:{line}: expected a number for {key}, got {value[:60]!r}") from None
     if not math.isfinite(number):

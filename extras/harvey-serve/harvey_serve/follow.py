@@ -11,10 +11,12 @@ from blackboard.change import Change, Posted, Retracted, Revised
 from harvey.errors import BadInput
 from harvey.runner.result import UNFINISHED
 from harvey_serve.live_state import LiveState, Shown
+from logs.disk import MOST_JOURNAL_BYTES
 from logs.records import DecisionRecord, EntryRecord, decision_of, entry_of, kinds_for, refs_of
 from logs.run_directory import RunDirectory
 from world_models import words
 from world_models.entries.body import CameraPicture
+from world_models.files.regular_files import open_regular
 
 PERIOD_S = 0.2
 """The files are looked at again after this time."""
@@ -41,7 +43,7 @@ class Follower:
         """Show the decisions that were written since. Raises BadInput where a line is no decision."""
         if not self._run.journal.is_file():
             return
-        with self._run.journal.open("rb") as file:
+        with open_regular(self._run.journal, MOST_JOURNAL_BYTES) as file:
             file.seek(self._read)
             written = file.read()
         whole = written[:written.rfind(b"\n") + 1]
@@ -64,9 +66,9 @@ class Follower:
         entry = entry_of(record, kinds_for(record.type))
         if isinstance(entry.value, CameraPicture):
             size = record.fields["jpeg"]["bytes"]
-            with self._run.camera.open("rb") as file:
+            with open_regular(self._run.camera, MOST_JOURNAL_BYTES) as file:
                 file.seek(self._pictures)
-                entry = entry._replace(value=replace(entry.value, jpeg=file.read(size)))
+                entry = entry._replace(value=replace(entry.value, jpeg=file.read(max(0, size))))
             self._pictures += size
         if record.change == "Retracted":
             return Retracted(entry, refs_of(record.retracted_because))

@@ -26,7 +26,8 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--speed", metavar="X", type=float, default=1.0,
                         help="how many times as fast as the robot's own time it may go; 0: as fast as it computes (1)")
     parser.add_argument("--paused", action="store_true", help="begin paused, so that a page can be opened first")
-    parser.add_argument("--out", metavar="DIR", help="directory for the run's files (runs/SCENARIO-SEED)")
+    parser.add_argument("--out", metavar="DIR", help="directory for the run's files (runs/SCENARIO-SEED, or the"
+                        " first of runs/SCENARIO-SEED-2, -3 ... that is free)")
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="settings",
                         help="change a setting, as harvey run does; may be repeated")
 
@@ -39,10 +40,18 @@ def _run(args: Namespace) -> int:
     seeds = parse_seeds(args.seed)
     if len(seeds) > 1:
         raise BadInput(f"--seed: expected one seed, got {len(seeds)}")
-    wanted = Path(args.out) if args.out else RUNS / f"{Path(args.scenario).stem}-{seeds[0]}"
+    wanted = Path(args.out) if args.out else _find_free(RUNS / f"{Path(args.scenario).stem}-{seeds[0]}")
+    if (wanted / "journal.jsonl").exists():  # what was told on its page cannot be said again
+        raise BadInput(f"--out {wanted}: expected a directory without a run, got one with a run")
     task = Task(args.scenario, parse_pairs(args.settings), seeds[0], check_vacant(wanted))
     task.load()  # what is wrong with it is said first
     return _serve(task, args, wanted)
+
+
+def _find_free(path: Path) -> Path:
+    """The same where no run is there, else the first beside it without: ``runs/try-2``."""
+    names = (path, *(path.with_name(f"{path.name}-{number}") for number in range(2, 10_000)))
+    return next((there for there in names if not (there / "journal.jsonl").exists()), path)
 
 
 def _serve(task: Task, args: Namespace, wanted: Path) -> int:

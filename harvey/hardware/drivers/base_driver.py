@@ -128,8 +128,12 @@ class BytePipe(Line, Protocol):
         ...
 
 
+SCHEMES = ("socket", "rfc2217", "loop")
+"""Of pyserial's URLs: they open nothing but a line."""
+
+
 class SerialLink:
-    """A line of pyserial: a device, a pseudo-terminal, or any URL that ``serial.serial_for_url`` knows."""
+    """A line of pyserial: a device, a pseudo-terminal, or one of its URLs that only open a line (:data:`SCHEMES`)."""
 
     def __init__(self, url: str, baud: int) -> None:
         """Open it. Raises OSError."""
@@ -159,6 +163,9 @@ class SerialLink:
 
     def _open(self) -> serial.SerialBase:
         """The write timeout keeps a dead line from holding us."""
+        scheme, slashes, more = self._url.partition("://")
+        if slashes and (scheme not in SCHEMES or "://" in more):  # spy://loop://?file=NAME would empty that file
+            raise OSError(f"{self._url}: expected a serial port, or a URL of {', '.join(SCHEMES)}, got {scheme}://")
         try:
             return serial.serial_for_url(self._url, baudrate=self._baud, timeout=0.1, write_timeout=0.5)
         except ValueError as error:

@@ -27,6 +27,7 @@ from logs.disk import Appended
 from logs.explain.phrases import sentence
 from logs.records import entry_of, read_records
 from world_models import words
+from world_models.files.toml.mission import ROOT
 from world_models.frames import Pose2
 
 SHORT = ["--set", "limits.max_cycles=36"]
@@ -372,3 +373,21 @@ def test_seeds_and_settings_are_read() -> None:
     assert parse_seeds("0..4") == (0, 1, 2, 3, 4)
     assert parse_seeds("7,1..2,7") == (7, 1, 2)
     assert parse_pairs(["a.b=off", "goal=(x=1)"]) == (("a.b", "off"), ("goal", "(x=1)"))
+
+
+def test_a_mission_by_a_relative_name_is_asked_and_goes_on_from_anywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("flat.toml", "flat-sim.toml"):
+        (tmp_path / name).write_text((ROOT / "docs" / "flat" / name).read_text())
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "flat-sim.toml", *SHORT, "--out", "made"]) == 1
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert main(["replay", "../made"]) == 0
+    assert main(["replay", "../made", "--set", "plan.max_leg_m=0.4"]) == 0
+    assert "the simulated robot went on by itself" in capsys.readouterr().out
+    whole = (tmp_path / "made" / "journal.jsonl").read_bytes()
+    (tmp_path / "made" / "journal.jsonl").write_bytes(whole[:len(whole) // 2])
+    assert main(["resume", "../made"]) == 1
+    assert (tmp_path / "made" / "journal.jsonl").read_bytes().startswith(whole[:len(whole) // 2].rpartition(b"\n")[0])

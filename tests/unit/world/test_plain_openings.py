@@ -6,6 +6,7 @@ import pytest
 import harvey
 from harvey.errors import BadInput
 from sim.render.mesh import DRAWN_GREY, build_mesh
+from world_models.building.geometry.scene import build_scene
 from world_models.building.world import World
 
 WORLD = """
@@ -96,3 +97,16 @@ def test_what_has_no_known_colour_is_drawn_grey_in_the_simulator() -> None:
 def test_an_unknown_colour_has_no_texture() -> None:
     with pytest.raises(BadInput, match="one of the keys colour, got 'texture'"):
         harvey.build_world(PLAN.format(defaults="", door="").replace('"unknown"', '"unknown", texture = "wood"'))
+
+
+@pytest.mark.parametrize("frame", ["none", "grey"])
+@pytest.mark.parametrize("height", [2.1, 2.7])
+def test_an_opening_may_be_as_wide_and_as_high_as_its_wall(frame: str, height: float) -> None:
+    text = WORLD.format(defaults=f'frame = "{frame}"', door="").replace("size = [4, 5]", "size = [4, 1.6]")
+    text = text.replace("along = 2.5, width = 1.0, height = 2.1, o", f"along = 0.8, width = 1.6, height = {height}, o")
+    world = harvey.build_world(text.replace("along = 2.5", "along = 0.8"))
+    assert not world.building_faults and [doorway.name for doorway in world.doorways_of("a")] == ["way"]
+    scene = build_scene(list(enumerate(world.faces)), list(enumerate(world.landmarks)))
+    assert np.isfinite(scene.planes_world).all() and np.isfinite(scene.edges.lines_world).all()
+    lines = [line for mark in world.landmarks if mark.name == "a/east-wall" for line in mark.edges.lines_world]
+    assert all(line[:, 2].min() >= height for line in lines), "nothing of the wall is seen where there is none of it"

@@ -17,6 +17,7 @@ from world_models.building.world import World, build_frames
 from world_models.files.construction.doors import LEAF_DEPTH_M, DoorSide, build_closed_door, build_open_door
 from world_models.files.construction.rooms import (
     CASING_WIDTH_M,
+    MIN_STRETCH_M,
     Opening,
     RoomShell,
     Wall,
@@ -101,14 +102,12 @@ class _WorldBuilder:
         half = door.width_m / 2
         neighbours = (*door.between[1:], None) if door.is_open else (None,)
         frame_m = CASING_WIDTH_M if door.casing else 0.0
-        opening = Opening(door.name, across - half, across + half, door.height_m, neighbours[0], frame_m)
-        _check_fit(near, opening)
+        opening = _fit(near, Opening(door.name, across - half, across + half, door.height_m, neighbours[0], frame_m))
         if len(door.between) == 1:
             return [(near.locale, near.name, opening)]
         ends_world = near.world_from_wall.apply([(across - half, 0, 0), (across + half, 0, 0)])
         far = self._find_far_opening(door, near, ends_world)
-        _check_fit(self.walls[far[0]][far[1]], far[2])
-        return [(near.locale, near.name, opening), far]
+        return [(near.locale, near.name, opening), (*far[:2], _fit(self.walls[far[0]][far[1]], far[2]))]
 
     def _find_far_opening(
         self, door: DoorSpec, near: Wall, ends_world: NDArray[np.float64]
@@ -119,7 +118,7 @@ class _WorldBuilder:
             ends = wall.world_from_wall.inverse().apply(ends_world)
             faces_back = float(wall.inward_world @ near.inward_world) < -0.999
             behind = -MAX_WALL_M <= ends[0, 1] <= 1e-6
-            if faces_back and behind and ends[1, 0] >= 0 and ends[0, 0] <= wall.length_m:
+            if faces_back and behind and ends[1, 0] >= -MIN_STRETCH_M and ends[0, 0] <= wall.length_m + MIN_STRETCH_M:
                 neighbour = door.between[0] if door.is_open else None
                 frame_m = CASING_WIDTH_M if door.casing else 0.0
                 opening = Opening(door.name, float(ends[1, 0]), float(ends[0, 0]), door.height_m, neighbour, frame_m)
@@ -189,17 +188,24 @@ class _CannotBuildError(Exception):
     """A door that the walls do not allow."""
 
 
-def _check_fit(wall: Wall, opening: Opening) -> None:
-    """Raises _CannotBuildError for an opening outside a wall, or over another opening."""
-    if opening.left_m < 0.0 or opening.right_m > wall.length_m or opening.top_m > wall.height_m:
+def _fit(wall: Wall, opening: Opening) -> Opening:
+    """An opening in a wall; less than MIN_STRETCH_M of wall beside or above it is none.
+
+    Raises _CannotBuildError where it is outside the wall, or over another opening.
+    """
+    left, right, top = opening.left_m, wall.length_m - opening.right_m, wall.height_m - opening.top_m
+    if min(left, right, top) < -MIN_STRETCH_M:
         raise _CannotBuildError(
             f"expected an opening within the {wall.name} wall of {wall.locale} ({wall.length_m:.2f} m long, "
             f"{wall.height_m:.2f} m high), "
             f"got {opening.left_m:.2f} .. {opening.right_m:.2f} m, {opening.top_m:.2f} m high"
         )
     for other in wall.openings:
-        if opening.left_m < other.right_m and other.left_m < opening.right_m:
+        if min(other.right_m - opening.left_m, opening.right_m - other.left_m) > MIN_STRETCH_M:
             raise _CannotBuildError(f"expected solid wall, got the opening of {other.name} in {wall.face_name}")
+    return replace(opening, left_m=0.0 if left < MIN_STRETCH_M else opening.left_m,
+                   right_m=wall.length_m if right < MIN_STRETCH_M else opening.right_m,
+                   top_m=wall.height_m if top < MIN_STRETCH_M else opening.top_m)
 
 
 def _coordinate_along(wall_name: str, wall_from_locale: Pose, along_m: float) -> float:

@@ -114,8 +114,10 @@ class DoorSide:
         (a, b), h, p, w = self.x, self.opening.top_m, self.casing_m, CASING_WIDTH_M
         frame, wall = self.casing, self.wall.finish
         if self.spec.casing is None:
-            sides = [self._edge_row((x, 0, 0), (x, 0, h), "+y", into, wall, wall) for x, into in ((a, "+x"), (b, "-x"))]
-            return Edges.from_rows([*sides, self._edge_row((a, 0, h), (b, 0, h), "+y", "-z", wall, wall)])
+            sides = [self._edge_row((x, 0, 0), (x, 0, h), "+y", into, wall, wall) for x, into in ((a, "+x"), (b, "-x"))
+                     if 0.0 < x < self.wall.length_m]
+            top = [self._edge_row((a, 0, h), (b, 0, h), "+y", "-z", wall, wall)] if h < self.wall.height_m else []
+            return Edges.from_rows([*sides, *top])
         rows = []
         for x, out, into in ((a, -1, "+x"), (b, 1, "-x")):
             side, outer = ("-x" if out < 0 else "+x"), x + out * w

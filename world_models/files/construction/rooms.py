@@ -92,6 +92,12 @@ class Wall:
         taken = [(o.left_m - m, o.right_m + m) for o, m in zip(self.openings, margins, strict=True)]
         return subtract_intervals((0.0, self.length_m), taken, MIN_STRETCH_M)
 
+    @property
+    def top_stretches(self) -> list[Range]:
+        """The stretches that reach its full height."""
+        taken = [(o.left_m, o.right_m) for o in self.openings if o.top_m >= self.height_m]
+        return subtract_intervals((0.0, self.length_m), taken, MIN_STRETCH_M)
+
     def with_opening(self, opening: Opening) -> Wall:
         """The wall with one more opening."""
         return replace(self, openings=tuple(sorted((*self.openings, opening), key=lambda o: o.left_m)))
@@ -174,8 +180,8 @@ class RoomShell:
             solids.append(self._build_strip(index, "baseboard", finishes.baseboard, stretches, z, BASEBOARD_DEPTH_M))
         if finishes.moulding:
             z = (wall.height_m - MOULDING_HEIGHT_M, wall.height_m)
-            whole = [(0.0, wall.length_m)]
-            solids.append(self._build_strip(index, "moulding", finishes.moulding, whole, z, MOULDING_DEPTH_M))
+            solids.append(
+                self._build_strip(index, "moulding", finishes.moulding, wall.top_stretches, z, MOULDING_DEPTH_M))
         return solids
 
     def _build_strip(
@@ -197,16 +203,19 @@ class RoomShell:
         wall, before = self.walls[index], self.walls[index - 1]
         finishes, rows = self.spec.finishes, []
         low, high = bare_wall_range(finishes, min(wall.height_m, before.height_m))
-        nan = float("nan")
-        rows.append((wall.world_from_wall.apply([(0, 0, low), (0, 0, high)]),
-                     (wall.inward_world, before.inward_world), (wall.brightness, before.brightness, nan)))
+        beside = [o.top_m for o in wall.openings if o.left_m <= 0.0]
+        beside += [o.top_m for o in before.openings if o.right_m >= before.length_m]
+        low, nan = max([low, *beside]), float("nan")
+        if high - low >= MIN_LINE_M:
+            rows.append((wall.world_from_wall.apply([(0, 0, low), (0, 0, high)]),
+                         (wall.inward_world, before.inward_world), (wall.brightness, before.brightness, nan)))
         flats = [(0.0, finishes.floor, UP, finishes.baseboard)]
         if finishes.ceiling is None:
             rows += self._build_skyline(wall, before)
         else:
             flats.append((wall.height_m, finishes.ceiling, -UP, finishes.moulding))
         for z, finish, normal, board in flats:
-            for x in wall.free_of_openings(with_frames=True) if board is None and z == 0.0 else [(0.0, wall.length_m)]:
+            for x in wall.free_of_openings(with_frames=True) if z == 0.0 else wall.top_stretches:
                 if board is None and x[1] - x[0] >= MIN_LINE_M:
                     line = wall.world_from_wall.apply([(x[0], 0, z), (x[1], 0, z)])
                     brightness = (wall.brightness, expected_brightness(finish, normal), nan)
@@ -216,7 +225,7 @@ class RoomShell:
     def _build_skyline(self, wall: Wall, before: Wall) -> list[_Row]:
         """Edges against the sky: the top of a wall, and the vertical end of whichever wall at its start is higher."""
         nan, rows = float("nan"), []
-        tops = [(wall, [(0.0, 0.0, wall.height_m), (wall.length_m, 0.0, wall.height_m)])]
+        tops = [(wall, [(low, 0.0, wall.height_m), (high, 0.0, wall.height_m)]) for low, high in wall.top_stretches]
         if wall.height_m > before.height_m:
             tops.append((wall, [(0.0, 0.0, before.height_m), (0.0, 0.0, wall.height_m)]))
         elif before.height_m > wall.height_m:
@@ -238,7 +247,7 @@ def _build_wall_face(wall: Wall) -> Face:
     """The face of a wall, with one region for each stretch between openings and one above each opening."""
     full = (0.0, wall.height_m)
     rectangles = [(x, full) for x in wall.free_of_openings()]
-    rectangles += [((o.left_m, o.right_m), (o.top_m, wall.height_m)) for o in wall.openings]
+    rectangles += [((o.left_m, o.right_m), (o.top_m, wall.height_m)) for o in wall.openings if o.top_m < wall.height_m]
     name = wall.face_name
     regions = tuple(build_region(f"{name}/{i}", wall.rectangle(x, z), wall.finish)
                     for i, (x, z) in enumerate(rectangles))

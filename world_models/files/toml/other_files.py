@@ -18,6 +18,8 @@ from world_models.frames import Pose
 
 MAX_DEPTH = 8
 """Longest chain of files that name each other."""
+MOST_NAMED = 5_000
+"""So often may files name others, all together: ten that each name the next ten times would be read 10**10 times."""
 
 
 def read_included(root: Node) -> Iterator[Source]:
@@ -39,10 +41,14 @@ def find_named_file(node: Node, shipped: Path = WORLDS) -> Source:
     """
     name = node.text()
     path = node.source.folder / name if name.endswith(".toml") else shipped / f"{name}.toml"
+    count = node.source.count
+    count[0] += 1
+    if count[0] > MOST_NAMED:
+        raise node.fail(f"at most {MOST_NAMED} times that a file names another, all together")
     bare = name.endswith(".toml") or name in [known.stem for known in shipped.glob("*.toml")]
     try:
         if bare and "\0" not in name and path.is_file():
-            return Source.read(path, depth=node.source.depth + 1)
+            return replace(Source.read(path, depth=node.source.depth + 1), count=count)
     except OSError:
         pass
     names = ", ".join(sorted(known.stem for known in shipped.glob("*.toml")))

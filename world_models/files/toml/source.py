@@ -143,6 +143,7 @@ class Source:
         text: as it was read; "" where the tables come from elsewhere.
         depth: length of the chain of files that name each other, up to this one.
         settings: keys whose values were replaced since it was read (``--set``).
+        count: how often it, or a file that it names, named another one; all of them have this one list.
     """
 
     name: str
@@ -151,6 +152,7 @@ class Source:
     text: str = ""
     depth: int = 0
     settings: frozenset[Key] = frozenset()
+    count: list[int] = field(default_factory=lambda: [0])
 
     @staticmethod
     def read(path: Path, depth: int = 0) -> Source:
