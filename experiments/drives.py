@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Generic, NamedTuple, Self, TypeVar
 
 from blackboard.journal import Decision, Sink
-from experiments.report import Cell, Report
-from experiments.trials import RESULTS, at_least, at_most, campaign_folder, run_trials
+from experiments.report import Cell, Claim, Report
+from experiments.trials import RESULTS, at_least, at_most, campaign_folder, judge_rare, judge_share, run_trials
 from harvey.campaign.campaign import Task, run_task
 from harvey.runner.result import MissionResult
 from knowledge_sources.methods.belief.odds import to_probability
@@ -20,7 +20,6 @@ from world_models.entries.door_state import DoorState
 WORST_SHOWN = 6
 NO_PEER = "no peer with one camera and a building's model is known."
 JUDGED = "; no constant was chosen on them. Bounds are one-sided, of 95 %, by Clopper and Pearson."
-Claim = tuple[str, bool]
 MAX_P_SHUT = 0.9
 """No door that is open is ever believed to be shut above this probability."""
 IN_PLACE_M = 0.1
@@ -185,8 +184,8 @@ def pick(*names: str) -> Mapping[str, Figure[End]]:
 
 def claim_share(what: str, is_right: Callable[[E], bool], ends: Sequence[E], least: float) -> Claim:
     """That at least such a share of the missions is right; ``what``: "told right: at least 99% reach"."""
-    right = sum(map(is_right, ends))
-    return f"{what}: {right} of {len(ends)}, so at least {at_least(right, len(ends)):.1%}", right >= least * len(ends)
+    right, of = sum(map(is_right, ends)), len(ends)
+    return f"{what}: {right} of {of}, so at least {at_least(right, of):.1%}", judge_share(right, of, least)
 
 
 def has_false_accept(end: End) -> bool:
@@ -195,9 +194,12 @@ def has_false_accept(end: End) -> bool:
 
 
 def claim_none(what: str, ends: Sequence[E], is_wrong: Callable[[E], bool] = has_false_accept) -> Claim:
-    """That something happens in no mission; ``what``: "no milestone is accepted at a wrong place"."""
-    wrong = sum(map(is_wrong, ends))
-    return f"{what}: {wrong} of {len(ends)} missions, so in at most {at_most(wrong, len(ends)):.2%}", not wrong
+    """That something happens in no mission; ``what``: "no milestone is accepted at a wrong place".
+
+    No number of missions proves it; the bound says how rare it is at least.
+    """
+    wrong, of = sum(map(is_wrong, ends)), len(ends)
+    return f"{what}: {wrong} of {of} missions, so in at most {at_most(wrong, of):.2%}", judge_rare(wrong, of, 0.0)
 
 
 def claim_open_doors(ends: Sequence[End]) -> Claim:

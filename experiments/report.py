@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from logs.tables import table
 
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 WIDTH = 120
 Cell = str | int | float | None
 """None, shown as a dash: not measured."""
+Finding = Literal["proved", "not contradicted", "fails"]
+"""Of a claim: its 95 % bound proves it; what was measured agrees, and is too little to prove it; it does not agree."""
+Claim = tuple[str, bool | Finding]
+"""A statement, and what was found. True: all that it speaks of was measured, and agrees; False: it fails."""
 
 SIDES: Mapping[str, tuple[str, ...]] = {
     "paper": ("paper", "literature"), "peer": ("peer", "py_trees", "clips", "networkx"), "ours": (),
@@ -35,14 +39,16 @@ class Report:
         columns: names of the columns; by convention what, paper, peer, ours.
         rows: as many cells each.
         notes: assumptions, and the meaning of the figures.
-        claims: statements that must hold, each with whether it does.
+        claims: statements that must hold, each with what was found.
+        is_small: it is of a smaller version of the experiment, which alone proves nothing that has no bound.
     """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     notes: tuple[str, ...] = ()
-    claims: tuple[tuple[str, bool], ...] = ()
+    claims: tuple[Claim, ...] = ()
+    is_small: bool = False
 
     def __post_init__(self) -> None:
         for row in self.rows:
@@ -51,18 +57,23 @@ class Report:
 
     @property
     def holds(self) -> bool:
-        """Whether every claim holds."""
-        return all(held for _, held in self.claims)
+        """Whether no claim fails."""
+        return not self.failing
+
+    @property
+    def findings(self) -> tuple[tuple[str, Finding], ...]:
+        """Each claim with one of the three words."""
+        return tuple((claim, _find(found, self.is_small)) for claim, found in self.claims)
 
     @property
     def failing(self) -> tuple[str, ...]:
-        """The claims that do not hold."""
-        return tuple(claim for claim, held in self.claims if not held)
+        """The claims that fail."""
+        return tuple(claim for claim, found in self.findings if found == "fails")
 
     def text(self) -> str:
         """The report as text for a terminal."""
         shown = table(self.columns, [[format_cell(cell) for cell in row] for row in self.rows])
-        claims = [f"{'holds' if held else 'FAILS'}: {claim}" for claim, held in self.claims]
+        claims = [f"{'FAILS' if found == 'fails' else found}: {claim}" for claim, found in self.findings]
         words = [fill(line, WIDTH, subsequent_indent="  ") for line in (*self.notes, *claims)]
         return "\n".join([self.title, "", shown, *([""] if words else []), *words])
 
@@ -75,7 +86,7 @@ class Report:
             "title": self.title,
             "rows": [self._row(dict(zip(self.columns, row, strict=True))) for row in self.rows],
             "notes": list(self.notes),
-            "claims": [{"claim": claim, "holds": held} for claim, held in self.claims],
+            "claims": [{"claim": claim, "found": found} for claim, found in self.findings],
         }
 
     def _row(self, cells: Mapping[str, Cell]) -> Mapping[str, Any]:
@@ -84,6 +95,14 @@ class Report:
         for column in measured:
             sides[_side_of(column)][column] = cells[column]
         return {"what": cells[what], **{side: _unpack_single(figures) for side, figures in sides.items()}, **cells}
+
+
+def _find(found: bool | Finding, is_small: bool) -> Finding:
+    if isinstance(found, str):
+        return found
+    if not found:
+        return "fails"
+    return "not contradicted" if is_small else "proved"
 
 
 def count_kinds(kinds: Iterable[str]) -> str | None:

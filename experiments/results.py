@@ -1,4 +1,4 @@
-"""What an experiment found, kept as a file: by which commit, when, with which options, and whether each claim holds."""
+"""What an experiment found, kept as a file: by which commit, when, with which options, and each claim."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from experiments.report import Cell, Report
+from experiments.report import Cell, Finding, Report
 from harvey.errors import BadInput
 
 ROOT = Path(__file__).parents[1]
@@ -29,7 +29,7 @@ class Result:
         options: as they were given: ``--quick``, ``--missions 12``; seed: of all random numbers.
         date: when it ended, in UTC; seconds: how long it took.
         commit: as by :func:`find_commit`.
-        claims: each with whether it holds.
+        claims: each with one of the three words of a finding.
         columns, rows: of its table.
     """
 
@@ -40,7 +40,7 @@ class Result:
     date: str
     seconds: float
     commit: str
-    claims: tuple[tuple[str, bool], ...]
+    claims: tuple[tuple[str, Finding], ...]
     columns: tuple[str, ...] = ()
     rows: tuple[tuple[Cell, ...], ...] = ()
 
@@ -48,7 +48,7 @@ class Result:
 def build_result(name: str, report: Report, options: str, seed: int, seconds: float) -> Result:
     """The result of a report that has just been made."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    return Result(name, report.title, options, seed, now, round(seconds, 1), find_commit(), report.claims,
+    return Result(name, report.title, options, seed, now, round(seconds, 1), find_commit(), report.findings,
                   report.columns, report.rows)
 
 

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from scipy.stats import beta
 from tqdm import tqdm
 
+from experiments.report import Finding
 from harvey.campaign.case_work import Killed
 from harvey.campaign.engine import RESULTS, Campaign, run_campaign
 from harvey.errors import BadInput
@@ -73,6 +74,18 @@ def at_most(found: int, of: int) -> float:
 def at_least(found: int, of: int) -> float:
     """The lower bound of a rate."""
     return 1.0 - at_most(of - found, of)
+
+
+def judge_share(right: int, of: int, least: float) -> Finding:
+    """What such a sample says of the claim that the rate is ``least`` or more: one below it fails."""
+    if of and at_least(right, of) >= least:
+        return "proved"
+    return "not contradicted" if right >= least * of else "fails"
+
+
+def judge_rare(wrong: int, of: int, most: float) -> Finding:
+    """The same of the claim that the rate is ``most`` or less; that something never happens no sample proves."""
+    return judge_share(of - wrong, of, 1.0 - most)
 
 
 def is_surely_within(found: int, of: int, low: float, high: float) -> bool:

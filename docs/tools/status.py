@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -35,11 +36,12 @@ def describe_experiments() -> str:
     found = {result.experiment: result for result in read_results(RESULTS)}
     rows = [row for folder in EXPERIMENTS.values() for name, asked in folder.items()
             for row in _rows(name, asked, found.get(name))]
-    held = [holds for result in found.values() for _, holds in result.claims]
+    counted = Counter(word for result in found.values() for _, word in result.claims)
     every, small = sum(map(len, EXPERIMENTS.values())), sum(1 for result in found.values() if result.options)
-    total = (f"Of {every} experiments {len(found) - small} were driven whole and {small} in a smaller version;"
-             f" of {count(len(held), 'claim')} {held.count(True)} hold.")
-    return "\n".join([total, *table(("experiment", "what", "holds", "driven"), rows)])
+    total = (f"Of {every} experiments {len(found) - small} were driven whole and {small} in a smaller version."
+             f" Of {count(counted.total(), 'claim')} {counted['proved']} are proved, {counted['not contradicted']} are"
+             f" not contradicted, {counted['fails']} fail.")
+    return "\n".join([total, *table(("experiment", "what", "found", "driven"), rows)])
 
 
 def _rows(name: str, asked: str, result: Result | None) -> Iterator[tuple[str, ...]]:
@@ -51,8 +53,8 @@ def _rows(name: str, asked: str, result: Result | None) -> Iterator[tuple[str, .
     driven += f"; **stale**: more than {STALE_AFTER} commits ago" if is_stale(result) else ""
     if not result.claims:
         yield (f"`{name}`", f"{escape(asked)} (claims nothing)", "", driven)
-    for claim, holds in result.claims:
-        yield (f"`{name}`", escape(claim), "yes" if holds else "**no**", driven)
+    for claim, word in result.claims:
+        yield (f"`{name}`", escape(claim), "**fails**" if word == "fails" else word, driven)
 
 
 def describe_rows(name: str, wanted: str = "") -> str:

@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 
 from blackboard.journal import Decision
 from experiments import drives
-from experiments.drives import Claim, Driven, End, Trial
+from experiments.drives import Driven, End, Trial
 from experiments.generated.door_missions import write_door_mission
-from experiments.report import Report
+from experiments.report import Claim, Report
 from harvey.campaign.campaign import Task
 from sim.scenario import load_scenario
 from world_models.entries.door_state import DoorState

@@ -16,9 +16,9 @@ import numpy as np
 
 from blackboard.journal import Decision
 from experiments import drives
-from experiments.drives import Claim, Driven, End, Trial
+from experiments.drives import Driven, End, Trial
 from experiments.generated.missions import write_camera_mission
-from experiments.report import Cell, Report
+from experiments.report import Cell, Claim, Report
 from harvey.campaign.campaign import Task
 from sim.faults.built_in_faults import CameraKnocked
 from sim.scenario import Scenario, load_scenario

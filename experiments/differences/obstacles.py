@@ -21,10 +21,10 @@ from blackboard.change import Change
 from blackboard.entry import Ref
 from blackboard.journal import Decision
 from experiments import drives
-from experiments.drives import Claim, Driven, End, Trial
+from experiments.drives import Driven, End, Trial
 from experiments.generated.free_floor import find_free_floor, find_shortest_way
 from experiments.generated.missions import write_cluttered_mission
-from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
+from experiments.report import OURS, PAPER, PEER, Cell, Claim, Report, chart
 from experiments.trials import RESULTS, at_least, at_most
 from harvey.campaign.campaign import Task
 from sim.body.collision import Obstacles

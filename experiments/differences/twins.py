@@ -18,10 +18,10 @@ from blackboard.journal import Decision
 from blackboard.level import Level
 from blackboard.servoing import Discrepancy
 from experiments import drives
-from experiments.drives import Claim, Driven, GoalEnd, Trial
+from experiments.drives import Driven, GoalEnd, Trial
 from experiments.generated.missions import write_twin_mission
-from experiments.report import Cell, Report
-from experiments.trials import at_least, at_most
+from experiments.report import Cell, Claim, Report
+from experiments.trials import at_least, at_most, judge_rare
 from harvey.campaign.campaign import Task
 from world_models.entries.location import PlaceOdds, TwinOdds
 from world_models.entries.task import Outcome
@@ -133,7 +133,7 @@ def _claims(driven: Driven[TwinEnd], quick: bool) -> Iterator[Claim]:
                                  MIN_NOTICED)
     confident, of = sum(e.is_wrong_and_sure for e in driven.ends), len(driven.ends)
     yield (f"wrong and confident: at most {MAX_WRONG:.1%}: {confident} of {of}, so at most"
-           f" {at_most(confident, of):.2%}", confident <= MAX_WRONG * of)
+           f" {at_most(confident, of):.2%}", judge_rare(confident, of, MAX_WRONG))
     if not quick and (unsure := [e for e in driven.ends if e.is_reached and e.said is not None]):
         yield claim_said(unsure)
 

@@ -23,9 +23,9 @@ from experiments.perception.photographs import (
     select_visible,
 )
 from experiments.perception.rivals import MIN_LINE_LENGTH_PX
-from experiments.report import Cell, Report
+from experiments.report import Cell, Claim, Report
 from experiments.shared_data import CORRIDOR, describe_absence
-from experiments.trials import campaign_folder, run_trials
+from experiments.trials import campaign_folder, judge_rare, judge_share, run_trials
 from knowledge_sources.methods.features.lines import find_lines
 from knowledge_sources.methods.verification.line_check import compute_coverage
 
@@ -57,7 +57,8 @@ def run(quick: bool, seed: int, seeds: int | None = None) -> Report:
         ("model length covered, whole picture", None, covered["given"], covered["whole"]),
         (f"the same, model shifted by {OFFSET_PX:.0f} px (chance)", None, covered["given beside"], covered["beside"]),
     ]
-    claims = [("own segments cover at least 95 % of the model's length", covered["focused"] >= MIN_COVERED)]
+    claims: list[Claim] = [
+        ("own segments cover at least 95 % of the model's length", covered["focused"] >= MIN_COVERED)]
     folder = campaign_folder("corridor", seed, quick=quick)
     attempts = [
         Attempt(test, frame, (seed, number, frame, k))
@@ -69,10 +70,12 @@ def run(quick: bool, seed: int, seeds: int | None = None) -> Report:
         trials = [trial for attempt, trial in found if attempt.test == test]
         rows += _rows(test, trials)
         if test.scale <= 1.0:
-            recovered = _share([t.recovered for t in trials])
-            claims.append((f"{test.name}: at least 95 % are recovered", recovered >= MIN_RECOVERED))
-        false_accepts = _share([t.is_false_accept for t in trials])
-        claims.append((f"{test.name}: at most 0.5 % wrong and verified", false_accepts <= MAX_FALSE_ACCEPTS))
+            recovered = sum(t.recovered for t in trials)
+            claims.append((f"{test.name}: at least 95 % are recovered: {recovered} of {len(trials)}",
+                           judge_share(recovered, len(trials), MIN_RECOVERED)))
+        wrong = sum(t.is_false_accept for t in trials)
+        claims.append((f"{test.name}: at most 0.5 % wrong and verified: {wrong} of {len(trials)}",
+                       judge_rare(wrong, len(trials), MAX_FALSE_ACCEPTS)))
     _draw(data, found, folder)
     return Report(TITLE, COLUMNS, tuple(rows), _notes(data, seed, folder), tuple(claims))
 

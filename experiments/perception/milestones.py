@@ -24,8 +24,8 @@ from experiments.perception.milestones_trials import (
     TrialResult,
     judge_trial,
 )
-from experiments.report import Cell, Report
-from experiments.trials import campaign_folder, run_trials
+from experiments.report import Cell, Claim, Report
+from experiments.trials import campaign_folder, judge_rare, run_trials
 from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
 
 FLOORS, EACH = 25, 210
@@ -139,12 +139,12 @@ def compute_calibration_error(bins: Sequence[Bin]) -> float:
 
 def _claims(
     right: Sequence[JudgedCase], wrong: Sequence[JudgedCase], bins: Sequence[Bin], quick: bool
-) -> tuple[tuple[str, bool], ...]:
+) -> tuple[Claim, ...]:
     accepts, rejects = sum(map(is_false_accept, wrong)), sum(j.verdict == "refuted" for j in right)
-    most = max(MAX_FALSE_ACCEPTS * len(wrong), 0.5)
     fewest = MAX_FALSE_REJECTS * len(right)
-    claims = [
-        (f"false accepts at most {MAX_FALSE_ACCEPTS:.1%}: {accepts} of {len(wrong)}", accepts <= most),
+    claims: list[Claim] = [
+        (f"false accepts at most {MAX_FALSE_ACCEPTS:.1%}: {accepts} of {len(wrong)}",
+         judge_rare(accepts, len(wrong), MAX_FALSE_ACCEPTS)),
         (f"false rejects at most {MAX_FALSE_REJECTS:.0%}: {rejects} of {len(right)}",
          rejects <= (max(fewest, 2.0) if quick else fewest)),
     ]

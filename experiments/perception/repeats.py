@@ -17,8 +17,8 @@ from experiments.perception.locate_camera import (
 )
 from experiments.perception.repeats_scenes import CAMERA, KINDS, MAX_PITCHES, RepeatScene, draw_scene, to_line_segments
 from experiments.perception.rivals import find_self_motions
-from experiments.report import Cell, Report
-from experiments.trials import RESULTS, at_least, at_most, campaign_folder, run_trials
+from experiments.report import Cell, Claim, Report
+from experiments.trials import RESULTS, at_least, at_most, campaign_folder, judge_rare, judge_share, run_trials
 from knowledge_sources.methods.matching.pose_matching import build_camera_parameters
 from world_models.frames import Pose
 
@@ -138,18 +138,18 @@ def _row(name: str, found: Sequence[CaseResult]) -> tuple[Cell, ...]:
         _count(_is_refuted_though_right(r) for r in found))
 
 
-def _claims(found: Sequence[CaseResult], *, quick: bool) -> tuple[tuple[str, bool], ...]:
+def _claims(found: Sequence[CaseResult], *, quick: bool) -> tuple[Claim, ...]:
     """What must hold; few cases cannot show how many unique ones are verified."""
     wrong, unique = _count(r.is_silently_wrong for r in found), [r for r in found if r.is_unique]
     refuted, verified = _count(_is_refuted_though_right(r) for r in found), _count(r.is_verified for r in unique)
-    claims = [
+    claims: list[Claim] = [
         (f"silently wrong at most 0.1%: {wrong} of {len(found)}, with 95 % confidence below"
-         f" {at_most(wrong, len(found)):.2%}", wrong <= MAX_WRONG * len(found)),
-        (f"no right pose is refuted: {refuted} of {len(found)}", not refuted)]
+         f" {at_most(wrong, len(found)):.2%}", judge_rare(wrong, len(found), MAX_WRONG)),
+        (f"no right pose is refuted: {refuted} of {len(found)}", judge_rare(refuted, len(found), 0.0))]
     if not quick and unique:
         claims.append((f"of the unique ones at least 98% are verified: {verified} of {len(unique)}, with 95 %"
                        f" confidence above {at_least(verified, len(unique)):.1%}",
-                       verified >= MIN_VERIFIED * len(unique)))
+                       judge_share(verified, len(unique), MIN_VERIFIED)))
     return tuple(claims)
 
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from experiments import drives
-from experiments.drives import Claim, Driven, GoalEnd, Trial
+from experiments.drives import Driven, GoalEnd, Trial
 from experiments.generated.missions import write_large_mission
-from experiments.report import Report
+from experiments.report import Claim, Report
 from harvey.campaign.campaign import Task
 from logs.run_head import load_known_world
 

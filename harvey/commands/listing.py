@@ -165,6 +165,7 @@ def _add_experiment_arguments(parser: ArgumentParser) -> None:
 
 def _run_experiment(args: Namespace) -> int:
     import time
+    from dataclasses import replace
 
     import experiments
     from experiments.results import build_result, write_result
@@ -174,8 +175,9 @@ def _run_experiment(args: Namespace) -> int:
     since_s = time.monotonic()
     with choose_workers(parse_workers(args)):
         report = experiments.run(args.experiment, quick=args.quick, seed=args.seed, missions=args.missions or None)
+    options = " ".join(["--quick"] * args.quick + [f"--missions {args.missions}"] * bool(args.missions))
+    report = replace(report, is_small=bool(options))
     if args.out:
-        options = " ".join(["--quick"] * args.quick + [f"--missions {args.missions}"] * bool(args.missions))
         took_s = time.monotonic() - since_s
         write_result(build_result(args.experiment, report, options, args.seed, took_s), Path(args.out))
     print(json.dumps(report.record(), indent=2) if args.json else report.text())
@@ -193,8 +195,9 @@ EXPERIMENT = CliCommand(
         ("harvey experiment figure12 --out figure12.json", "its claims, with date and commit, for docs/status.md"),
     ),
     _add_experiment_arguments, _run_experiment,
-    "It prints a table, notes (assumptions, and what the columns mean) and claims, each with 'holds' or 'FAILS'.\n"
-    "Exit code 0 if all claims hold, 1 if one does not. With --json one object is printed: title, rows (the cells by\n"
+    "It prints a table, notes (assumptions, and what the columns mean) and claims, each 'proved' (by\n"
+    "its 95 % bound), 'not contradicted' (too little was measured) or 'FAILS'.\n"
+    "Exit code 0 if no claim fails, else 1. With --json one object is printed: title, rows (the cells by\n"
     "their columns; beside them paper, peer and ours: a figure, several by name, or null), notes and claims.\n\n"
     "Long ones keep their results and pictures in runs/experiments/NAME/; one that was interrupted continues there.\n"
     "Peers (PoseLib, CLIPS, py_trees) are installed by pip install '.[peers]'; buildings of other programs need\n"

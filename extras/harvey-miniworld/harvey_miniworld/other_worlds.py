@@ -11,8 +11,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from experiments import drives
-from experiments.drives import Claim, Driven, GoalEnd, Mission, Trial
-from experiments.report import Report
+from experiments.drives import Driven, GoalEnd, Mission, Trial
+from experiments.report import Claim, Report
 from harvey_miniworld.drawn_floor import load_miniworld
 from harvey_miniworld.floor_missions import draw_mission
 from harvey_miniworld.floor_missions import drive as drive_mission

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -129,7 +130,8 @@ def test_a_row_of_the_levels_tells_outcomes_and_errors() -> None:
 def test_a_report_holds_when_all_its_claims_do() -> None:
     report = Report("t", ("what", "paper", "ours"), (("x", None, 0.123456),), claims=(("a", True), ("b", False)))
     assert not report.holds
-    assert "0.1235" in report.text() and "FAILS: b" in report.text()
+    assert "0.1235" in report.text() and "FAILS: b" in report.text() and "proved: a" in report.text()
+    assert "not contradicted: a" in replace(report, is_small=True).text()
     assert report.record()["rows"] == [{"what": "x", "paper": None, "peer": None, "ours": 0.123456}]
     with pytest.raises(ValueError, match="expected 3 cells"):
         Report("t", ("what", "paper", "ours"), (("x", 1.0),))

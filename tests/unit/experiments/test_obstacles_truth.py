@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.differences.obstacles import Lacking, count_stops, find_shortest_m, judge
-from experiments.trials import at_least, at_most
+from experiments.trials import at_least, at_most, judge_rare, judge_share
 from sim.body.collision import ROBOT_RADIUS_M, Obstacles
 from world_models.frames import Pose2
 
@@ -69,5 +69,8 @@ def test_none_of_1000_proves_three_in_a_thousand() -> None:
     assert at_most(0, 1000) == pytest.approx(0.003, abs=1e-5)
     assert at_least(1000, 1000) == pytest.approx(0.997, abs=1e-5)
     assert at_most(3, 3) == 1.0 and at_least(0, 3) == 0.0 and at_least(0, 0) == 0.0 and at_most(0, 0) == 1.0
+    assert [judge_share(n, 60, 0.95) for n in (60, 57, 56)] == ["proved", "not contradicted", "fails"]
+    assert [judge_rare(n, 600, 0.01) for n in (0, 6, 7)] == ["proved", "not contradicted", "fails"]
+    assert [judge_rare(n, 600, 0.0) for n in (0, 1)] == ["not contradicted", "fails"]
     with pytest.raises(ValueError, match="expected 0 to 2 of 2"):
         at_most(3, 2)

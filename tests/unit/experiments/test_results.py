@@ -11,7 +11,7 @@ import pytest
 
 from docs.tools import status
 from experiments import results
-from experiments.report import Report
+from experiments.report import Finding, Report
 from experiments.results import (
     Result,
     build_result,
@@ -23,7 +23,7 @@ from experiments.results import (
 )
 from harvey.cli import main
 
-CLAIMS = (("at least 9 of 10: 7 of 10", False), ("none lost", True))
+CLAIMS: tuple[tuple[str, Finding], ...] = (("at least 9 of 10: 7 of 10", "fails"), ("none lost", "proved"))
 REPORT = Report("Doors", ("what", "ours"), (("a", 1),), claims=CLAIMS)
 OLD = Result("doors", "Doors", "--quick", 3, "2001-01-01T00:00:00+00:00", 1.0, "0123abcd", CLAIMS)
 
@@ -89,9 +89,9 @@ def test_the_table_says_what_failed_what_was_not_driven_and_what_is_stale(
     monkeypatch.setattr(status, "RESULTS", tmp_path)
     monkeypatch.setattr(status, "is_stale", lambda result: True)
     lines = status.describe_experiments().splitlines()
-    assert lines[0].endswith("of 2 claims 1 hold.")
+    assert lines[0].endswith("Of 2 claims 1 are proved, 0 are not contradicted, 1 fail.")
     row = next(line for line in lines if "7 of 10" in line)
-    assert row.startswith("| `doors` | at least 9 of 10: 7 of 10 | **no** |")
+    assert row.startswith("| `doors` | at least 9 of 10: 7 of 10 | **fails** |")
     assert "| `--quick --seed 3`, 2001-01-01, 0123abcd; **stale**" in row
     assert any(line.startswith("| `soak` |") and "not driven" in line for line in lines)
 
@@ -111,6 +111,6 @@ def test_the_command_writes_what_it_found(tmp_path: Path, capsys: pytest.Capture
     out = tmp_path / "figure12.json"
     assert main(["experiment", "figure12", "--out", str(out)]) == 0
     found = json.loads(out.read_text(encoding="utf-8"))
-    assert found["experiment"] == "figure12" and found["claims"] and all(holds for _, holds in found["claims"])
+    assert found["experiment"] == "figure12" and found["claims"] and {word for _, word in found["claims"]} == {"proved"}
     assert main(["experiment", "figure12", "--out", str(tmp_path / "nowhere" / "x.json")]) == 2
     assert "nowhere" in capsys.readouterr().err
