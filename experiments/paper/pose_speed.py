@@ -12,8 +12,9 @@ from tqdm import tqdm
 
 from experiments.paper.pose_peer import NOT_INSTALLED, Peer
 from experiments.paper.pose_scenes import PoseScene, campus, draw_prior, end_noise, wrong_landmarks
+from experiments.paper.pose_solvers import r_and_t, trunc_r_and_t
 from experiments.report import Cell, Report
-from knowledge_sources.methods.pose import med_r_and_t, r_and_t, r_and_t_ml, trunc_r_and_t
+from knowledge_sources.methods.pose import med_r_and_t, r_and_t_ml
 from world_models.frames import Pose
 
 Array = NDArray[np.float64]
@@ -30,7 +31,8 @@ NOTES = (
     " for the robust solvers, none for the others.",
     f"Ends with {SIGMA_PX} px of noise; prior off by up to {PRIOR_M} m and {PRIOR_RAD} rad on each axis.",
     "Whole calls from Python on both sides, checks and results included; ours also gives residuals, covariance and"
-    " reasons. Ours are compiled by numba, PoseLib is C++. The peer's pose object is made within its call.",
+    " reasons. Ours are compiled by numba (Trunc R and T in part), PoseLib is C++. The peer's pose object is made within"
+    " its call.",
     f"Each figure: median over the trials of the best of {ROUNDS} rounds of {CALLS} calls, in alternation, so that"
     " other load on the machine meets both equally. The paper gives no times.",
 )

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.special import bdtr
 
+from experiments.paper.pose_solvers import trunc_r_and_t
 from experiments.perception.rivals import (
     DETECTION_RATE,
     MIN_LINE_LENGTH_PX,
@@ -28,7 +29,7 @@ from knowledge_sources.methods.arrays import Floats, Indices
 from knowledge_sources.methods.features.lines import LineSegments, find_lines, remove_duplicates
 from knowledge_sources.methods.matching import match_in_space
 from knowledge_sources.methods.matching.pose_matching import CameraParameters, build_camera_parameters
-from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml, trunc_r_and_t
+from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml
 from knowledge_sources.methods.pose.least_median import MIN_NOISE_PART
 from knowledge_sources.methods.verification.line_check import Agreement, compute_agreement, compute_p_false
 from knowledge_sources.settings import DEFAULT

@@ -43,9 +43,8 @@ MIN_STEP, MIN_POINT_STEP = 1e-8, 1e-10
 MIN_RELATIVE_GAIN = 1e-12
 """A relative gain below this ends a minimisation: rounding, no setting."""
 
-PLANES, IMAGE, SINES, TURN = 0, 1, 2, 3
-"""What is minimised: E1 (§6.2.2), with T eliminated; squared distances in the image over their variance; E2, each
-distance of E1 over that of the end from the camera; or n . R d (§6.2.1), which is of R alone, with T as E1 has it."""
+PLANES, IMAGE = 0, 1
+"""What is minimised: E1 (§6.2.2), with T eliminated; or squared distances in the image over their variance."""
 
 FINE, NOT_FINITE, NO_LENGTH = 0, 1, 2
 """What is wrong with a row of a set of lines."""
@@ -134,7 +133,7 @@ def minimise_pose(
     """The pose (six unknowns) of least cost, by Levenberg-Marquardt from ``start``.
 
     Args:
-        kind: PLANES, IMAGE, SINES or TURN.
+        kind: PLANES or IMAGE.
         weights: (n,) of the lines; a line of weight 0 does not count.
         prior: counts as one more measurement with ``information`` (6, 6); all zero: no prior.
 
@@ -142,7 +141,7 @@ def minimise_pose(
         R, T, the Gauss-Newton Hessian (6, 6) there, the cost and the steps taken.
     """
     rotation, translation = start[0].copy(), start[1].copy()
-    if kind in (PLANES, TURN):
+    if kind == PLANES:
         _minimise_translation(lines, weights, rotation, translation)
     problem = kind, lines, weights, prior, information
     state, hessian, cost, done = _minimise_pose(problem, (rotation, translation), iterations)
@@ -153,7 +152,7 @@ def minimise_pose(
 def _move_pose(problem: PoseProblem, state: RigidMotion, step: Floats) -> RigidMotion:
     """E1 is quadratic in T: after each step T is eliminated exactly."""
     rotation, translation = _perturb(step, state[0], state[1])
-    if problem[0] in (PLANES, TURN):
+    if problem[0] == PLANES:
         _minimise_translation(problem[1], problem[2], rotation, translation)
     return rotation, translation
 
@@ -342,69 +341,6 @@ def _is_same_line(ends: Floats, other: Floats) -> bool:
 
 
 @compiled
-def refine_truncated(
-    lines: LineArrays, start: RigidMotion, prior: RigidMotion, information: Floats, weak: Floats, bound: float,
-    max_beside_px: float, min_lines: int, rounds: int, iterations: int,
-) -> tuple[Floats, Floats, float]:
-    """Alternate inliers and least squares until they agree; the R, T of least truncated cost on the way, and that cost.
-
-    Args:
-        information: (6, 6) of the prior, which counts as one more measurement, also in the cost; all zero: it does not.
-        weak: (6, 6) information of the prior, which helps where the inliers leave a direction open.
-        bound: of a line's squared distance over its variance; the first round admits lines up to twice as far.
-    """
-    best_rotation, best_translation = start[0].copy(), start[1].copy()
-    near = compute_truncated_costs(lines, best_rotation, best_translation, 4.0 * bound, max_beside_px) < 4.0 * bound
-    best = compute_truncated_costs(lines, best_rotation, best_translation, bound, max_beside_px).sum()
-    best += compute_prior_cost(prior, information, best_rotation, best_translation)
-    rotation, translation = best_rotation, best_translation
-    for _ in range(rounds):
-        if np.sum(near) < min_lines:
-            break
-        weights = np.where(near, 1.0, 0.0)
-        rotation, translation, hessian, _, _ = minimise_pose(
-            IMAGE, lines, weights, (rotation, translation), prior, information, iterations
-        )
-        if not _is_decided(hessian, weak):
-            rotation, translation, _, _, _ = minimise_pose(IMAGE, lines, weights, prior, prior, weak, iterations)
-        costs = compute_truncated_costs(lines, rotation, translation, bound, max_beside_px)
-        cost = costs.sum() + compute_prior_cost(prior, information, rotation, translation)
-        if cost < best:
-            best, best_rotation, best_translation = cost, rotation, translation
-        again = costs < bound
-        if np.all(again == near):
-            break
-        near = again
-    return best_rotation, best_translation, best
-
-
-@compiled
-def compute_prior_cost(prior: RigidMotion, information: Floats, rotation: Floats, translation: Floats) -> float:
-    """The prior's share of the cost at a pose; 0 without information."""
-    if information[0, 0] <= 0.0:
-        return 0.0
-    return _add_prior(prior, information, rotation, translation, np.zeros((6, 6)), np.zeros(6))
-
-
-@compiled
-def compute_truncated_costs(
-    lines: LineArrays, rotation: Floats, translation: Floats, bound: float, max_beside_px: float
-) -> Floats:
-    """(n,) squared distances over their variance, at most ``bound``: the truncated loss.
-
-    Lines behind the camera cost ``bound``, and so do segments beside their model line's ends.
-    """
-    sigma = lines[6]
-    distances, front, over = measure_lines(lines, rotation, translation, max_beside_px)
-    out = np.full(len(sigma), bound)
-    for i in range(len(sigma)):
-        if front[i] and over[i]:
-            square = (distances[i, 0] ** 2 + distances[i, 1] ** 2) / (sigma[i] * sigma[i])
-            out[i] = min(square, bound)
-    return out
-
-
-@compiled
 def solve_subsets(
     lines: LineArrays, rows: Indices, real: Floats, rotations: Floats, translations: Floats, iterations: int
 ) -> RigidMotion:
@@ -427,7 +363,7 @@ def solve_subsets(
             for w in range(rows.shape[1]):
                 if real[j, w] > 0.0:
                     i = rows[j, w]
-                    _add_plane_terms(PLANES, points[i], normals[i], 1.0, rotation, translation, hessian, gradient)
+                    _add_plane_terms(points[i], normals[i], 1.0, rotation, translation, hessian, gradient)
             _mirror_upper(hessian)
             largest = 1e-9
             for a in range(6):
@@ -676,12 +612,8 @@ def _linearise_pose(problem: PoseProblem, pose: RigidMotion, hessian: Floats, gr
     for i in range(len(points)):
         if weights[i] == 0.0:
             continue
-        if kind in (PLANES, SINES):
-            cost += _add_plane_terms(kind, points[i], normals[i], weights[i], rotation, translation, hessian, gradient)
-        elif kind == TURN:
-            turned = _rotate(rotation, directions[i])
-            by = _cross(turned, normals[i])
-            cost += _add_row(_dot(turned, normals[i]), by, (0.0, 0.0, 0.0), weights[i], hessian, gradient)
+        if kind == PLANES:
+            cost += _add_plane_terms(points[i], normals[i], weights[i], rotation, translation, hessian, gradient)
         else:
             weight = weights[i] / (sigma[i] * sigma[i])
             cost += _add_image_terms(
@@ -698,22 +630,14 @@ _minimise_pose = _build_minimiser(_linearise_pose, _move_pose, 6, MIN_STEP)
 
 @compiled
 def _add_plane_terms(
-    kind: int, ends: Floats, normal: Floats, weight: float, rotation: Floats, translation: Floats, hessian: Floats,
+    ends: Floats, normal: Floats, weight: float, rotation: Floats, translation: Floats, hessian: Floats,
     gradient: Floats,
 ) -> float:
-    """A line's two terms n . q of E1, q = R p + T, with derivatives (q x n, n); of E2 over the length of q."""
+    """A line's two terms n . q of E1, q = R p + T, with derivatives (q x n, n)."""
     cost = 0.0
     for e in range(2):
         q, slope = _transform(rotation, translation, ends[e]), (normal[0], normal[1], normal[2])
-        miss = _dot(q, normal)
-        if kind == SINES:
-            square = max(_dot(q, q), TINY)
-            reach, part = math.sqrt(square), miss / square
-            miss = miss / reach
-            slope = (
-                (normal[0] - part * q[0]) / reach, (normal[1] - part * q[1]) / reach, (normal[2] - part * q[2]) / reach
-            )
-        cost += _add_row(miss, _cross(q, slope), slope, weight, hessian, gradient)
+        cost += _add_row(_dot(q, normal), _cross(q, slope), slope, weight, hessian, gradient)
     return cost
 
 

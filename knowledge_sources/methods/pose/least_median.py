@@ -1,4 +1,4 @@
-"""Robust poses from subsets of 3 lines or landmarks: least median of squares (§6.2.4), or a truncated loss."""
+"""Robust poses from subsets of 3 lines or landmarks: least median of squares (§6.2.4)."""
 
 from __future__ import annotations
 
@@ -12,13 +12,11 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.pose import kernels
 from knowledge_sources.methods.pose.estimate import (
-    MAX_ITERATIONS,
     MIN_LENGTH_PX,
     NO_SUBSET,
     PoseEstimate,
     build_estimate,
     build_prior_estimate,
-    compute_weak_information,
     find_rejections,
 )
 from knowledge_sources.methods.pose.kernels import RigidMotion
@@ -50,11 +48,6 @@ MAX_OUTLIER_PART = 0.45  # share of wrong lines up to which the median is to hol
 MED_DRAWN_OUTLIER_PART = 0.5  # share of wrong lines for which enough subsets are drawn (§6.2.4)
 MED_CANDIDATES = 16  # candidates of least median that are solved again
 MIN_NOISE_PART = 0.3  # smallest estimate of the noise, in parts of the stated one
-TRUNC_DRAWN_OUTLIER_PART = 0.7  # share of wrong lines for which enough subsets are drawn (experiment table3)
-TRUNC_CANDIDATES = 24  # candidates of least loss that are solved again
-TRUNC_INLIER_PART = 0.35  # share of the lines that they are solved again on
-TRUNC_FINALISTS = 5  # candidates that are refined before one is chosen
-TRUNC_ROUNDS = 6  # rounds of inliers and pose in that refinement
 
 MEDIAN_CHI2_2 = 1.386
 """Median of the chi-squared law with two degrees of freedom: a line has two residuals."""
@@ -102,8 +95,8 @@ def med_r_and_t(
             return np.median(errors, axis=1)
 
         half = (len(lines) + SUBSET_SIZE) // 2
-        rotations, translations = _add_concentrated(lines, rotations, translations, rank, MED_CANDIDATES, half)
-        rotations, translations = _keep_possible(lines, prior, prior_covariance, rotations, translations)
+        rotations, translations = add_concentrated(lines, rotations, translations, rank, MED_CANDIDATES, half)
+        rotations, translations = keep_possible(lines, prior, prior_covariance, rotations, translations)
         errors = compute_squared_distances(lines, rotations, translations)
         medians = rank(errors)
         least = float(medians.min())
@@ -112,14 +105,14 @@ def med_r_and_t(
         best = int(tied[np.argmin(np.minimum(errors[tied], bound).sum(axis=1))])
         return (rotations[best], translations[best]), errors[best] <= bound, bound
 
-    return _solve(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px, probability,
-                  MED_DRAWN_OUTLIER_PART, rng, prior_covariance, settings, choose)
+    return solve_from_subsets(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px, probability,
+                              MED_DRAWN_OUTLIER_PART, rng, prior_covariance, settings, choose)
 
 
 Choose = Callable[[LineSet, Floats, Floats], tuple[RigidMotion, Mask, float]]
 
 
-def _solve(
+def solve_from_subsets(
     model_lines_world: Any, segments_px: Any, camera: Camera, prior: Pose, landmark_ids: LandmarkIds, sigma_px: Any,
     probability: float | None, outlier_part: float, rng: np.random.Generator | None, prior_covariance: Any,
     settings: PoseSettings, choose: Choose,
@@ -146,7 +139,7 @@ def _solve(
     return _refine_on_inliers(lines, prior, prior_covariance, landmark_ids, *choose(lines, *candidates), settings)
 
 
-def _keep_possible(
+def keep_possible(
     lines: LineSet, prior: Pose, prior_covariance: Any, rotations: Floats, translations: Floats
 ) -> tuple[Floats, Floats]:
     """The candidates (k, 3, 3), (k, 3) that the prior does not exclude, and the prior itself; all if it is unknown.
@@ -207,7 +200,7 @@ def _refine_on_inliers(
     return build_estimate(lines, end, covariance, rejected, settings, prior, known, reason, bound, near)
 
 
-def _add_concentrated(
+def add_concentrated(
     lines: LineSet, rotations: Floats, translations: Floats, rank: Callable[[Floats], Floats], count: int, keep: int
 ) -> tuple[Floats, Floats]:
     """The candidates, and the best ``count`` solved again, round by round, on the ``keep`` lines that fit each best.
@@ -241,59 +234,6 @@ def _compute_robust_scale(median_squared: float, n: int) -> float:
     """Standard deviation of one residual from the median over n lines, with Rousseeuw's small-sample factor."""
     scale = (1.0 + 5.0 / max(n - SUBSET_SIZE, 1)) * float(np.sqrt(median_squared / MEDIAN_CHI2_2))
     return max(scale, MIN_NOISE_PART)
-
-
-def trunc_r_and_t(
-    model_lines_world: Any,
-    segments_px: Any,
-    camera: Camera,
-    prior: Pose,
-    *,
-    landmark_ids: LandmarkIds = None,
-    sigma_px: Any = 1.0,
-    probability: float | None = None,
-    rng: np.random.Generator | None = None,
-    prior_covariance: Any = None,
-    settings: PoseSettings = DEFAULT.pose,
-) -> PoseEstimate:
-    """Camera pose of least truncated loss (MSAC): holds beyond 50 % of wrong lines, if ``sigma_px`` is true.
-
-    The loss is the sum of squared errors over their variance, each line's at most ``2 outlier_sigmas^2``. Candidates
-    and arguments are those of :func:`med_r_and_t`; the prior's share is part of the loss if its covariance is given.
-    The best candidates are refined on their own inliers, and a line that matches only beside its model line's ends, or
-    behind the camera, counts as an outlier.
-
-    Raises:
-        ValueError: as :func:`med_r_and_t`.
-    """
-    bound = 2.0 * settings.outlier_sigmas**2
-
-    def choose(lines: LineSet, rotations: Floats, translations: Floats) -> tuple[RigidMotion, Mask, float]:
-        def rank(errors: Floats) -> Floats:
-            return np.asarray(np.minimum(errors, bound).sum(axis=1))
-
-        few = max(SUBSET_SIZE + 1, int(len(lines) * TRUNC_INLIER_PART))
-        rotations, translations = _add_concentrated(lines, rotations, translations, rank, TRUNC_CANDIDATES, few)
-        rotations, translations = _keep_possible(lines, prior, prior_covariance, rotations, translations)
-        costs = rank(compute_squared_distances(lines, rotations, translations))
-        order = np.argsort(costs, kind="stable")[:TRUNC_FINALISTS].tolist()
-        information = np.zeros((6, 6))
-        if prior_covariance is not None:
-            information, order = np.linalg.inv(prior_covariance), [*order, len(rotations) - 1]
-        towards = np.array(prior.rotation), np.array(prior.translation)
-        ends = [
-            kernels.refine_truncated(
-                lines.arrays, (rotations[i].copy(), translations[i].copy()), towards, information,
-                np.array(compute_weak_information()), bound, settings.max_beside_px, SUBSET_SIZE, TRUNC_ROUNDS,
-                MAX_ITERATIONS)
-            for i in order
-        ]
-        rotation, translation, _ = min(ends, key=lambda end: end[2])
-        near = kernels.compute_truncated_costs(lines.arrays, rotation, translation, bound, settings.max_beside_px)
-        return (rotation, translation), near < bound, bound
-
-    return _solve(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px, probability,
-                  TRUNC_DRAWN_OUTLIER_PART, rng, prior_covariance, settings, choose)
 
 
 def count_subsets(size: int, outliers: float, probability: float) -> int:

@@ -1,12 +1,8 @@
-"""Camera poses to which every line counts: R then T (§6.2.1), R and T (§6.2.2), and R and T of maximum likelihood.
-
-Those of the paper are distances of the model lines' ends to the observed projection planes; the likelihood's are
-distances in the image. All of them minimise with the compiled Levenberg-Marquardt of `kernels`.
-"""
+"""The camera pose of maximum likelihood, to which every line counts; started from the paper's R and T (E1, §6.2.2)."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +29,7 @@ from knowledge_sources.methods.pose.estimate import (
     reject_behind,
     solve_near_prior,
 )
-from knowledge_sources.methods.pose.kernels import IMAGE, PLANES, SINES, TINY, TURN, RigidMotion
+from knowledge_sources.methods.pose.kernels import IMAGE, PLANES, RigidMotion
 from knowledge_sources.methods.pose.line_set import (
     LandmarkIds,
     LineSet,
@@ -42,128 +38,11 @@ from knowledge_sources.methods.pose.line_set import (
     check_matched_arrays,
     check_sigma,
     compute_squared_distances,
-    cross,
     invert_information,
 )
 from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
-
-Weighting = Literal["unit", "length"]
-
-
-def r_and_t(
-    model_lines_world: Any,
-    segments_px: Any,
-    camera: Camera,
-    prior: Pose,
-    *,
-    landmark_ids: LandmarkIds = None,
-    sigma_px: Any = 1.0,
-    objective: Literal["E1", "E2"] = "E1",
-    weighting: Weighting = "unit",
-    settings: PoseSettings = DEFAULT.pose,
-) -> PoseEstimate:
-    """Camera pose of least squared distances of the model ends to the observed projection planes.
-
-    Source: §6.2.2, E1 = sum_i sigma_i (n_i . (R p_i + T))^2, and E2, each term over |R p_i + T|^2. E1 is quadratic
-    in T, which is eliminated: the basin does not depend on the prior's translation. Every line counts: use
-    :func:`med_r_and_t` where some may be matched wrongly.
-
-    Args:
-        model_lines_world: (n, 2, 3) [m].
-        segments_px: (n, 2, 2) observed, as the lens shows them.
-        prior: guess of ``camera_from_world``.
-        landmark_ids: checked, not used, as every line counts.
-        sigma_px: of the segment ends across the line, one number or (n,); scales the covariance.
-        objective: "E1", or "E2" (ends weigh alike whatever their depth), started from E1.
-        weighting: the paper's sigma_i: "unit" or by segment "length".
-
-    Raises:
-        ValueError: as :func:`build_line_set`; ids that are not one a line; an unknown objective or weighting.
-    """
-    if objective not in ("E1", "E2"):
-        raise ValueError(f'expected objective "E1" or "E2", got {objective!r}')
-    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
-    kinds = (PLANES,) if objective == "E1" else (PLANES, SINES)
-    return _solve(lines, prior, landmark_ids, weighting, kinds, settings)
-
-
-def r_then_t(
-    model_lines_world: Any,
-    segments_px: Any,
-    camera: Camera,
-    prior: Pose,
-    *,
-    landmark_ids: LandmarkIds = None,
-    sigma_px: Any = 1.0,
-    weighting: Weighting = "unit",
-    settings: PoseSettings = DEFAULT.pose,
-) -> PoseEstimate:
-    """Camera pose in two least-squares problems: n_i . R d_i = 0 for R, then n_i . (R p_i + T) = 0 for T.
-
-    Source: §6.2.1 (Liu et al. [27]). Rotation increments are axis-angle vectors, not Liu's Euler angles: the minimum is
-    the same, the way to it safer. Arguments and errors as in :func:`r_and_t`, which is more accurate.
-    """
-    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
-    return _solve(lines, prior, landmark_ids, weighting, (TURN,), settings)
-
-
-def _solve(
-    lines: LineSet, prior: Pose, landmark_ids: LandmarkIds, weighting: Weighting, kinds: tuple[int, ...],
-    settings: PoseSettings,
-) -> PoseEstimate:
-    """Minimise what ``kinds`` of `kernels` name, each from where the one before ended."""
-    check_landmarks(landmark_ids, len(lines))
-    if len(lines) < MIN_LINES:
-        return build_prior_estimate(lines, prior, FEW_LINES, settings)
-    weights = _compute_line_weights(lines, weighting)
-    end = Minimum(prior.rotation, prior.translation, np.zeros((6, 6)), 0.0, 0)
-    for kind in kinds:
-        again = minimise(kind, lines, end.state, weights=weights)
-        end = again._replace(iterations=end.iterations + again.iterations)
-    kept = reject_behind(lines, end.state)
-    covariance = compute_covariance(lines, end.state, kept, _compute_gain(lines, end, weights, kinds[-1]), settings)
-    return build_estimate(lines, end, covariance, kept, settings, prior)
-
-
-def _compute_line_weights(lines: LineSet, weighting: Weighting) -> Floats:
-    """The paper's weights sigma_i (n,): all one, or the segment's length over the mean length."""
-    if weighting == "unit":
-        return np.ones(len(lines))
-    if weighting == "length":
-        return np.asarray(lines.lengths_px / max(float(np.mean(lines.lengths_px)), TINY))
-    raise ValueError(f'expected weighting "unit" or "length", got {weighting!r}')
-
-
-def _compute_gain(lines: LineSet, end: Minimum, weights: Floats, kind: int) -> tuple[Floats, Floats]:
-    """How the pose of one of the paper's minima moves with the observed ends, see :func:`kernels.compute_gain`.
-
-    None of them is a likelihood, so the inverse Hessian is not the covariance. At a minimum the gradient is zero, and
-    stays so: its derivative by the pose, times the pose's move, is minus its derivative by the ends.
-    """
-    q = lines.points @ end.rotation.T + end.translation
-    weigh = np.repeat(weights[:, None], 2, axis=1)
-    if kind == SINES:
-        weigh = weigh / np.maximum(np.sum(q**2, axis=-1), TINY)
-    normals = np.broadcast_to(lines.normals[:, None], q.shape)
-    slopes = np.concatenate([cross(q, normals), normals], axis=-1)
-    first, second = lines.rays[:, 0], lines.rays[:, 1]
-    along = (second - first)[:, :2] * lines.focal_px
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(lines.lengths_px, TINY)[:, None]
-    shift = np.concatenate([across / lines.focal_px, np.zeros((len(lines), 1))], axis=1)
-    size = np.maximum(np.linalg.norm(cross(first, second), axis=1), TINY)[:, None, None]
-    moved = np.stack([cross(shift, second), cross(first, shift)], axis=1) / size  # normals, for each end by one px
-    hessian = np.einsum("ik,ika,ikb->ab", weigh, slopes, slopes)
-    spread = np.einsum("ik,ika,ikc,iec->aie", weigh, slopes, q, moved)
-    if kind == TURN:  # the rotation has conditions of its own
-        turned = lines.directions @ end.rotation.T
-        about = cross(turned, lines.normals)
-        hessian[:3] = np.concatenate([np.einsum("i,ia,ib->ab", weights, about, about), np.zeros((3, 3))], axis=1)
-        spread[:3] = np.einsum("i,ia,ic,iec->aie", weights, about, turned, moved)
-    least = max(float(np.trace(hessian)) * 1e-15, TINY) * np.eye(6)
-    gain = -np.linalg.solve(hessian + least, spread.reshape(6, -1)).reshape(6, len(lines), 2)
-    return np.ascontiguousarray(np.moveaxis(gain, 0, 2)), across
 
 
 def r_and_t_ml(

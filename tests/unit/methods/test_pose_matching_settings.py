@@ -12,16 +12,9 @@ import pytest
 from numpy.typing import NDArray
 
 from experiments.paper import pose_scenes
+from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.matching import Peak, match_in_space, match_lines, match_on_floor
-from knowledge_sources.methods.pose import (
-    med_r_and_t,
-    planar_from_lines,
-    planar_from_points,
-    r_and_t,
-    r_and_t_ml,
-    r_then_t,
-    trunc_r_and_t,
-)
+from knowledge_sources.methods.pose import med_r_and_t, planar_from_lines, planar_from_points, r_and_t_ml
 from knowledge_sources.methods.pose.displacements import fit_displacements
 from knowledge_sources.settings import PAPER_MATCHING, MatchingSettings, PoseSettings
 from world_models.building.model_errors import LineErrors
