@@ -31,7 +31,7 @@ NOTES = (
     " for the robust solvers, none for the others.",
     f"Ends with {SIGMA_PX} px of noise; prior off by up to {PRIOR_M} m and {PRIOR_RAD} rad on each axis.",
     "Whole calls from Python on both sides, checks and results included; ours also gives residuals, covariance and"
-    " reasons. Ours are compiled by numba (Trunc R and T in part), PoseLib is C++. The peer's pose object is made within"
+    " reasons. Ours are compiled by numba (Trunc R and T in part), PoseLib is C++. The peer's pose object is made in"
     " its call.",
     f"Each figure: median over the trials of the best of {ROUNDS} rounds of {CALLS} calls, in alternation, so that"
     " other load on the machine meets both equally. The paper gives no times.",
