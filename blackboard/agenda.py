@@ -1,6 +1,6 @@
 """Agenda: the pending activations, found by the entry that triggered them and by how well they are rated.
 
-A robot has a few dozen of them at most, so each question looks at all.
+A robot has few of them at a time, so each question looks at all.
 """
 
 from __future__ import annotations

@@ -84,7 +84,7 @@ def _notes(parts: int) -> tuple[str, ...]:
         f"Processor time of {PART_CYCLES} cycles: the best of {parts} such parts, which alternate with those of other"
         " numbers pending; beside it the median, which also shows what else the machine was doing. A bare Python"
         f" call took {1e9 * call_s:.0f} ns here.",
-        "More are pending the longer a cycle takes, as it looks at all of them: a mission has a few dozen at most.",
+        "More are pending the longer a cycle takes, as it looks at all of them: a mission has a few.",
         "CLIPS (clipspy) is a rule engine in C, and may be faster than ours; no claim is made. A rule of its own"
         " language fires with as many activations of lower salience on the agenda, and calls Python to write a short"
         " line. Comparable as to the agenda only: matching is in C, the line says only what fired, nothing is rated,"
