@@ -47,8 +47,6 @@ class FeaturesSettings:
     sigma_across_px: float = setting(
         0.7, "px", "Standard deviation of a segment's end across its model line, with the model's own errors.",
         "measured on rendered edges (tests/laws/features)")
-    max_duplicate_offset_px: float = setting(
-        0.7, "px", "Largest distance across at which a segment repeats a longer one.")
 
     # Segments near predicted lines: bands
     band_px: float = setting(

@@ -27,12 +27,6 @@ from knowledge_sources.methods.pose.estimate import (
     reject_behind,
 )
 from knowledge_sources.methods.pose.kernels import IMAGE, PLANES, TINY, RigidMotion
-from knowledge_sources.methods.pose.least_median import (
-    SUBSET_SIZE,
-    add_concentrated,
-    keep_possible,
-    solve_from_subsets,
-)
 from knowledge_sources.methods.pose.line_set import (
     LandmarkIds,
     LineSet,
@@ -41,6 +35,12 @@ from knowledge_sources.methods.pose.line_set import (
     compute_squared_distances,
     cross,
     measure_lines,
+)
+from knowledge_sources.methods.pose.r_and_t import (
+    SUBSET_SIZE,
+    add_concentrated,
+    keep_possible,
+    solve_from_subsets,
 )
 from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.camera import Camera
@@ -199,7 +199,7 @@ def _descend(
 
 
 def _compute_gain(lines: LineSet, end: Minimum, weights: Floats, objective: str) -> tuple[Floats, Floats]:
-    """How the pose of one of the paper's minima moves with the observed ends, see :func:`kernels.compute_gain`.
+    """How the pose of one of the paper's minima moves with the observed ends, see :func:`compute_gain`.
 
     None of them is a likelihood, so the inverse Hessian is not the covariance. At a minimum the gradient is zero, and
     stays so: its derivative by the pose, times the pose's move, is minus its derivative by the ends.

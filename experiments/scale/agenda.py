@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from experiments.report import Cell, Report
 from experiments.scale import agenda_memory, agenda_peers
 from experiments.scale.agenda_load import PART_CYCLES, Speed, measure
-from harvey.campaign.progress import stages
 from logs.journal_file import HELD_LINES
 
 PENDING = (10, 100, 1_000)
@@ -29,13 +28,12 @@ Row = tuple[Cell, ...]
 def run(quick: bool, seed: int) -> Report:
     """Measure memory first, while the process is small; then agenda and peers."""
     pending, parts, cycles = (QUICK_PENDING, QUICK_PARTS, QUICK_CYCLES) if quick else (PENDING, PARTS, CYCLES)
-    with stages(3, sys.stderr) as begin:
-        begin(f"memory: {cycles} cycles")
-        memory = agenda_memory.long_run(cycles)
-        begin(f"{pending[0]} to {pending[-1]} pending")
-        speeds = measure(pending, parts, seed)
-        begin("peers")
-        peers = {number: _peers(number) for number in pending}
+    print(f"1 of 3: memory: {cycles} cycles", file=sys.stderr)
+    memory = agenda_memory.long_run(cycles)
+    print(f"2 of 3: {pending[0]} to {pending[-1]} pending", file=sys.stderr)
+    speeds = measure(pending, parts, seed)
+    print("3 of 3: peers", file=sys.stderr)
+    peers = {number: _peers(number) for number in pending}
     return Report("Agenda: activations per second, journal included", COLUMNS,
                   (*_speed_rows(speeds, peers), *_memory_rows(memory)), notes=_notes(parts),
                   claims=tuple(_claims(speeds, peers, memory)))

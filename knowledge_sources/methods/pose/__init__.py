@@ -47,10 +47,9 @@ True
 """
 
 from knowledge_sources.methods.pose.estimate import PlanarEstimate, PoseEstimate
-from knowledge_sources.methods.pose.least_median import med_r_and_t
 from knowledge_sources.methods.pose.planar import planar_from_points
 from knowledge_sources.methods.pose.planar_from_lines import planar_from_lines
-from knowledge_sources.methods.pose.r_and_t import r_and_t_ml
+from knowledge_sources.methods.pose.r_and_t import med_r_and_t, r_and_t_ml
 
 __all__ = [
     "PlanarEstimate",
