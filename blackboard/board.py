@@ -173,15 +173,14 @@ class View:
         return tuple(entry for entry in self.all(kind) if predicate(entry.value))
 
     def having(self, index: Index[T], key: Hashable) -> tuple[Entry[T], ...]:
-        """Current entries that an index files under a key, oldest first; takes as long as there are any."""
-        found = self._board._store(index.kind).having(index, key)
-        return () if found is None else tuple(found)
+        """Current entries that an index files under a key, oldest first."""
+        return tuple(self._board._store(index.kind).having(index, key))
 
     def newest(self, index: Index[T], key: Hashable) -> Entry[T] | None:
-        """The newest posting that an index files under a key, or None; takes the same time however many there are."""
+        """The newest posting that an index files under a key, or None."""
         store = self._board._stores.get(index.kind)
-        found = None if store is None else store.having(index, key)
-        return None if found is None else found.newest()
+        found = () if store is None else store.having(index, key)
+        return found[-1] if found else None
 
     def keys(self, index: Index[T]) -> Collection[Hashable]:
         """The keys under which an index files something now."""

@@ -2,8 +2,7 @@
 
 Order of a cycle: changes of the last cycle -> obviate what they made stale -> activate the watchers -> choose (pure),
 asking the best whether it still holds, and obviating it if not -> act -> apply -> journal -> ports. The journal has the
-decision before any port sees it, so that nothing reaches the motors that is not written down. What a cycle costs does
-not depend on how much is pending.
+decision before any port sees it, so that nothing reaches the motors that is not written down.
 
 An act that lacks something asks for it (:class:`~blackboard.effect.MissingEntryError`): that request is all that the
 cycle does, and the activation goes back to where it was, to be chosen again when a port has answered.
@@ -84,7 +83,7 @@ class Scheduler:
         self._watchers: dict[tuple[type[Change], type[Any]], Watchers] = {}
         self._ports = tuple(ports)
         self._sinks = tuple(sinks)
-        self._agenda = Agenda(self._servoing.levels)
+        self._agenda = Agenda()
         self.kinds = registry_of(sources, kinds)
         self._requests = frozenset(filter(is_request, self.kinds.values()))
         self._traced = frozenset(kind for kind in self.kinds.values() if kind_of(kind).traced)
@@ -195,7 +194,7 @@ class Scheduler:
             return chosen, self._best(groups, obviated), ""
         except Exception:
             if chosen is not None:
-                self._agenda.put_back(chosen)
+                self._agenda.add(chosen)
             return None, None, RAISED + traceback.format_exc(limit=-4)
 
     def _best(self, groups: Groups, obviated: list[Obviated]) -> Activation | None:
@@ -270,7 +269,7 @@ class Scheduler:
                 return (), f"nobody answered {asked.ref}"
         made, refused = self._apply(chosen.source, (Post(request, (chosen.trigger.entry,)),))
         if made:
-            self._agenda.put_back(chosen)
+            self._agenda.add(chosen)
             self._is_waiting = True
         return made, refused
 

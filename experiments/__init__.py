@@ -60,7 +60,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "soak": "Errands in one building, day after day: 1,000 km",
     },
     "scale": {
-        "agenda": "Activations per second with 10 to 100,000 pending",
+        "agenda": "Activations per second with 10 to 1,000 pending",
         "cost": "Where the processor time of missions goes",
         "explanations": "Missions of every scenario, explained and replayed",
         "frame-budget": "Time of perception per frame",

@@ -5,7 +5,7 @@ The Python interface. Everything below is loaded when it is first used:
 - missions: :func:`run`, :func:`open_run`, :class:`RecordedRun`, :class:`MissionResult`, :func:`load_scenario`;
   what a recorded run yields: :class:`DecisionRecord`, with :class:`EntryRecord` and :class:`Candidate`
 - building models: :func:`load_world`, :func:`build_world`, :class:`World`
-- poses from matched lines: :func:`med_r_and_t`, :func:`trunc_r_and_t`, :func:`r_and_t_ml`, :func:`planar_from_lines`
+- poses from matched lines: :func:`med_r_and_t`, :func:`r_and_t_ml`, :func:`planar_from_lines`
   (``knowledge_sources.methods.pose`` says which to use when), :class:`Camera`, :class:`Pose`, :class:`Pose2`
 - the blackboard by itself: :class:`Scheduler`, :class:`KnowledgeSource`, :class:`Watch`, :class:`Posted`,
   :class:`Revised`, :class:`Retracted`, :class:`Post`, :class:`Revise`, :class:`Retract`, :class:`View`, :class:`Entry`,
@@ -49,7 +49,6 @@ if TYPE_CHECKING:
         med_r_and_t,
         planar_from_lines,
         r_and_t_ml,
-        trunc_r_and_t,
     )
     from logs.records import Candidate, DecisionRecord, EntryRecord
     from sim.scenario import load_scenario
@@ -72,7 +71,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "harvey.errors": ("BadInput",),
     "harvey.runner.result": ("MissionResult",),
     "knowledge_sources.methods.pose": (
-        "PlanarEstimate", "PoseEstimate", "med_r_and_t", "planar_from_lines", "r_and_t_ml", "trunc_r_and_t"),
+        "PlanarEstimate", "PoseEstimate", "med_r_and_t", "planar_from_lines", "r_and_t_ml"),
     "logs.records": ("Candidate", "DecisionRecord", "EntryRecord"),
     "sim.scenario": ("load_scenario",),
     "world_models.building.world": ("World",),
@@ -88,7 +87,7 @@ __all__ = [
     "MissionResult", "PlanarEstimate", "Pose", "Pose2", "PoseEstimate", "Post", "Posted", "RecordedRun", "Retract",
     "Retracted", "Revise", "Revised", "RunPicture", "Scheduler", "TrackPoint", "View", "Watch", "World",
     "build_world", "inference", "load_scenario", "load_world", "med_r_and_t", "observation", "open_run",
-    "planar_from_lines", "r_and_t_ml", "request", "run", "trunc_r_and_t",
+    "planar_from_lines", "r_and_t_ml", "request", "run",
 ]
 
 

@@ -62,7 +62,7 @@ def _value(
     default: float | str = BY_MISSION,
 ) -> RobotValue:
     kind, part, room = where
-    return RobotValue(kind, part, field, Row(room, key, default, unit, what, "§3.2", bounds.high, ()), bounds)
+    return RobotValue(kind, part, field, Row(room, key, default, unit, what, "§3.2", bounds.high), bounds)
 
 
 def _wheels(field: str, unit: str, what: str) -> RobotValue:

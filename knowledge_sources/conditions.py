@@ -18,7 +18,6 @@ from blackboard.servoing import Discrepancy
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.questions import (
     active_goal,
-    current_leg,
     deepest_sketch,
     find_belief,
     find_building,
@@ -146,4 +145,3 @@ MILESTONE = Condition("a milestone awaited", open_milestone, "none was")
 NO_MILESTONE = Condition("no milestone awaited", _none_open(open_milestone), _tell_open(open_milestone, "awaited"))
 GOAL = Condition("a goal", active_goal, "none was pursued")
 SKETCH = Condition("a sketch", deepest_sketch, "there was none")
-LEG = Condition("a leg", current_leg, "none was")

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, fields, replace
 from math import inf
 from typing import Any
 
-Value = float | tuple[float, ...] | str
-"""Of a setting: a number (or ``True`` and ``False``), several numbers, or a name."""
+Value = float | tuple[float, ...]
+"""Of a setting: a number (or ``True`` and ``False``), or several numbers."""
 
 SWITCHES: Mapping[str, bool] = {"on": True, "yes": True, "true": True, "off": False, "no": False, "false": False}
 """What may be written for a setting that is on or off."""
@@ -22,19 +22,17 @@ SWITCHES: Mapping[str, bool] = {"on": True, "yes": True, "true": True, "off": Fa
 
 def setting(
     default: Value, unit: str, what: str, source: str = "engineering judgement", *, most: float = inf,
-    choices: tuple[str, ...] = (),
 ) -> Any:
     """A field of a settings dataclass.
 
     Args:
-        default: a whole number where only whole numbers make sense; a tuple where there are several; a name.
-        unit: ``px``, ``m``, ``rad``, ``s``, ``1`` for a ratio or a probability, ``count``, ``name``, ``yes/no``.
+        default: a whole number where only whole numbers make sense; a tuple where there are several.
+        unit: ``px``, ``m``, ``rad``, ``s``, ``1`` for a ratio or a probability, ``count``, ``yes/no``.
         what: one sentence, without the unit.
         source: section or equation of the paper, or the experiment that chose it; what nobody measured is judgement.
         most: largest value, where something else does not allow more.
-        choices: of a name.
     """
-    details = {"unit": unit, "what": what, "source": source, "most": most, "choices": choices}
+    details = {"unit": unit, "what": what, "source": source, "most": most}
     return field(default=default, metadata=details)
 
 
@@ -49,8 +47,6 @@ class FeaturesSettings:
     sigma_across_px: float = setting(
         0.7, "px", "Standard deviation of a segment's end across its model line, with the model's own errors.",
         "measured on rendered edges (tests/laws/features)")
-    max_duplicate_offset_px: float = setting(
-        0.7, "px", "Largest distance across at which a segment repeats a longer one.")
 
     # Segments near predicted lines: bands
     band_px: float = setting(
@@ -109,28 +105,18 @@ class MatchingSettings:
     """The numbers of line matching (§6.1)."""
 
     # The search, in the image or with a pose
-    objective: str = setting(
-        "likelihood", "name", "Match error in the image: likelihood, or paper (E_match).",
-        "§6.1.3, experiment matcher", choices=("likelihood", "paper"))
-    strategy: str = setting(
-        "steepest", "name", "Local search in the image: steepest descent, or first improvement (paper).",
-        "§6.1.1", choices=("steepest", "first"))
-    exchange: bool = setting(
-        True, "yes/no", "Whether two data lines of a model line may be exchanged at a local minimum (paper: no).",
-        "§6.1.1, experiment matcher")
-    with_scale: bool = setting(False, "yes/no", "Whether the fit in the image has a scale.", "§6.1.2")
     min_gain: float = setting(1e-9, "1", "A move must lower the match error by more than this.", "rounding")
 
-    # The two objectives
+    # The objective: a likelihood (§6.1.3)
     chance_exponent: float = setting(
-        3.0, "1", "How fast clutter along a model line becomes rarer with its length, likelihood.")
-    chance_length_px: float = setting(10.0, "px", "Length from which clutter along a model line is rare, likelihood.")
+        3.0, "1", "How fast clutter along a model line becomes rarer with its length.")
+    chance_length_px: float = setting(10.0, "px", "Length from which clutter along a model line is rare.")
 
     # In the image
     max_pair_px: float = setting(
         4.0, "px",
         "Largest distance of a data end from its model line in the image.", "§6.1.4 says 3 px; wider for perspective")
-    pair_sigmas: float = setting(3.0, "1", "Standard deviations of a data end in that largest distance, likelihood.")
+    pair_sigmas: float = setting(3.0, "1", "Standard deviations of a data end in that largest distance.")
 
     # Starts in the image: a generalised Hough transform
     max_starts: int = setting(3, "count", "Placements that are searched (paper: 1).", "§6.1.4, experiment matcher")
@@ -147,12 +133,6 @@ class MatchingSettings:
     max_near_pairs: int = setting(
         2500, "count",
         "Most pairs near a pose that are searched; of more, each model line's longest.", "experiment matcher")
-
-
-PAPER_MATCHING = MatchingSettings(
-    objective="paper", strategy="first", exchange=False, max_starts=1, max_pair_px=3.0
-)
-"""The paper's own way (§6.1): its match error, first improvement, no exchanges, one start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -520,18 +500,17 @@ class Row:
     """One setting.
 
     Attributes:
-        room, field: where it is found; value: as it is set.
-        unit, what, source, most, choices: as :func:`setting` takes them.
+        room, field: where it is found; value: as it is set, or in words who sets it.
+        unit, what, source, most: as :func:`setting` takes them.
     """
 
     room: str
     field: str
-    value: Value
+    value: Value | str
     unit: str
     what: str
     source: str
     most: float
-    choices: tuple[str, ...]
 
     @property
     def name(self) -> str:
@@ -563,10 +542,6 @@ def replace_value(settings: Settings, name: str, value: Any) -> Settings:
 def _convert(value: Any, row: Row) -> Value:
     """The value as one of the setting's kind. Raises ValueError."""
     default = row.value
-    if isinstance(default, str):
-        if value in row.choices:
-            return str(value)
-        raise ValueError(f"expected {' or '.join(row.choices)}")
     if isinstance(default, bool):
         is_on = SWITCHES.get(str(value).lower())
         if is_on is None:

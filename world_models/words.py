@@ -89,11 +89,6 @@ def point(x_m: Number, y_m: Number) -> str:
     return f"({number(x_m):.2f}, {number(y_m):.2f}) m"
 
 
-def pixels(value: float) -> str:
-    """``4.7 px``."""
-    return f"{value:.1f} px"
-
-
 def quantity(value: Number, unit: str) -> str:
     """A number in a unit that the board names; lengths and angles in the units that people use."""
     if unit == "m":

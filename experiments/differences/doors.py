@@ -39,7 +39,7 @@ class DoorEnd(End):
 
     Attributes:
         door: the door that is otherwise; "" where none is.
-        is_found: whether that was ever held to be shut or ajar.
+        is_found: whether that was ever held to be shut.
         false_states: what was held of doors and is not so.
     """
 
@@ -96,7 +96,7 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
         "Missions on floors whose doors are otherwise", "doors", FIGURES,
         notes=(
             "as it should end: reached; with no way left blocked, and the outcome names that door. door found: it was"
-            " held to be shut or ajar at some time; a way need not lead past it. false states: a door that is held to"
+            " held to be shut at some time; a way need not lead past it. false states: a door that is held to"
             " be shut and is open, or open and is shut, when it was seen. false accepts: milestones verified while the"
             " robot was elsewhere.",
             f"The paper's doors are as its model says, and {drives.NO_PEER}",

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
+from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
 from experiments.report import Cell, Report
 from experiments.trials import at_least, at_most, campaign_folder, is_surely_within, run_trials
-from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, r_and_t_ml, r_then_t, trunc_r_and_t
+from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml
 from knowledge_sources.settings import DEFAULT
 from world_models.frames import Pose
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 from itertools import pairwise, zip_longest
 
 import numpy as np
 
+from experiments.paper.paper_matching import PaperSearch, TraceStep, match_as_paper
 from experiments.report import Cell, Report
-from knowledge_sources.methods.matching import Match, Peak, TraceStep, match_lines
-from knowledge_sources.settings import PAPER_MATCHING
+from knowledge_sources.methods.matching import Match, Peak
 
 NAMES = "ABCD"
 MODEL = (
@@ -56,16 +56,17 @@ MAX_PAIR_PX = 10.0
 
 def run(quick: bool, seed: int) -> Report:
     """Run the paper's search from the paper's wrong start; nothing is random, so ``seed`` changes nothing."""
-    match = _search(paper=True)
-    shorter = _search(paper=False)
-    states = list(zip_longest(PAPER, match.trace))
+    search, steepest = PaperSearch(), PaperSearch(first=False, exchange=True)
+    _match(search)
+    shorter = _match(steepest)
+    states = list(zip_longest(PAPER, search.trace))
     rows: list[tuple[Cell, ...]] = []
     for i, (theirs, ours) in enumerate(states):
         paper = theirs or (None, None)
         name = "initial" if i == 0 else str(i)
         rows.append((name, *paper, None, *((_format_pairs(ours), ours.evaluation) if ours else (None, None))))
-    errors = [step.evaluation for step in match.trace]
-    pairs = [set(step.pairs) for step in match.trace]
+    errors = [step.evaluation for step in search.trace]
+    pairs = [set(step.pairs) for step in search.trace]
     return Report(
         "Figure 12: the trace of a local search",
         ("state", "paper: pairs", "paper: E", "peer", "ours: pairs", "ours: E"),
@@ -77,27 +78,23 @@ def run(quick: bool, seed: int) -> Report:
             f"First improvement, k = 1, no exchanges, alpha .5, beta 4, pairs within {MAX_PAIR_PX:.0f} px and .3 rad,"
             " from C-8 and D-7 at the model's own place. Omission weighs by relative model length (§6.1.3 allows it;"
             " unweighted, four lines fully seen cost 2.0 and 1.61 cannot be reached).",
-            f"Steepest descent with exchanges from the same start ends at {_format_pairs(shorter.trace[-1])},"
+            f"Steepest descent with exchanges from the same start ends at {_format_pairs(steepest.trace[-1])},"
             f" E = {shorter.e_match:.2f}, in {shorter.steps} moves.",
             "The trace as printed by the matcher; model 0-3 are A-D, data count from 0:",
-            *format_trace(match).splitlines(),
+            *format_trace(search.trace).splitlines(),
         ),
         claims=(
             ("the evaluation falls at each step", all(b < a for a, b in pairwise(errors))),
             ("each step adds or deletes one pair", all(len(a ^ b) == 1 for a, b in pairwise(pairs))),
             ("both wrong pairs of the start are gone in the end", not set(WRONG_START) & pairs[-1]),
-            ("the final state is the figure's", _format_pairs(match.trace[-1]) == PAPER[-1][0]),
+            ("the final state is the figure's", _format_pairs(search.trace[-1]) == PAPER[-1][0]),
         ),
     )
 
 
-def _search(*, paper: bool) -> Match:
-    """Search as the paper does, or by steepest descent with exchanges."""
-    settings = PAPER_MATCHING if paper else replace(PAPER_MATCHING, strategy="steepest", exchange=True)
-    return match_lines(
-        np.array(MODEL), np.array(DATA), settings, pair_px=MAX_PAIR_PX, start=Peak(0.0, (0.0, 0.0), 0.0),
-        first_pairs=WRONG_START, trace=True,
-    )
+def _match(search: PaperSearch) -> Match:
+    return match_as_paper(np.array(MODEL), np.array(DATA), search=search, pair_px=MAX_PAIR_PX,
+                          start=Peak(0.0, (0.0, 0.0), 0.0), first_pairs=WRONG_START)
 
 
 def _format_pairs(step: TraceStep) -> str:
@@ -105,13 +102,13 @@ def _format_pairs(step: TraceStep) -> str:
     return " ".join(f"{NAMES[model]}{data + 1}" for model, data in sorted(step.pairs))
 
 
-def format_trace(match: Match) -> str:
-    """The states of the search as a table like Figure 12(d): one row a state, its pairs and its evaluation."""
-    columns = sorted({pair for step in match.trace for pair in step.pairs})
+def format_trace(trace: Sequence[TraceStep]) -> str:
+    """The states of a search as a table like Figure 12(d): one row a state, its pairs and its evaluation."""
+    columns = sorted({pair for step in trace for pair in step.pairs})
     head = " ".join(f"{m}-{d}" for m, d in columns)
     rows = [f"{'step':>7}  {head}  evaluation"]
-    last = len(match.trace) - 1
-    for i, step in enumerate(match.trace):
+    last = len(trace) - 1
+    for i, step in enumerate(trace):
         name = "initial" if i == 0 else "final" if i == last else str(i)
         have = set(step.pairs)
         marks = " ".join(f"{'x' if c in have else '.':>{len(f'{c[0]}-{c[1]}')}}" for c in columns)

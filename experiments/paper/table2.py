@@ -23,9 +23,10 @@ from experiments.paper.pose_scenes import (
     fragment,
     rho_theta_noise,
 )
+from experiments.paper.pose_solvers import r_and_t, r_then_t
 from experiments.report import Cell, Report, format_triple
 from experiments.trials import at_least, at_most, is_surely_within
-from knowledge_sources.methods.pose import PoseEstimate, r_and_t, r_and_t_ml, r_then_t
+from knowledge_sources.methods.pose import PoseEstimate, r_and_t_ml
 from knowledge_sources.settings import DEFAULT
 from world_models.frames import Pose
 

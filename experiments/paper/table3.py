@@ -23,9 +23,10 @@ from experiments.paper.pose_scenes import (
     fragment,
     wrong_landmarks,
 )
+from experiments.paper.pose_solvers import r_and_t, trunc_r_and_t
 from experiments.report import Cell, Report, format_triple
 from experiments.trials import campaign_folder, run_trials
-from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t, trunc_r_and_t
+from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t
 from world_models.frames import Pose
 
 Array = NDArray[np.float64]

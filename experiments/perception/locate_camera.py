@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.special import bdtr
 
+from experiments.paper.pose_solvers import trunc_r_and_t
 from experiments.perception.rivals import (
     DETECTION_RATE,
     MIN_LINE_LENGTH_PX,
@@ -25,17 +26,19 @@ from experiments.perception.rivals import (
     project_leaders,
 )
 from knowledge_sources.methods.arrays import Floats, Indices
-from knowledge_sources.methods.features.lines import LineSegments, find_lines, remove_duplicates
+from knowledge_sources.methods.features.lines import LineSegments, find_lines
 from knowledge_sources.methods.matching import match_in_space
 from knowledge_sources.methods.matching.pose_matching import CameraParameters, build_camera_parameters
-from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml, trunc_r_and_t
-from knowledge_sources.methods.pose.least_median import MIN_NOISE_PART
+from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml
+from knowledge_sources.methods.pose.r_and_t import MIN_NOISE_PART
 from knowledge_sources.methods.verification.line_check import Agreement, compute_agreement, compute_p_false
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose
 
 CAMERA_BAND_PX = 6.0  # half-width of the bands that are searched for edges around the first pose
+MAX_DUPLICATE_OFFSET_PX = 0.7  # px; largest distance across at which a segment repeats a longer one
+MAX_DUPLICATE_OVERHANG_PX = 3.0  # px; largest distance beyond the ends at which it does
 CAMERA_SECOND_PRIOR = 0.15  # standard deviation of the first pose, as a part of the prior's
 CAMERA_NEAR_PRIOR = 0.5  # the same of a second try from the prior, where nothing is verified from the whole of it
 CAMERA_START_SIGMAS = 1.5  # shifts of further tries along its axes, in the prior's deviations; to its corners, one
@@ -351,3 +354,25 @@ class CameraSearch:
         root = CAMERA_DISPLACEMENT_SIGMAS * np.linalg.cholesky(self.covariance)
         steps = [sign * root[:, i] + root[:, j] for i in range(3) for j in range(3, 6) for sign in (1.0, -1.0)]
         return [pose.perturbed(step[:3], step[3:]) for step in steps]
+
+
+def remove_duplicates(found: LineSegments, offset_px: float = MAX_DUPLICATE_OFFSET_PX) -> LineSegments:
+    """Drop segments that repeat a longer one; the others, longest first (non-maximum suppression).
+
+    An edge that lies in the bands of two predictions is found twice. A segment is a repeat if both its ends lie on the
+    longer one, within ``offset_px`` across and MAX_DUPLICATE_OVERHANG_PX along, and its brighter side
+    is the same.
+    """
+    ordered = found.take(np.argsort(-found.lengths_px, kind="stable"))
+    start, delta = ordered.segments_px[:, 0], ordered.segments_px[:, 1] - ordered.segments_px[:, 0]
+    length, overhang = ordered.lengths_px, MAX_DUPLICATE_OVERHANG_PX
+    along = delta / length[:, None]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    on = np.ones((len(found), len(found)), bool)  # [i, j]: segment j lies on segment i
+    for end in (0, 1):
+        places = ordered.segments_px[:, end].T
+        t, o = (axis @ places - np.sum(axis * start, axis=1)[:, None] for axis in (along, across))
+        on &= (np.abs(o) <= offset_px) & (t >= -overhang) & (t <= length[:, None] + overhang)
+    bright_right = along * np.sign(ordered.contrast)[:, None]
+    on &= bright_right @ bright_right.T > 0.0
+    return ordered.take(~np.any(np.triu(on, 1), axis=0))

@@ -60,7 +60,7 @@ def generate_match_scene(lines: int, data: int, rng: np.random.Generator) -> Mat
     model = _model(lines, rng)
     shift, centre = rng.uniform(-SHIFT_PX, SHIFT_PX, 2), model.reshape(-1, 2).mean(axis=0)
     move = Similarity2(
-        float(rng.uniform(-TURN_RAD, TURN_RAD)), (float(shift[0]), float(shift[1])), 1.0,
+        float(rng.uniform(-TURN_RAD, TURN_RAD)), (float(shift[0]), float(shift[1])),
         (float(centre[0]), float(centre[1])),
     )
     moved = move.apply(model)
@@ -231,4 +231,4 @@ def _fit(table: PairTable, chosen: NDArray[np.intp], placement: Array) -> Array:
         return placement
     rows = table.across[chosen] * np.sqrt(table.shares[chosen])[:, None, None]
     form = np.einsum("pea,peb->ab", rows, rows) + 1e-6 * np.diag([0.0, 0.0, 1.0, 1.0, 0.0])
-    return np.asarray(compute_best_fits(form[None], False, placement).placements[0])
+    return np.asarray(compute_best_fits(form[None], placement).placements[0])

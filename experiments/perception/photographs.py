@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
+from experiments.paper.paper_matching import match_as_paper
 from experiments.paper.pose_peer import Peer
 from experiments.perception.locate_camera import CameraFix, PoseVerdict, locate_camera
 from experiments.perception.rivals import MIN_LINE_LENGTH_PX
@@ -22,9 +23,8 @@ from experiments.shared_data import CORRIDOR, data_path, describe_absence
 from harvey.errors import BadInput
 from knowledge_sources.methods.features.lines import LineSegments, find_lines
 from knowledge_sources.methods.features.picture import read_picture
-from knowledge_sources.methods.matching import match_lines
 from knowledge_sources.methods.pose import med_r_and_t
-from knowledge_sources.settings import DEFAULT, PAPER_MATCHING
+from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -210,7 +210,7 @@ def _solve_as_paper(
 ) -> Pose:
     """§6 once: rigid 2D match of the projected model, then Med R and T."""
     model, px = select_visible(data.model_lines, frame, prior)
-    match = match_lines(px, segments.segments_px, PAPER_MATCHING)
+    match = match_as_paper(px, segments.segments_px)
     i, k = match.pairs.T
     return med_r_and_t(
         model[i], segments.segments_px[k], frame.camera, prior, landmark_ids=i.tolist(),

@@ -27,7 +27,9 @@ from tqdm import tqdm
 
 from experiments.report import Report
 from experiments.robustness.malformed_texts import GML, IFC, SMALL
-from harvey.campaign.engine import map_values
+from harvey.campaign.case_work import Killed
+from harvey.campaign.engine import map_cases
+from harvey.errors import BadInput
 from world_models.building.checks import check_world
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import compile_file, load_world, read_world
@@ -86,9 +88,11 @@ def _judge_files(files: int, chunk: int, seed: int) -> Iterator[FileResult]:
     parts = [range(first, min(first + chunk, files)) for first in range(0, files, chunk)]
     known: dict[int, list[FileResult]] = {}
     with tqdm(total=files, unit="file", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
-        for place, found in map_values(partial(judge_files, seed=seed), parts):
-            known[place] = found
-            bar.update(len(found))
+        for place, found in map_cases(partial(judge_files, seed=seed), parts):
+            if isinstance(found, Killed):
+                raise BadInput(f"case {place}: {found.text}")
+            known[place] = found.value
+            bar.update(len(found.value))
     for place in range(len(parts)):
         yield from known[place]
 

@@ -205,14 +205,6 @@ def map_cases(
         yield place, answer
 
 
-def map_values(work: Callable[[T], R], cases: Sequence[T]) -> Iterator[tuple[int, R]]:
-    """(place in ``cases``, what ``work`` returns), as :func:`map_cases`. Raises BadInput where a case is given up."""
-    for place, answer in map_cases(work, cases):
-        if isinstance(answer, Killed):
-            raise BadInput(f"case {place}: {answer.text}")
-        yield place, answer.value
-
-
 def run_campaign(campaign: Campaign[T, R], workers: Workers | None = None) -> Iterator[tuple[int, R | Killed]]:
     """(case, result), first those that are kept already, then as they are done; on the disk before they are told.
 

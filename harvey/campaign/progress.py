@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
@@ -107,25 +107,6 @@ def following(out: TextIO) -> Iterator[Follow]:
     finally:
         for item in shown:
             item.close()
-
-
-@contextmanager
-def stages(total: int, out: TextIO) -> Iterator[Callable[[str], None]]:
-    """Work of so many parts; to be told of each as it begins. A bar on a terminal, a line for each elsewhere."""
-    with tqdm(total=total, file=out, disable=not out.isatty(), leave=False, dynamic_ncols=True,
-              bar_format="{percentage:3.0f} %|{bar}| {desc} [{elapsed}]") as bar:
-        begun = 0
-
-        def begin(what: str) -> None:
-            nonlocal begun
-            begun += 1
-            if out.isatty():
-                bar.n = begun - 1
-                bar.set_description_str(what)
-            else:
-                print(f"{begun} of {total}: {what}", file=out, flush=True)
-
-        yield begin
 
 
 def count_missions(

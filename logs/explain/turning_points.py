@@ -32,8 +32,6 @@ from world_models.words import count
 
 TOLD = ("refuted", "not testable", "lost", "found", "fault", "contact", "door", "thing", "resumed", "told")
 """Kinds that a short account of a run must not leave out."""
-IMPASSABLE = ("shut", "ajar")
-"""States of a door through which no way leads."""
 REMEMBERED = 8
 """The newest entries of a type that are looked back for."""
 MARKS, NOT_VERIFIED = ("escalated", "relocalization"), ("refuted", "not testable")
@@ -180,7 +178,7 @@ def _turn(value: Any, is_new: bool, cycle: int, get: Get, believed: Believed, wa
         belief = believed(cycle)
         where = "" if belief is None else f", at {belief.value.place()} by its belief"
         yield TurningPoint(cycle, "contact", f"{words.brief(value)}{where}")
-    elif isinstance(value, DoorState) and value.is_passable is (was in IMPASSABLE):
+    elif isinstance(value, DoorState) and value.is_passable is (was == "shut"):
         yield TurningPoint(cycle, "door", words.brief(value))
     elif isinstance(value, Obstacle) and value.is_there is not (was == "there"):
         yield TurningPoint(cycle, "thing", words.brief(value))

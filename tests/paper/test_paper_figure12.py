@@ -7,7 +7,6 @@ starts, as there, from C-8 and D-7 alone, both wrong in the end.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -15,8 +14,9 @@ import numpy as np
 import pytest
 
 from experiments.paper.figure12 import format_trace
+from experiments.paper.paper_matching import PaperSearch, TraceStep, match_as_paper
 from knowledge_sources.methods.matching import Match, Peak, match_lines
-from knowledge_sources.settings import PAPER_MATCHING
+from knowledge_sources.settings import MatchingSettings
 
 MODEL = np.array(
     [
@@ -48,17 +48,13 @@ NUMBERS = list(DATA)
 BELONGS = {(A, 1), (A, 2), (B, 3), (C, 4), (D, 5), (D, 6)}
 
 
-def solve(**more: Any) -> Match:
-    segments = np.array([DATA[n] for n in NUMBERS])
-    start = {(C, NUMBERS.index(8)), (D, NUMBERS.index(7))}
-    return match_lines(
-        MODEL,
-        segments,
-        pair_px=10.0,
-        start=Peak(0.0, (0.0, 0.0), 0.0),
-        trace=True,
-        **{"settings": PAPER_MATCHING, "first_pairs": start, **more},
-    )
+SEGMENTS = np.array([DATA[n] for n in NUMBERS])
+NEAR: dict[str, Any] = {"pair_px": 10.0, "start": Peak(0.0, (0.0, 0.0), 0.0)}
+
+
+def solve() -> tuple[Match, tuple[TraceStep, ...]]:
+    start, search = {(C, NUMBERS.index(8)), (D, NUMBERS.index(7))}, PaperSearch()
+    return match_as_paper(MODEL, SEGMENTS, search=search, first_pairs=start, **NEAR), search.trace
 
 
 def number_pairs(match: Match) -> set[tuple[int, int]]:
@@ -66,40 +62,39 @@ def number_pairs(match: Match) -> set[tuple[int, int]]:
 
 
 def test_the_evaluation_falls_at_each_step() -> None:
-    evaluations = [step.evaluation for step in solve().trace]
+    evaluations = [step.evaluation for step in solve()[1]]
     assert len(evaluations) >= 6
     assert all(after < before for before, after in pairwise(evaluations))
 
 
 def test_each_step_adds_or_deletes_one_pair() -> None:
-    states = [set(step.pairs) for step in solve().trace]
+    states = [set(step.pairs) for step in solve()[1]]
     assert states[0] == {(C, NUMBERS.index(8)), (D, NUMBERS.index(7))}
     assert all(len(before ^ after) == 1 for before, after in pairwise(states))
 
 
 def test_the_search_leaves_the_false_start_and_finds_the_model() -> None:
-    match = solve()
+    match, _ = solve()
     assert number_pairs(match) == BELONGS
     assert np.all(match.coverage > 0.8)
 
 
 def test_the_evaluations_span_the_figure_s() -> None:
     """17.44 at the start, 1.61 at the end: omission weighted by relative model length, alpha .5, beta 4."""
-    trace = solve().trace
+    _, trace = solve()
     assert trace[0].evaluation == pytest.approx(17.44, rel=0.35)
     assert trace[-1].evaluation == pytest.approx(1.61, abs=0.9)
 
 
 def test_the_likelihood_agrees_from_the_nearest_pairs() -> None:
     """Its evidence grows with the logarithm of length: from the false start the exchange would come too late."""
-    likely = replace(PAPER_MATCHING, objective="likelihood", pair_sigmas=10.0, exchange=True)
-    assert number_pairs(solve(settings=likely, first_pairs=None)) == BELONGS
+    assert number_pairs(match_lines(MODEL, SEGMENTS, MatchingSettings(pair_sigmas=10.0), **NEAR)) == BELONGS
 
 
 def test_the_trace_prints_as_a_table() -> None:
-    match = solve()
-    lines = format_trace(match).splitlines()
-    assert len(lines) == len(match.trace) + 1
+    match, trace = solve()
+    lines = format_trace(trace).splitlines()
+    assert len(lines) == len(trace) + 1
     assert lines[1].split()[0] == "initial" and lines[-1].split()[0] == "final"
     assert lines[-1].split()[1:-1].count("x") == len(match.pairs)
     assert float(lines[-1].split()[-1]) == pytest.approx(match.e_match, abs=0.01)

@@ -7,7 +7,7 @@ describes, sorted by locale, with extents and passage graphs.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -44,16 +44,13 @@ class World(Building):
 
     Attributes:
         frames: of all locales; a compiled world unpacks each when it is asked for.
-        name: of the world and of its root locale.
+        name: of the world and of its root locale: that of the first frame.
         building_faults: parts of the description that could not be built.
     """
 
-    def __init__(
-        self, frames: Mapping[str, LocaleFrame], building_faults: Sequence[Finding] = (), name: str = ""
-    ) -> None:
-        """``name``: of the root; by default that of the first frame."""
+    def __init__(self, frames: Mapping[str, LocaleFrame], building_faults: Sequence[Finding] = ()) -> None:
         super().__init__(frames)
-        self.name = name or next(iter(frames))
+        self.name = next(iter(frames))
         self.building_faults = tuple(building_faults)
         self._results: dict[str, dict[Hashable, Any]] = {}
 
@@ -232,15 +229,6 @@ def build_frames(
     """
     parts = _group((name, part) for part in _build_parts(faces, landmarks)
                    for name in dict.fromkeys((part.locale, part.neighbour)) if name is not None)
-    return {frame.name: frame
-            for frame in iterate_frames(locales, doorways, links, things, lambda name: parts.get(name, ()))}
-
-
-def iterate_frames(
-    locales: Mapping[str, Locale], doorways: Sequence[Doorway], links: Sequence[Link], things: Sequence[Thing],
-    parts_of: Callable[[str], tuple[LocaleGeometry, ...]],
-) -> Iterator[LocaleFrame]:
-    """The same, one by one, where the geometry of all locales at once would take too much memory."""
     parents = {name: locale.parent for name, locale in locales.items()}
     extents = _compute_extents(locales, parents)
     children = _group((parent, extents[name]) for name, parent in parents.items() if parent is not None)
@@ -248,12 +236,13 @@ def iterate_frames(
     own_doorways = _group((name, doorway) for doorway in doorways for name in doorway.between)
     own_links = _group((name, link) for link in links for name in link.between)
     own_things = _group((thing.locale, thing) for thing in things)
-    for name, locale in locales.items():
-        yield LocaleFrame(
+    return {
+        name: LocaleFrame(
             world="", locale=locale, extent=extents[name], children=children.get(name, ()),
-            doorways=own_doorways.get(name, ()), links=own_links.get(name, ()), parts=parts_of(name),
+            doorways=own_doorways.get(name, ()), links=own_links.get(name, ()), parts=parts.get(name, ()),
             things=own_things.get(name, ()), edges=passages.edges.get(name, ()),
             components=passages.components.get(name, ()))
+        for name, locale in locales.items()}
 
 
 def _build_parts(faces: Sequence[Face], landmarks: Sequence[Landmark]) -> list[LocaleGeometry]:

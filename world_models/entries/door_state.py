@@ -7,7 +7,7 @@ from typing import Literal
 
 from blackboard.kinds import inference
 
-DoorCondition = Literal["open", "shut", "ajar", "unknown"]
+DoorCondition = Literal["open", "shut", "unknown"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class DoorState:
 
     Attributes:
         door: its name; between: the locales that it joins.
-        state: open, shut, ajar (too little room is left to pass), or unknown as long as that is not certain.
+        state: open, shut, or unknown as long as that is not certain.
         certainty: probability of the state, 0..1; of unknown: that the door is not open.
         log_odds: of not being open, all pictures together.
         pictures: number of them that were counted.
@@ -63,7 +63,7 @@ class DoorState:
 
     @property
     def is_passable(self) -> bool:
-        return self.state not in ("shut", "ajar")
+        return self.state != "shut"
 
     @property
     def may_be_shut(self) -> bool:

@@ -16,7 +16,7 @@ from blackboard.kinds import inference
 from world_models import words
 from world_models.frames import Pose, Pose2, flattened, wrap_angle
 
-HypothesisStatus = Literal["held", "candidate", "doubted"]
+HypothesisStatus = Literal["held", "candidate"]
 
 
 class LocalePoses(Protocol):
@@ -79,7 +79,7 @@ class Hypothesis:
         locale_from_robot: its pose in that locale's frame.
         covariance: over (x, y, heading) in the locale's frame.
         basis: what it rests on last: command, odometry, tracks, milestone or relocalization.
-        status: held (the one that is acted on), candidate, or doubted.
+        status: held (the one that is acted on) or candidate.
         weight: relative belief among candidates.
         motion: id of the last motion report that is taken into account, or "".
         evidence: what speaks for it, in words, where no other entry says it.

@@ -1,8 +1,7 @@
 """Compiled worlds: a table of packed locale frames in one SQLite file, each unpacked when it is first asked for.
 
 A frame is packed as JSON, field by field as its dataclass says; the numbers of its arrays follow in little-endian
-float64, so that they keep every bit. Layers: a world as the robot knows it, then with each file of details added; a
-layer holds the frames in which it differs from the one below.
+float64, so that they keep every bit.
 """
 
 from __future__ import annotations
@@ -13,34 +12,29 @@ import os
 import sqlite3
 import types
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import fields, is_dataclass
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from world_models.building.locale_frame import LocaleFrame
-from world_models.building.locales import Doorway, Finding, Link
-from world_models.building.world import World, words_about, words_of
+from world_models.building.locales import Finding
+from world_models.building.world import World
 from world_models.files.regular_files import expect_regular
 from world_models.files.toml.source import WorldError
 from world_models.frames import frozen
 
-FORMAT = "harvey world 3"
+FORMAT = "harvey world 4"
 SUFFIXES = (".world", ".sqlite")
 """Suffixes of compiled worlds."""
 SCHEMA = """
 create table meta (format text not null, sha256 text not null, about blob not null);
-create table frame (number integer not null, layer integer not null, name text not null, packed blob not null);
-create table passage (name text primary key, locale text not null, other text not null) without rowid;
-create table word (word text not null, number integer not null, name text not null,
-                   primary key (word, number)) without rowid;
+create table frame (name text primary key, packed blob not null) without rowid;
 """
-INDICES = "create index frame_name on frame (name, layer); create index frame_number on frame (layer, number, name);"
-"""Made at the end, which is faster."""
 MOST_UNPACKED_BYTES = 100_000_000
 """Of one frame."""
 VIEWS = "select 1 from sqlite_master where type = 'view' or sql like 'create virtual%' or sql like '%generated%'"
@@ -124,46 +118,22 @@ def _fields_of(kind: Any) -> list[tuple[str, Any]]:
     return [(field.name, hints[field.name]) for field in fields(kind) if field.name not in NOT_PACKED]
 
 
-def compile_world(layers: Sequence[World], out: Path, details: Sequence[str] = ()) -> None:
-    """Write a world to a compiled file.
-
-    Args:
-        layers: the world as the robot knows it, then with each file of details added.
-        out: the file; replaced.
-        details: names of the files of details, in that order.
-
-    Raises:
-        WorldError: the file cannot be written.
-    """
-    frames, counts = [layer.frames.values() for layer in layers], [layer.counts() for layer in layers]
-    write_frames(out, frames, counts, details, [(fault.source, fault.what) for fault in layers[-1].building_faults])
-
-
-def write_frames(out: Path, layers: Sequence[Iterable[LocaleFrame]], counts: Sequence[Mapping[str, int]],
-                 details: Sequence[str] = (), faults: Sequence[tuple[str, str]] = ()) -> None:
-    """Write frames as they come, root first, layer by layer; see :func:`compile_world`."""
+def compile_world(world: World, out: Path) -> None:
+    """Write a world to a compiled file; what was there is replaced. Raises WorldError where it cannot be written."""
     partial = out.with_name(out.name + ".partial")
+    about = json.dumps({"names": list(world.frames),
+                        "faults": [(fault.source, fault.what) for fault in world.building_faults]}).encode()
+    digest = hashlib.sha256(about)
     try:
         partial.unlink(missing_ok=True)
         with closing(sqlite3.connect(partial)) as file:
             file.executescript("pragma journal_mode = off; pragma synchronous = off;" + SCHEMA)
-            known: dict[str, bytes] = {}
-            for layer, frames in enumerate(layers):
-                for frame in frames:
-                    packed = pack_frame(frame)
-                    digest = hashlib.sha256(packed).digest()
-                    if known.get(frame.name) != digest:
-                        row = frame.extent.number, layer, frame.name, packed
-                        file.execute("insert into frame values (?, ?, ?, ?)", row)
-                    if layer == 0:
-                        _index(file, frame)
-                    known[frame.name] = digest
-            about = json.dumps({"name": next(iter(known)), "names": _digest_of(known), "details": list(details),
-                                "counts": [dict(each) for each in counts], "faults": list(faults)}).encode()
-            sha256 = hashlib.sha256(b"".join((about, *known.values()))).hexdigest()
-            file.execute("insert into meta values (?, ?, ?)", (FORMAT, sha256, zlib.compress(about)))
+            for name, frame in world.frames.items():
+                packed = pack_frame(frame)
+                digest.update(packed)
+                file.execute("insert into frame values (?, ?)", (name, packed))
+            file.execute("insert into meta values (?, ?, ?)", (FORMAT, digest.hexdigest(), zlib.compress(about)))
             file.commit()
-            file.executescript(INDICES)
         os.replace(partial, out)
     except (OSError, sqlite3.Error) as error:
         raise WorldError(f"{out}: expected a file that a world can be compiled to, got: {error}") from None
@@ -171,31 +141,24 @@ def write_frames(out: Path, layers: Sequence[Iterable[LocaleFrame]], counts: Seq
         partial.unlink(missing_ok=True)
 
 
-def _index(file: sqlite3.Connection, frame: LocaleFrame) -> None:
-    """Enter by which words a locale is found, and where its passages are."""
-    number, name = frame.extent.number, frame.name
-    file.executemany("insert into word values (?, ?, ?)",
-                     ((word, number, name) for word in sorted(words_about(frame.locale))))
-    passages: tuple[Doorway | Link, ...] = (*frame.links, *frame.doorways)
-    file.executemany("insert or ignore into passage values (?, ?, ?)",
-                     ((passage.name, name, passage.other(name)) for passage in passages))
-
-
-def _digest_of(names: Iterable[str]) -> str:
-    return hashlib.sha256("\n".join(names).encode()).hexdigest()
+def open_world(path: Path) -> World:
+    """A compiled world. Raises WorldError where the file is none."""
+    frames = PackedFrames(path)
+    with frames.world_errors():
+        return World(frames, [Finding(source, what) for source, what in frames.about["faults"]])
 
 
 class PackedFrames(Mapping[str, LocaleFrame]):
     """The frames of a compiled world by name, each unpacked when it is first asked for.
 
     Attributes:
-        about: name of the world, names of its details, and by layer how much there is.
+        about: the names of its locales, root first, and the faults of its building.
         sha256: digest of the contents; stored in the file, so that a large one need not be read for it.
         touched: the locales whose frames were unpacked so far, in order.
     """
 
-    def __init__(self, path: Path, details: Sequence[str] = ()) -> None:
-        """Open a compiled world. Raises WorldError where it is none, or was compiled with other details."""
+    def __init__(self, path: Path) -> None:
+        """Open a compiled world. Raises WorldError where it is none."""
         self._path = path
         self.touched: list[str] = []
         self._known: dict[str, LocaleFrame] = {}
@@ -213,10 +176,7 @@ class PackedFrames(Mapping[str, LocaleFrame]):
             raise WorldError(f"{path.name}: expected {FORMAT!r}, got {written!r}: compile it anew")
         with self.world_errors():
             self.sha256, self.about = str(found[0][1]), json.loads(_decompress(found[0][2]))
-        if details and list(details) != self.about["details"]:
-            raise WorldError(f"{path.name}: expected the details that it was compiled with "
-                             f"({', '.join(self.about['details']) or 'none'}), got {', '.join(details)}")
-        self.layer = len(details)
+            self._names = dict.fromkeys(self.about["names"])
 
     @contextmanager
     def world_errors(self) -> Iterator[None]:
@@ -233,25 +193,18 @@ class PackedFrames(Mapping[str, LocaleFrame]):
         """Compare the contents with their digest. Raises WorldError where they are others."""
         with self.world_errors():
             said = hashlib.sha256(_decompress(self._file.execute("select about from meta").fetchone()[0]))
-            known: dict[str, bytes] = {}
-            for name, packed in self._file.execute("select name, packed from frame order by number, layer"):
-                known[name] = hashlib.sha256(packed).digest()
-            said.update(b"".join(known.values()))
-            if said.hexdigest() != self.sha256:
+            packed = dict(self._file.execute("select name, packed from frame"))
+            for name in self._names:
+                said.update(packed.pop(name))
+            if packed or said.hexdigest() != self.sha256:
                 raise ValueError("other contents than were compiled")
 
-    def rows(self, query: str, *values: Any) -> list[tuple[Any, ...]]:
-        """The answer to a query of the file. Raises WorldError."""
-        with self.world_errors():
-            return self._file.execute(query, values).fetchall()
-
     def __getitem__(self, name: str) -> LocaleFrame:
+        if name not in self._names:
+            raise KeyError(name)
         if name not in self._known:
-            rows = self.rows("select packed from frame where name = ? and layer <= ? order by layer desc limit 1",
-                             name, self.layer)
-            if not rows and name not in self._names:
-                raise KeyError(name)
             with self.world_errors():
+                rows = self._file.execute("select packed from frame where name = ?", (name,)).fetchall()
                 frame = unpack_frame(rows[0][0])
                 if frame.name != name:
                     raise ValueError(f"the frame of {frame.name!r} under {name!r}")
@@ -264,38 +217,3 @@ class PackedFrames(Mapping[str, LocaleFrame]):
 
     def __len__(self) -> int:
         return len(self._names)
-
-    @cached_property
-    def _names(self) -> dict[str, None]:
-        names = [str(row[0]) for row in self.rows("select name from frame where layer = 0 order by number")]
-        if _digest_of(names) != self.about["names"]:
-            raise WorldError(f"{self._path.name}: expected a sound compiled world, got one with other names")
-        return dict.fromkeys(names)
-
-
-class PackedWorld(World):
-    """A compiled world: locales and passages are found by name without reading all frames."""
-
-    frames: PackedFrames
-
-    def __init__(self, frames: PackedFrames) -> None:
-        with frames.world_errors():
-            faults = [Finding(source, what) for source, what in frames.about["faults"]]
-            super().__init__(frames, faults, frames.about["name"])
-
-    def named(self, words: str) -> Sequence[str]:
-        wanted = sorted(words_of(words))
-        marks = ", ".join("?" * len(wanted))
-        return [row[0] for row in self.frames.rows(
-            f"select name from word where word in ({marks}) group by number having count(*) = ? order by number",
-            *wanted, len(wanted))]
-
-    def find_passage(self, name: str) -> Doorway | Link | None:
-        locales = [row[0] for row in self.frames.rows("select locale from passage where name = ?", name)]
-        passages: list[Doorway | Link] = [link for locale in locales for link in self.links_of(locale)]
-        passages += [doorway for locale in locales for doorway in self.doorways_of(locale)]
-        return next((passage for passage in passages if passage.name == name), None)
-
-    def counts(self) -> Mapping[str, int]:
-        counts: dict[str, int] = self.frames.about["counts"][self.frames.layer]
-        return counts

@@ -11,7 +11,7 @@ from pathlib import Path
 from world_models.building.world import World
 from world_models.files.construction.builder import build_world
 from world_models.files.construction.specs import WorldSpec
-from world_models.files.packed import SUFFIXES, PackedFrames, PackedWorld, compile_world
+from world_models.files.packed import SUFFIXES, PackedFrames, compile_world, open_world
 from world_models.files.toml.other_files import compute_digest
 from world_models.files.toml.settings_reader import suggest_keys
 from world_models.files.toml.source import WORLDS, Source, WorldError
@@ -28,21 +28,20 @@ def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[st
 
     Args:
         path: the world file.
-        details: further files that add parts, finishes and things (no rooms or doors). A compiled world contains its
-            details: here they must be those that it was compiled with, and only their names count.
-        opened: closed doors between two locales that are built open; a compiled world has none.
-        altered: makes another description of the one that was read; of a compiled world there is none.
+        details: further files that add parts, finishes and things (no rooms or doors).
+        opened: closed doors between two locales that are built open.
+        altered: makes another description of the one that was read.
 
     Raises:
         WorldError: a file cannot be read or does not describe a world; names file, line, what was expected and got.
+            Also where a compiled world is to be changed.
     """
     path = Path(path)
     if path.suffix in SUFFIXES:
-        if opened:
-            raise WorldError(f"{path}: expected a TOML file where closed doors are opened, got a compiled world")
-        if altered is not None:
-            raise WorldError(f"{path}: expected a TOML file where the description is altered, got a compiled world")
-        return PackedWorld(PackedFrames(path, [Path(detail).stem for detail in details]))
+        if details or opened or altered is not None:
+            raise WorldError(f"{path}: expected a TOML file where details are added, closed doors opened or the "
+                             "description altered, got a compiled world")
+        return open_world(path)
     files = (path, *map(Path, details))
     if altered is not None:
         return _read_files(files, opened, altered)
@@ -74,10 +73,9 @@ def fingerprint(path: str | PathLike[str]) -> str:
 def compile_file(path: str | PathLike[str], out: str | PathLike[str],
                  details: Sequence[str | PathLike[str]] = ()) -> World:
     """Compile a TOML world with its details into one file; returns that world. Raises WorldError."""
-    base, added = Source.read(Path(path)), [Source.read(Path(detail)) for detail in details]
-    layers = [read_world(base, added[:count]) for count in range(len(added) + 1)]
-    compile_world(layers, Path(out), [Path(detail).stem for detail in details])
-    return layers[-1]
+    world = load_world(path, details=details)
+    compile_world(world, Path(out))
+    return world
 
 
 def read_world(base: Source, details: Sequence[Source] = (), opened: Collection[str] = (),

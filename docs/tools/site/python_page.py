@@ -20,8 +20,8 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
         "MissionResult", "TrackPoint", "RunPicture", "BadInput"),
     "Building models": ("load_world", "build_world", "World"),
     "Poses from matched lines": (
-        "med_r_and_t", "trunc_r_and_t", "r_and_t_ml", "planar_from_lines", "PoseEstimate", "PlanarEstimate", "Camera",
-        "CameraMount", "Pose", "Pose2"),
+        "med_r_and_t", "r_and_t_ml", "planar_from_lines", "PoseEstimate", "PlanarEstimate", "Camera", "CameraMount",
+        "Pose", "Pose2"),
     "The blackboard": (
         "KnowledgeSource", "View", "Entry", "Watch", "Change", "Posted", "Revised", "Retracted", "Effect", "Post",
         "Revise", "Retract", "Level", "Scheduler", "Decision", "request", "observation", "inference"),

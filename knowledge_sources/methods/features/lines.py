@@ -30,7 +30,6 @@ EDGE_PROFILE_PX = 1.1
 MIN_LINE_LENGTH_PX = 8.0  # px; least length of a segment (§6.1.4)
 MIN_LINE_CONTRAST = 2.0  # grey levels; least brightness step across a segment
 MIN_LINE_SUPPORT = 0.5  # least share of a segment's samples that lie on its refined line
-MAX_DUPLICATE_OVERHANG_PX = 3.0  # px; largest distance beyond the ends at which a segment repeats a longer one
 MIN_GRADIENT_PER_PX = 4.0  # grey levels/px; least gradient of an edge pixel when the whole image is searched
 SAMPLE_SPACING_PX = 2.0  # px; distance of the places along a segment at which the edge is located
 MIN_SAMPLES = 5  # least number of such places on a segment
@@ -79,28 +78,6 @@ class LineSegments:
         """Those that an index array or a mask chooses."""
         return LineSegments(self.segments_px[index], self.sigma_offset_px[index], self.sigma_angle_rad[index],
                             self.contrast[index], self.predicted[index])
-
-
-def remove_duplicates(found: LineSegments, settings: FeaturesSettings = DEFAULT.features) -> LineSegments:
-    """Drop segments that repeat a longer one; the others, longest first (non-maximum suppression).
-
-    An edge that lies in the bands of two predictions is found twice. A segment is a repeat if both its ends lie on the
-    longer one, within ``max_duplicate_offset_px`` across and ``max_duplicate_overhang_px`` along, and its brighter side
-    is the same.
-    """
-    ordered = found.take(np.argsort(-found.lengths_px, kind="stable"))
-    start, delta = ordered.segments_px[:, 0], ordered.segments_px[:, 1] - ordered.segments_px[:, 0]
-    length, overhang = ordered.lengths_px, MAX_DUPLICATE_OVERHANG_PX
-    along = delta / length[:, None]
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    on = np.ones((len(found), len(found)), bool)  # [i, j]: segment j lies on segment i
-    for end in (0, 1):
-        places = ordered.segments_px[:, end].T
-        t, o = (axis @ places - np.sum(axis * start, axis=1)[:, None] for axis in (along, across))
-        on &= (np.abs(o) <= settings.max_duplicate_offset_px) & (t >= -overhang) & (t <= length[:, None] + overhang)
-    bright_right = along * np.sign(ordered.contrast)[:, None]
-    on &= bright_right @ bright_right.T > 0.0
-    return ordered.take(~np.any(np.triu(on, 1), axis=0))
 
 
 def find_lines(

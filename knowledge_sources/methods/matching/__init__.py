@@ -23,7 +23,7 @@ Three lines of a model, of which the data show two, moved by (5, -3) pixels, and
 
 from knowledge_sources.methods.matching.image_matching import Match, Peak, match_lines
 from knowledge_sources.methods.matching.pose_matching import FloorMatch, PoseMatch, match_in_space, match_on_floor
-from knowledge_sources.methods.matching.search import Similarity2, TraceStep
+from knowledge_sources.methods.matching.search import Similarity2
 
 __all__ = [
     "FloorMatch",
@@ -31,7 +31,6 @@ __all__ = [
     "Peak",
     "PoseMatch",
     "Similarity2",
-    "TraceStep",
     "match_in_space",
     "match_lines",
     "match_on_floor",

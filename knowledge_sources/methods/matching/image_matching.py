@@ -7,24 +7,23 @@ the placement that lays the data on the model (§6.1.4).
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices, Ints, Mask
-from knowledge_sources.methods.matching.matching_kernels import compiled
+from knowledge_sources.methods.matching.matching_kernels import RIGID, compiled
 from knowledge_sources.methods.matching.search import (
     Correspondence,
     Fitting,
     PairSpace,
+    SearchResult,
     Similarity2,
     Terms,
-    TraceStep,
     build_likelihood_terms,
     build_masks,
-    build_paper_terms,
     choose_nearest,
     compute_best_fits,
     compute_coverage,
@@ -45,6 +44,8 @@ MIN_LENGTH_PX = 1e-12  # keeps the direction of a segment without length finite
 
 Pair = tuple[int, int]
 """Model index, data index."""
+Search = Callable[[PairSpace, Terms, Mask, MatchingSettings], SearchResult]
+"""As :func:`search_pairs`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,14 +54,11 @@ class Match(Correspondence):
 
     Attributes:
         transform: moves the model onto the data.
-        objective: under which objective. steps: moves made from the start to this state.
-        trace: the states of the search, first to last, if asked for.
+        steps: moves made from the start to this state.
     """
 
     transform: Similarity2
-    objective: str
     steps: int
-    trace: tuple[TraceStep, ...] = ()
 
 
 def match_lines(
@@ -71,13 +69,14 @@ def match_lines(
     pair_px: Any = None,
     start: Peak | None = None,
     first_pairs: Collection[Pair] | None = None,
-    trace: bool = False,
+    terms: Terms | None = None,
+    search: Search = search_pairs,
 ) -> Match:
     """Match the projected model to the data lines, the model moving as a rigid figure in the image.
 
     Source: §6.1: a generalised Hough transform over the data within a window of the model places the model; the pairs
-    near that place form the space; local search finds the state of least match error. The paper's own way is
-    ``replace(settings, objective="paper", strategy="first", exchange=False, max_starts=1)``.
+    near that place form the space; local search finds the state of least match error. The paper's own objective and
+    search are in :mod:`experiments.paper.paper_matching`.
 
     Args:
         model_px: (m, 2, 2) projected model lines. data_px: (k, 2, 2) data lines.
@@ -85,29 +84,26 @@ def match_lines(
             (m,) when some model lines are predicted worse than others. Wider when perspective bends the prediction.
         start: this placement (about the mean of the model's ends) instead of Hough's.
         first_pairs: pairs of the first state; ``None``: each near data line to its nearest model line.
-        trace: keep the states of the search.
+        terms, search: another objective than the likelihood, and another local search.
 
     Raises:
-        ValueError: a wrong shape, a distance that is not > 0, an unknown objective or strategy.
+        ValueError: a wrong shape, a distance that is not > 0.
     """
     model, data = _check_lines(model_px, "model_px"), _check_lines(data_px, "data_px")
     centre = model.reshape(-1, 2).mean(axis=0) if len(model) else np.zeros(2)
     still, scene = build_line_table(model, centre), build_line_table(data, centre)
     gates = _check_gates(settings.max_pair_px if pair_px is None else pair_px, len(model))
-    terms = _build_terms(still, scene, gates, settings)
+    terms = terms or _build_terms(still, scene, gates, settings)
     window_px = settings.hough_window_px + np.maximum(gates, START_WIDTHS_PX[0])
     table = build_pair_table(still, scene, window_px, HOUGH_WINDOW_RAD + MAX_PAIR_RAD)
     placements = [compute_placement(start)] if start else _find_starts(still, scene, table, settings)
     tries = []
     for placement in placements:
-        space, first, rows = _build_space(table, placement, gates, terms, settings)
+        space, first, rows = _build_space(table, placement, gates, terms)
         if first_pairs is not None:
             first = np.array([pair in first_pairs for pair in zip(space.model, space.data, strict=True)], bool)
-        result = search_pairs(
-            space, terms, first, settings, strategy=settings.strategy, exchange=settings.exchange, keep_trace=trace
-        )
-        tries.append((space, rows, result))
-    space, rows, result = min(tries, key=lambda tried: tried[2].error)
+        tries.append((space, rows, search(space, terms, first, settings)))
+    space, rows, result = min(tries, key=lambda tried: float(tried[2].errors[-1]))
     chosen, pairs = list_pairs(space, result.chosen)
     fit, covered = fit_state(space, result.chosen), compute_coverage(space, result.chosen)
     return Match(
@@ -117,18 +113,12 @@ def match_lines(
         coverage=covered,
         residuals_px=np.asarray(rows[chosen] @ fit.placements[0]),
         transform=compute_model_motion(fit.placements[0], centre),
-        objective=settings.objective,
-        steps=result.steps,
-        trace=result.trace,
+        steps=len(result.errors) - 1,
     )
 
 
 def _build_terms(model: LineTable, data: LineTable, gates: Floats, settings: MatchingSettings) -> Terms:
     """The objective, its noise taken from the median distance (m,) within which pairs are looked for [px]."""
-    if settings.objective == "paper":
-        return build_paper_terms(model.lengths, data.lengths)
-    if settings.objective != "likelihood":
-        raise ValueError(f'expected objective "paper" or "likelihood", got {settings.objective!r}')
     width = float(np.median(gates)) if len(gates) else settings.max_pair_px
     sigma_px = max(MIN_SIGMA_PX, width / settings.pair_sigmas)
     start_px = max(width, MIN_START_ERROR_PX)
@@ -152,7 +142,7 @@ def _find_starts(still: LineTable, scene: LineTable, table: PairTable, settings:
 
 
 def _build_space(
-    table: PairTable, placement: Floats, gates: Floats, terms: Terms, settings: MatchingSettings
+    table: PairTable, placement: Floats, gates: Floats, terms: Terms
 ) -> tuple[PairSpace, Mask, Floats]:
     """The restricted space at a placement; the state to start from, each near data line to its nearest line; and the
     rows ``across`` of its pairs.
@@ -169,7 +159,7 @@ def _build_space(
         masks=build_masks(table.along[members] @ placement, table.lengths[members], COVERAGE_CELLS),
         lines=table.lines,
         anchor=build_anchors(placement[None], shift, turn, scale)[0],
-        fitting=Fitting.in_image(settings.with_scale, placement),
+        fitting=Fitting(RIGID, math.atan2(placement[1], placement[0])),
     )
     distances = np.sqrt(np.mean((rows @ placement) ** 2, axis=1))
     return space, choose_nearest(data, distances, distances <= 0.5 * gates[model]), rows
@@ -436,11 +426,10 @@ def compute_placement(peak: Peak) -> Floats:
 
 def compute_model_motion(placement: Floats, centre: Floats) -> Similarity2:
     """The motion of the model onto the data: the inverse of a placement (5,), about ``centre`` (2,) [px]."""
-    c, s, u, v, scale = placement
+    c, s, u, v, _ = placement
     return Similarity2(
         float(np.arctan2(-s, c)),
         (float(-(c * u + s * v)), float(-(-s * u + c * v))),
-        float(scale),
         (float(centre[0]), float(centre[1])),
     )
 
@@ -468,7 +457,7 @@ def refine_placements(table: PairTable, placements: Floats, widths_px: tuple[flo
         weights = _compute_closeness(table, at, width) ** 2 * table.shares
         total = weights.sum(axis=1)
         anchors = build_anchors(at, 1e-3 * total + 1e-9, 10.0 * total + 1e-9, total + 1e-9)
-        at = compute_best_fits((weights @ forms).reshape(-1, 5, 5) + anchors, False, at).placements
+        at = compute_best_fits((weights @ forms).reshape(-1, 5, 5) + anchors, at).placements
     return at, _compute_support(table, at, widths_px[-1])
 
 

@@ -15,59 +15,51 @@ from knowledge_sources.methods.arrays import Floats, Indices, Ints, Mask
 
 SpaceArrays = tuple[Floats, Mask, Indices, Indices, Floats]
 """Forms (p, d, d), masks (p, c), model and data indices (p,), anchor (d, d) of a :class:`PairSpace`."""
-TermArrays = tuple[Floats, Floats, float]
-"""Scale (m,), lengths (m,) and rate of the omission, see :class:`Terms`."""
+TermArrays = tuple[Floats, Floats]
+"""Scale (m,) and lengths (m,) of the omission, see :class:`Terms`."""
 StateArrays = tuple[Ints, Floats, Floats, Floats, Ints]
 Scratch = tuple[Floats, Floats, Floats]
 
 compiled = njit(cache=True, error_model="numpy")
 
-RIGID, SCALED, STEP = 0, 1, 2
-"""What is fitted: a turn and a shift in the image; a scale too; or a step of a pose, to first order."""
+RIGID, STEP = 0, 1
+"""What is fitted: a turn and a shift in the image; or a step of a pose, to first order."""
 NEWTON_STEPS = 4
 """Newton's method doubles the digits at each step: from a start near the turn so many reach rounding."""
 
 
 @compiled
 def search_locally(
-    space: SpaceArrays, terms: TermArrays, kind: int, turn: float, start: Mask, first: bool, exchange: bool,
-    most: int, gain: float,
-) -> tuple[Mask, Ints, Floats]:
+    space: SpaceArrays, terms: TermArrays, kind: int, turn: float, start: Mask, most: int, gain: float,
+) -> tuple[Mask, Floats]:
     """Add or delete one pair at a time, or exchange two of a model line, while the match error falls by ``gain``.
 
     Args:
-        kind, turn: see :func:`compute_fits`.
-        first: take the first improvement, not the steepest. exchange: exchange at local minima. most: moves.
+        kind, turn: see :func:`compute_fits`. most: moves.
 
     Returns:
-        The last state (p,); the moves (k, 2), each (pair flipped, -1) or (pair put in, pair taken out); and the match
-        errors (k + 1,) of all states on the way.
+        The last state (p,), and the match errors (k + 1,) of all states on the way.
     """
-    data = space[3]
-    chosen, last, count = start.copy(), -1, 0
-    moves, errors = np.empty((most, 2), np.int64), np.empty(most + 1)
+    chosen, count, errors = start.copy(), 0, np.empty(most + 1)
     scratch = np.empty(space[0].shape[1:]), np.empty((8, 8)), np.empty(8)
     state = _summarise(space, terms, chosen)
     errors[0] = _fit_form(state[3], kind, turn, scratch[1], scratch[2]) + state[2].sum()
     while count < most:
         below = errors[count] - gain
-        move, out, error = _find_best_flip(space, terms, kind, turn, chosen, state, first, last, below, scratch)
-        if move < 0 and exchange:
+        move, out, error = _find_best_flip(space, terms, kind, turn, chosen, state, below, scratch)
+        if move < 0:
             move, out, error = _find_best_exchange(space, terms, kind, turn, chosen, state, below, scratch)
         if move < 0:
             break
-        if out < 0:
-            last = move
-        apply_move(data, chosen, move, out)
-        moves[count, 0], moves[count, 1] = move, out
+        _apply_move(space[3], chosen, move, out)
         count += 1
         errors[count] = error
         state = _summarise(space, terms, chosen)
-    return chosen, moves[:count], errors[: count + 1]
+    return chosen, errors[: count + 1]
 
 
 @compiled
-def apply_move(data: Indices, chosen: Mask, move: int, out: int) -> None:
+def _apply_move(data: Indices, chosen: Mask, move: int, out: int) -> None:
     """Change a state: flip pair ``move``, or exchange pair ``out`` for it; ``out`` is -1 if there is none.
 
     A pair that is added takes its data line from the pair that has it.
@@ -83,21 +75,19 @@ def apply_move(data: Indices, chosen: Mask, move: int, out: int) -> None:
 
 @compiled
 def _find_best_flip(
-    space: SpaceArrays, terms: TermArrays, kind: int, turn: float, chosen: Mask, state: StateArrays, first: bool,
-    last: int, below: float, scratch: Scratch,
+    space: SpaceArrays, terms: TermArrays, kind: int, turn: float, chosen: Mask, state: StateArrays, below: float,
+    scratch: Scratch,
 ) -> tuple[int, int, float]:
     """The pair whose flip lowers the match error most, -1, and the match error then; pair -1 if none gets ``below``.
 
-    With ``first`` it is the first such pair after ``last``. A pair that cannot get there by its omission alone is not
-    fitted, as more pairs never fit better.
+    A pair that cannot get there by its omission alone is not fitted, as more pairs never fit better.
     """
     forms, masks, model, data, _ = space
     counts, covered, now, base, holder = state
     form = scratch[0]
     total, here = now.sum(), _fit_form(base, kind, turn, scratch[1], scratch[2])
     best, move = below, -1
-    for i in range(len(model)):
-        p = (last + 1 + i) % len(model) if first else i
+    for p in range(len(model)):
         line, holder_pair, bound = model[p], -1, 0.0
         if chosen[p]:
             left = covered[line] - _compute_share(masks[p], counts[line], 1)
@@ -116,8 +106,6 @@ def _find_best_flip(
         error = _fit_form(form, kind, turn, scratch[1], scratch[2]) + omission
         if error < best:
             best, move = error, p
-            if first:
-                break
     return move, -1, best
 
 
@@ -216,18 +204,16 @@ def _compute_share(mask: Mask, counts: Ints, count: int) -> float:
 @compiled
 def _compute_omission(uncovered: float, line: int, terms: TermArrays) -> float:
     """As :meth:`Terms.compute_omission`."""
-    scale, lengths, rate = terms
-    if rate == 0.0:
-        size = lengths[line]
-        return float(scale[line] * math.log((1.0 + size) / (1.0 + size * (1.0 - uncovered))))
-    return float(scale[line] * math.exp(rate * uncovered))
+    scale, lengths = terms
+    size = lengths[line]
+    return float(scale[line] * math.log((1.0 + size) / (1.0 + size * (1.0 - uncovered))))
 
 
 @compiled
 def compute_fits(forms: Floats, kind: int, turns: Floats) -> tuple[Floats, Floats]:
     """Errors (k,) and placements of the best fits of quadratic forms (k, d, d).
 
-    ``kind`` is RIGID, SCALED or STEP; a rigid fit starts from ``turns`` (k,) [rad].
+    ``kind`` is RIGID or STEP; a rigid fit starts from ``turns`` (k,) [rad].
     """
     errors, work = np.empty(len(forms)), np.empty((8, 8))
     placements = np.empty((len(forms), forms.shape[1] - 1 if kind == STEP else 5))
@@ -243,19 +229,15 @@ def _fit_form(form: Floats, kind: int, turn: float, work: Floats, placement: Flo
         return _fit_step(form, work, placement)
     back, q = work[:2], work[2:5]
     _eliminate_shift(form, back, q)
-    scale = 1.0
-    if kind == SCALED:
-        c, s, scale = _fit_turn_and_scale(q)
-    else:
-        c, s = _fit_turn(q, turn)
-    rest = (c, s, scale)
+    c, s = _fit_turn(q, turn)
+    rest = (c, s, 1.0)
     error = 0.0
     for a in range(3):
         for b in range(3):
             error += rest[a] * q[a, b] * rest[b]
-    placement[0], placement[1], placement[4] = c, s, scale
+    placement[0], placement[1], placement[4] = c, s, 1.0
     for t in range(2):
-        placement[2 + t] = -(back[t, 0] * c + back[t, 1] * s + back[t, 2] * scale)
+        placement[2 + t] = -(back[t, 0] * c + back[t, 1] * s + back[t, 2])
     return max(error, 0.0)
 
 
@@ -293,18 +275,6 @@ def _eliminate_shift(form: Floats, back: Floats, reduced: Floats) -> None:
         for j in range(3):
             across = form[2, kept[i]] * back[0, j] + form[3, kept[i]] * back[1, j]
             reduced[i, j] = form[kept[i], kept[j]] - across
-
-
-@compiled
-def _fit_turn_and_scale(q: Floats) -> tuple[float, float, float]:
-    """Eliminate s from (3, 3), then the smaller root of the second-order equation."""
-    pull = (q[0, 2] / q[2, 2], q[1, 2] / q[2, 2])
-    xx, xy, yy = q[0, 0] - q[0, 2] * pull[0], q[0, 1] - q[0, 2] * pull[1], q[1, 1] - q[1, 2] * pull[1]
-    turn = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
-    c, s = math.cos(turn), math.sin(turn)
-    if c < 0.0:
-        c, s = -c, -s
-    return c, s, -(pull[0] * c + pull[1] * s)
 
 
 @compiled

@@ -143,7 +143,7 @@ def _match(
     """Match model lines (m, 2, 3) to data lines (k, 2, 2).
 
     Pairs that the prior allows vote by a robust fit from starts all over the prior; the best poses are searched as
-    :func:`match_lines` does, under its objective "likelihood" with the prior as one more term.
+    :func:`match_lines` does, under its objective with the prior as one more term.
     """
     scene = build_scene(model_lines_world, data_px, camera, parameters)
     lengths = project_model(scene, parameters.prior)[1]
@@ -155,9 +155,8 @@ def _match(
         pairs = pairs.take(find_near_pairs(pairs, pair_px, MAX_POSE_PAIR_RAD))
         pairs = keep_longest(pairs, settings.max_near_pairs)
         space, first = _build_space(scene, pose, pairs, pair_px, sigma_px)
-        result = search_pairs(space, terms, first, settings, strategy="steepest", exchange=True, keep_trace=False)
-        tries.append((space, pairs, pose, result))
-    space, pairs, pose, result = min(tries, key=lambda tried: tried[3].error)
+        tries.append((space, pairs, pose, search_pairs(space, terms, first, settings)))
+    space, pairs, pose, result = min(tries, key=lambda tried: float(tried[3].errors[-1]))
     fit, (rows, chosen) = fit_state(space, result.chosen), list_pairs(space, result.chosen)
     e_fit, step = float(fit.errors[0]), fit.placements[0]
     return PoseMatch(

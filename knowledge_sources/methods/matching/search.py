@@ -1,7 +1,7 @@
 """Local search over correspondences, in the image or with a pose (§6.1.1 to §6.1.4).
 
-A state, the chosen pairs, has a best fit (in closed form in the image, §6.1.2, or a step of a pose), and a match error:
-the paper's, or one derived as a likelihood (§6.1.3). The inner loops are compiled, in `kernels`.
+A state, the chosen pairs, has a best fit (in closed form in the image, §6.1.2, or a step of a pose), and a match error,
+derived as a likelihood (§6.1.3). The inner loops are compiled, in `matching_kernels`.
 """
 
 from __future__ import annotations
@@ -15,11 +15,9 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.matching.matching_kernels import (
     RIGID,
-    SCALED,
     STEP,
     SpaceArrays,
     TermArrays,
-    apply_move,
     compute_fits,
     count_cover,
     search_locally,
@@ -27,31 +25,27 @@ from knowledge_sources.methods.matching.matching_kernels import (
 from knowledge_sources.settings import MatchingSettings
 
 MAX_MOVES_PER_PAIR = 4  # the search stops after this many moves for each possible pair
-OMISSION_ALPHA = 0.5  # weight of the omission error, paper (§6.1.3, alpha)
-OMISSION_BETA = 4.0  # exponent of the omission error, paper (§6.1.3, beta)
 
 
 @dataclass(frozen=True, slots=True)
 class Similarity2:
-    """A motion of the model onto the data: ``p_data = scale R(rotation) (p_model - centre) + centre + shift``.
+    """A motion of the model onto the data: ``p_data = R(rotation) (p_model - centre) + centre + shift``.
 
     Attributes:
         rotation_rad: from u towards v.
         shift_px: (u, v).
-        scale: 1 unless scale was fitted.
         centre_px: the centre of the rotation.
     """
 
     rotation_rad: float
     shift_px: tuple[float, float]
-    scale: float
     centre_px: tuple[float, float]
 
     def apply(self, points_px: Floats) -> Floats:
         """Model points (..., 2) moved to the data."""
         c, s = math.cos(self.rotation_rad), math.sin(self.rotation_rad)
         turned = (np.asarray(points_px, float) - self.centre_px) @ np.array([[c, s], [-s, c]])
-        return np.asarray(self.scale * turned + self.centre_px + self.shift_px)
+        return np.asarray(turned + self.centre_px + self.shift_px)
 
 
 class Fits(NamedTuple):
@@ -62,15 +56,10 @@ class Fits(NamedTuple):
 
 
 class Fitting(NamedTuple):
-    """How states are fitted: RIGID, SCALED or STEP, and the turn [rad] that a rigid fit starts from."""
+    """How states are fitted: RIGID or STEP, and the turn [rad] that a rigid fit starts from."""
 
     kind: int
     turn_rad: float
-
-    @staticmethod
-    def in_image(with_scale: bool, start: Floats) -> Fitting:
-        """As :func:`compute_best_fits`, from the turn of a placement (5,)."""
-        return Fitting(SCALED if with_scale else RIGID, math.atan2(start[1], start[0]))
 
     def fit(self, forms: Floats) -> Fits:
         """The best fits of k forms (k, d, d)."""
@@ -81,18 +70,17 @@ POSE_STEP = Fitting(STEP, 0.0)
 """Forms (k, d + 1, d + 1) are minimised over the first d of (step, 1); ``placements`` are the steps (k, d)."""
 
 
-def compute_best_fits(forms: Floats, with_scale: bool, start: Floats) -> Fits:
-    """Minimise k quadratic forms (k, 5, 5) over R, T and, if asked, s: T and s by elimination, then R.
+def compute_best_fits(forms: Floats, start: Floats) -> Fits:
+    """Minimise k quadratic forms (k, 5, 5) over R and T, where s is 1: T by elimination, then R.
 
     Source: §6.1.2, E_fit = sum_i (l_i / 2) sum over both ends (n_i . (R p_i + T) - s rho_i)^2, each bracket linear
     in (cos, sin, T_u, T_v, s), so that a state is the sum of its pairs' forms.
-    With scale the rest is x'Qx on the unit circle, tan 2 phi = 2 Q12 / (Q11 - Q22): the second-order equation.
-    Without scale a linear term is left, and the minimum is a root of a quartic, which Newton's method finds from the
-    turn of ``start`` (5,) or (k, 5).
+    A linear term is left beside the square one, and the minimum is a root of a quartic, which Newton's method finds
+    from the turn of ``start`` (5,) or (k, 5).
     """
     turns = np.empty(len(forms))
     turns[:] = np.arctan2(start[..., 1], start[..., 0])
-    return Fits(*compute_fits(np.ascontiguousarray(forms), SCALED if with_scale else RIGID, turns))
+    return Fits(*compute_fits(np.ascontiguousarray(forms), RIGID, turns))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,46 +89,25 @@ class Terms:
 
     Attributes:
         end_weights: (k,) weight of a squared end distance [1/px^2], one a data line.
-        omission_scale, lengths: (m,), and omission_rate: omission of model line L is ``scale_L * e^(rate P_L)``,
-            or, if the rate is 0, ``scale_L * log((1 + length_L) / (1 + length_L (1 - P_L)))``; P_L is the part of the
-            line that no data line covers.
+        omission_scale, lengths: (m,); omission of model line L is
+            ``scale_L * log((1 + length_L) / (1 + length_L (1 - P_L)))``; P_L is the part that no data line covers.
         anchor_weights: of the weak pull to the start: shift [1/px^2], turn [1/rad^2], scale.
     """
 
     end_weights: Floats
     omission_scale: Floats
     lengths: Floats
-    omission_rate: float
     anchor_weights: tuple[float, float, float]
 
     @property
     def arrays(self) -> TermArrays:
         """Of the omission, as the compiled functions take them."""
-        return self.omission_scale, self.lengths, self.omission_rate
+        return self.omission_scale, self.lengths
 
     def compute_omission(self, uncovered: Floats, lines: Indices) -> Floats:
         """Weighted omission (...) of model lines of which the data leave the part ``uncovered`` (...)."""
-        if self.omission_rate == 0.0:
-            size = self.lengths[lines]
-            return np.asarray(self.omission_scale[lines] * np.log((1.0 + size) / (1.0 + size * (1.0 - uncovered))))
-        return np.asarray(self.omission_scale[lines] * np.exp(self.omission_rate * uncovered))
-
-
-def build_paper_terms(model_lengths: Floats, data_lengths: Floats) -> Terms:
-    """E_match = E_fit + alpha sum_L e^(beta P_L). Source: §6.1.3.
-
-    Lengths (m,), (k,) [px] count relative to the model's: E_fit is a mean squared distance [px^2], and a model line's
-    omission weighs by its share of the model ("perhaps on the basis of model line length"). So weighted, the error
-    spans the range of Figure 12(d).
-    """
-    total = max(float(np.sum(model_lengths)), 1.0)
-    return Terms(
-        end_weights=0.5 * data_lengths / total,
-        omission_scale=OMISSION_ALPHA * model_lengths / total,
-        lengths=model_lengths,
-        omission_rate=OMISSION_BETA,
-        anchor_weights=(1e-6, 1e-2, 1e-2),
-    )
+        size = self.lengths[lines]
+        return np.asarray(self.omission_scale[lines] * np.log((1.0 + size) / (1.0 + size * (1.0 - uncovered))))
 
 
 def build_likelihood_terms(
@@ -170,7 +137,6 @@ def build_likelihood_terms(
         end_weights=np.full(data_count, 0.5 / sigma_px**2),
         omission_scale=np.full(len(model_lengths), exponent),
         lengths=model_lengths / length_px,
-        omission_rate=0.0,
         anchor_weights=(0.5 / start_px**2, 0.5 * (half / start_px) ** 2, 0.5 * (half / start_px) ** 2),
     )
 
@@ -224,50 +190,23 @@ class Correspondence:
         return self.e_fit + self.e_omission
 
 
-@dataclass(frozen=True, slots=True)
-class TraceStep:
-    """One state of the search: its pairs (model, data) and its match error, as a row of Figure 12(d)."""
-
-    pairs: tuple[tuple[int, int], ...]
-    evaluation: float
-
-
 class SearchResult(NamedTuple):
-    """Where a search ended: (p,) chosen pairs, E_match, moves made, and the states if kept."""
+    """Where a search ended: (p,) chosen pairs, and E_match of each state on the way (moves + 1,)."""
 
     chosen: Mask
-    error: float
-    steps: int
-    trace: tuple[TraceStep, ...]
+    errors: Floats
 
 
-def search_pairs(
-    space: PairSpace,
-    terms: Terms,
-    start: Mask,
-    settings: MatchingSettings,
-    *,
-    strategy: str,
-    exchange: bool,
-    keep_trace: bool,
-) -> SearchResult:
-    """Local search: add or delete one pair at a time (k = 1) while the match error falls.
+def search_pairs(space: PairSpace, terms: Terms, start: Mask, settings: MatchingSettings) -> SearchResult:
+    """Local search by steepest descent: add or delete one pair at a time (k = 1) while the match error falls.
 
-    A data line goes to one model line: adding a pair takes its data line from the pair that had it. With ``exchange``
-    a state that no single flip improves may also exchange one data line of a model line for another (§6.1.1 names
-    the lack of that move as the cause of local minima).
-
-    Raises:
-        ValueError: an unknown strategy.
+    A data line goes to one model line: adding a pair takes its data line from the pair that had it. A state that no
+    single flip improves may also exchange one data line of a model line for another (§6.1.1 names the lack of that
+    move as the cause of local minima).
     """
-    if strategy not in ("first", "steepest"):
-        raise ValueError(f'expected strategy "first" or "steepest", got {strategy!r}')
     most = MAX_MOVES_PER_PAIR * len(start)
-    chosen, moves, errors = search_locally(
-        space.arrays, terms.arrays, *space.fitting, start, strategy == "first", exchange, most, settings.min_gain
-    )
-    steps = _list_states(space, start, moves.tolist(), errors.tolist()) if keep_trace else ()
-    return SearchResult(chosen, float(errors[-1]), len(moves), steps)
+    return SearchResult(*search_locally(
+        space.arrays, terms.arrays, *space.fitting, start, most, settings.min_gain))
 
 
 def evaluate_state(space: PairSpace, terms: Terms, chosen: Mask) -> float:
@@ -308,20 +247,3 @@ def list_pairs(space: PairSpace, chosen: Mask) -> tuple[Indices, Indices]:
     rows = np.flatnonzero(chosen)
     rows = rows[np.lexsort((space.data[rows], space.model[rows]))]
     return rows, np.stack([space.model[rows], space.data[rows]], axis=1)
-
-
-def _list_states(
-    space: PairSpace, start: Mask, moves: list[tuple[int, int]], errors: list[float]
-) -> tuple[TraceStep, ...]:
-    """The states of a search: each move flips a pair, or exchanges one for another."""
-    chosen = start.copy()
-    steps = [_build_step(space, chosen, errors[0])]
-    for (move, out), error in zip(moves, errors[1:], strict=True):
-        apply_move(space.data, chosen, move, out)
-        steps.append(_build_step(space, chosen, error))
-    return tuple(steps)
-
-
-def _build_step(space: PairSpace, chosen: Mask, error: float) -> TraceStep:
-    pairs = zip(space.model[chosen].tolist(), space.data[chosen].tolist(), strict=True)
-    return TraceStep(tuple(sorted(pairs)), error)

@@ -12,6 +12,8 @@ Which solver to use:
 :func:`r_then_t`            the paper's baseline (Liu et al.): rotation first, then translation
 ==========================  =========================================================================
 
+The paper's other ones, which only its tables use, are in :mod:`experiments.paper.pose_solvers`.
+
 The solvers of a camera's six unknowns take ``(model_lines_world (n, 2, 3) [m], segments_px (n, 2, 2), camera, prior)``,
 ``prior`` being a guess of ``camera_from_world``, and return a :class:`PoseEstimate`. Those on the floor take the
 mounting ``camera_from_robot`` and a prior ``world_from_robot``, and return a :class:`PlanarEstimate`. All of them say
@@ -45,10 +47,9 @@ True
 """
 
 from knowledge_sources.methods.pose.estimate import PlanarEstimate, PoseEstimate
-from knowledge_sources.methods.pose.least_median import med_r_and_t, trunc_r_and_t
 from knowledge_sources.methods.pose.planar import planar_from_points
 from knowledge_sources.methods.pose.planar_from_lines import planar_from_lines
-from knowledge_sources.methods.pose.r_and_t import r_and_t, r_and_t_ml, r_then_t
+from knowledge_sources.methods.pose.r_and_t import med_r_and_t, r_and_t_ml
 
 __all__ = [
     "PlanarEstimate",
@@ -56,8 +57,5 @@ __all__ = [
     "med_r_and_t",
     "planar_from_lines",
     "planar_from_points",
-    "r_and_t",
     "r_and_t_ml",
-    "r_then_t",
-    "trunc_r_and_t",
 ]

@@ -14,10 +14,15 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from knowledge_sources.methods.arrays import Floats, Mask
+from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.pose import kernels
-from knowledge_sources.methods.pose.kernels import RigidMotion
-from knowledge_sources.methods.pose.line_set import LineSet, compute_image_jacobian, measure_lines
+from knowledge_sources.methods.pose.kernels import TINY, RigidMotion
+from knowledge_sources.methods.pose.line_set import (
+    LineSet,
+    compute_image_jacobian,
+    compute_normals_px,
+    measure_lines,
+)
 from knowledge_sources.settings import PoseSettings
 from world_models.frames import Pose, Pose2, frozen
 
@@ -313,7 +318,7 @@ def compute_covariance(
     lines: LineSet, state: RigidMotion, rejected: tuple[str | None, ...], gain: tuple[Floats, Floats],
     settings: PoseSettings, bound: float | None = None, doubtful: Mask | None = None,
 ) -> Floats:
-    """(6, 6) covariance from how the pose moves with the ends of the lines, see :func:`kernels.spread_errors`.
+    """(6, 6) covariance from how the pose moves with the ends of the lines, see :func:`spread_errors`.
 
     The lines' own errors may be larger than stated. Lines of which only the best part is kept, those within ``bound``
     (squared distance over variance), scatter more than that part shows. Lines that scatter more than their noise
@@ -324,11 +329,69 @@ def compute_covariance(
     if bound is not None:
         mean = noise if noise > 1.0 else compute_mean_square(1.0, bound)
         noise = compute_spread(mean, bound, MAX_SCATTER)
-    arrays = lines.arrays
     if bound is not None and doubtful is not None:
-        arrays = (*arrays[:6], lines.sigma_px * np.where(doubtful, math.sqrt(max(0.5 * bound, 1.0)), 1.0), arrays[7])
-    covariance: Floats = kernels.spread_errors(arrays, *gain, noise, settings.shared_px)
-    return covariance
+        wide = np.where(doubtful, math.sqrt(max(0.5 * bound, 1.0)), 1.0)
+        lines = replace(lines, sigma_px=lines.sigma_px * wide)
+    return spread_errors(lines, *gain, noise, settings.shared_px)
+
+
+def compute_gain(lines: LineSet, weights: Floats, state: RigidMotion, covariance: Floats) -> tuple[Floats, Floats]:
+    """How the likeliest pose moves when the observed ends do.
+
+    Args:
+        weights: (n,) of the lines. covariance: (6, 6) inverse of the cost's Hessian.
+
+    Returns:
+        (n, 2, 6) left perturbation of the pose for each px that an end moves along its line's normal, and those
+        normals (n, 2) in the picture.
+    """
+    _, slopes = compute_image_jacobian(lines, *state)
+    return -(weights / lines.sigma_px**2)[:, None, None] * slopes @ covariance, compute_normals_px(lines, *state)
+
+
+def spread_errors(lines: LineSet, gain: Floats, normals_px: Floats, noise: float, shared_px: float) -> Floats:
+    """(6, 6) covariance of a pose from the errors of the observed ends.
+
+    A line's own error moves its two ends independently; its fragments (equal model lines) are parts of one line, and
+    move with it: they count once. The shared error moves all lines alike: at (x, y) = ray / z the picture is displaced
+    by A (1, x, y), each element of A (2, 3) having the deviation ``shared_px``: as a wrong principal point, focal
+    length, skew or mounting does.
+
+    Args:
+        gain, normals_px: see :func:`compute_gain`. noise: factor on the variance of the lines' own errors.
+    """
+    first, group = _group_fragments(lines.points)
+    along = (np.stack([-normals_px[:, 1], normals_px[:, 0]], axis=1) * lines.focal_px)[first][group]
+    places = np.sum(lines.rays[..., :2] * along[:, None], axis=2)
+    counts = np.any(gain != 0.0, axis=(1, 2))
+    low, high = np.full(len(first), math.inf), np.full(len(first), -math.inf)
+    np.minimum.at(low, group[counts], places[counts].min(axis=1))
+    np.maximum.at(high, group[counts], places[counts].max(axis=1))
+    many = np.bincount(group[counts], minlength=len(first)) > 1
+    low, size = np.where(many, low, 0.0), np.where(many, np.maximum(high - low, TINY), 1.0)
+    part = np.where(many[group][:, None], (places - low[group][:, None]) / size[group][:, None], (0.0, 1.0))
+    side = np.where(np.sum(normals_px * normals_px[first][group], axis=1) >= 0.0, lines.sigma_px, -lines.sigma_px)
+    moved = side[:, None, None] * gain
+    ends = np.zeros((2, len(first), 6))
+    for end, share in zip(ends, (1.0 - part, part), strict=True):
+        np.add.at(end, group, np.sum(share[..., None] * moved, axis=1))
+    out = noise * np.einsum("ega,egb->ab", ends, ends)
+    shared = np.einsum("ia,iec,ief->acf", normals_px, _list_places(lines), gain).reshape(6, 6)
+    return np.asarray(out + shared_px**2 * shared.T @ shared)
+
+
+def _group_fragments(points: Floats) -> tuple[Indices, Indices]:
+    """The first line (g,) of each model line of (n, 2, 3), ends in either order, and the group (n,) of each line."""
+    apart = points[:, 0] - points[:, 1]
+    is_turned = apart[np.arange(len(points)), np.argmax(apart != 0.0, axis=1)] > 0.0
+    ordered = np.where(is_turned[:, None, None], points[:, ::-1], points).reshape(-1, 6)
+    _, first, group = np.unique(ordered, axis=0, return_index=True, return_inverse=True)
+    return first, group.reshape(-1)
+
+
+def _list_places(lines: LineSet) -> Floats:
+    """(n, 2, 3) 1, x, y of the observed ends, (x, y) = ray / z."""
+    return np.concatenate([np.ones((*lines.rays.shape[:2], 1)), lines.rays[..., :2]], axis=2)
 
 
 def _measure_scatter(lines: LineSet, state: RigidMotion, settings: PoseSettings) -> float:
@@ -343,10 +406,8 @@ def _measure_scatter(lines: LineSet, state: RigidMotion, settings: PoseSettings)
     if freedom < MIN_SCATTER_FREEDOM or chi2 <= compute_max_chi2(freedom, settings):
         return 1.0
     residuals, slopes = compute_image_jacobian(lines, *state)
-    normals_px = kernels.compute_gain(
-        lines.arrays, np.zeros(len(lines)), np.array(state[0]), np.array(state[1]), np.eye(6))[1]
-    places = np.concatenate([np.ones((*lines.rays.shape[:2], 1)), lines.rays[..., :2]], axis=2)
-    shared = np.einsum("ia,iec->ieac", normals_px, places).reshape(len(lines), 2, 6) * (settings.shared_px > 0.0)
+    shared = np.einsum("ia,iec->ieac", compute_normals_px(lines, *state), _list_places(lines))
+    shared = shared.reshape(len(lines), 2, 6) * (settings.shared_px > 0.0)
     sigma = np.repeat(lines.sigma_px, 2)
     columns = np.concatenate([slopes, shared], axis=2).reshape(-1, 12) / sigma[:, None]
     whitened = residuals.reshape(-1) / sigma

@@ -43,9 +43,8 @@ MIN_STEP, MIN_POINT_STEP = 1e-8, 1e-10
 MIN_RELATIVE_GAIN = 1e-12
 """A relative gain below this ends a minimisation: rounding, no setting."""
 
-PLANES, IMAGE, SINES, TURN = 0, 1, 2, 3
-"""What is minimised: E1 (§6.2.2), with T eliminated; squared distances in the image over their variance; E2, each
-distance of E1 over that of the end from the camera; or n . R d (§6.2.1), which is of R alone, with T as E1 has it."""
+PLANES, IMAGE = 0, 1
+"""What is minimised: E1 (§6.2.2), with T eliminated; or squared distances in the image over their variance."""
 
 FINE, NOT_FINITE, NO_LENGTH = 0, 1, 2
 """What is wrong with a row of a set of lines."""
@@ -134,7 +133,7 @@ def minimise_pose(
     """The pose (six unknowns) of least cost, by Levenberg-Marquardt from ``start``.
 
     Args:
-        kind: PLANES, IMAGE, SINES or TURN.
+        kind: PLANES or IMAGE.
         weights: (n,) of the lines; a line of weight 0 does not count.
         prior: counts as one more measurement with ``information`` (6, 6); all zero: no prior.
 
@@ -142,7 +141,7 @@ def minimise_pose(
         R, T, the Gauss-Newton Hessian (6, 6) there, the cost and the steps taken.
     """
     rotation, translation = start[0].copy(), start[1].copy()
-    if kind in (PLANES, TURN):
+    if kind == PLANES:
         _minimise_translation(lines, weights, rotation, translation)
     problem = kind, lines, weights, prior, information
     state, hessian, cost, done = _minimise_pose(problem, (rotation, translation), iterations)
@@ -153,7 +152,7 @@ def minimise_pose(
 def _move_pose(problem: PoseProblem, state: RigidMotion, step: Floats) -> RigidMotion:
     """E1 is quadratic in T: after each step T is eliminated exactly."""
     rotation, translation = _perturb(step, state[0], state[1])
-    if problem[0] in (PLANES, TURN):
+    if problem[0] == PLANES:
         _minimise_translation(problem[1], problem[2], rotation, translation)
     return rotation, translation
 
@@ -205,206 +204,6 @@ def measure_lines(
 
 
 @compiled
-def solve_from_prior(
-    model: Floats, ends_px: Floats, intrinsics: tuple[float, float, float, float], sigma: Floats, prior: RigidMotion,
-    weak: Floats, max_cost: float, max_beside_px: float, iterations: int, shared_px: float,
-) -> tuple[bool, Floats, Floats, Floats, float, int, Floats, Mask]:
-    """The likeliest pose in the prior's own basin, and whether it explains the lines to their noise.
-
-    Args:
-        model: (n, 2, 3) [m]. ends_px: (n, 2, 2) without distortion. intrinsics: fx, fy, cx, cy. sigma: (n,) [px].
-        weak: (6, 6) information that the lines must exceed in every direction.
-        max_cost: the highest cost at which the lines are explained. shared_px: see :func:`spread_errors`.
-
-    Returns:
-        whether they are (never, if a line is faulty), R, T, the covariance (6, 6), cost, steps, and the distances and
-        the mask in front of :func:`measure_lines`.
-    """
-    fx, fy, cx, cy = intrinsics
-    directions, moments, rays, normals, lengths, fault, _ = prepare_lines(model, ends_px, fx, fy, cx, cy)
-    lines = model, directions, moments, rays, normals, lengths, sigma, np.array([fx, fy])
-    n = len(model)
-    rotation, translation, hessian, cost, steps = minimise_pose(
-        IMAGE, lines, np.ones(n), prior, prior, np.zeros((6, 6)), iterations
-    )
-    distances, front, _ = measure_lines(lines, rotation, translation, max_beside_px)
-    fine = bool(fault == FINE and cost <= max_cost and 2 * np.sum(front) > n and _is_decided(hessian, weak))
-    covariance = hessian
-    if fine:
-        gain, normals_px = compute_gain(lines, np.ones(n), rotation, translation, _invert(hessian))
-        covariance = spread_errors(lines, gain, normals_px, 1.0, shared_px)
-    return fine, _orthonormalise(rotation), translation, covariance, cost, steps, distances, front
-
-
-@compiled
-def compute_gain(
-    lines: LineArrays, weights: Floats, rotation: Floats, translation: Floats, covariance: Floats
-) -> tuple[Floats, Floats]:
-    """How the likeliest pose moves when the observed ends do.
-
-    Args:
-        weights: (n,) of the lines. covariance: (6, 6) inverse of the cost's Hessian.
-
-    Returns:
-        (n, 2, 6) left perturbation of the pose for each px that an end moves along its line's normal, and those
-        normals (n, 2) in the picture.
-    """
-    _, directions, moments, rays, _, _, sigma, focal = lines
-    n = len(directions)
-    gain, normals_px, row = np.zeros((n, 2, 6)), np.zeros((n, 2)), np.empty(6)
-    for i in range(n):
-        direction, plane, reach = _project_line(directions[i], moments[i], focal, rotation, translation)
-        normals_px[i, 0], normals_px[i, 1] = plane[0] / focal[0] / reach, plane[1] / focal[1] / reach
-        u, v = plane[0] / (focal[0] * focal[0]) / reach, plane[1] / (focal[1] * focal[1]) / reach
-        weight = weights[i] / (sigma[i] * sigma[i])
-        if weight == 0.0:
-            continue
-        for e in range(2):
-            ray = rays[i, e]
-            distance = _dot(ray, plane) / reach
-            slope = (ray[0] - distance * u) / reach, (ray[1] - distance * v) / reach, ray[2] / reach
-            turn, shift = _cross(plane, slope), _cross(direction, slope)
-            for a in range(3):
-                row[a], row[3 + a] = turn[a], shift[a]
-            for a in range(6):
-                for b in range(6):
-                    gain[i, e, a] -= weight * covariance[a, b] * row[b]
-    return gain, normals_px
-
-
-@compiled
-def spread_errors(
-    lines: LineArrays, gain: Floats, normals_px: Floats, noise: float, shared_px: float
-) -> Floats:
-    """(6, 6) covariance of a pose from the errors of the observed ends.
-
-    A line's own error moves its two ends independently; its fragments (equal model lines) are parts of one line, and
-    move with it: they count once. The shared error moves all lines alike: at (x, y) = ray / z the picture is displaced
-    by A (1, x, y), each element of A (2, 3) having the deviation ``shared_px``: as a wrong principal point, focal
-    length, skew or mounting does.
-
-    Args:
-        gain, normals_px: see :func:`compute_gain`. noise: factor on the variance of the lines' own errors.
-    """
-    points, _, _, rays, _, _, sigma, focal = lines
-    n = len(points)
-    out, done, first, last = np.zeros((6, 6)), np.zeros(n, np.bool_), np.empty(6), np.empty(6)
-    for i in range(n):
-        if done[i]:
-            continue
-        u, v, low, high, count = -normals_px[i, 1] * focal[0], normals_px[i, 0] * focal[1], math.inf, -math.inf, 0
-        for j in range(i, n):
-            if _is_same_line(points[i], points[j]) and np.any(gain[j] != 0.0):
-                count += 1
-                for e in range(2):
-                    along = rays[j, e, 0] * u + rays[j, e, 1] * v
-                    low, high = min(low, along), max(high, along)
-        first[:], last[:] = 0.0, 0.0
-        for j in range(i, n):
-            if done[j] or not _is_same_line(points[i], points[j]):
-                continue
-            done[j] = True
-            side = normals_px[i, 0] * normals_px[j, 0] + normals_px[i, 1] * normals_px[j, 1]
-            size = sigma[j] if side >= 0.0 else -sigma[j]
-            for e in range(2):
-                part = (rays[j, e, 0] * u + rays[j, e, 1] * v - low) / max(high - low, TINY)
-                if count <= 1:
-                    part = float(e)
-                for a in range(6):
-                    first[a] += (1.0 - part) * size * gain[j, e, a]
-                    last[a] += part * size * gain[j, e, a]
-        for a in range(6):
-            for b in range(6):
-                out[a, b] += noise * (first[a] * first[b] + last[a] * last[b])
-    if shared_px > 0.0:
-        for axis in range(2):
-            for c in range(3):
-                first[:] = 0.0
-                for i in range(n):
-                    for e in range(2):
-                        moved = normals_px[i, axis] * (1.0 if c == 0 else rays[i, e, c - 1])
-                        for a in range(6):
-                            first[a] += moved * gain[i, e, a]
-                for a in range(6):
-                    for b in range(6):
-                        out[a, b] += shared_px * shared_px * first[a] * first[b]
-    return out
-
-
-@compiled
-def _is_same_line(ends: Floats, other: Floats) -> bool:
-    """Whether the ends (2, 3) of two model lines are equal, in either order."""
-    same = swapped = True
-    for a in range(3):
-        same = same and ends[0, a] == other[0, a] and ends[1, a] == other[1, a]
-        swapped = swapped and ends[0, a] == other[1, a] and ends[1, a] == other[0, a]
-    return same or swapped
-
-
-@compiled
-def refine_truncated(
-    lines: LineArrays, start: RigidMotion, prior: RigidMotion, information: Floats, weak: Floats, bound: float,
-    max_beside_px: float, min_lines: int, rounds: int, iterations: int,
-) -> tuple[Floats, Floats, float]:
-    """Alternate inliers and least squares until they agree; the R, T of least truncated cost on the way, and that cost.
-
-    Args:
-        information: (6, 6) of the prior, which counts as one more measurement, also in the cost; all zero: it does not.
-        weak: (6, 6) information of the prior, which helps where the inliers leave a direction open.
-        bound: of a line's squared distance over its variance; the first round admits lines up to twice as far.
-    """
-    best_rotation, best_translation = start[0].copy(), start[1].copy()
-    near = compute_truncated_costs(lines, best_rotation, best_translation, 4.0 * bound, max_beside_px) < 4.0 * bound
-    best = compute_truncated_costs(lines, best_rotation, best_translation, bound, max_beside_px).sum()
-    best += compute_prior_cost(prior, information, best_rotation, best_translation)
-    rotation, translation = best_rotation, best_translation
-    for _ in range(rounds):
-        if np.sum(near) < min_lines:
-            break
-        weights = np.where(near, 1.0, 0.0)
-        rotation, translation, hessian, _, _ = minimise_pose(
-            IMAGE, lines, weights, (rotation, translation), prior, information, iterations
-        )
-        if not _is_decided(hessian, weak):
-            rotation, translation, _, _, _ = minimise_pose(IMAGE, lines, weights, prior, prior, weak, iterations)
-        costs = compute_truncated_costs(lines, rotation, translation, bound, max_beside_px)
-        cost = costs.sum() + compute_prior_cost(prior, information, rotation, translation)
-        if cost < best:
-            best, best_rotation, best_translation = cost, rotation, translation
-        again = costs < bound
-        if np.all(again == near):
-            break
-        near = again
-    return best_rotation, best_translation, best
-
-
-@compiled
-def compute_prior_cost(prior: RigidMotion, information: Floats, rotation: Floats, translation: Floats) -> float:
-    """The prior's share of the cost at a pose; 0 without information."""
-    if information[0, 0] <= 0.0:
-        return 0.0
-    return _add_prior(prior, information, rotation, translation, np.zeros((6, 6)), np.zeros(6))
-
-
-@compiled
-def compute_truncated_costs(
-    lines: LineArrays, rotation: Floats, translation: Floats, bound: float, max_beside_px: float
-) -> Floats:
-    """(n,) squared distances over their variance, at most ``bound``: the truncated loss.
-
-    Lines behind the camera cost ``bound``, and so do segments beside their model line's ends.
-    """
-    sigma = lines[6]
-    distances, front, over = measure_lines(lines, rotation, translation, max_beside_px)
-    out = np.full(len(sigma), bound)
-    for i in range(len(sigma)):
-        if front[i] and over[i]:
-            square = (distances[i, 0] ** 2 + distances[i, 1] ** 2) / (sigma[i] * sigma[i])
-            out[i] = min(square, bound)
-    return out
-
-
-@compiled
 def solve_subsets(
     lines: LineArrays, rows: Indices, real: Floats, rotations: Floats, translations: Floats, iterations: int
 ) -> RigidMotion:
@@ -427,7 +226,7 @@ def solve_subsets(
             for w in range(rows.shape[1]):
                 if real[j, w] > 0.0:
                     i = rows[j, w]
-                    _add_plane_terms(PLANES, points[i], normals[i], 1.0, rotation, translation, hessian, gradient)
+                    _add_plane_terms(points[i], normals[i], 1.0, rotation, translation, hessian, gradient)
             _mirror_upper(hessian)
             largest = 1e-9
             for a in range(6):
@@ -676,12 +475,8 @@ def _linearise_pose(problem: PoseProblem, pose: RigidMotion, hessian: Floats, gr
     for i in range(len(points)):
         if weights[i] == 0.0:
             continue
-        if kind in (PLANES, SINES):
-            cost += _add_plane_terms(kind, points[i], normals[i], weights[i], rotation, translation, hessian, gradient)
-        elif kind == TURN:
-            turned = _rotate(rotation, directions[i])
-            by = _cross(turned, normals[i])
-            cost += _add_row(_dot(turned, normals[i]), by, (0.0, 0.0, 0.0), weights[i], hessian, gradient)
+        if kind == PLANES:
+            cost += _add_plane_terms(points[i], normals[i], weights[i], rotation, translation, hessian, gradient)
         else:
             weight = weights[i] / (sigma[i] * sigma[i])
             cost += _add_image_terms(
@@ -698,22 +493,14 @@ _minimise_pose = _build_minimiser(_linearise_pose, _move_pose, 6, MIN_STEP)
 
 @compiled
 def _add_plane_terms(
-    kind: int, ends: Floats, normal: Floats, weight: float, rotation: Floats, translation: Floats, hessian: Floats,
+    ends: Floats, normal: Floats, weight: float, rotation: Floats, translation: Floats, hessian: Floats,
     gradient: Floats,
 ) -> float:
-    """A line's two terms n . q of E1, q = R p + T, with derivatives (q x n, n); of E2 over the length of q."""
+    """A line's two terms n . q of E1, q = R p + T, with derivatives (q x n, n)."""
     cost = 0.0
     for e in range(2):
         q, slope = _transform(rotation, translation, ends[e]), (normal[0], normal[1], normal[2])
-        miss = _dot(q, normal)
-        if kind == SINES:
-            square = max(_dot(q, q), TINY)
-            reach, part = math.sqrt(square), miss / square
-            miss = miss / reach
-            slope = (
-                (normal[0] - part * q[0]) / reach, (normal[1] - part * q[1]) / reach, (normal[2] - part * q[2]) / reach
-            )
-        cost += _add_row(miss, _cross(q, slope), slope, weight, hessian, gradient)
+        cost += _add_row(_dot(q, normal), _cross(q, slope), slope, weight, hessian, gradient)
     return cost
 
 
@@ -776,15 +563,6 @@ def _add_prior(
         gradient[a] += pull
         cost += away[a] * pull
     return cost
-
-
-@compiled
-def find_rotation_vectors(rotations: Floats) -> Floats:
-    """(k, 3) axis times angle of rotations (k, 3, 3) by less than half a turn."""
-    out = np.empty((len(rotations), 3))
-    for k in range(len(rotations)):
-        out[k, 0], out[k, 1], out[k, 2] = _rotation_vector(rotations[k])
-    return out
 
 
 @compiled
@@ -855,70 +633,6 @@ def _solve_damped(hessian: Floats, gradient: Floats, damping: float, factor: Flo
         for k in range(a + 1, len(gradient)):
             value -= factor[k, a] * step[k]
         step[a] = value / factor[a, a]
-
-
-@compiled
-def _factor_cholesky(matrix: Floats, factor: Floats) -> bool:
-    """Fill Cholesky's lower factor of a (6, 6) matrix; False where it is not positive definite."""
-    for a in range(6):
-        for b in range(a + 1):
-            value = matrix[a, b]
-            for k in range(b):
-                value -= factor[a, k] * factor[b, k]
-            if a == b:
-                if not value > 0.0:
-                    return False
-                factor[a, b] = math.sqrt(value)
-            else:
-                factor[a, b] = value / factor[b, b]
-    return True
-
-
-@compiled
-def _is_decided(hessian: Floats, weak: Floats) -> bool:
-    """Whether there is more information than the diagonal of ``weak`` (6, 6) in every direction."""
-    scaled, factor = np.empty((6, 6)), np.zeros((6, 6))
-    for a in range(6):
-        for b in range(6):
-            scaled[a, b] = hessian[a, b] / math.sqrt(weak[a, a] * weak[b, b])
-        scaled[a, a] -= 1.0
-    return _factor_cholesky(scaled, factor)
-
-
-@compiled
-def _invert(matrix: Floats) -> Floats:
-    """Inverse of a positive definite (6, 6) matrix."""
-    factor, inverse, out = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((6, 6))
-    _factor_cholesky(matrix, factor)
-    for c in range(6):
-        for a in range(c, 6):
-            value = 1.0 if a == c else 0.0
-            for k in range(c, a):
-                value -= factor[a, k] * inverse[k, c]
-            inverse[a, c] = value / factor[a, a]
-    for a in range(6):
-        for b in range(a + 1):
-            value = 0.0
-            for k in range(a, 6):
-                value += inverse[k, a] * inverse[k, b]
-            out[a, b] = out[b, a] = value
-    return out
-
-
-@compiled
-def _orthonormalise(rotation: Floats) -> Floats:
-    """The rotation nearest to one that has drifted by rounding: a Newton step, R (3 - R'R) / 2."""
-    out = np.empty((3, 3))
-    for a in range(3):
-        for b in range(3):
-            value = 1.5 * rotation[a, b]
-            for k in range(3):
-                gram = 0.0
-                for c in range(3):
-                    gram += rotation[c, k] * rotation[c, b]
-                value -= 0.5 * rotation[a, k] * gram
-            out[a, b] = value
-    return out
 
 
 @compiled

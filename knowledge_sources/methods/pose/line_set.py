@@ -162,6 +162,12 @@ def compute_distance_slopes(lines: LineSet, planes: Floats) -> tuple[Floats, Flo
     return distances, slopes
 
 
+def compute_normals_px(lines: LineSet, rotation: Floats, translation: Floats) -> Floats:
+    """(n, 2) unit normals of the projected model lines in the picture."""
+    _, planes = _project_planes(lines, rotation, translation)
+    return np.asarray(planes[:, :2] / lines.focal_px / _compute_reach(planes, lines.focal_px)[:, None])
+
+
 def compute_squared_distances(lines: LineSet, rotations: Floats, translations: Floats) -> Floats:
     """(k, n), or (n,) for one pose, squared image distance of each line, over its variance."""
     many = kernels.compute_squared_distances(

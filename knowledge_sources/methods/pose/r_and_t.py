@@ -1,22 +1,25 @@
-"""Camera poses to which every line counts: R then T (§6.2.1), R and T (§6.2.2), and R and T of maximum likelihood.
+"""Camera poses (six unknowns, §6.2): R and T of maximum likelihood, and Med R and T, its least median of squares.
 
-Those of the paper are distances of the model lines' ends to the observed projection planes; the likelihood's are
-distances in the image. All of them minimise with the compiled Levenberg-Marquardt of `kernels`.
+To the likelihood every line counts; it is started from the paper's R and T (E1, §6.2.2). Med R and T draws subsets of 3
+lines or landmarks, and holds where some are matched wrongly (§6.2.4).
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal
+import math
+from collections.abc import Callable
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 
-from knowledge_sources.methods.arrays import Floats, Mask
+from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.pose import kernels
 from knowledge_sources.methods.pose.estimate import (
-    BEHIND,
     FEW_LINES,
-    MAX_ITERATIONS,
+    MIN_LENGTH_PX,
     MIN_LINES,
+    NO_SUBSET,
     NOT_BETTER,
     UNDECIDED,
     Minimum,
@@ -24,146 +27,47 @@ from knowledge_sources.methods.pose.estimate import (
     build_estimate,
     build_prior_estimate,
     compute_covariance,
+    compute_gain,
     compute_max_chi2,
     compute_weak_information,
-    find_doubt,
+    find_rejections,
     is_mostly_in_front,
     knows_more,
     minimise,
     reject_behind,
     solve_near_prior,
 )
-from knowledge_sources.methods.pose.kernels import IMAGE, PLANES, SINES, TINY, TURN, RigidMotion
+from knowledge_sources.methods.pose.kernels import IMAGE, PLANES, RigidMotion
 from knowledge_sources.methods.pose.line_set import (
     LandmarkIds,
     LineSet,
     build_line_set,
     check_landmarks,
-    check_matched_arrays,
-    check_sigma,
+    compute_image_jacobian,
     compute_squared_distances,
-    cross,
+    group_by_landmark,
     invert_information,
 )
 from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
 
-Weighting = Literal["unit", "length"]
+SUBSET_ITERATIONS = 4  # gauss-Newton steps on a subset (§6.2.4)
+# how often the best candidates are solved again on the lines that fit them best (Rousseeuw's concentration steps)
+CONCENTRATION_ROUNDS = 3
+CONCENTRATION_ITERATIONS = 2  # gauss-Newton steps in each of these rounds
+MAX_REFINEMENTS = 6  # rounds in which inliers and pose may still change each other (§6.2.4, steps 3 and 4)
+MAX_OUTLIER_PART = 0.45  # share of wrong lines up to which the median is to hold (§6.2.4, Table 3)
+MED_DRAWN_OUTLIER_PART = 0.5  # share of wrong lines for which enough subsets are drawn (§6.2.4)
+MED_CANDIDATES = 16  # candidates of least median that are solved again
+MIN_NOISE_PART = 0.3  # smallest estimate of the noise, in parts of the stated one
 
-
-def r_and_t(
-    model_lines_world: Any,
-    segments_px: Any,
-    camera: Camera,
-    prior: Pose,
-    *,
-    landmark_ids: LandmarkIds = None,
-    sigma_px: Any = 1.0,
-    objective: Literal["E1", "E2"] = "E1",
-    weighting: Weighting = "unit",
-    settings: PoseSettings = DEFAULT.pose,
-) -> PoseEstimate:
-    """Camera pose of least squared distances of the model ends to the observed projection planes.
-
-    Source: §6.2.2, E1 = sum_i sigma_i (n_i . (R p_i + T))^2, and E2, each term over |R p_i + T|^2. E1 is quadratic
-    in T, which is eliminated: the basin does not depend on the prior's translation. Every line counts: use
-    :func:`med_r_and_t` where some may be matched wrongly.
-
-    Args:
-        model_lines_world: (n, 2, 3) [m].
-        segments_px: (n, 2, 2) observed, as the lens shows them.
-        prior: guess of ``camera_from_world``.
-        landmark_ids: checked, not used, as every line counts.
-        sigma_px: of the segment ends across the line, one number or (n,); scales the covariance.
-        objective: "E1", or "E2" (ends weigh alike whatever their depth), started from E1.
-        weighting: the paper's sigma_i: "unit" or by segment "length".
-
-    Raises:
-        ValueError: as :func:`build_line_set`; ids that are not one a line; an unknown objective or weighting.
-    """
-    if objective not in ("E1", "E2"):
-        raise ValueError(f'expected objective "E1" or "E2", got {objective!r}')
-    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
-    kinds = (PLANES,) if objective == "E1" else (PLANES, SINES)
-    return _solve(lines, prior, landmark_ids, weighting, kinds, settings)
-
-
-def r_then_t(
-    model_lines_world: Any,
-    segments_px: Any,
-    camera: Camera,
-    prior: Pose,
-    *,
-    landmark_ids: LandmarkIds = None,
-    sigma_px: Any = 1.0,
-    weighting: Weighting = "unit",
-    settings: PoseSettings = DEFAULT.pose,
-) -> PoseEstimate:
-    """Camera pose in two least-squares problems: n_i . R d_i = 0 for R, then n_i . (R p_i + T) = 0 for T.
-
-    Source: §6.2.1 (Liu et al. [27]). Rotation increments are axis-angle vectors, not Liu's Euler angles: the minimum is
-    the same, the way to it safer. Arguments and errors as in :func:`r_and_t`, which is more accurate.
-    """
-    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
-    return _solve(lines, prior, landmark_ids, weighting, (TURN,), settings)
-
-
-def _solve(
-    lines: LineSet, prior: Pose, landmark_ids: LandmarkIds, weighting: Weighting, kinds: tuple[int, ...],
-    settings: PoseSettings,
-) -> PoseEstimate:
-    """Minimise what ``kinds`` of `kernels` name, each from where the one before ended."""
-    check_landmarks(landmark_ids, len(lines))
-    if len(lines) < MIN_LINES:
-        return build_prior_estimate(lines, prior, FEW_LINES, settings)
-    weights = _compute_line_weights(lines, weighting)
-    end = Minimum(prior.rotation, prior.translation, np.zeros((6, 6)), 0.0, 0)
-    for kind in kinds:
-        again = minimise(kind, lines, end.state, weights=weights)
-        end = again._replace(iterations=end.iterations + again.iterations)
-    kept = reject_behind(lines, end.state)
-    covariance = compute_covariance(lines, end.state, kept, _compute_gain(lines, end, weights, kinds[-1]), settings)
-    return build_estimate(lines, end, covariance, kept, settings, prior)
-
-
-def _compute_line_weights(lines: LineSet, weighting: Weighting) -> Floats:
-    """The paper's weights sigma_i (n,): all one, or the segment's length over the mean length."""
-    if weighting == "unit":
-        return np.ones(len(lines))
-    if weighting == "length":
-        return np.asarray(lines.lengths_px / max(float(np.mean(lines.lengths_px)), TINY))
-    raise ValueError(f'expected weighting "unit" or "length", got {weighting!r}')
-
-
-def _compute_gain(lines: LineSet, end: Minimum, weights: Floats, kind: int) -> tuple[Floats, Floats]:
-    """How the pose of one of the paper's minima moves with the observed ends, see :func:`kernels.compute_gain`.
-
-    None of them is a likelihood, so the inverse Hessian is not the covariance. At a minimum the gradient is zero, and
-    stays so: its derivative by the pose, times the pose's move, is minus its derivative by the ends.
-    """
-    q = lines.points @ end.rotation.T + end.translation
-    weigh = np.repeat(weights[:, None], 2, axis=1)
-    if kind == SINES:
-        weigh = weigh / np.maximum(np.sum(q**2, axis=-1), TINY)
-    normals = np.broadcast_to(lines.normals[:, None], q.shape)
-    slopes = np.concatenate([cross(q, normals), normals], axis=-1)
-    first, second = lines.rays[:, 0], lines.rays[:, 1]
-    along = (second - first)[:, :2] * lines.focal_px
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.maximum(lines.lengths_px, TINY)[:, None]
-    shift = np.concatenate([across / lines.focal_px, np.zeros((len(lines), 1))], axis=1)
-    size = np.maximum(np.linalg.norm(cross(first, second), axis=1), TINY)[:, None, None]
-    moved = np.stack([cross(shift, second), cross(first, shift)], axis=1) / size  # normals, for each end by one px
-    hessian = np.einsum("ik,ika,ikb->ab", weigh, slopes, slopes)
-    spread = np.einsum("ik,ika,ikc,iec->aie", weigh, slopes, q, moved)
-    if kind == TURN:  # the rotation has conditions of its own
-        turned = lines.directions @ end.rotation.T
-        about = cross(turned, lines.normals)
-        hessian[:3] = np.concatenate([np.einsum("i,ia,ib->ab", weights, about, about), np.zeros((3, 3))], axis=1)
-        spread[:3] = np.einsum("i,ia,ic,iec->aie", weights, about, turned, moved)
-    least = max(float(np.trace(hessian)) * 1e-15, TINY) * np.eye(6)
-    gain = -np.linalg.solve(hessian + least, spread.reshape(6, -1)).reshape(6, len(lines), 2)
-    return np.ascontiguousarray(np.moveaxis(gain, 0, 2)), across
+MEDIAN_CHI2_2 = 1.386
+"""Median of the chi-squared law with two degrees of freedom: a line has two residuals."""
+MAX_CHI2_6 = 27.86
+"""Of the chi-squared law with six degrees of freedom, 99.99 % is below."""
+SUBSET_SIZE = 3
+"""Lines or landmarks in a subset: three lines decide six unknowns."""
 
 
 def r_and_t_ml(
@@ -194,12 +98,6 @@ def r_and_t_ml(
     Raises:
         ValueError: as :func:`build_line_set`; ids that are not one a line; a covariance of another shape.
     """
-    if prior_covariance is None:
-        estimate = _solve_in_prior_basin(
-            model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px, settings
-        )
-        if estimate is not None:
-            return estimate
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     check_landmarks(landmark_ids, len(lines))
     information, known = invert_covariance(prior_covariance)
@@ -223,7 +121,7 @@ def compute_likeliest_covariance(
         end: where the minimisation over the lines with ``weights`` (n,) ended; its Hessian has the prior's information.
     """
     inverse = invert_information(end.hessian)
-    gain = kernels.compute_gain(lines.arrays, weights, np.array(end.rotation), np.array(end.translation), inverse)
+    gain = compute_gain(lines, weights, end.state, inverse)
     scaled = gain[0].reshape(-1, 6) * np.repeat(lines.sigma_px, 2)[:, None]
     return inverse - scaled.T @ scaled + compute_covariance(
         lines, end.state, rejected, gain, settings, bound, doubtful)
@@ -232,12 +130,19 @@ def compute_likeliest_covariance(
 def find_likeliest(
     lines: LineSet, prior: Pose, information: Floats | None, settings: PoseSettings, start: RigidMotion | None = None
 ) -> tuple[Minimum, str | None]:
-    """The likeliest pose from ``start`` (``None``: E1's minimum), and why the prior had to help.
+    """The likeliest pose from ``start``, and why the prior had to help.
+
+    Without ``start`` it is the prior's own basin, if that explains the lines to their noise, else E1's minimum.
 
     ``information`` (6, 6) is the prior's, ``None`` if it does not count.
     """
     if information is None and len(lines) < MIN_LINES:
         return _solve_near_prior(lines, prior, settings), FEW_LINES
+    if information is None and start is None:
+        end = minimise(IMAGE, lines, (prior.rotation, prior.translation))
+        explains = end.cost <= compute_max_chi2(2.0 * len(lines) - 6.0, settings)
+        if explains and is_mostly_in_front(lines, end.state) and knows_more(end.hessian, compute_weak_information()):
+            return end, None
     end = minimise(IMAGE, lines, start or _find_start(lines, prior), prior, information)
     if information is not None:
         return end, None
@@ -258,31 +163,6 @@ def _solve_near_prior(lines: LineSet, prior: Pose, settings: PoseSettings) -> Mi
         compute_max_chi2(2.0 * len(lines), settings),
     )
     return minimise(IMAGE, lines, state, prior, weak, iterations=0)
-
-
-def _solve_in_prior_basin(
-    model_lines: Any, segments: Any, camera: Camera, prior: Pose, landmark_ids: LandmarkIds, sigma_px: Any,
-    settings: PoseSettings,
-) -> PoseEstimate | None:
-    """The estimate at the minimum of the prior's own basin, without E1, if it explains the lines to their noise."""
-    model, ends_px = check_matched_arrays(model_lines, segments)
-    n = len(model)
-    check_landmarks(landmark_ids, n)
-    freedom = 2.0 * n - 6.0
-    if freedom < 0.0:
-        return None
-    sigma = check_sigma(sigma_px, n)
-    fine, rotation, translation, covariance, cost, steps, distances, front = kernels.solve_from_prior(
-        model, camera.undistort(ends_px), (camera.fx, camera.fy, camera.cx, camera.cy), sigma,
-        (np.array(prior.rotation), np.array(prior.translation)), np.array(compute_weak_information()),
-        compute_max_chi2(freedom, settings), settings.max_beside_px, MAX_ITERATIONS, settings.shared_px,
-    )
-    if not fine:
-        return None
-    fronts = front.tolist()
-    rejected = tuple(None if f else BEHIND for f in fronts)
-    doubt = None if all(fronts) else find_doubt(distances / sigma[:, None], rejected, settings)
-    return PoseEstimate(Pose(rotation, translation), covariance, front, distances, rejected, cost, steps, doubt)
 
 
 def invert_covariance(covariance: Any) -> tuple[Floats | None, Floats | None]:
@@ -307,3 +187,225 @@ def _find_start(lines: LineSet, prior: Pose) -> RigidMotion:
 
 def _compute_chi2(lines: LineSet, state: RigidMotion) -> float:
     return float(np.sum(compute_squared_distances(lines, *state)))
+
+
+def med_r_and_t(
+    model_lines_world: Any,
+    segments_px: Any,
+    camera: Camera,
+    prior: Pose,
+    *,
+    landmark_ids: LandmarkIds = None,
+    sigma_px: Any = 1.0,
+    probability: float | None = None,
+    rng: np.random.Generator | None = None,
+    prior_covariance: Any = None,
+    settings: PoseSettings = DEFAULT.pose,
+) -> PoseEstimate:
+    """Camera pose by least median of squares: holds up to about 45 % of wrong lines.
+
+    Source: §6.2.4, E_m, steps 1 to 4. R and T solves each subset. The errors whose median is taken are measured in the
+    image, over ``sigma_px``, where they are alike for near and far lines. Medians that this noise cannot tell apart are
+    ties, and the threshold of step 3 decides between them: the pose under which more lines stay.
+
+    Args:
+        model_lines_world: (n, 2, 3) [m]. segments_px: (n, 2, 2) observed, as the lens shows them.
+        prior: guess of ``camera_from_world``; every subset starts from it.
+        landmark_ids: n hashable names: 3-landmark subsets. ``None``: 3-line subsets.
+        sigma_px: standard deviation of the segment ends across the line, one number or (n,).
+        probability: ``None`` tries every subset; else so many are drawn (with ``rng``) that one is free of outliers
+            with this probability.
+        prior_covariance: (6, 6) of the prior's left perturbation: the prior is one more measurement, and candidates
+            that it excludes are not looked at. ``None``: see :func:`r_and_t_ml`.
+
+    Raises:
+        ValueError: as :func:`build_line_set`; ids that are not one a line; subsets must be drawn without ``rng``; a
+            covariance of another shape.
+    """
+    def choose(lines: LineSet, rotations: Floats, translations: Floats) -> tuple[RigidMotion, Mask, float]:
+        def rank(errors: Floats) -> Floats:
+            return np.median(errors, axis=1)
+
+        half = (len(lines) + SUBSET_SIZE) // 2
+        rotations, translations = add_concentrated(lines, rotations, translations, rank, MED_CANDIDATES, half)
+        rotations, translations = keep_possible(lines, prior, prior_covariance, rotations, translations)
+        errors = compute_squared_distances(lines, rotations, translations)
+        medians = rank(errors)
+        least = float(medians.min())
+        bound = 2.0 * (settings.outlier_sigmas * _compute_robust_scale(least, len(lines))) ** 2
+        tied = np.flatnonzero(medians <= max(least, _compute_tied_median()))
+        best = int(tied[np.argmin(np.minimum(errors[tied], bound).sum(axis=1))])
+        return (rotations[best], translations[best]), errors[best] <= bound, bound
+
+    return solve_from_subsets(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px, probability,
+                              MED_DRAWN_OUTLIER_PART, rng, prior_covariance, settings, choose)
+
+
+Choose = Callable[[LineSet, Floats, Floats], tuple[RigidMotion, Mask, float]]
+
+
+def solve_from_subsets(
+    model_lines_world: Any, segments_px: Any, camera: Camera, prior: Pose, landmark_ids: LandmarkIds, sigma_px: Any,
+    probability: float | None, outlier_part: float, rng: np.random.Generator | None, prior_covariance: Any,
+    settings: PoseSettings, choose: Choose,
+) -> PoseEstimate:
+    """The likeliest pose from the candidate that ``choose`` takes; of all lines, where they are 3 or fewer.
+
+    Args:
+        choose: from the lines and the poses (k, 3, 3), (k, 3) of the subsets: a pose, the lines (n,) near it, and the
+            bound on their squared distances over their variance.
+    """
+    lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
+    groups = group_by_landmark(landmark_ids, len(lines))
+    if len(groups) < SUBSET_SIZE:
+        groups = group_by_landmark(None, len(lines))
+    if len(lines) <= SUBSET_SIZE:
+        return r_and_t_ml(
+            model_lines_world, segments_px, camera, prior, sigma_px=sigma_px, prior_covariance=prior_covariance,
+            settings=settings,
+        )
+    needed = None if probability is None else count_subsets(SUBSET_SIZE, outlier_part, probability)
+    rows, real = _pad_rows(groups, list_subsets(len(groups), SUBSET_SIZE, needed, rng))
+    starts = np.tile(prior.rotation, (len(rows), 1, 1)), np.tile(prior.translation, (len(rows), 1))
+    candidates = kernels.solve_subsets(lines.arrays, rows, real, *starts, SUBSET_ITERATIONS)
+    return _refine_on_inliers(lines, prior, prior_covariance, landmark_ids, *choose(lines, *candidates), settings)
+
+
+def keep_possible(
+    lines: LineSet, prior: Pose, prior_covariance: Any, rotations: Floats, translations: Floats
+) -> tuple[Floats, Floats]:
+    """The candidates (k, 3, 3), (k, 3) that the prior does not exclude, and the prior itself; all if it is unknown.
+
+    A candidate has the noise of its subset: about that of all lines, over the subset's share of them.
+    """
+    if prior_covariance is None:
+        return rotations, translations
+    from scipy.spatial.transform import Rotation  # loaded when first used: missions start without it
+
+    rotations = np.concatenate([rotations, prior.rotation[None]])
+    translations = np.concatenate([translations, prior.translation[None]])
+    slopes = compute_image_jacobian(lines, prior.rotation, prior.translation)[1] / lines.sigma_px[:, None, None]
+    slopes = slopes.reshape(-1, 6) * np.sqrt(SUBSET_SIZE / len(lines))
+    spread = np.asarray(prior_covariance, float) + invert_information(slopes.T @ slopes)
+    turns = rotations @ prior.rotation.T
+    moves = np.concatenate([Rotation.from_matrix(turns).as_rotvec(), translations - turns @ prior.translation], axis=1)
+    squares = np.sum(moves * np.linalg.solve(spread, moves.T).T, axis=1)
+    possible = squares <= MAX_CHI2_6
+    return rotations[possible], translations[possible]
+
+
+def _find_doubtful(landmark_ids: LandmarkIds, kept: Mask) -> Mask:
+    """(n,) the kept lines of landmarks of which no more are kept than left out.
+
+    A landmark is matched wrongly as a whole: a line of it may be near its model line by chance.
+    """
+    out = np.zeros(len(kept), bool)
+    for rows in group_by_landmark(landmark_ids, len(kept)):
+        out[rows] = kept[rows] & (2 * np.count_nonzero(kept[rows]) <= len(rows))
+    return out
+
+
+def _refine_on_inliers(
+    lines: LineSet, prior: Pose, prior_covariance: Any, landmark_ids: LandmarkIds, start: RigidMotion, near: Mask,
+    bound: float, settings: PoseSettings,
+) -> PoseEstimate:
+    """The likeliest pose of the lines kept, with reasons for the others (§6.2.4, steps 3 and 4).
+
+    Repeated while the new pose keeps other lines: a line that a subset's noise had put too far may come back.
+
+    Args:
+        near: (n,) the lines kept at ``start``. bound: of a line's squared distance over its variance.
+    """
+    information, known = invert_covariance(prior_covariance)
+    near = near & (lines.lengths_px > MIN_LENGTH_PX)
+    if int(np.count_nonzero(near)) < SUBSET_SIZE:
+        return build_prior_estimate(lines, prior, NO_SUBSET, settings, known)
+    for _ in range(MAX_REFINEMENTS):
+        end, reason = find_likeliest(lines.take(near), prior, information, settings, start)
+        start = end.state
+        fine = compute_squared_distances(lines, *start) <= bound
+        rejected = find_rejections(lines, start, fine, settings)
+        again = np.array([r is None for r in rejected], bool)
+        if np.array_equal(again, near) or int(np.count_nonzero(again)) < SUBSET_SIZE:
+            break
+        near = again
+    doubtful = _find_doubtful(landmark_ids, near)
+    covariance = compute_likeliest_covariance(lines, end, near.astype(float), rejected, settings, bound, doubtful)
+    return build_estimate(lines, end, covariance, rejected, settings, prior, known, reason, bound, near)
+
+
+def add_concentrated(
+    lines: LineSet, rotations: Floats, translations: Floats, rank: Callable[[Floats], Floats], count: int, keep: int
+) -> tuple[Floats, Floats]:
+    """The candidates, and the best ``count`` solved again, round by round, on the ``keep`` lines that fit each best.
+
+    Rousseeuw's concentration steps: a minimal subset amplifies the noise; half of all lines do not.
+
+    Args:
+        rank: of squared distances (k, n) over their variance, (k,), less is better.
+    """
+    errors = compute_squared_distances(lines, rotations, translations)
+    best = np.argsort(rank(errors), kind="stable")[:count]
+    more = rotations[best], translations[best]
+    for _ in range(CONCENTRATION_ROUNDS):
+        rows = np.argsort(compute_squared_distances(lines, *more), axis=1, kind="stable")[:, :keep]
+        more = kernels.solve_subsets(
+            lines.arrays, np.ascontiguousarray(rows), np.ones(rows.shape), *more, CONCENTRATION_ITERATIONS
+        )
+    return np.concatenate([rotations, more[0]]), np.concatenate([translations, more[1]])
+
+
+def _compute_tied_median() -> float:
+    """Medians of squared errors up to this are ties: with the most wrong lines, noise alone gives as much.
+
+    The median of all lines is then the quantile 0.5 / (1 - outliers) of the right ones' chi-squared law with two
+    degrees of freedom, 1 - exp(-x / 2).
+    """
+    return -2.0 * math.log(1.0 - 0.5 / (1.0 - MAX_OUTLIER_PART))
+
+
+def _compute_robust_scale(median_squared: float, n: int) -> float:
+    """Standard deviation of one residual from the median over n lines, with Rousseeuw's small-sample factor."""
+    scale = (1.0 + 5.0 / max(n - SUBSET_SIZE, 1)) * float(np.sqrt(median_squared / MEDIAN_CHI2_2))
+    return max(scale, MIN_NOISE_PART)
+
+
+def count_subsets(size: int, outliers: float, probability: float) -> int:
+    """Random subsets to draw so that one is free of outliers with the stated probability (RANSAC's count).
+
+    Raises:
+        ValueError: ``outliers`` is not in [0, 1), or ``probability`` not in (0, 1).
+    """
+    if not (0.0 <= outliers < 1.0 and 0.0 < probability < 1.0):
+        raise ValueError(f"expected outliers in [0, 1) and probability in (0, 1), got {outliers} and {probability}")
+    clean = (1.0 - outliers) ** size
+    return 1 if clean >= 1.0 else max(1, math.ceil(math.log1p(-probability) / math.log1p(-clean)))
+
+
+def list_subsets(
+    count: int, size: int, needed: int | None = None, rng: np.random.Generator | None = None
+) -> Indices:
+    """Subsets (k, size) of ``count`` groups: all of them, or ``needed`` different ones drawn with ``rng``.
+
+    Raises:
+        ValueError: subsets must be drawn and there is no ``rng``.
+    """
+    total = math.comb(count, size)
+    if needed is None or needed >= total:
+        return np.array(list(combinations(range(count), size)), dtype=np.intp).reshape(-1, size)
+    if rng is None:
+        raise ValueError(f"expected an rng to draw {needed} of {total} subsets, got None")
+    keys = rng.random((needed, count))
+    drawn = np.sort(np.argpartition(keys, size - 1, axis=1)[:, :size], axis=1)
+    return np.unique(drawn, axis=0).astype(np.intp)
+
+
+def _pad_rows(groups: list[Indices], subsets: Indices) -> tuple[Indices, Floats]:
+    """Line indices (k, w) of each subset of groups, padded with 0, and weights (k, w) that are 0 on the padding."""
+    width = max((len(g) for g in groups), default=0)
+    table = np.zeros((len(groups), width), dtype=np.intp)
+    real = np.zeros((len(groups), width))
+    for i, rows in enumerate(groups):
+        table[i, : len(rows)] = rows
+        real[i, : len(rows)] = 1.0
+    return table[subsets].reshape(len(subsets), -1), real[subsets].reshape(len(subsets), -1)

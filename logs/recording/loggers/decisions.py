@@ -22,7 +22,7 @@ from world_models.entries.location import Hypothesis
 from world_models.entries.robot_state import Drift
 from world_models.entries.task import Leg, Milestone
 
-TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "doubted", "halted")
+TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "halted")
 """Statuses of milestones, sketches, goals, hypotheses and legs that stand for something gone wrong."""
 COLUMNS = ("focus_level", "chosen_knowledge_source", "rating", "trigger_entry", "effects_on_the_board",
            "runner_up_with_rating", "waiting")

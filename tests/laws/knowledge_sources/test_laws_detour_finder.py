@@ -67,7 +67,7 @@ def test_a_leg_of_a_plan_that_is_over_halts_nothing(stale: str) -> None:
     elif stale == "goal":
         bench.revise(bench.view["Goal-1"], status="reached")
     else:
-        bench.revise(bench.view["Hypothesis-1"], status="doubted")
+        bench.revise(bench.view["Hypothesis-1"], status="candidate")
     assert bench.ask(SOURCE, leg) is None
 
 

@@ -178,7 +178,7 @@ RIDE = Subgoal(Place("car-1", 0.0, 0.0), Place("car-2", 0.0, 0.0), primitive=Fal
 BROKEN: Mapping[str, Callable[[Blackboard], list[Effect]]] = {
     "not given up": post(Outcome("stopped", "by a law")),
     "not over": post(Outcome("stopped", "by a law")),
-    "a belief": close(Hypothesis, status="doubted"),
+    "a belief": close(Hypothesis, status="candidate"),
     "a picture": lambda board: [Retract(entry) for entry in board.view.all(CameraPicture)],
     "belief up to date": post(MotorCommand(0.1, 0.0)),
     "standing": post(MotorCommand(0.1, 0.0)),

@@ -103,7 +103,7 @@ def test_there_is_nothing_to_look_at_or_nobody_to_look(stale: str) -> None:
     if stale == "goal":
         bench.retract(bench.view["Goal-1"])
     elif stale == "belief":
-        bench.revise(bench.view["Hypothesis-1"], status="doubted")
+        bench.revise(bench.view["Hypothesis-1"], status="candidate")
     else:
         bench.revise(bench.view["Obstacle-1"], status="gone")
     assert bench.ask(SOURCE, impasse) is None

@@ -166,7 +166,7 @@ def test_each_line_is_of_its_own_landmark_whichever_segment_shows_it(
 def test_without_a_belief_or_a_milestone_no_pose_is_solved_for(lacks: str) -> None:
     bench, match, milestone = match_lines(BELIEF, BELIEF)
     if lacks == "belief":
-        bench.revise(bench.view["Hypothesis-1"], status="doubted")
+        bench.revise(bench.view["Hypothesis-1"], status="candidate")
     elif lacks == "milestone":
         bench.retract(milestone)
     effects = bench.ask(SOURCE, match)

@@ -232,7 +232,7 @@ def test_only_the_milestone_that_is_next_lets_its_sketch_go_on(index: int, lacks
     elif lacks == "goal":
         bench.retract(bench.view["Goal-1"])
     elif lacks == "belief":
-        bench.revise(belief, status="doubted")
+        bench.revise(belief, status="candidate")
     elif lacks == "life":
         bench.revise(sketch, status="superseded")
     assert (bench.ask(MilestonePasser(), milestone) is not None) == (index == 1 and lacks == "nothing")

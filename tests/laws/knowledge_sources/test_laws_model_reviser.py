@@ -28,7 +28,7 @@ DOOR, ROOMS = "archive-north-door", ("archive", HALL)
 THING = f"{HALL}/obstacle-1"
 LEAST_M = DEFAULT.action.min_footprint_change_m
 found = st.tuples(st.just("found"), st.sampled_from(("suspected", "there", "gone")), st.sampled_from((0.0, 0.3, 3.0)))
-seen = st.tuples(st.just("seen"), st.sampled_from(("open", "shut", "ajar", "unknown")), st.just(0.0))
+seen = st.tuples(st.just("seen"), st.sampled_from(("open", "shut", "unknown")), st.just(0.0))
 told = st.tuples(st.just("told"), st.sampled_from(("open", "shut", "gone")), st.just(0.0))
 """What is found of a thing and by how many times the least change it stands elsewhere; seen of a door; or told."""
 

@@ -121,7 +121,7 @@ def test_it_acts_only_where_the_place_is_known_so_well(sigma_m: float, sigma_rad
 def test_it_acts_only_on_a_picture_that_refutes_a_place_it_believes(lacks: str) -> None:
     bench, milestone = refute(before_door(3.0, 0.0), is_shut=True)
     if lacks == "belief":
-        bench.revise(bench.view["Hypothesis-1"], status="doubted")
+        bench.revise(bench.view["Hypothesis-1"], status="candidate")
     elif lacks == "doubt":
         bench.revise(bench.view["Discrepancy-1"], status="corrected")
     elif lacks == "measure":

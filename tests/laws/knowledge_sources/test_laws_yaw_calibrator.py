@@ -234,7 +234,7 @@ def test_it_wakes_where_a_milestone_has_corrected_the_belief() -> None:
     bench = Bench()
     belief = bench.believe()
     for basis, status in (("milestone", "held"), ("tracks", "held"), ("milestone", "candidate"), ("command", "held"),
-                          ("odometry", "held"), ("relocalization", "held"), ("milestone", "doubted")):
+                          ("odometry", "held"), ("relocalization", "held"), ("milestone", "candidate")):
         revised = bench.revise(belief, basis=basis, status=status)
         assert wakes(YawCalibrator(), Revised(revised)) == ((basis, status) == ("milestone", "held"))
     assert not wakes(YawCalibrator(), Posted(belief))

@@ -21,16 +21,8 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from consistency import assert_soon_consistent, compute_error, compute_nees
-from knowledge_sources.methods.pose import (
-    PoseEstimate,
-    med_r_and_t,
-    planar_from_lines,
-    planar_from_points,
-    r_and_t,
-    r_and_t_ml,
-    r_then_t,
-    trunc_r_and_t,
-)
+from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
+from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, planar_from_lines, planar_from_points, r_and_t_ml
 from knowledge_sources.methods.pose.estimate import compute_mean_square, compute_spread
 from knowledge_sources.methods.pose.with_camera import estimate_camera_and_pose
 from knowledge_sources.settings import DEFAULT

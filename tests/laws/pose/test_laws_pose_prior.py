@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
-from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml, trunc_r_and_t
+from experiments.paper.pose_solvers import trunc_r_and_t
+from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml
 from world_models.frames import Pose
 
 ROBUST = [med_r_and_t, trunc_r_and_t]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from world_models.building.locales import Locale
 from world_models.building.world import World, build_frames
-from world_models.files.packed import PackedFrames, PackedWorld, compile_world
+from world_models.files.packed import compile_world
 from world_models.files.world_files import WORLDS, compile_file, load_world
 from world_models.frames import Pose
 
@@ -65,8 +65,8 @@ def check_extents(one: World, other: World) -> None:
 @settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(world=hierarchies(), data=st.data())
 def test_a_descent_finds_what_is_near_in_any_world(world: World, data: st.DataObject, tmp_path: Path) -> None:
-    compile_world([world], tmp_path / "w.world")
-    compiled = PackedWorld(PackedFrames(tmp_path / "w.world"))
+    compile_world(world, tmp_path / "w.world")
+    compiled = load_world(tmp_path / "w.world")
     check_extents(world, compiled)
     for _ in range(4):
         margin_m = data.draw(MARGINS)

@@ -60,7 +60,7 @@ def test_nothing_changed_means_nothing_differs(run: RunDirectory, capsys: pytest
 
 
 @pytest.mark.parametrize("name", [
-    "action.lookahead_m", "plan.look_turns_rad", "matching.objective", "features.sigma_across_px"])
+    "action.lookahead_m", "plan.look_turns_rad", "matching.max_starts", "features.sigma_across_px"])
 def test_a_setting_set_to_its_default_changes_nothing(run: RunDirectory, name: str) -> None:
     value = next(row.value for row in list_rows() if row.name == name)
     answer = what_if(run, (), [(name, str(list(value) if isinstance(value, tuple) else value))], go_on=False)
@@ -69,7 +69,7 @@ def test_a_setting_set_to_its_default_changes_nothing(run: RunDirectory, name: s
 
 @pytest.mark.parametrize(("name", "value"), [
     ("plan.max_leg_m", "1.5"), ("features.sigma_across_px", "1.4"), ("verification.line_tolerance_px", "4.0"),
-    ("tracking.max_tracks", "8"), ("matching.objective", "paper"), ("pose.floor_widenings", "[1.0]"),
+    ("tracking.max_tracks", "8"), ("matching.max_pair_px", "1.0"), ("pose.floor_widenings", "[1.0]"),
 ])
 def test_a_setting_of_any_room_changes_decisions(run: RunDirectory, name: str, value: str) -> None:
     answer = what_if(run, (), [(name, value)], go_on=False)

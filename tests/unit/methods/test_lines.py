@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from knowledge_sources.methods.features.lines import find_lines, remove_duplicates
-from knowledge_sources.settings import DEFAULT
+from experiments.perception.locate_camera import remove_duplicates
+from knowledge_sources.methods.features.lines import find_lines
 
 
 def square() -> np.ndarray:
@@ -87,8 +85,7 @@ def test_both_edges_of_a_thin_stripe_are_distinct() -> None:
     image = np.full((64, 64), 180, np.uint8)
     image[:, 30:34] = 60
     found = find_lines(image, [[[33.0, 60.0], [33.0, 4.0]]])
-    wide = replace(DEFAULT.features, max_duplicate_offset_px=6.0)
-    assert len(remove_duplicates(found, wide)) == 2
+    assert len(remove_duplicates(found, offset_px=6.0)) == 2
 
 
 def test_no_lines_are_no_distinct_lines() -> None:

@@ -12,18 +12,11 @@ import pytest
 from numpy.typing import NDArray
 
 from experiments.paper import pose_scenes
+from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.matching import Peak, match_in_space, match_lines, match_on_floor
-from knowledge_sources.methods.pose import (
-    med_r_and_t,
-    planar_from_lines,
-    planar_from_points,
-    r_and_t,
-    r_and_t_ml,
-    r_then_t,
-    trunc_r_and_t,
-)
+from knowledge_sources.methods.pose import med_r_and_t, planar_from_lines, planar_from_points, r_and_t_ml
 from knowledge_sources.methods.pose.displacements import fit_displacements
-from knowledge_sources.settings import PAPER_MATCHING, MatchingSettings, PoseSettings
+from knowledge_sources.settings import MatchingSettings, PoseSettings
 from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
@@ -130,7 +123,7 @@ def solve_all(settings: PoseSettings) -> bytes:
 
 
 def match_all(settings: MatchingSettings) -> bytes:
-    """The results of the three matchers, in clutter, in the image under both objectives, and of a wrong start."""
+    """The results of the three matchers, in clutter, and of a wrong start."""
     wrong_start = match_lines(SQUARE, np.concatenate([SQUARE, SQUARE[:1] + np.array([3.0, 0.0])]), settings,
                               start=Peak(0.0, (0.0, 0.0), 0.0), first_pairs=((0, 4), (1, 1), (2, 2), (3, 3)))
     out: list[Array] = [wrong_start.pairs]
@@ -148,9 +141,8 @@ def match_all(settings: MatchingSettings) -> bytes:
         turn = rng.uniform(-0.1, 0.1)
         rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
         model_px = (segments - 256.0) @ rotation + 256.0 + rng.uniform(-15.0, 15.0, 2)
-        for more in ({}, {"objective": PAPER_MATCHING.objective}):
-            match = match_lines(model_px, data, replace(settings, **more))
-            out += [match.pairs, np.array([match.steps, match.e_match, *match.transform.shift_px])]
+        match = match_lines(model_px, data, settings)
+        out += [match.pairs, np.array([match.steps, match.e_match, *match.transform.shift_px])]
         prior = Pose2(TRUTH.x_m + 0.3, TRUTH.y_m - 0.25, TRUTH.heading_rad + 0.08)
         floor = match_on_floor(lines, data, CAMERA, MOUNT, prior, np.diag([0.2, 0.2, 0.06]) ** 2, settings)
         far = Pose2(TRUTH.x_m + 0.9, TRUTH.y_m - 0.6, TRUTH.heading_rad + 0.25)
@@ -165,8 +157,6 @@ def match_all(settings: MatchingSettings) -> bytes:
 def list_values(field: Field[Any]) -> list[Any]:
     """Other values of a setting, some far from its default."""
     default: Any = field.default
-    if isinstance(default, str):
-        return [choice for choice in field.metadata["choices"] if choice != default]
     if isinstance(default, bool):
         return [not default]
     if isinstance(default, int):

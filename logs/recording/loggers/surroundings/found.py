@@ -27,9 +27,8 @@ ABOVE_FLOOR_M, OUTLINE_M, OPACITY = 0.03, 0.02, 110
 LINE_M = 0.02
 UNKNOWN_HEIGHT_M = 0.05
 """What nothing tells the height of is drawn so flat."""
-COLOURS: Mapping[DoorCondition, Colour] = {
-    "open": MATCHED, "shut": REJECTED, "ajar": REJECTED, "unknown": EXPECTED}
-HEIGHTS_M: Mapping[DoorCondition, float] = {"open": 0.04, "shut": 1.0, "ajar": 1.0, "unknown": 0.5}
+COLOURS: Mapping[DoorCondition, Colour] = {"open": MATCHED, "shut": REJECTED, "unknown": EXPECTED}
+HEIGHTS_M: Mapping[DoorCondition, float] = {"open": 0.04, "shut": 1.0, "unknown": 0.5}
 """An open door is a line on the floor; one that cannot be passed is barred."""
 BAR_M = 0.05
 
