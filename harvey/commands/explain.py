@@ -15,7 +15,7 @@ from logs.disk import is_being_written
 from logs.run_directory import RunDirectory, open_run
 
 if TYPE_CHECKING:
-    from logs.explain.why import Story
+    from logs.explain.phrases import Story
     from logs.timeline import Timeline
 
 
@@ -109,25 +109,25 @@ def _paragraphs(history: Timeline, args: Namespace, stories: list[Story]) -> Ite
 
 
 def _record(one: Story) -> dict[str, Any]:
-    steps = [{"label": step.label, "text": step.text, "entries": list(step.refs)} for step in one.steps]
+    steps = [{"label": step.label, "text": step.text, "entries": step.refs} for step in one.steps]
     return {"entry": one.ref, "headline": one.headline, "decided": one.decided, "steps": steps}
 
 
 def _print_check(history: Timeline, as_json: bool) -> int:
-    from logs.explain.web import KINDS, check, ground_names
+    from logs.explain.web import check
 
     found = check(history)
     if not found.decisions:
         raise BadInput(f"{history.source}: expected at least one decision, got none")
     if as_json:
         print(json.dumps({"decisions": found.decisions, "acts": found.acts, "reached": found.reached, **found.by_kind,
-                          "failing": [one.decision.cycle for one in found.failing]}, indent=2))
+                          "failing": list(found.failing)}, indent=2))
     else:
-        kinds = ", ".join(f"{found.by_kind[kind]} {words}" for kind, words in zip(KINDS, ground_names(), strict=True))
-        print(f"{found.reached} of {found.decisions} decisions rest on something ({kinds}).")
-        for one in found.failing:
-            lacking = ", ".join(ref for ref, grounds in one.grounds.items() if not grounds.hold)
-            print(f"  cycle {one.decision.cycle}: nothing is below {lacking}")
+        goal, model, sensor = found.by_kind.values()
+        print(f"{found.reached} of {found.decisions} decisions rest on something ({goal} reach the goal, {model} the"
+              f" model, {sensor} a camera frame).")
+        for cycle, lacking in found.failing.items():
+            print(f"  cycle {cycle}: nothing is below {', '.join(lacking)}")
     return 0 if not found.failing else 1
 
 

@@ -11,20 +11,25 @@ import ast
 import difflib
 import inspect
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, TypeVar
 
-from blackboard.board import Blackboard, View
-from blackboard.change import Change, Posted, Retracted, Revised
-from blackboard.effect import Effect, MissingEntryError, Post, Retract, Revise
-from blackboard.entry import Entry
-from blackboard.entry_store import Index
+from blackboard import (
+    Blackboard,
+    Change,
+    Entry,
+    Index,
+    KnowledgeSource,
+    Level,
+    MissingEntryError,
+    Posted,
+    Retracted,
+    View,
+)
 from blackboard.kinds import Registry, always
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
 from harvey.errors import BadInput
 from logs.explain.why_not import Fate, in_cycle, in_run, of_entry, tell_fates
-from logs.records import EntryRecord, cycle_of_writing, entry_of, refs_of
+from logs.records import CHANGES, EntryRecord, entry_of
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline
 from world_models import words
@@ -45,69 +50,47 @@ def answers(run: RunDirectory, history: Timeline, name: str, cycle: int | None) 
     if cycle is None:
         occasions = in_run(history, source)
         if not occasions:
-            yield from _never(run, source)
+            yield from _ask_again(run, history, source, None)
         yield from tell_fates(source, occasions)
         return
-    found = in_cycle(history, source, cycle)
-    if found:
-        for one in found:
-            yield f"In cycle {cycle} the {words.source(source)} {one.fate.value} on {one.trigger}: {one.why}."
-    else:
+    found, decision = in_cycle(history, source, cycle), history.decision(cycle)
+    for one in found:
+        yield f"In cycle {cycle} the {words.source(source)} {one.fate.value} on {one.trigger}: {one.why}."
+    if not found:
         yield from _ask_again(run, history, source, cycle)
-    yield from _instead(history, cycle, any(one.fate in (Fate.ACTED, Fate.ASKED) for one in found))
-
-
-def _instead(history: Timeline, cycle: int, acted: bool) -> Iterator[str]:
-    decision = history.decision(cycle)
-    chosen = decision.chosen
-    if chosen is None:
+    if decision.chosen is None:
         yield f"Nobody acted in cycle {cycle}."
-    elif not acted:
-        made = ", ".join(r.ref for r in decision.made) or "nothing"
+    elif not any(one.fate in (Fate.ACTED, Fate.ASKED) for one in found):
+        chosen, made = decision.chosen, ", ".join(r.ref for r in decision.made) or "nothing"
         yield (f"The {words.source(chosen.source)} acted, on {chosen.trigger}, rated {chosen.rating:.2f}, with the"
                f" {decision.focus} level in focus: it made {made}.")
 
 
-def _never(run: RunDirectory, source: str) -> Iterator[str]:
+def _ask_again(run: RunDirectory, history: Timeline, source: str, cycle: int | None) -> Iterator[str]:
+    """Whether it sat at the board at all; of a cycle, it is asked once more, on the board as it was."""
     from harvey.agent import build_agent
     from logs.run_head import RunHead
-
-    agent = build_agent(RunHead.read(run.path))
-    named = _find(source, agent.sources)
-    if not agent.servoing.allows(named.closes):
-        yield f"The {named.closes} level of servoing was off, and the {words.source(source)} closes it."
-
-
-def _ask_again(run: RunDirectory, history: Timeline, source: str, cycle: int) -> Iterator[str]:
-    """The knowledge source is asked once more, on the board as it was."""
-    from harvey.agent import build_agent
-    from logs.run_head import RunHead
-
 
     head = RunHead.read(run.path)
     if source in head.without:
         yield f"The {words.source(source)} was left out of this run."
         return
     agent = build_agent(head)
-    named = _find(source, agent.sources)
-    if not agent.servoing.allows(named.closes):
-        yield f"The {named.closes} level of servoing was off, and the {words.source(source)} closes it."
-    else:
-        yield from why_absent(history, named, cycle, agent.kinds, agent.store)
-
-
-def _find(source: str, sources: tuple[KnowledgeSource, ...]) -> KnowledgeSource:
-    names = [one.name for one in sources]
-    if source not in names:
-        near = difflib.get_close_matches(source, names, n=4, cutoff=0.5) or names
+    sources = {one.name: one for one in agent.sources}
+    if source not in sources:
+        near = difflib.get_close_matches(source, sources, n=4, cutoff=0.5) or sources
         raise BadInput(
             f"--not: expected a knowledge source as {', '.join(near)}, or an entry as Goal-1, got {source!r}")
-    return sources[names.index(source)]
+    closes = sources[source].closes
+    if not agent.servoing.allows(closes):
+        yield f"The {closes} level of servoing was off, and the {words.source(source)} closes it."
+    elif cycle is not None:
+        yield from why_absent(history, sources[source], cycle, agent.kinds, agent.store)
 
 
+T = TypeVar("T")
 MOST_OF_A_VALUE = 120
 """Letters of a value that a condition asked for."""
-CHANGES: Mapping[str, type[Change]] = {"Posted": Posted, "Revised": Revised, "Retracted": Retracted}
 
 
 def why_absent(
@@ -230,35 +213,27 @@ class AskedView(View):
         super().__init__(board)
         self.asked: list[tuple[str, list[str]]] = []
 
-    def _note(self, question: str, found: Iterable[Entry[Any] | None]) -> None:
+    def _note(self, question: str, found: T) -> T:
         if not self.asked or self.asked[-1][0] != question:
             self.asked.append((question, []))
-        self.asked[-1][1].extend(str(e.ref) for e in found if e is not None)
+        entries: Any = (found,) if isinstance(found, Entry) else found or ()
+        self.asked[-1][1].extend(str(entry.ref) for entry in entries)
+        return found
 
     def get(self, id: str) -> Entry[Any] | None:
-        found = super().get(id)
-        self._note(f"what {id} is now", (found,))
-        return found
+        return self._note(f"what {id} is now", super().get(id))
 
     def latest(self, kind: type[Any], where: Callable[[Any], bool] = always) -> Entry[Any] | None:
-        found = super().latest(kind, where)
-        self._note(f"the newest {kind.__name__}{_with_condition(where)}", (found,))
-        return found
+        return self._note(f"the newest {kind.__name__}{_with_condition(where)}", super().latest(kind, where))
 
     def where(self, kind: type[Any], predicate: Callable[[Any], bool]) -> tuple[Entry[Any], ...]:
-        found = super().where(kind, predicate)
-        self._note(f"every {kind.__name__}{_with_condition(predicate)}", found)
-        return found
+        return self._note(f"every {kind.__name__}{_with_condition(predicate)}", super().where(kind, predicate))
 
     def newest(self, index: Index[Any], key: Any) -> Entry[Any] | None:
-        found = super().newest(index, key)
-        self._note(f"the newest {_by(index, key)}", (found,))
-        return found
+        return self._note(f"the newest {_by(index, key)}", super().newest(index, key))
 
     def having(self, index: Index[Any], key: Any) -> tuple[Entry[Any], ...]:
-        found = super().having(index, key)
-        self._note(f"every {_by(index, key)}", found)
-        return found
+        return self._note(f"every {_by(index, key)}", super().having(index, key))
 
 
 def _by(index: Index[Any], key: Any) -> str:
@@ -279,27 +254,13 @@ def changes(history: Timeline, cycle: int, kinds: Registry, store: FrameStore) -
 
 def board_at(history: Timeline, cycle: int, kinds: Registry, store: FrameStore) -> Blackboard:
     """The board as knowledge sources saw it when they were asked in a cycle. Raises BadInput."""
-    told: list[EntryRecord[Any]] = []
+    last: dict[str, EntryRecord[Any]] = {}  # older revisions cannot be seen any more
     for one in history.cycles:
-        if one > cycle:
-            break
-        decision = history.decision(one)
-        told += (*decision.observed, *(decision.made if one < cycle else ()))
-    last = {record.id: record for record in told}
-    # older revisions cannot be seen any more, so each value is made once
-    values = {id: entry_of(record, kinds, store).value for id, record in last.items()}
+        if one <= cycle:
+            decision = history.decision(one)
+            last |= {record.id: record for record in (decision.changes if one < cycle else decision.observed)}
     board = Blackboard()
-    for record in told:
-        board.apply([_effect(board, record, values[record.id])], author=record.author, cycle=cycle_of_writing(record))
+    for record in last.values():
+        if not record.is_gone:
+            board.follow(Posted(entry_of(record, kinds, store)))
     return board
-
-
-def _effect(board: Blackboard, record: EntryRecord[Any], value: Any) -> Effect:
-    if record.is_new:
-        return Post(value, refs_of(record.because))
-    entry = board.view.get(record.id)
-    if entry is None:
-        raise BadInput(f"{record.ref}: expected it on the board in cycle {record.cycle}, where it is not")
-    if record.is_gone:
-        return Retract(entry, refs_of(record.retracted_because))
-    return Revise(entry, value, refs_of(record.because))

@@ -15,8 +15,8 @@ from harvey.errors import BadInput
 from harvey.report import data
 from harvey.report.data import draw_plans, read_pictures
 from harvey.report.drawing import draw_errors
-from logs.explain.questions_in_words import read_errors
 from logs.explain.story import RunStory, run_name, tell_run
+from logs.explain.true_errors import read_errors
 from logs.pictures import open_pictures
 from logs.reader import read_true_track
 from logs.run_directory import RunDirectory
@@ -115,8 +115,8 @@ def _opening(story: RunStory) -> str:
 
 def _sections(story: RunStory) -> Iterator[str]:
     for section in story.sections:
-        yield f"<h3>{escape(section.title)}</h3>\n<table>"
-        for one in section.sentences:
+        yield f"<h3>{escape(section.headline)}</h3>\n<table>"
+        for one in section.steps:
             time = "" if one.time_s is None else f"{one.time_s:.1f} s"
             refs = " ".join(_reference(ref) for ref in one.refs)
             yield f"<tr><td>{_cycle(one.cycle)}</td><td>{time}</td><td>{escape(one.text)} {refs}</td></tr>"

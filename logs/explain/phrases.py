@@ -1,4 +1,4 @@
-"""The phrase book: what an entry, a decision, and an entry with its neighbours say in whole sentences.
+"""The phrase book: what a sentence is, and what an entry, a decision, and an entry with its neighbours say.
 
 One entry is told by the sentence of its own kind. A run of another version, whose values do not fit their kinds, raises
 BadInput.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
 
@@ -36,6 +37,49 @@ CORRECTED_BY: Mapping[Level, str] = {
 }
 Find = Callable[[type[Any]], Any]
 """Gives the value of the first entry of a kind that something rests on; None where there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sentence:
+    """Something that is said of a run.
+
+    Attributes:
+        text: one sentence or two.
+        refs: the entries that say so; none for what only the simulator knows.
+        cycle: when it was so; None for what is so during the whole run.
+        label: what it is about, in a word or two.
+        time_s: of the cycle, since the run began, by the body's clock; None where nothing told it.
+    """
+
+    text: str
+    refs: tuple[str, ...] = ()
+    cycle: int | None = None
+    label: str = ""
+    time_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """Sentences under a headline: why an entry came about, or a part of what happened in a run.
+
+    Attributes:
+        headline: what the entry is, of a motion the whole chain in one sentence; or the part's title.
+        steps: the reasons, from the entry downward; or what happened.
+        ref: the entry; "" where it is about none.
+        decided: who decided it, when, against what.
+    """
+
+    headline: str
+    steps: tuple[Sentence, ...] = ()
+    ref: str = ""
+    decided: str = ""
+
+
+def said(text: str, *records: EntryRecord[Any] | None, label: str = "") -> Sentence:
+    """A sentence that some entries say, in the cycle of the first."""
+    known = [record for record in records if record is not None]
+    refs = dict.fromkeys(record.ref for record in known)
+    return Sentence(text, tuple(refs), known[0].cycle if known else None, label)
 
 
 def capital(text: str) -> str:
@@ -96,7 +140,7 @@ def _tell_questions(history: Timeline, record: EntryRecord[Any], chosen: Candida
     return f" It had waited for an answer first: it asked for {listed(wanted, MAX_LISTED)}." if wanted else ""
 
 
-def tell_answer(history: Timeline, request: EntryRecord[Any]) -> Iterator[tuple[str, tuple[str, ...]]]:
+def tell_answer(history: Timeline, request: EntryRecord[Any]) -> Iterator[Sentence]:
     """What became of the act that asked."""
     asked = history.entry(f"{request.id}.0") or request
     act = history.decision(asked.cycle).chosen
@@ -104,8 +148,8 @@ def tell_answer(history: Timeline, request: EntryRecord[Any]) -> Iterator[tuple[
         if act is not None and later.cycle > asked.cycle and later.chosen and later.chosen.number == act.number:
             refs = tuple(record.ref for record in later.made)
             made = listed(refs, MAX_LISTED) or "nothing"
-            yield (f"The act waited for the answer, and came again in cycle {later.cycle}: it made {made}.",
-                   refs[:MAX_LISTED])
+            yield Sentence(f"The act waited for the answer, and came again in cycle {later.cycle}: it made {made}.",
+                           refs[:MAX_LISTED], label="answered")
             return
 
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy
 from logs.explain import phrases, turning_points
-from logs.explain.phrases import UNREADABLE, capital, named, plainly, sentence, wrap
+from logs.explain.phrases import UNREADABLE, Sentence, Story, capital, named, plainly, said, sentence, wrap
 from logs.explain.turning_points import (
+    SIMULATOR,
     TurningPoint,
     read_collisions,
     read_happenings,
@@ -42,7 +43,6 @@ WITHOUT: Mapping[str, str] = {
 """What it means that a level is off."""
 WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, UserReport, Redirection)
 """What changes the knowledge of a locale."""
-PLANS: tuple[type[Any], ...] = (Goal, PlanSketch)
 MOST_PLACES = 4
 """So many places that came into question are told, the newest."""
 COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong", "at most")
@@ -55,29 +55,9 @@ robot knew it, except where the simulator is named. Names in brackets are entrie
 with harvey why RUN --at CYCLE."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sentence:
-    """Something that happened.
-
-    Attributes:
-        text: one sentence or two.
-        cycle: when; None for what is so during the whole run.
-        time_s: since the run began, by the body's clock; None where nothing told it.
-        refs: the entries that say so; none for what only the simulator knows.
-    """
-
-    text: str
-    cycle: int | None = None
-    time_s: float | None = None
-    refs: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """A part of a story under its title."""
-
-    title: str
-    sentences: tuple[Sentence, ...]
+Result = Mapping[str, Any]
+"""``result.json``, which says what only the simulator knows."""
+NO_RESULT: Result = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,12 +102,15 @@ class RunStory:
 
     opening: tuple[str, ...]
     turning_points: tuple[TurningPoint, ...]
-    sections: tuple[Section, ...]
+    sections: tuple[Story, ...]
     milestones: tuple[MilestoneRow, ...]
 
     def record(self) -> dict[str, Any]:
         """As JSON types."""
-        return asdict(self)
+        keys = "text", "cycle", "time_s", "refs"
+        return asdict(self) | {"sections": [
+            {"title": one.headline, "sentences": [{key: getattr(step, key) for key in keys} for step in one.steps]}
+            for one in self.sections]}
 
 
 def run_name(run: RunDirectory) -> str:
@@ -192,11 +175,7 @@ def tell_run(run: RunDirectory, history: Timeline) -> RunStory:
     """The story of a run. Raises BadInput where journal or ``result.json`` cannot be read as this version's."""
     first, result = tuple(opening(run, history)), run.read_result()
     try:
-        turns = tuple(read_turning_points(history))
-        sections = (
-            tell_errand(history), tell_happenings(history, result), tell_plans(history), tell_lost(history),
-            tell_contacts(history, turns, result),
-            tell_things(turns), tell_camera(history), tell_end(history, result))
+        turns, sections = tuple(read_turning_points(history)), tuple(part(history, result) for part in PARTS)
         return RunStory(first, turns, sections, read_milestones(history))
     except UNREADABLE as error:
         raise _strange(history, error) from error
@@ -206,30 +185,29 @@ def _strange(history: Timeline, error: Exception) -> BadInput:
     return BadInput(f"{history.source}: expected entries as this version writes them, got others ({error!r})")
 
 
-def _said(history: Timeline, text: str, record: EntryRecord[Any], *others: EntryRecord[Any] | None) -> Sentence:
-    """A sentence that a record tells, in its cycle; ``others`` say so too."""
-    refs = dict.fromkeys(one.ref for one in (record, *others) if one is not None)
-    return Sentence(text, record.cycle, history.time_at(record.cycle), tuple(refs))
+def _section(history: Timeline, title: str, told: Iterable[Sentence], nothing: str = "") -> Story:
+    """A part of the story; ``nothing`` is said where nothing else is."""
+    steps = [one if one.cycle is None else replace(one, time_s=history.time_at(one.cycle)) for one in told]
+    return Story(title, tuple(steps) or (Sentence(nothing),) * bool(nothing))
 
 
-def tell_errand(history: Timeline) -> Section:
+def tell_errand(history: Timeline, _: Result = NO_RESULT) -> Story:
     """What was asked for, and what it was told on the way."""
-    told = [_said(history, plainly(r), r) for r in history.of_kind(Command, UserReport, Redirection) if r.observed]
-    return Section("What it was to do", tuple(told))
+    asked = history.of_kind(Command, UserReport, Redirection)
+    return _section(history, "What it was to do", [said(plainly(one), one) for one in asked if one.observed])
 
 
-def tell_happenings(history: Timeline, result: Mapping[str, Any]) -> Section:
+def tell_happenings(history: Timeline, result: Result = NO_RESULT) -> Story:
     """What the simulator did to the robot and its building, as far as its result says."""
-    told = [Sentence(f"{capital(one.text)}.", one.cycle, one.time_s) for one in read_happenings(history, result)]
-    if not told and result.get("happened") is None:
-        told = [Sentence("What was done to the robot nobody recorded: there is no result of the simulator.")]
-    return Section("What was done to it", tuple(told) or (Sentence("The simulator did nothing to it."),))
+    nothing = "The simulator did nothing to it." if result.get("happened") is not None else (
+        "What was done to the robot nobody recorded: there is no result of the simulator.")
+    return _section(history, "What was done to it", _points(read_happenings(history, result), SIMULATOR), nothing)
 
 
-def tell_plans(history: Timeline) -> Section:
+def tell_plans(history: Timeline, _: Result = NO_RESULT) -> Story:
     """Each goal, each sketch, and each that was withdrawn."""
-    told = [(_plan(history, record), record) for record in history.of_kind(*PLANS)]
-    return Section("How it planned", tuple(_said(history, text, record) for text, record in told if text))
+    told = [said(_plan(history, record), record) for record in history.of_kind(Goal, PlanSketch)]
+    return _section(history, "How it planned", [one for one in told if one.text])
 
 
 def _plan(history: Timeline, record: EntryRecord[Any]) -> str:
@@ -263,7 +241,7 @@ def _cause(history: Timeline, ref: str) -> str:
     return sentence(record).partition(";")[0]
 
 
-def tell_lost(history: Timeline) -> Section:
+def tell_lost(history: Timeline, _: Result = NO_RESULT) -> Story:
     """Each time that it was lost."""
     told: list[Sentence] = []
     found = [one for one in history.of_kind(Hypothesis)
@@ -272,7 +250,7 @@ def tell_lost(history: Timeline) -> Section:
         if turning_points.may_turn(record) and turning_points.is_lost(record.value):
             until = next((one for one in found if one.cycle >= record.cycle), None)
             told += sorted(_tell_loss(history, record, until), key=lambda one: one.cycle or 0)
-    return Section("Lost and found", tuple(told) or (Sentence("It was never lost."),))
+    return _section(history, "Lost and found", told, "It was never lost.")
 
 
 def _tell_loss(
@@ -280,23 +258,23 @@ def _tell_loss(
 ) -> Iterator[Sentence]:
     what, below = lost.value.what, history.nearest(lost, Hypothesis)
     where = "" if below is None else f" {phrases.believed(below.value)}"
-    yield _said(history, f"It was lost: {what}.{where}", lost, below)
+    yield said(f"It was lost: {what}.{where}", lost, below)
     if (certificate := history.nearest(lost, Certificate)) is not None:
         verdict = f"{certificate.value.verdict}: {certificate.value.reason}"
-        yield _said(history, f"The last verdict on a milestone was {verdict}.", certificate)
+        yield said(f"The last verdict on a milestone was {verdict}.", certificate)
     began = next((one for one in history.within(lost) if is_a(one, Discrepancy) and one.value.what != what), None)
     if began is not None:
-        yield _said(history, f"It began to doubt: {began.value.what}.", history.entry(f"{began.id}.0") or began)
+        yield said(f"It began to doubt: {began.value.what}.", history.entry(f"{began.id}.0") or began)
     yield from _tell_search(history, lost, history.cycles[-1] if found is None else found.cycle)
     if found is None:
-        yield Sentence("It did not find out where it was.", history.cycles[-1], history.time_at(history.cycles[-1]))
+        yield Sentence("It did not find out where it was.", cycle=history.cycles[-1])
         return
     now, then_s, now_s = found.value, history.time_at(lost.cycle), history.time_at(found.cycle)
     later = f"{count(found.cycle - lost.cycle, 'cycle')} later"
     later += "" if then_s is None or now_s is None else f", after {now_s - then_s:.1f} s"
     how = f": {now.evidence}" if now.evidence else ""
     where = f"{phrases.pose(now)}{'' if below is None else _apart(below.value, now)}{how}"
-    yield _said(history, f"It found out where it was, {later}: at {where}.", found)
+    yield said(f"It found out where it was, {later}: at {where}.", found)
 
 
 def _tell_search(history: Timeline, lost: EntryRecord[Any], last: int) -> Iterator[Sentence]:
@@ -312,7 +290,7 @@ def _tell_search(history: Timeline, lost: EntryRecord[Any], last: int) -> Iterat
         places = [f"{record.value.place()} ({record.value.weight:.0%})" for record in candidates]
         text += f"; it may have stood at {listed(places, MOST_PLACES)}"
     first = min((*looks, *candidates), key=lambda record: record.cycle)
-    yield _said(history, f"{text}.", first, *candidates)
+    yield said(f"{text}.", first, *candidates)
 
 
 def _apart(before: Hypothesis, now: Hypothesis) -> str:
@@ -322,39 +300,40 @@ def _apart(before: Hypothesis, now: Hypothesis) -> str:
     return f", {metres(now.locale_from_robot.distance_to(before.locale_from_robot))} from where it had believed"
 
 
-def tell_contacts(history: Timeline, turns: tuple[TurningPoint, ...], result: Mapping[str, Any]) -> Section:
+def tell_contacts(history: Timeline, result: Result = NO_RESULT) -> Story:
     """What it felt; and, where the simulator says so, what it truly touched."""
-    truly = [Sentence(f"It truly touched something at {point.text}.", point.cycle, point.time_s)
+    truly = [Sentence(f"It truly touched something at {point.text}.", cycle=point.cycle)
              for point in read_collisions(history, result)]
-    told = [*(_points(turns, "contact") or [Sentence("It felt no contact.")]), *truly]
+    felt = _points(read_turning_points(history, told=True), "contact")
+    told = [*(felt or [Sentence("It felt no contact.")]), *truly]
     if result.get("collisions") is None:
         told += [Sentence("What it touched without feeling it nobody recorded: there is no result of the simulator.")]
     elif (missing := result["collisions"] - len(truly)) > 0:
         told += [Sentence(f"The simulator counts {missing} more, and does not say where.")]
-    return Section("What it touched", tuple(told))
+    return _section(history, "What it touched", told)
 
 
-def tell_things(turns: tuple[TurningPoint, ...]) -> Section:
+def tell_things(history: Timeline, _: Result = NO_RESULT) -> Story:
     """Doors found shut, things in the way, and what became of them; faults of its body."""
-    nothing = Sentence("No door was found otherwise than known, nothing stood in the way, and nothing failed.")
-    told = _points(turns, "door", "thing", "fault", "resumed") or [nothing]
-    return Section("Doors, things in the way and faults", tuple(told))
+    nothing = "No door was found otherwise than known, nothing stood in the way, and nothing failed."
+    told = _points(read_turning_points(history, told=True), "door", "thing", "fault", "resumed")
+    return _section(history, "Doors, things in the way and faults", told, nothing)
 
 
-def _points(turns: tuple[TurningPoint, ...], *kinds: str) -> list[Sentence]:
+def _points(turns: Iterable[TurningPoint], *kinds: str) -> list[Sentence]:
     """The turning points of some kinds."""
-    return [Sentence(f"{capital(point.text)}.", point.cycle, point.time_s) for point in turns if point.kind in kinds]
+    return [Sentence(f"{capital(point.text)}.", cycle=point.cycle) for point in turns if point.kind in kinds]
 
 
-def tell_camera(history: Timeline) -> Section:
+def tell_camera(history: Timeline, _: Result = NO_RESULT) -> Story:
     """What has turned out to be otherwise about the camera than told: each since when it was so to the end."""
     records, told = list(history.of_kind(CameraState)), list[Sentence]()
     lessons = [find_camera_lessons(records[0].value, record.value) for record in records]
     for lesson in lessons[-1] if lessons else ():
         has_it = [any(one.what == lesson.what for one in then) for then in lessons]
         since = max((i for i, has in enumerate(has_it) if not has), default=-1) + 1
-        told.append(_said(history, f"The {lesson.text()}; known since then.", records[since], records[-1]))
-    return Section("The camera", tuple(told) or (Sentence("The camera was found to be as told."),))
+        told.append(said(f"The {lesson.text()}; known since then.", records[since], records[-1]))
+    return _section(history, "The camera", told, "The camera was found to be as told.")
 
 
 def _outcome(history: Timeline) -> EntryRecord[Outcome] | None:
@@ -362,21 +341,21 @@ def _outcome(history: Timeline) -> EntryRecord[Outcome] | None:
     return next(iter([*history.of_kind(Outcome)][-1:]), None)
 
 
-def tell_end(history: Timeline, result: Mapping[str, Any]) -> Section:
+def tell_end(history: Timeline, result: Result = NO_RESULT) -> Story:
     """The outcome, the last belief, and the errors that only the simulator knows."""
     outcome = _outcome(history)
-    told = [] if outcome is None else [_said(history, plainly(outcome), outcome)]
+    told = [] if outcome is None else [said(plainly(outcome), outcome)]
     beliefs = (history.entry(ref) for ref in reversed(history.refs) if ref.startswith("Hypothesis-"))
     last = next((record for record in beliefs if record is not None and record.value.is_held), None)
     if last is not None:
         now = history.newest[last.id] == last.ref and history.retraction(last.ref) is None
         text = "It believed that it stood at" if now else "The last place where it had believed to stand was"
-        told.append(_said(history, f"{text} {phrases.pose(last.value)}.", last))
+        told.append(said(f"{text} {phrases.pose(last.value)}.", last))
     told += [Sentence(f"{capital(text)}.") for text in result.get("starved") or ()]
     truth = ", ".join(_truth(result))
     told.append(Sentence(f"In truth, by the simulator's result.json: {truth}." if truth else
                          "Where it truly was nobody recorded: there is no result of the simulator."))
-    return Section("How it ended", tuple(told))
+    return _section(history, "How it ended", told)
 
 
 def _truth(result: Mapping[str, Any]) -> Iterator[str]:
@@ -391,6 +370,19 @@ def _truth(result: Mapping[str, Any]) -> Iterator[str]:
     wrong = (result.get("milestones") or {}).get("false_accepts")
     if isinstance(wrong, int):
         yield f"and accepted {count(wrong, 'milestone')} wrongly" if wrong else "and accepted no milestone wrongly"
+
+
+def tell_trouble(history: Timeline, result: Result = NO_RESULT) -> Story:
+    """What a short account of the run does not leave out."""
+    points = [*read_happenings(history, result), *read_turning_points(history, told=True)]
+    told = [Sentence(f"{point.kind}: {point.text}.", cycle=point.cycle)
+            for point in sorted(points, key=lambda point: point.cycle)]
+    nothing = "Nothing went wrong." if _outcome(history) else "Nothing had gone wrong when the run was cut off."
+    return _section(history, "What went wrong", told, nothing)
+
+
+PARTS = (tell_errand, tell_happenings, tell_plans, tell_lost, tell_contacts, tell_things, tell_camera, tell_end)
+"""The parts of a story, in their order."""
 
 
 def read_milestones(history: Timeline) -> tuple[MilestoneRow, ...]:
@@ -443,14 +435,14 @@ def story_lines(story: RunStory) -> Iterator[str]:
     yield from story.opening
     *before, last = story.sections
     for section in before:
-        yield from ("", section.title, *_section_lines(section))
+        yield from ("", section.headline, *_section_lines(section))
     yield from ("", MILESTONES, *(f"  {line}" for line in milestone_lines(story.milestones)))
-    yield from ("", last.title, *_section_lines(last))
+    yield from ("", last.headline, *_section_lines(last))
     yield from ("", LEGEND)
 
 
-def _section_lines(section: Section) -> Iterator[str]:
-    heads = ["" if one.cycle is None else turning_points.at(one.cycle, one.time_s) for one in section.sentences]
+def _section_lines(section: Story) -> Iterator[str]:
+    heads = ["" if one.cycle is None else turning_points.at(one.cycle, one.time_s) for one in section.steps]
     width = max(map(len, heads), default=0)
-    for head, one in zip(heads, section.sentences, strict=True):
+    for head, one in zip(heads, section.steps, strict=True):
         yield wrap(named(one.text, one.refs), f"  {head:<{width}}" + "  " * (width > 0))

@@ -9,9 +9,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, NamedTuple
 
 from logs.explain.phrases import sentence
 from logs.explain.why import headline
@@ -38,13 +37,8 @@ class Fate(Enum):
     ABSENT = "was not considered"
 
 
-@dataclass(frozen=True, slots=True)
-class Occasion:
-    """One time that a knowledge source could have acted.
-
-    Attributes:
-        cycle: when; fate: what became of it; trigger: what it would have answered; why: what decided, in a sentence.
-    """
+class Occasion(NamedTuple):
+    """One time that a knowledge source could have acted: when, what came of it, on what, and what decided."""
 
     cycle: int
     fate: Fate

@@ -12,9 +12,9 @@ import pytest
 
 from harvey.cli import main
 from logs.explain.model import WorldFile
-from logs.explain.phrases import describe_decision
+from logs.explain.phrases import Sentence, Story, describe_decision
 from logs.explain.web import check
-from logs.explain.why import Step, Story, lines_of, story
+from logs.explain.why import lines_of, story
 from logs.explain.why_not import Fate, in_cycle, in_run
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
@@ -55,7 +55,7 @@ def value_in(history: Timeline, ref: str) -> dict[str, Any]:
     return dict(record.fields)
 
 
-def step(of: Story, label: str) -> Step:
+def step(of: Story, label: str) -> Sentence:
     found = next((one for one in of.steps if one.label == label), None)
     assert found is not None, f"{of.ref} tells no {label!r}"
     return found

@@ -117,10 +117,10 @@ def test_what_the_simulator_did_is_told_as_that() -> None:
     lines = list(turn_lines(MemoryTimeline(records()), {"happened": happened}))
     assert lines[2] == "  cycle 3  simulator  somebody carries the robot off, as only the simulator knows"
     told = tell_happenings(MemoryTimeline(records()), {"happened": happened})
-    assert [(one.cycle, one.text) for one in told.sentences] == [
+    assert [(one.cycle, one.text) for one in told.steps] == [
         (3, "Somebody carries the robot off, as only the simulator knows.")]
-    (nothing,) = tell_happenings(MemoryTimeline(records()), {"happened": []}).sentences
-    (unknown,) = tell_happenings(MemoryTimeline(records()), {}).sentences
+    (nothing,) = tell_happenings(MemoryTimeline(records()), {"happened": []}).steps
+    (unknown,) = tell_happenings(MemoryTimeline(records()), {}).steps
     assert nothing.text == "The simulator did nothing to it." and "nobody recorded" in unknown.text
 
 
