@@ -21,10 +21,8 @@ from typing import Any, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.entry import Entry
-from blackboard.journal import Decision
+from blackboard import Decision, Entry, KnowledgeSource
 from blackboard.kinds import Registry
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import registry_of
 from harvey import wiring
 from harvey.agent import Sources, build_agent

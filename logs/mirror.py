@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from blackboard.board import Blackboard, View
-from blackboard.change import Change, Retracted
-from blackboard.entry import Entry
+from blackboard import Blackboard, Change, Entry, Retracted, View
 from world_models.entries.location import Hypothesis
 
 KEPT = 64

@@ -130,6 +130,10 @@ class Timeline:
         """All revisions of locale frames, each by what the journal keeps of it."""
         return cast(Iterator[EntryRecord[FrameReference]], self.of_kind(LocaleFrame, until=until))
 
+    def last(self, kind: type[K]) -> EntryRecord[K] | None:
+        """The last revision of the newest entry of a kind; None where there is none."""
+        return next(iter([*self.last_of_kind(kind)][-1:]), None)
+
     def last_of_kind(self, kind: type[K]) -> Iterator[EntryRecord[K]]:
         """The last revision of each entry of a kind, in the order in which the entries came about."""
         return (record for id in self.ids_of(kind) if (record := self.entry(self.newest[id])) is not None)
@@ -189,8 +193,8 @@ class Timeline:
         if not self.newest:
             self.verify()
             raise BadInput(f"{self.source}: expected at least one entry, got none")
-        outcomes = self.ids_of(Outcome)
-        return self.newest[outcomes[-1]] if outcomes else self.refs[-1]
+        last = self.last(Outcome)
+        return self.refs[-1] if last is None else last.ref
 
     @property
     def cut_off(self) -> int | None:
@@ -245,6 +249,13 @@ class Timeline:
             if found.fields["basis"] not in ("tracks", "odometry") and found.author != YAW_CALIBRATOR:
                 return found
         return None
+
+    def held(self, until: int | None = None) -> EntryRecord[Hypothesis] | None:
+        """The newest belief that was held in a cycle or before it, or at the end."""
+        refs = [ref for ref in self.refs if ref.startswith("Hypothesis-")]
+        past = refs if until is None else refs[: bisect_right(refs, until, key=self.cycle_of_ref)]
+        records = (record for ref in reversed(past) if (record := self.entry(ref)) is not None)
+        return next((record for record in records if record.field("status") == "held"), None)
 
     def resolve(self, text: str) -> str:
         """The ref that a user means: ``MotorCommand-12.3``, or ``MotorCommand-12`` for its last revision.

@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from logs.explain.phrases import Sentence, by_landmark, said
 from logs.records import EntryRecord
@@ -100,16 +99,9 @@ def _find_holder(name: str, frames: Mapping[str, EntryRecord[Any]], world: World
     return next((locale for locale in locales if locale in frames), "")
 
 
-
-
-@dataclass(frozen=True, slots=True)
-class Element:
-    """A part of the building's description.
-
-    Attributes:
-        kind: in a word: ``desk``, ``open door``, ``wall``.
-        locales: whose frames hold it.
-        source: file:line of its description; the file relative to the project where it comes with it.
+class Element(NamedTuple):
+    """A part of the building's description: its kind in a word (``desk``, ``open door``, ``wall``), whose frames hold
+    it, and file:line of its description; the file relative to the project where it comes with it.
     """
 
     kind: str
@@ -138,8 +130,8 @@ class WorldFile:
             return Element(locale.kind, (name,), _brief(locale.source))
         if (passage := world.find_passage(name)) is not None:
             return Element(getattr(passage, "kind", "open door"), tuple(passage.between), _brief(passage.source))
-        frame = self._frame(name)
-        return None if frame is None else _find_in(frame, name)
+        elements = () if (frame := self._frame(name)) is None else _elements(frame)
+        return next((element for called, element in elements if called == name), None)
 
     def near(self, name: str) -> list[str]:
         """Names in the world that a user may have meant."""
@@ -181,18 +173,13 @@ def tell_source(world: WorldFile, name: str) -> str:
         f"{name} is described in {element.source} ({element.kind}).")
 
 
-def _find_in(frame: LocaleFrame, name: str) -> Element | None:
-    thing = next((thing for thing in frame.things if thing.name == name), None)
-    if thing is not None:
-        return Element(thing.kind, (frame.name,), _brief(thing.source))
+def _elements(frame: LocaleFrame) -> Iterator[tuple[str, Element]]:
+    """The things, landmarks and faces of a frame by their names."""
+    yield from ((thing.name, Element(thing.kind, (frame.name,), _brief(thing.source))) for thing in frame.things)
     for part in frame.parts:
         locales = (part.locale, *((part.neighbour,) if part.neighbour else ()))
-        mark = next((mark for _, mark in part.landmarks if mark.name == name), None)
-        if mark is not None:
-            return Element(mark.kind, locales, _brief(mark.source))
-        if any(face.name == name for _, face in part.faces):
-            return Element("face", locales, _brief(frame.locale.source))
-    return None
+        yield from ((mark.name, Element(mark.kind, locales, _brief(mark.source))) for _, mark in part.landmarks)
+        yield from ((face.name, Element("face", locales, _brief(frame.locale.source))) for _, face in part.faces)
 
 
 def _brief(source: str) -> str:

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
 
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Level
 from logs.records import WHAT_IF, Candidate, EntryRecord
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
@@ -272,6 +271,11 @@ def verdict(certificate: Certificate, milestone: Milestone | None) -> str:
 def milestone_name(milestone: Milestone) -> str:
     """``milestone M1 of the route``, or the check that it is."""
     return f"milestone {milestone.name()}" if milestone.sketch else f"the {milestone.name()}"
+
+
+def milestone_of(record: EntryRecord[Any]) -> str:
+    """As :meth:`~world_models.entries.task.Milestone.name`, without decoding its lines."""
+    return str(record.fields["what"]).partition(", because")[0]
 
 
 def expectation(milestone: Milestone) -> str:

@@ -13,10 +13,10 @@ from blackboard import Discrepancy
 from logs.explain import phrases, turning_points
 from logs.explain.phrases import UNREADABLE, Sentence, Story, capital, named, plainly, said, sentence, wrap
 from logs.explain.turning_points import (
+    COLLISION,
     SIMULATOR,
     TurningPoint,
-    read_collisions,
-    read_happenings,
+    read_truth,
     read_turning_points,
     turn_lines,
 )
@@ -152,7 +152,7 @@ def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
         history.verify()
         raise BadInput(f"{history.source}: expected at least one decision, got none")
     try:
-        outcome = _outcome(history)
+        outcome = history.last(Outcome)
         cycle = history.cycles[-1] if outcome is None else outcome.cycle
         time_s = history.time_at(cycle)
         when = f"in cycle {cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run")
@@ -201,7 +201,7 @@ def tell_happenings(history: Timeline, result: Result = NO_RESULT) -> Story:
     """What the simulator did to the robot and its building, as far as its result says."""
     nothing = "The simulator did nothing to it." if result.get("happened") is not None else (
         "What was done to the robot nobody recorded: there is no result of the simulator.")
-    return _section(history, "What was done to it", _points(read_happenings(history, result), SIMULATOR), nothing)
+    return _section(history, "What was done to it", _points(read_truth(history, result), SIMULATOR), nothing)
 
 
 def tell_plans(history: Timeline, _: Result = NO_RESULT) -> Story:
@@ -303,7 +303,7 @@ def _apart(before: Hypothesis, now: Hypothesis) -> str:
 def tell_contacts(history: Timeline, result: Result = NO_RESULT) -> Story:
     """What it felt; and, where the simulator says so, what it truly touched."""
     truly = [Sentence(f"It truly touched something at {point.text}.", cycle=point.cycle)
-             for point in read_collisions(history, result)]
+             for point in read_truth(history, result) if point.kind == COLLISION]
     felt = _points(read_turning_points(history, told=True), "contact")
     told = [*(felt or [Sentence("It felt no contact.")]), *truly]
     if result.get("collisions") is None:
@@ -336,18 +336,11 @@ def tell_camera(history: Timeline, _: Result = NO_RESULT) -> Story:
     return _section(history, "The camera", told, "The camera was found to be as told.")
 
 
-def _outcome(history: Timeline) -> EntryRecord[Outcome] | None:
-    """The outcome of a run; None where it has none."""
-    return next(iter([*history.of_kind(Outcome)][-1:]), None)
-
-
 def tell_end(history: Timeline, result: Result = NO_RESULT) -> Story:
     """The outcome, the last belief, and the errors that only the simulator knows."""
-    outcome = _outcome(history)
+    outcome = history.last(Outcome)
     told = [] if outcome is None else [said(plainly(outcome), outcome)]
-    beliefs = (history.entry(ref) for ref in reversed(history.refs) if ref.startswith("Hypothesis-"))
-    last = next((record for record in beliefs if record is not None and record.value.is_held), None)
-    if last is not None:
+    if (last := history.held()) is not None:
         now = history.newest[last.id] == last.ref and history.retraction(last.ref) is None
         text = "It believed that it stood at" if now else "The last place where it had believed to stand was"
         told.append(said(f"{text} {phrases.pose(last.value)}.", last))
@@ -374,10 +367,10 @@ def _truth(result: Mapping[str, Any]) -> Iterator[str]:
 
 def tell_trouble(history: Timeline, result: Result = NO_RESULT) -> Story:
     """What a short account of the run does not leave out."""
-    points = [*read_happenings(history, result), *read_turning_points(history, told=True)]
+    points = [*read_truth(history, result), *read_turning_points(history, told=True)]
     told = [Sentence(f"{point.kind}: {point.text}.", cycle=point.cycle)
-            for point in sorted(points, key=lambda point: point.cycle)]
-    nothing = "Nothing went wrong." if _outcome(history) else "Nothing had gone wrong when the run was cut off."
+            for point in sorted(points, key=lambda point: point.cycle) if point.kind != COLLISION]
+    nothing = "Nothing went wrong." if history.last(Outcome) else "Nothing had gone wrong when the run was cut off."
     return _section(history, "What went wrong", told, nothing)
 
 
@@ -391,20 +384,15 @@ def read_milestones(history: Timeline) -> tuple[MilestoneRow, ...]:
     for record in history.of_kind(Certificate):
         if not record.is_gone:
             c, below = record.value, history.reason(record, Milestone)
-            name, ref = (c.milestone, f"{c.milestone}.0") if below is None else (_name(below), below.ref)
+            name, ref = (c.milestone, f"{c.milestone}.0") if below is None else (phrases.milestone_of(below), below.ref)
             rows.append(MilestoneRow(
                 record.cycle, history.time_at(record.cycle), name, c.verdict, c.expected, c.matched, c.deviation_m,
                 c.deviation_rad, c.p_wrong, c.most_p_wrong, (record.ref, ref)))
     judged = {ref.rpartition(".")[0] for row in rows for ref in row.refs}
-    rows += [MilestoneRow(one.cycle, history.time_at(one.cycle), _name(one), str(one.fields["status"]),
+    rows += [MilestoneRow(one.cycle, history.time_at(one.cycle), phrases.milestone_of(one), str(one.fields["status"]),
                           len(one.fields["expected"]), 0, None, None, None, None, (one.ref,))
              for one in history.last_of_kind(Milestone) if one.id not in judged]
     return tuple(sorted(rows, key=lambda row: row.cycle))
-
-
-def _name(record: EntryRecord[Any]) -> str:
-    """As :meth:`~world_models.entries.task.Milestone.name`, without decoding its lines."""
-    return str(record.fields["what"]).partition(", because")[0]
 
 
 def milestone_lines(rows: Sequence[MilestoneRow]) -> Iterator[str]:

@@ -9,10 +9,8 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard.board import View
-from blackboard.entry import Entry
+from blackboard import Discrepancy, Entry, View
 from blackboard.kinds import always
-from blackboard.servoing import Discrepancy
 from logs.explain import phrases
 from logs.explain.turning_points import SIMULATOR, Happening, TurningPoint, TurningPointFinder
 from logs.mirror import find_belief
