@@ -359,12 +359,12 @@ class Originals:
     """What the journal names only by reference.
 
     Attributes:
-        pictures: number -> JPEG bytes.
-        frames: of the world's locales.
+        pictures: number -> JPEG bytes; without them a picture has no bytes.
+        frames: of the world's locales; without them a locale frame is the reference to it.
     """
 
-    pictures: Mapping[int, bytes]
-    frames: FrameStore
+    pictures: Mapping[int, bytes] | None = None
+    frames: FrameStore | None = None
 
 
 def effect_of(record: EntryRecord[Any], originals: Originals, view: View, kinds: Registry) -> Effect:
@@ -379,24 +379,18 @@ def effect_of(record: EntryRecord[Any], originals: Originals, view: View, kinds:
     """
     because = refs_of(record.because)
     if record.is_new:
-        return Post(original_of(record, originals, kinds), because)
+        return Post(value_of(record, kinds, originals), because)
     entry = view.get(record.id)
     if entry is None:
         raise BadInput(f"{record.ref}: expected an entry on the board, got none")
     if record.is_gone:
         return Retract(entry, refs_of(record.retracted_because))
-    return Revise(entry, original_of(record, originals, kinds), because)
+    return Revise(entry, value_of(record, kinds, originals), because)
 
 
-def original_of(record: EntryRecord[Any], originals: Originals, kinds: Registry) -> Any:
+def value_of(record: EntryRecord[Any], kinds: Registry, originals: Originals) -> Any:
     """The value itself, with what the journal keeps by reference. Raises BadInput where it does not fit its kind."""
-    return _value(record, kinds, originals.pictures, originals.frames)
-
-
-def _value(
-    record: EntryRecord[Any], kinds: Registry, pictures: Mapping[int, bytes] | None, frames: FrameStore | None
-) -> Any:
-    """As :func:`original_of`; without pictures or frames the value has no bytes, or is the reference."""
+    pictures, frames = originals.pictures, originals.frames
     if record.type not in kinds:
         raise BadInput(f"{record.ref}: expected a kind of entry that is known here ({', '.join(sorted(kinds))}), got a "
                        f"{record.type}: is the package that brings it installed?")
@@ -431,7 +425,7 @@ def entry_of(record: EntryRecord[Any], kinds: Registry, store: FrameStore | None
 
     Raises BadInput where the value is of a kind that is not known, or does not fit it.
     """
-    value, ref = _value(record, kinds, None, store), ref_of(record.ref)
+    value, ref = value_of(record, kinds, Originals(frames=store)), ref_of(record.ref)
     return Entry(ref.id, ref.revision, value, record.author, cycle_of_writing(record), refs_of(record.because))
 
 

@@ -7,7 +7,6 @@ a part of the run's story.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import SequenceMatcher
@@ -16,7 +15,7 @@ from typing import Any, NamedTuple
 
 from logs.explain import phrases
 from logs.explain.phrases import Sentence, Story, describe_decision, plainly, said, sentence
-from logs.explain.story import tell_contacts, tell_end, tell_happenings, tell_lost, tell_trouble
+from logs.explain.story import ENDED, HAPPENED, LOST, TOUCHED, TROUBLE, tell_part
 from logs.explain.true_errors import read_errors
 from logs.explain.why import headline, label_of
 from logs.records import EntryRecord, is_a
@@ -114,10 +113,10 @@ def _entries(
     return answer
 
 
-def _part(tell: Callable[[Timeline, Mapping[str, Any]], Story], nothing: str) -> Answer:
+def _part(title: str, nothing: str) -> Answer:
     """A question for a part of the run's story; ``nothing`` is so where it has nothing up to a cycle."""
     def answer(asked: Asked) -> Iterator[Story]:
-        part = tell(asked.history, {} if asked.run is None else asked.run.read_result())
+        part = tell_part(asked.history, title, {} if asked.run is None else asked.run.read_result())
         told = [one for one in part.steps if asked.at is None or (one.cycle is not None and one.cycle <= asked.at)]
         for one in told:
             time = "" if one.time_s is None else f", {one.time_s:.1f} s into the run"
@@ -262,21 +261,16 @@ def _compare_plans(asked: Asked, old: EntryRecord[PlanSketch]) -> Iterator[Sente
 
 def _beside(ahead: Sequence[Subgoal], thing: Obstacle) -> str:
     """How far from the line of a plan the middle of a thing is; "" where none of it is in its locale."""
-    lines = [(_distance_m(one, thing), one) for one in ahead
-             if one.origin.locale == one.destination.locale == thing.locale]
+    from shapely import LineString, Point
+
+    middle = Point(thing.x_m, thing.y_m)
+    lines = [(LineString([(one.origin.x_m, one.origin.y_m), (one.destination.x_m, one.destination.y_m)]), one)
+             for one in ahead if one.origin.locale == one.destination.locale == thing.locale]
     if not lines:
         return ""
-    off_m, one = min(lines, key=lambda pair: pair[0])
+    off_m, one = min(((line.distance(middle), one) for line, one in lines), key=lambda pair: pair[0])
     return (f"; its middle is {metres(off_m)} from the line of that plan, from {one.origin.words()} to"
             f" {one.destination.words()}")
-
-
-def _distance_m(line: Subgoal, thing: Obstacle) -> float:
-    (x0, y0), dx, dy = (line.origin.x_m, line.origin.y_m), *(
-        line.destination.x_m - line.origin.x_m, line.destination.y_m - line.origin.y_m)
-    long2 = dx * dx + dy * dy
-    part = 0.0 if long2 == 0.0 else min(max(((thing.x_m - x0) * dx + (thing.y_m - y0) * dy) / long2, 0.0), 1.0)
-    return math.hypot(thing.x_m - x0 - part * dx, thing.y_m - y0 - part * dy)
 
 
 def _tell_doors(asked: Asked, records: list[Record]) -> Iterator[Story]:
@@ -309,15 +303,15 @@ def _words(text: str) -> frozenset[str]:
 
 
 KNOWN: Mapping[str, tuple[frozenset[str], Answer]] = {
-    "what went wrong?": (_words("wrong trouble happened"), _part(tell_trouble, "Up to then nothing had gone wrong.")),
+    "what went wrong?": (_words("wrong trouble happened"), _part(TROUBLE, "Up to then nothing had gone wrong.")),
     "what was done to it?": (_words("done simulator bumped carried"),
-                             _part(tell_happenings, "Up to then the simulator did nothing to it.")),
+                             _part(HAPPENED, "Up to then the simulator did nothing to it.")),
     "how did it end?": (
-        _words("end ended ends outcome finish finished"), _part(tell_end, "Up to then it had not ended.")),
-    "when was it lost?": (_words("lost"), _part(tell_lost, "Up to then it was not lost.")),
+        _words("end ended ends outcome finish finished"), _part(ENDED, "Up to then it had not ended.")),
+    "when was it lost?": (_words("lost"), _part(LOST, "Up to then it was not lost.")),
     "where did it touch anything?": (
         _words("touch touched contact contacts collide collided collision collisions hit"),
-        _part(tell_contacts, "Up to then it touched nothing.")),
+        _part(TOUCHED, "Up to then it touched nothing.")),
     "how far off was it?": (_words("far off truth truly error"), _tell_error),
     "why that detour?": (
         _words("detour detours round around another other else withdrawn replan replanned instead"),

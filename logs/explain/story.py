@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -53,11 +53,6 @@ LEGEND = """\
 Places are in metres in each room's own frame. Times are by the body's clock. All of it is from the journal, as the
 robot knew it, except where the simulator is named. Names in brackets are entries: ask on with harvey why RUN NAME, or
 with harvey why RUN --at CYCLE."""
-
-
-Result = Mapping[str, Any]
-"""``result.json``, which says what only the simulator knows."""
-NO_RESULT: Result = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +170,8 @@ def tell_run(run: RunDirectory, history: Timeline) -> RunStory:
     """The story of a run. Raises BadInput where journal or ``result.json`` cannot be read as this version's."""
     first, result = tuple(opening(run, history)), run.read_result()
     try:
-        turns, sections = tuple(read_turning_points(history)), tuple(part(history, result) for part in PARTS)
+        turns, sections = tuple(read_turning_points(history)), tuple(
+            tell_part(history, title, result) for title in PARTS if title != TROUBLE)
         return RunStory(first, turns, sections, read_milestones(history))
     except UNREADABLE as error:
         raise _strange(history, error) from error
@@ -185,29 +181,32 @@ def _strange(history: Timeline, error: Exception) -> BadInput:
     return BadInput(f"{history.source}: expected entries as this version writes them, got others ({error!r})")
 
 
-def _section(history: Timeline, title: str, told: Iterable[Sentence], nothing: str = "") -> Story:
-    """A part of the story; ``nothing`` is said where nothing else is."""
-    steps = [one if one.cycle is None else replace(one, time_s=history.time_at(one.cycle)) for one in told]
-    return Story(title, tuple(steps) or (Sentence(nothing),) * bool(nothing))
+def tell_part(history: Timeline, title: str, result: Mapping[str, Any]) -> Story:
+    """A part of the story, by its title in PARTS; ``result``: ``result.json``, or nothing."""
+    tell, nothing = PARTS[title]
+    told = list(tell(history, result)) or [Sentence(nothing)] * bool(nothing)
+    return Story(title, tuple(
+        one if one.cycle is None else replace(one, time_s=history.time_at(one.cycle)) for one in told))
 
 
-def tell_errand(history: Timeline, _: Result = NO_RESULT) -> Story:
+def _tell_errand(history: Timeline, _: Mapping[str, Any]) -> Iterator[Sentence]:
     """What was asked for, and what it was told on the way."""
     asked = history.of_kind(Command, UserReport, Redirection)
-    return _section(history, "What it was to do", [said(plainly(one), one) for one in asked if one.observed])
+    return (said(plainly(one), one) for one in asked if one.observed)
 
 
-def tell_happenings(history: Timeline, result: Result = NO_RESULT) -> Story:
+def _tell_happenings(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
     """What the simulator did to the robot and its building, as far as its result says."""
-    nothing = "The simulator did nothing to it." if result.get("happened") is not None else (
-        "What was done to the robot nobody recorded: there is no result of the simulator.")
-    return _section(history, "What was done to it", _points(read_truth(history, result), SIMULATOR), nothing)
+    yield from _points(read_truth(history, result), SIMULATOR)
+    if result.get("happened") is None:
+        yield Sentence("What was done to the robot nobody recorded: there is no result of the simulator.")
 
 
-def tell_plans(history: Timeline, _: Result = NO_RESULT) -> Story:
+def _tell_plans(history: Timeline, _: Mapping[str, Any]) -> Iterator[Sentence]:
     """Each goal, each sketch, and each that was withdrawn."""
-    told = [said(_plan(history, record), record) for record in history.of_kind(Goal, PlanSketch)]
-    return _section(history, "How it planned", [one for one in told if one.text])
+    for record in history.of_kind(Goal, PlanSketch):
+        if text := _plan(history, record):
+            yield said(text, record)
 
 
 def _plan(history: Timeline, record: EntryRecord[Any]) -> str:
@@ -241,16 +240,14 @@ def _cause(history: Timeline, ref: str) -> str:
     return sentence(record).partition(";")[0]
 
 
-def tell_lost(history: Timeline, _: Result = NO_RESULT) -> Story:
+def _tell_lost(history: Timeline, _: Mapping[str, Any]) -> Iterator[Sentence]:
     """Each time that it was lost."""
-    told: list[Sentence] = []
     found = [one for one in history.of_kind(Hypothesis)
              if turning_points.may_turn(one) and turning_points.is_found(one.value)]
     for record in history.of_kind(Discrepancy):
         if turning_points.may_turn(record) and turning_points.is_lost(record.value):
             until = next((one for one in found if one.cycle >= record.cycle), None)
-            told += sorted(_tell_loss(history, record, until), key=lambda one: one.cycle or 0)
-    return _section(history, "Lost and found", told, "It was never lost.")
+            yield from sorted(_tell_loss(history, record, until), key=lambda one: one.cycle or 0)
 
 
 def _tell_loss(
@@ -300,24 +297,20 @@ def _apart(before: Hypothesis, now: Hypothesis) -> str:
     return f", {metres(now.locale_from_robot.distance_to(before.locale_from_robot))} from where it had believed"
 
 
-def tell_contacts(history: Timeline, result: Result = NO_RESULT) -> Story:
+def _tell_contacts(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
     """What it felt; and, where the simulator says so, what it truly touched."""
-    truly = [Sentence(f"It truly touched something at {point.text}.", cycle=point.cycle)
-             for point in read_truth(history, result) if point.kind == COLLISION]
-    felt = _points(read_turning_points(history, told=True), "contact")
-    told = [*(felt or [Sentence("It felt no contact.")]), *truly]
+    yield from _points(read_turning_points(history, told=True), "contact") or [Sentence("It felt no contact.")]
+    truly = [point for point in read_truth(history, result) if point.kind == COLLISION]
+    yield from (Sentence(f"It truly touched something at {point.text}.", cycle=point.cycle) for point in truly)
     if result.get("collisions") is None:
-        told += [Sentence("What it touched without feeling it nobody recorded: there is no result of the simulator.")]
+        yield Sentence("What it touched without feeling it nobody recorded: there is no result of the simulator.")
     elif (missing := result["collisions"] - len(truly)) > 0:
-        told += [Sentence(f"The simulator counts {missing} more, and does not say where.")]
-    return _section(history, "What it touched", told)
+        yield Sentence(f"The simulator counts {missing} more, and does not say where.")
 
 
-def tell_things(history: Timeline, _: Result = NO_RESULT) -> Story:
+def _tell_things(history: Timeline, _: Mapping[str, Any]) -> list[Sentence]:
     """Doors found shut, things in the way, and what became of them; faults of its body."""
-    nothing = "No door was found otherwise than known, nothing stood in the way, and nothing failed."
-    told = _points(read_turning_points(history, told=True), "door", "thing", "fault", "resumed")
-    return _section(history, "Doors, things in the way and faults", told, nothing)
+    return _points(read_turning_points(history, told=True), "door", "thing", "fault", "resumed")
 
 
 def _points(turns: Iterable[TurningPoint], *kinds: str) -> list[Sentence]:
@@ -325,30 +318,28 @@ def _points(turns: Iterable[TurningPoint], *kinds: str) -> list[Sentence]:
     return [Sentence(f"{capital(point.text)}.", cycle=point.cycle) for point in turns if point.kind in kinds]
 
 
-def tell_camera(history: Timeline, _: Result = NO_RESULT) -> Story:
+def _tell_camera(history: Timeline, _: Mapping[str, Any]) -> Iterator[Sentence]:
     """What has turned out to be otherwise about the camera than told: each since when it was so to the end."""
-    records, told = list(history.of_kind(CameraState)), list[Sentence]()
+    records = list(history.of_kind(CameraState))
     lessons = [find_camera_lessons(records[0].value, record.value) for record in records]
     for lesson in lessons[-1] if lessons else ():
         has_it = [any(one.what == lesson.what for one in then) for then in lessons]
         since = max((i for i, has in enumerate(has_it) if not has), default=-1) + 1
-        told.append(said(f"The {lesson.text()}; known since then.", records[since], records[-1]))
-    return _section(history, "The camera", told, "The camera was found to be as told.")
+        yield said(f"The {lesson.text()}; known since then.", records[since], records[-1])
 
 
-def tell_end(history: Timeline, result: Result = NO_RESULT) -> Story:
+def _tell_end(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
     """The outcome, the last belief, and the errors that only the simulator knows."""
-    outcome = history.last(Outcome)
-    told = [] if outcome is None else [said(plainly(outcome), outcome)]
+    if (outcome := history.last(Outcome)) is not None:
+        yield said(plainly(outcome), outcome)
     if (last := history.held()) is not None:
         now = history.newest[last.id] == last.ref and history.retraction(last.ref) is None
         text = "It believed that it stood at" if now else "The last place where it had believed to stand was"
-        told.append(said(f"{text} {phrases.pose(last.value)}.", last))
-    told += [Sentence(f"{capital(text)}.") for text in result.get("starved") or ()]
+        yield said(f"{text} {phrases.pose(last.value)}.", last)
+    yield from (Sentence(f"{capital(text)}.") for text in result.get("starved") or ())
     truth = ", ".join(_truth(result))
-    told.append(Sentence(f"In truth, by the simulator's result.json: {truth}." if truth else
-                         "Where it truly was nobody recorded: there is no result of the simulator."))
-    return _section(history, "How it ended", told)
+    yield Sentence(f"In truth, by the simulator's result.json: {truth}." if truth else
+                   "Where it truly was nobody recorded: there is no result of the simulator.")
 
 
 def _truth(result: Mapping[str, Any]) -> Iterator[str]:
@@ -365,17 +356,31 @@ def _truth(result: Mapping[str, Any]) -> Iterator[str]:
         yield f"and accepted {count(wrong, 'milestone')} wrongly" if wrong else "and accepted no milestone wrongly"
 
 
-def tell_trouble(history: Timeline, result: Result = NO_RESULT) -> Story:
+def _tell_trouble(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
     """What a short account of the run does not leave out."""
-    points = [*read_truth(history, result), *read_turning_points(history, told=True)]
-    told = [Sentence(f"{point.kind}: {point.text}.", cycle=point.cycle)
-            for point in sorted(points, key=lambda point: point.cycle) if point.kind != COLLISION]
-    nothing = "Nothing went wrong." if history.last(Outcome) else "Nothing had gone wrong when the run was cut off."
-    return _section(history, "What went wrong", told, nothing)
+    truly = (point for point in read_truth(history, result) if point.kind != COLLISION)
+    points = sorted([*truly, *read_turning_points(history, told=True)], key=lambda point: point.cycle)
+    yield from (Sentence(f"{point.kind}: {point.text}.", cycle=point.cycle) for point in points)
+    if not points:
+        yield Sentence("Nothing went wrong." if history.last(Outcome) is not None else
+                       "Nothing had gone wrong when the run was cut off.")
 
 
-PARTS = (tell_errand, tell_happenings, tell_plans, tell_lost, tell_contacts, tell_things, tell_camera, tell_end)
-"""The parts of a story, in their order."""
+TROUBLE, HAPPENED, LOST, TOUCHED, ENDED = (
+    "What went wrong", "What was done to it", "Lost and found", "What it touched", "How it ended")
+PARTS: Mapping[str, tuple[Callable[[Timeline, Mapping[str, Any]], Iterable[Sentence]], str]] = {
+    "What it was to do": (_tell_errand, ""),
+    HAPPENED: (_tell_happenings, "The simulator did nothing to it."),
+    "How it planned": (_tell_plans, ""),
+    LOST: (_tell_lost, "It was never lost."),
+    TOUCHED: (_tell_contacts, ""),
+    "Doors, things in the way and faults": (
+        _tell_things, "No door was found otherwise than known, nothing stood in the way, and nothing failed."),
+    "The camera": (_tell_camera, "The camera was found to be as told."),
+    ENDED: (_tell_end, ""),
+    TROUBLE: (_tell_trouble, ""),
+}
+"""Each part of a story by its title: what tells it, and what is said where there is nothing to tell."""
 
 
 def read_milestones(history: Timeline) -> tuple[MilestoneRow, ...]:

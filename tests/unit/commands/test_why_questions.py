@@ -126,7 +126,7 @@ def test_a_detour_is_told_with_the_plan_before_and_after_and_what_lay_between() 
         steps = {step.label: step.text for step in story.steps}
         assert story.headline == "In cycle 6 it planned another way through hallway."
         assert steps["before"] == "It was to go to (2.00, 0.15) m of hallway."
-        assert "its middle is 100 mm from the line of that plan" in steps["between"]
+        assert "its middle is 0.10 m from the line of that plan" in steps["between"]
         assert steps["after"] == "In cycle 8 it was to go to (0.20, 0.90) m of hallway, then (2.00, 0.15) m of hallway."
 
 
