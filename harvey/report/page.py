@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from html import escape
 from importlib.resources import files
@@ -125,14 +125,10 @@ def _sections(story: RunStory) -> Iterator[str]:
 
 def _milestones(story: RunStory) -> Iterator[str]:
     for row in story.milestones:
-        numbers: Sequence[str] = (
-            "" if row.time_s is None else f"{row.time_s:.1f}", f"{row.matched} of {row.expected}",
-            "" if row.deviation_m is None else f"{1e3 * row.deviation_m:.1f}",
-            *("" if p is None else f"{p:.2g}" for p in (row.p_wrong, row.most_p_wrong)))
-        when, *others = (f"<td>{escape(cell)}</td>" for cell in numbers)
+        when, lines, off_mm, _, *odds = (f"<td>{escape(cell)}</td>" for cell in row.cells(""))
         name = f"<td>{escape(row.name)} {' '.join(_reference(ref) for ref in row.refs[:1])}</td>"
         verdict = f'<td class="{escape(row.verdict.replace(" ", "-"))}">{escape(row.verdict)}</td>'
-        yield f"<tr><td>{_cycle(row.cycle)}</td>{when}{name}{verdict}{''.join(others)}</tr>"
+        yield f"<tr><td>{_cycle(row.cycle)}</td>{when}{name}{verdict}{''.join((lines, off_mm, *odds))}</tr>"
 
 
 def _cycle(cycle: int | None) -> str:

@@ -14,15 +14,16 @@ from textwrap import fill
 from typing import Any
 
 from blackboard import Discrepancy, Level
-from logs.records import WHAT_IF, Candidate, EntryRecord
+from logs.records import WHAT_IF, Candidate, EntryRecord, is_a
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
 from world_models import words
 from world_models.building.locale_frame import FrameRequest
-from world_models.entries.body import Course, MotionReport, MotorCommand
+from world_models.entries.body import Course, MotionReport, MotorCommand, PictureRequest
 from world_models.entries.location import Hypothesis, Place, PlaceSearch
 from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
-from world_models.entries.task import Certificate, Goal, Leg, Milestone, PlanSketch
+from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, PlanSketch
+from world_models.entries.user_reports import Redirection, UserReport
 from world_models.words import count, degrees, landmark, listed, metres, point, quantity, size, turn
 
 UNREADABLE = (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError)
@@ -367,3 +368,51 @@ def _tell_match(history: Timeline, belief: EntryRecord[Any]) -> Iterator[str]:
         yield f"{'' if belief.value.basis == 'tracks' else 'where its pose was '}made from match {match.id} of {best}"
     elif anchor is not None:
         yield f"made from pose {anchor.ref} by {anchor.value.basis}"
+
+
+def headline(record: EntryRecord[Any]) -> str:
+    """What the entry is, as something that Harvey did where it is an act."""
+    if record.kind in (MotorCommand, Course):
+        return f"Harvey was told to {sentence(record)}."
+    if record.kind in (UserReport, Redirection):
+        return f"It {sentence(record)}."
+    if is_a(record, PictureRequest):
+        return f"A picture was taken {words.purpose(record.value.purpose)}."
+    if is_a(record, Hypothesis) and record.value.is_held:
+        if record.value.basis == "relocalization":
+            return f"It found out where it is: at {pose(record.value)}."
+        return believed(record.value)
+    return plainly(record) if sentence(record) else record.ref
+
+
+def phrase(history: Timeline, record: EntryRecord[Any]) -> str:
+    """A whole sentence of an entry, as the phrase book has it for its kind; else the kind's own."""
+    say = PHRASES.get(record.kind)
+    return plainly(record) if say is None else say(history, record)
+
+
+def tell(
+    history: Timeline, record: EntryRecord[Any] | None, label: str, *others: EntryRecord[Any] | None
+) -> list[Sentence]:
+    """The phrase of an entry, which others say too; nothing where there is no such entry."""
+    return [] if record is None else [said(phrase(history, record), record, *others, label=label)]
+
+
+def _line_of_plan(history: Timeline, record: EntryRecord[Leg]) -> str:
+    sketch = history.nearest(record, PlanSketch)
+    return line(record.value, sketch.value if sketch and sketch.id == record.value.sketch else None)
+
+
+PHRASES: Mapping[type[Any], Callable[[Timeline, EntryRecord[Any]], str]] = {
+    Leg: _line_of_plan,
+    Hypothesis: lambda _, r: believed(r.value),
+    Milestone: lambda _, r: expectation(r.value),
+    Discrepancy: lambda _, r: doubt(r.value),
+    PlanSketch: lambda _, r: plan(r.value),
+    Goal: lambda _, r: goal(r.value),
+    UserReport: lambda _, r: headline(r),
+    Redirection: lambda _, r: headline(r),
+    Command: lambda _, r: f"The user asked for it: {r.value.text}.",
+    PoseFix: lambda history, r: describe_line_match(history, r),
+    Certificate: lambda history, r: capital(verdict(r.value, history.because(r, Milestone))),
+}

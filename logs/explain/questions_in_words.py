@@ -14,10 +14,10 @@ from itertools import groupby
 from typing import Any, NamedTuple
 
 from logs.explain import phrases
-from logs.explain.phrases import Sentence, Story, describe_decision, plainly, said, sentence
+from logs.explain.phrases import Sentence, Story, describe_decision, headline, plainly, said, sentence
 from logs.explain.story import ENDED, HAPPENED, LOST, TOUCHED, TROUBLE, tell_part
 from logs.explain.true_errors import read_errors
-from logs.explain.why import headline, label_of
+from logs.explain.why import label_of
 from logs.records import EntryRecord, is_a
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput

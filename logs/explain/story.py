@@ -83,6 +83,15 @@ class MilestoneRow:
     most_p_wrong: float | None
     refs: tuple[str, ...]
 
+    def cells(self, unknown: str) -> tuple[str, ...]:
+        """Time [s], lines, deviation [mm, degrees], and the two probabilities, as a table for people has them."""
+        off_m, off_rad = self.deviation_m, self.deviation_rad
+        return (
+            unknown if self.time_s is None else f"{self.time_s:.1f}", f"{self.matched} of {self.expected}",
+            unknown if off_m is None else f"{1e3 * off_m:.1f}",
+            unknown if off_rad is None else f"{math.degrees(abs(off_rad)):.1f}",
+            *(unknown if p is None else f"{p:.2g}" for p in (self.p_wrong, self.most_p_wrong)))
+
 
 @dataclass(frozen=True, slots=True)
 class RunStory:
@@ -411,16 +420,9 @@ def milestone_lines(rows: Sequence[MilestoneRow]) -> Iterator[str]:
         shown = sorted({*failed, *rows[-MOST_ROWS // 2 :]}, key=lambda row: row.cycle)
     if len(shown) < len(rows):
         yield f"Of {len(rows)} these {len(shown)}; --json has them all."
-    yield from table(COLUMNS, [_cells(row) for row in shown]).splitlines()
-
-
-def _cells(row: MilestoneRow) -> tuple[str, ...]:
-    off_m, off_rad = row.deviation_m, row.deviation_rad
-    return (
-        str(row.cycle), "-" if row.time_s is None else f"{row.time_s:.1f}", row.name, row.verdict,
-        f"{row.matched} of {row.expected}", "-" if off_m is None else f"{1e3 * off_m:.1f}",
-        "-" if off_rad is None else f"{math.degrees(abs(off_rad)):.1f}",
-        *("-" if p is None else f"{p:.2g}" for p in (row.p_wrong, row.most_p_wrong)))
+    cells = [(row, *row.cells("-")) for row in shown]
+    lines = [(str(row.cycle), time, row.name, row.verdict, *others) for row, time, *others in cells]
+    yield from table(COLUMNS, lines).splitlines()
 
 
 def story_lines(story: RunStory) -> Iterator[str]:

@@ -10,7 +10,7 @@ from typing import Any
 from blackboard.servoing import Discrepancy
 from logs.explain import phrases
 from logs.explain.model import MAX_LISTED, WorldFile, tell_changes, tell_model_lines, tell_source
-from logs.explain.phrases import UNREADABLE, Sentence, Story, capital, describe_decision, said, sentence
+from logs.explain.phrases import UNREADABLE, Sentence, Story, capital, describe_decision, said, sentence, tell
 from logs.explain.web import find_refs
 from logs.explain.why import tell_stories
 from logs.records import WHAT_IF, EntryRecord
@@ -82,31 +82,22 @@ def _tell(
     first = revisions[0] if revisions else last
     verdicts = (history.reason(record, Certificate) for record in reversed(revisions))
     certificate = next((found for found in verdicts if found is not None), None)
-    if (doubt := history.reason(first, Discrepancy)) is not None:
-        yield said(phrases.doubt(doubt.value), doubt, label="wanted")
-    if (sketch := history.reason(first, PlanSketch)) is not None:
-        yield said(phrases.plan(sketch.value), sketch, label="wanted")
     looked = (None if certificate is None else history.reason(certificate, Milestone)) or last
-    if (belief := history.reason(looked, Hypothesis)) is not None:
-        yield said(phrases.believed(belief.value), belief, label="believed")
-    yield said(phrases.expectation(looked.value), looked, label="expected")
+    yield from tell(history, history.reason(first, Discrepancy), "wanted")
+    yield from tell(history, history.reason(first, PlanSketch), "wanted")
+    yield from tell(history, history.reason(looked, Hypothesis), "believed")
+    yield from tell(history, looked, "expected")
     if certificate is not None:
-        yield from _tell_verdict(history, certificate, world)
+        fix, *below = history.chain(certificate, PoseFix, LineMatch, Segments, CameraPicture)
+        yield from tell(history, fix, "seen", *below)
+        yield from () if fix is None else tell_model_lines(history, fix, world)
+        yield from tell(history, certificate, "judged")
         yield from _tell_consequences(history, certificate)
     elif last.fields["status"] != "withdrawn":
         yield said(f"It was never judged: when the run ended it was {last.fields['status']}.", last, label="judged")
     if last.fields["status"] == "withdrawn":
         yield said(f"The {words.source(last.author)} withdrew it in cycle {last.cycle}.", last, label="withdrawn")
         yield from tell_changes(history, last)
-
-
-def _tell_verdict(history: Timeline, certificate: EntryRecord[Any], world: WorldFile | None) -> Iterator[Sentence]:
-    fix, match, segments, frame = history.chain(certificate, PoseFix, LineMatch, Segments, CameraPicture)
-    if fix is not None:
-        yield said(phrases.describe_line_match(history, fix), fix, match, segments, frame, label="seen")
-        yield from tell_model_lines(history, fix, world)
-    verdict = phrases.verdict(certificate.value, history.because(certificate, Milestone))
-    yield said(capital(verdict), certificate, label="judged")
 
 
 def _tell_consequences(history: Timeline, certificate: EntryRecord[Any]) -> Iterator[Sentence]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TextIO
 
 from blackboard.journal import Decision, Sink, decision_record
+from logs.explain.diff import differing_leaves
 from logs.explain.phrases import describe_decision, sentence, wrap
 from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of
 from logs.timeline import Timeline, ranked
@@ -19,7 +20,9 @@ from world_models.entries.percepts import Tracks
 from world_models.entries.robot_state import CameraState, Footprint, Wheels
 from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, Outcome, PlanSketch
 from world_models.entries.user_reports import Redirection, UserReport
+from world_models.words import count
 
+DEEPEST_INDENT, FEW = 20, 2
 DEPTH = 5
 """How many steps down the walk goes unless told otherwise."""
 PRINCIPAL = (Outcome, MotorCommand, Goal, PlanSketch, Recovery, Hypothesis, Certificate, Milestone, Leg, PictureRequest)
@@ -102,33 +105,64 @@ def _change_line(word: str, change: EntryRecord[Any]) -> str:
     return f"  {word:<9} {change.ref} by {change.author}: {sentence(change)}"
 
 
-def list_reasons(history: Timeline, refs: Sequence[str], depth: int) -> Iterator[EntryRecord[Any]]:
-    """Some entries and what they rest on, each once, the nearest first, up to so many steps down.
+def walk(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Iterator[tuple[int, str, str]]:
+    """Each entry, then what it rests on, depth first; what is shared is told once, nearest to what is explained.
 
-    Raises BadInput where a reason is missing, and so is a line of the journal, or a part of one.
+    Returns:
+        steps down, ref, sentence; of an earlier revision of what rests on it only what little was different.
     """
-    known, layer = set[str](), list(refs)
-    for _ in range(depth + 1):
-        records = [record for ref in dict.fromkeys(layer) if ref not in known and (record := history.entry(ref))]
-        if not records:
-            return
-        yield from records
-        known.update(record.ref for record in records)
-        layer = [ref for record in records for ref in record.because]
-        if any(history.entry(ref) is None for ref in layer):
-            history.verify()
+    told, nearest = set[str](), _distances(history, refs, depth)
+    stack: list[tuple[int, str, EntryRecord[Any] | None]] = [(0, ref, None) for ref in reversed(refs)]
+    while stack:
+        level, name, after = stack.pop()
+        record = history.entry(name)
+        if name in told or nearest[name] < level:
+            yield level, name, f"{name}, as {'above' if name in told else 'below'}"
+        elif record is None:
+            yield level, name, f"{name}, of which the journal says nothing"
+        else:
+            told.add(name)
+            is_revised = after is not None and after.id == record.id
+            before = list(differing_leaves(record.fields, after.fields)) if after is not None and is_revised else []
+            text = f"{name}: {sentence(record)}" if not 0 < len(before) <= FEW else (
+                f"{name}: before that, {', '.join(f'{path} = {then}' for path, then, _ in before)}")
+            if level < depth:
+                stack += [(level + 1, reason, record) for reason in reversed(record.because)]
+                yield level, name, text + ", because" * bool(record.because)
+            else:
+                tail = f" (and so on: {count(len(record.because), 'reason')} below)"
+                yield level, name, text + tail * bool(record.because)
+
+
+def _distances(history: Timeline, refs: Sequence[str], depth: int) -> dict[str, int]:
+    """The fewest steps from what is explained to each entry that is at most ``depth`` steps away."""
+    nearest, layer = dict.fromkeys(refs, 0), list(refs)
+    for steps in range(1, depth + 1):
+        records = [record for ref in layer if (record := history.entry(ref)) is not None]
+        layer = [*dict.fromkeys(ref for record in records for ref in record.because if ref not in nearest)]
+        nearest |= dict.fromkeys(layer, steps)
+        if not layer:
+            break
+    return nearest
 
 
 def explain(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Iterator[str]:
-    """The same in plain sentences, each with the names of what it rests on. Raises BadInput as above."""
-    records = list(list_reasons(history, refs, depth))
-    for record in records:
-        if record.ref in refs:
-            yield wrap(f"{record.ref}: {describe_decision(history, record)}")
-        because = f"; because of {', '.join(record.because)}" if record.because else ""
-        yield wrap(f"{record.ref}: {sentence(record)}{because}", "  ", "    ")
-    if not {ref for record in records for ref in record.because} <= {record.ref for record in records}:
-        yield f"(--depth {depth + 1} goes on)"
+    """The walk in plain sentences, indented.
+
+    Raises BadInput where a reason is missing, and so is a line of the journal, or a part of one.
+    """
+    reasons = list(walk(history, refs, depth))
+    if any(history.entry(ref) is None for _, ref, _ in reasons):
+        history.verify()
+    for number, (level, ref, text) in enumerate(reasons):
+        record = history.entry(ref)
+        if level == 0 and record is not None:
+            yield from [""] * (number > 0)
+            yield wrap(f"{ref}: {describe_decision(history, record)}")
+        indent = "  " * min(level, DEEPEST_INDENT)
+        yield wrap(text, indent, indent + "    ")
+    if any(text.endswith(" below)") for _, _, text in reasons):
+        yield f"(--depth {depth + 1} goes on where it says \"and so on\")"
 
 
 def find_refs(history: Timeline, what: str | int | None) -> list[str]:

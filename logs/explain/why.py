@@ -7,7 +7,7 @@ kind of thing once, at the place nearest to what is explained, and says by name 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from blackboard import Discrepancy, Quiescence
@@ -19,17 +19,17 @@ from logs.explain.phrases import (
     Story,
     capital,
     describe_decision,
+    headline,
     named,
+    phrase,
     plainly,
     said,
-    sentence,
     tell_answer,
     wrap,
 )
 from logs.records import EntryRecord, is_a
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
-from world_models import words
 from world_models.building.locale_frame import FrameRequest, LocaleFrame
 from world_models.entries.body import (
     BodyFault,
@@ -91,21 +91,6 @@ def label_of(record: EntryRecord[Any]) -> str:
     return TOLD.get(record.kind, OTHERS)[0] or record.type
 
 
-def headline(record: EntryRecord[Any]) -> str:
-    """What the entry is, as something that Harvey did where it is an act."""
-    if record.kind in (MotorCommand, Course):
-        return f"Harvey was told to {sentence(record)}."
-    if record.kind in (UserReport, Redirection):
-        return f"It {sentence(record)}."
-    if is_a(record, PictureRequest):
-        return f"A picture was taken {words.purpose(record.value.purpose)}."
-    if is_a(record, Hypothesis) and record.value.is_held:
-        if record.value.basis == "relocalization":
-            return f"It found out where it is: at {phrases.pose(record.value)}."
-        return phrases.believed(record.value)
-    return plainly(record) if sentence(record) else record.ref
-
-
 class _Teller:
     """Tells steps; ``told`` are the keys of those that were told already, ``met`` the entries that were come to."""
 
@@ -148,7 +133,7 @@ class _Teller:
             found = self.history.nearest(record, kind)
             if found is not None and found.id != record.id:
                 key = found.id if kind in SEVERAL else found.type
-                yield from self._one(key, TOLD[kind][0], SENTENCES[kind](self.history, found), found)
+                yield from self._one(key, TOLD[kind][0], phrase(self.history, found), found)
 
     def _below(self, record: EntryRecord[Any], kind: type[Any] | None = None) -> Iterator[EntryRecord[Any]]:
         """What an entry rests on beside itself, of a kind or of any."""
@@ -165,14 +150,14 @@ class _Teller:
         if key in self.told or record.ref in self.met or len(self.told) > MOST or len(self.met) > MOST_MET:
             return
         self.met.add(record.ref)
-        label, say, frame = label_of(record), SENTENCES.get(record.kind), None
+        label, frame = label_of(record), None
         if perhaps:
             label, text = "thought", f"It may have stood at {phrases.pose(record.value)} ({record.value.weight:.0%})."
         elif is_a(record, Segments) and above.kind in (MotorCommand, PictureRequest):
             frame = self.history.reason(record, CameraPicture)
             text = f"It saw {phrases.describe_segments(record.value)}; where it is did not yet follow from them."
         else:
-            text = "" if record.kind in FOLDED else say(self.history, record) if say else plainly(record)
+            text = "" if record.kind in FOLDED else phrase(self.history, record)
         yield from self._one(key, label, text, record, frame)
         if perhaps:
             for below in self._below(record, PlaceSearch):
@@ -239,22 +224,6 @@ class _Teller:
                 yield one
 
 
-def _line(history: Timeline, record: EntryRecord[Leg]) -> str:
-    sketch = history.nearest(record, PlanSketch)
-    return phrases.line(record.value, sketch.value if sketch and sketch.id == record.value.sketch else None)
-
-
-SENTENCES: Mapping[type[Any], Callable[[Timeline, EntryRecord[Any]], str]] = {
-    Leg: _line,
-    Hypothesis: lambda _, r: phrases.believed(r.value),
-    Milestone: lambda _, r: phrases.expectation(r.value),
-    Discrepancy: lambda _, r: phrases.doubt(r.value),
-    PlanSketch: lambda _, r: phrases.plan(r.value),
-    Goal: lambda _, r: phrases.goal(r.value),
-    UserReport: lambda _, r: headline(r),
-    Redirection: lambda _, r: headline(r),
-    Command: lambda _, r: f"The user asked for it: {r.value.text}.",
-}
 OTHERS: tuple[str, None] = ("", None)
 TOLD: Mapping[type[Any], tuple[str, tuple[type[Any], ...] | None]] = {
     BodyFault: ("fault", None),

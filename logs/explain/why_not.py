@@ -12,8 +12,7 @@ from collections.abc import Iterator
 from enum import Enum
 from typing import Any, NamedTuple
 
-from logs.explain.phrases import sentence
-from logs.explain.why import headline
+from logs.explain.phrases import headline, sentence
 from logs.records import Candidate, DecisionRecord, EntryRecord
 from logs.timeline import Timeline
 from world_models import words

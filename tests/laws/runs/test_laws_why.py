@@ -21,7 +21,7 @@ from harvey.errors import BadInput
 from harvey.wiring import load_kinds
 from logs.explain.diff import describe, differing_leaves, first_difference
 from logs.explain.phrases import sentence
-from logs.explain.web import SENSOR, Trace, explain, explained_by, holds, list_reasons, trace_grounds
+from logs.explain.web import SENSOR, Trace, explain, explained_by, holds, trace_grounds, walk
 from logs.explain.why import lines_of, story
 from logs.explain.why_not import Fate, in_cycle, in_run, of_entry
 from logs.records import Candidate, DecisionRecord, EntryRecord, as_line, decision_of
@@ -30,6 +30,7 @@ from memory_timeline import MemoryTimeline
 from strategies import Note, Scripted, Tally
 
 LAWS = settings(deadline=None, max_examples=60)
+KNOWN = re.compile(", as (above|below)$")
 
 
 def wilful(choices: list[int]) -> Scripted:
@@ -100,16 +101,35 @@ def within(known: dict[str, EntryRecord], ref: str, steps: int) -> set[str]:
 
 
 @LAWS
-@given(journals(), st.integers(0, 10**6), st.integers(0, 5) | st.just(10**6))
-def test_what_an_entry_rests_on_is_listed_once_so_many_steps_down(lines: list[str], pick: int, depth: int) -> None:
+@given(journals(), st.integers(0, 10**6))
+def test_the_whole_walk_is_the_closure_and_tells_each_entry_once(lines: list[str], pick: int) -> None:
     decisions = read(lines)
     known, history = entries(decisions), MemoryTimeline(decisions)
     ref = sorted(known)[pick % len(known)]
-    listed = [record.ref for record in list_reasons(history, [ref], depth)]
-    assert len(listed) == len(set(listed))
-    assert set(listed) == (within(known, ref, depth) if depth <= 5 else grounds(known, ref))
-    last = list(explain(history, [ref], depth))[-1]
-    assert ("--depth" in last) == (set(listed) != grounds(known, ref))
+    told = [name for _, name, text in walk(history, [ref], depth=10**6) if not KNOWN.search(text)]
+    assert len(told) == len(set(told))
+    assert set(told) == grounds(known, ref)
+
+
+@LAWS
+@given(journals(), st.integers(0, 10**6), st.integers(0, 5))
+def test_a_short_walk_is_the_beginning_of_the_whole_and_says_what_it_leaves_out(
+    lines: list[str], pick: int, depth: int
+) -> None:
+    decisions = read(lines)
+    known, history = entries(decisions), MemoryTimeline(decisions)
+    ref = sorted(known)[pick % len(known)]
+    reasons = list(walk(history, [ref], depth))
+    assert max(level for level, _, _ in reasons) <= depth
+    told = [name for _, name, text in reasons if not KNOWN.search(text)]
+    assert len(told) == len(set(told))
+    assert set(told) == within(known, ref, depth)
+    hidden = [len(known[name].because) if level == depth and not KNOWN.search(text) else 0
+              for level, name, text in reasons]
+    for more, (_, _, text) in zip(hidden, reasons, strict=True):
+        assert (f"(and so on: {more} reason" in text) == (more > 0)
+    lines_told = list(explain(history, [ref], depth))
+    assert ("--depth" in lines_told[-1]) == any(hidden)
 
 
 @LAWS

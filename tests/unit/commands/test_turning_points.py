@@ -20,7 +20,7 @@ from harvey.campaign.summary import format_result
 from harvey.errors import BadInput
 from harvey.runner.result import MissionResult, RunCounts
 from harvey.simulation.contacts import ContactWatch
-from logs.explain.phrases import describe_decision
+from logs.explain.phrases import describe_decision, headline
 from logs.explain.story import HAPPENED, levels_off, tell_part
 from logs.explain.turning_points import (
     Collision,
@@ -30,7 +30,7 @@ from logs.explain.turning_points import (
     read_turning_points,
     turn_lines,
 )
-from logs.explain.why import headline, story
+from logs.explain.why import story
 from logs.records import DecisionRecord, decision_of
 from logs.run_directory import RunDirectory
 from memory_timeline import MemoryTimeline
