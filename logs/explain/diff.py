@@ -41,8 +41,14 @@ Records = Sequence[EntryRecord[Any]]
 Maybe = EntryRecord[Any] | None
 
 
-ABSENT = object()
-"""Stands for a value that is not there."""
+class _Absent:
+    """A value that is not there."""
+
+    def __str__(self) -> str:
+        return "nothing"
+
+
+ABSENT = _Absent()
 
 
 def first_difference(
@@ -129,8 +135,7 @@ def _against(path: str, a: Any, b: Any) -> str:
 
 def _short(value: Any) -> str:
     """A value in a few words."""
-    text = "nothing" if value is ABSENT else (
-        f"{len(value)} values" if isinstance(value, list) and len(value) > 4 else str(value))
+    text = f"{len(value)} values" if isinstance(value, list) and len(value) > 4 else str(value)
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 

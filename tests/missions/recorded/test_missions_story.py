@@ -139,13 +139,6 @@ def test_each_contact_is_told_with_its_cycle(told: tuple[str, Path], story: RunS
     assert all(re.search(r"\(-?[0-9.]+, -?[0-9.]+\) m", s.text) for s in section.steps if s.cycle is not None)
 
 
-def test_its_first_lines_open_why(
-    told: tuple[str, Path], story: RunStory, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["why", str(told[1])]) == 0
-    assert capsys.readouterr().out.startswith("\n".join(story.opening))
-
-
 def test_the_story_of_a_replayed_run_is_the_same(told: tuple[str, Path], story: RunStory) -> None:
     run = RunDirectory(told[1])
     agent = build_agent(RunHead.read(run.path))
@@ -193,21 +186,6 @@ def test_how_far_off_it_was_is_what_the_recording_has_drawn(told: tuple[str, Pat
         (error,) = [errors[cycle]] if cycle in errors else read_errors(run, history, cycle)
         assert 1e3 * error.off_m == pytest.approx(math.hypot(*values), abs=0.01)
     assert read_errors(run, history, max(errors)) == [errors[max(errors)]]
-
-
-def test_the_questions_after_a_bad_run_are_answered_without_the_viewer(
-    told: tuple[str, Path], history: Timeline, story: RunStory, capsys: pytest.CaptureFixture[str]
-) -> None:
-    run = str(told[1])
-    for question, kind in (("when was it lost?", "lost"), ("where did it touch anything?", "contact")):
-        assert main(["why", run, question]) == 0
-        answer = capsys.readouterr().out
-        assert all(f"In cycle {point.cycle}" in answer for point in story.turning_points if point.kind == kind)
-    last = history.cycles[-1]
-    assert main(["why", run, "how far off was it in truth?", "--at", str(last)]) == 0
-    assert f"In cycle {last} it stood " in capsys.readouterr().out
-    assert main(["why", run, "how far off was it?", "--at", str(last + 1)]) == 2
-    assert f"got {last + 1}" in capsys.readouterr().err
 
 
 def test_without_the_recording_nothing_is_said_of_the_truth(

@@ -142,11 +142,6 @@ def test_every_line_of_every_explanation_ends_in_goal_model_or_sensor(history: T
     assert found.by_kind["model"] > 100
 
 
-def test_what_was_told_is_in_the_first_lines(run: RunDirectory, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["why", str(run.path)]) == 0
-    assert re.search(rf"^  cycle \d+ .* told  {DOOR} is shut", capsys.readouterr().out, re.MULTILINE)
-
-
 def test_a_door_a_landmark_and_a_room_are_answered_by_name(
     run: RunDirectory, history: Timeline, store: FrameStore, capsys: pytest.CaptureFixture[str]
 ) -> None:
