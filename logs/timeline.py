@@ -1,4 +1,5 @@
-"""Timeline: a recorded run asked by name: every revision of every entry, the decision that made it, what it rests on.
+"""Timeline: a recorded run asked by name: every revision of every entry, the decision that made it, what it rests on;
+and, of a run that goes on, a mirror of its board.
 
 Where each entry stands in the journal is found in one sweep over its bytes, and only the lines that are needed are
 read. No index is kept beside the journal: the sweep over an hour's journal takes a tenth of a second, and what a line
@@ -18,6 +19,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from blackboard import Blackboard, Change, Entry, Retracted, View
 from logs.records import Candidate, DecisionRecord, EntryRecord, check_step, decision_at, is_a
 from logs.run_directory import check_version
 from logs.run_errors import BadInput
@@ -338,3 +340,27 @@ def time_told(get: Callable[[str], Any]) -> float | None:
     if isinstance(since, int | float) and isinstance(waited, int | float):
         value = since + waited
     return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+
+
+KEPT = 64
+"""So many entries of a type are remembered, the newest: nothing older is asked for, and a long run does not grow."""
+
+
+class Mirror(View):
+    """A view of the newest entries of each type."""
+
+    def __init__(self, kept: int = KEPT) -> None:
+        super().__init__(Blackboard())
+        self._kept = kept
+
+    def take(self, *changes: Change) -> None:
+        """Follow some changes."""
+        for change in changes:
+            self._board.follow(change)
+            if not isinstance(change, Retracted) and len(same := self.all(type(change.entry.value))) > self._kept:
+                self._board.forget(same[0].id)
+
+
+def find_belief(board: View) -> Entry[Hypothesis] | None:
+    """The hypothesis that is acted on."""
+    return board.latest(Hypothesis, lambda value: value.is_held)

@@ -420,8 +420,10 @@ def milestone_lines(rows: Sequence[MilestoneRow]) -> Iterator[str]:
         shown = sorted({*failed, *rows[-MOST_ROWS // 2 :]}, key=lambda row: row.cycle)
     if len(shown) < len(rows):
         yield f"Of {len(rows)} these {len(shown)}; --json has them all."
-    cells = [row.cells("-") for row in shown]
-    lines = [(str(row.cycle), each[0], row.name, row.verdict, *each[1:]) for row, each in zip(shown, cells, strict=True)]
+    lines = []
+    for row in shown:
+        time, *others = row.cells("-")
+        lines.append((str(row.cycle), time, row.name, row.verdict, *others))
     yield from table(COLUMNS, lines).splitlines()
 
 

@@ -12,10 +12,9 @@ from typing import Any
 
 from blackboard import Decision, Discrepancy, Level, Posted, Retracted
 from logs.explain.phrases import milestone_of, wrap
-from logs.mirror import Mirror, find_belief
 from logs.records import EntryRecord, Opaque
 from logs.run_errors import BadInput
-from logs.timeline import Timeline, time_told
+from logs.timeline import Mirror, Timeline, find_belief, time_told
 from world_models import words
 from world_models.entries.body import BodyFault
 from world_models.entries.door_state import DoorState

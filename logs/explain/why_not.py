@@ -33,7 +33,6 @@ class Fate(Enum):
     REFUSED = "acted, and was refused"
     DROPPED = "was dropped"
     OUTRANKED = "was not chosen"
-    ABSENT = "was not considered"
 
 
 class Occasion(NamedTuple):

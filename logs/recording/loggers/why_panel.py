@@ -13,12 +13,12 @@ from blackboard import Discrepancy, Entry, View
 from blackboard.kinds import always
 from logs.explain import phrases
 from logs.explain.turning_points import SIMULATOR, Happening, TurningPoint, TurningPointFinder
-from logs.mirror import find_belief
 from logs.recording.logger import Logger, Moment, Panel, Subject, log_view
 from logs.recording.loggers.lanes import ACTIVITY_KINDS, activity, doubts, leg_under_way
 from logs.recording.palette import BELIEVED, DONE, LEVELS, MATCHED, PLANNED, REJECTED, REVISED, TRUE, VERDICTS, Colour
 from logs.recording.paths import CHAPTERS, DESCRIPTION, WHY
 from logs.recording.stream import RecordingStream, viewable
+from logs.timeline import find_belief
 from world_models import words
 from world_models.entries.body import BodyFault, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis
