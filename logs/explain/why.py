@@ -77,8 +77,10 @@ def story(history: Timeline, record: EntryRecord[Any], world: WorldFile | None =
     """
     teller = _Teller(history, world)
     try:
-        steps = [*teller.own(record), *teller.reasons(record), *model.tell_used(history, record),
-                 *teller.context(record)]
+        own: Iterable[Sentence] = tell_answer(history, record) if record.kind is FrameRequest else ()
+        if record.kind is LocaleFrame and world is not None:
+            own = (said(tell_source(world, record.value.locale), record, label="described"),)
+        steps = [*own, *teller.reasons(record), *model.tell_used(history, record), *teller.context(record)]
         head = phrases.in_one_sentence(history, record) or headline(record)
     except UNREADABLE:
         below = itertools.islice(history.within(record), 1, MOST_PLAIN)
@@ -97,13 +99,6 @@ class _Teller:
     def __init__(self, history: Timeline, world: WorldFile | None) -> None:
         self.history, self.world = history, world
         self.told, self.met = set[str](), set[str]()
-
-    def own(self, record: EntryRecord[Any]) -> Iterator[Sentence]:
-        """What is said of an entry itself, beside its headline."""
-        if record.kind is FrameRequest:
-            yield from tell_answer(self.history, record)
-        elif record.kind is LocaleFrame and self.world is not None:
-            yield said(tell_source(self.world, record.value.locale), record, label="described")
 
     def reasons(self, record: EntryRecord[Any]) -> Iterator[Sentence]:
         """What an entry rests on, below the entry itself."""
