@@ -280,10 +280,18 @@ class Timeline:
         return None
 
     def near(self, text: str) -> list[str]:
-        """Names of entries that are spelt like one that is not there; else the first and the last."""
-        lower = {id.lower(): id for id in self.newest}
-        near = difflib.get_close_matches(text.lower().partition(".")[0], lower, n=4, cutoff=0.5)
-        return [lower[name] for name in near] or [*self.newest][:1] + [*self.newest][-1:]
+        """Names like one that is not there: of the same kind with near numbers, else of a kind that is spelt alike."""
+        numbers: dict[str, list[int]] = {}
+        for head, _, number in (id.rpartition("-") for id in self.newest):
+            numbers.setdefault(head, []).extend([int(number)] if number.isdecimal() else [])
+        kinds = {kind.lower(): kind for kind in numbers}
+        kind, _, rest = text.rpartition("-")
+        alike = difflib.get_close_matches((kind or text).lower(), sorted(kinds), n=2, cutoff=0.6)
+        if not alike:
+            return [*self.newest][:1] + [*self.newest][-1:]
+        wanted = int(rest.partition(".")[0]) if rest.partition(".")[0].isdecimal() else 1
+        return [f"{kinds[name]}-{n}" for name in alike
+                for n in sorted(numbers[kinds[name]], key=lambda n: (abs(n - wanted), n))[:2]]
 
     def _sweep(self) -> None:
         """Note where each cycle and each entry stands. What stands in an unusual line is read from it.

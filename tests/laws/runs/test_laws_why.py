@@ -18,12 +18,12 @@ from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.journal import Decision, decision_line
 from blackboard.scheduler import Scheduler
 from harvey.errors import BadInput
+from harvey.replay.why_not_again import Fate, in_cycle, in_run, of_entry
 from harvey.wiring import load_kinds
 from logs.explain.diff import describe, differing_leaves, first_difference
 from logs.explain.phrases import sentence
 from logs.explain.web import SENSOR, Trace, explain, explained_by, holds, trace_grounds, walk
 from logs.explain.why import lines_of, story
-from logs.explain.why_not import Fate, in_cycle, in_run, of_entry
 from logs.records import Candidate, DecisionRecord, EntryRecord, as_line, decision_of
 from logs.timeline import Timeline
 from memory_timeline import MemoryTimeline

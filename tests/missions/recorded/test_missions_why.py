@@ -17,12 +17,11 @@ from blackboard.scheduler import registry_of
 from experiments.scale.explanations import write_hour
 from harvey.agent import Agent, build_agent
 from harvey.cli import main
-from harvey.replay.why_not_again import AskedView, board_at, changes, why_absent
+from harvey.replay.why_not_again import AskedView, board_at, changes, in_cycle, why_absent
 from logs.explain.diff import grounds, parting, same
 from logs.explain.phrases import describe_decision
 from logs.explain.web import check
 from logs.explain.why import lines_of, story
-from logs.explain.why_not import in_cycle
 from logs.run_head import RunHead
 from logs.timeline import Timeline
 from recorded_runs import Recorded

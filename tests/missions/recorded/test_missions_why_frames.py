@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from harvey.cli import main
+from harvey.replay.why_not_again import Fate, in_cycle, in_run
 from logs.explain.model import WorldFile
 from logs.explain.phrases import Sentence, Story, describe_decision
 from logs.explain.web import check
 from logs.explain.why import lines_of, story
-from logs.explain.why_not import Fate, in_cycle, in_run
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
 from logs.timeline import Timeline

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 
 from blackboard.journal import plain
+from harvey.replay.why_not_again import Fate, in_run
 from logs.explain.model import tell_changes, tell_used
 from logs.explain.phrases import Sentence, sentence
 from logs.explain.subjects import milestone_story
 from logs.explain.web import MODEL, Trace, kind_of
 from logs.explain.why import story
-from logs.explain.why_not import Fate, in_run
 from logs.records import Candidate, DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
 from world_models.building.locale_frame import FrameChange, FrameReference, FrameRequest
