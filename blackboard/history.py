@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +30,12 @@ class History:
         self._changes: dict[str, Record] = {}
         for number, line in enumerate(lines, 1):
             try:
-                record = json.loads(line)
-                self._note(record)
+                self._note(line)
             except (ValueError, TypeError, KeyError):
                 raise ValueError(f"line {number}: expected a decision, got {line[:80]!r}") from None
-            self.lines.append(line)
 
     def __call__(self, decision: Decision) -> None:
-        line = decision_line(decision)
-        self.lines.append(line)
-        self._note(json.loads(line))
+        self._note(decision_line(decision))
 
     def save(self, path: Path | str) -> None:
         """Write it as a journal. Raises OSError."""
@@ -81,19 +78,33 @@ class History:
                 return cycle
         return None
 
-    def _note(self, decision: Record) -> None:
-        for record in (*decision["observed"], *decision["made"]):
-            if record["change"] != "Retracted":
-                self._changes[record["entry"]] = {**record, "cycle": decision["cycle"],
-                                                  "outside": record in decision["observed"]}
+    def parts_from(self, other: History) -> str:
+        """The first cycle in which two runs differ, and in what, in words; "" where they are the same."""
+        for cycle, (one, two) in enumerate(zip_longest(self.lines, other.lines), 1):
+            if one == two:
+                continue
+            if one is None or two is None:
+                return f"cycle {cycle}: the {'first' if one is None else 'second'} run has ended"
+            first, second = json.loads(one), json.loads(two)
+            key = next(key for key in {**first, **second} if first.get(key) != second.get(key))
+            ours, theirs = _brief(first.get(key)), _brief(second.get(key))
+            return f"cycle {cycle}: {key} is {ours} in the first run, {theirs} in the second"
+        return ""
+
+    def _note(self, line: str) -> None:
+        decision = json.loads(line)
+        for whence, key in (("from", "observed"), ("by", "made")):
+            self._changes |= {record["entry"]: {**record, "cycle": decision["cycle"], "whence": whence}
+                              for record in decision[key] if record["change"] != "Retracted"}
+        self.lines.append(line)
 
     def _tell(self, ref: str, depth: int, told: set[str]) -> Iterator[str]:
         record, indent = self._changes.get(ref), "  " * depth
         if record is None:
             yield f"{indent}{ref}"
             return
-        whence = "from" if record["outside"] else "by"
-        yield f"{indent}{ref}: {_brief(record['value'])} ({whence} {record['author']}, cycle {record['cycle']})"
+        whence = f"{record['whence']} {record['author']}, cycle {record['cycle']}"
+        yield f"{indent}{ref}: {_brief(record['value'])} ({whence})"
         for below in record["because"]:
             if below in told:
                 yield f"{indent}  {below}: see above"

@@ -21,10 +21,8 @@ from typing import Any, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.entry import Entry
-from blackboard.journal import Decision
+from blackboard import Decision, Entry, KnowledgeSource
 from blackboard.kinds import Registry
-from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import registry_of
 from harvey import wiring
 from harvey.agent import Sources, build_agent
@@ -37,8 +35,9 @@ from harvey.simulation.simulated_run import build_head, run_mission
 from knowledge_sources.settings import Settings
 from logs import run_directory
 from logs.explain.model import WorldFile
+from logs.explain.phrases import Story
 from logs.explain.subjects import stories_of
-from logs.explain.why import Story, lines_of
+from logs.explain.why import lines_of
 from logs.pictures import open_pictures
 from logs.reader import read_true_track
 from logs.records import DecisionRecord, EntryRecord, entry_of, knowing, read_records

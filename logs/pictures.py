@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 
 from logs.mjpeg_file import Pictures
-from logs.records import DecisionRecord, EntryRecord, is_a, read_records
+from logs.records import EntryRecord
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
+from logs.timeline import Timeline
 from world_models.entries.body import CameraPicture
 from world_models.files.regular_files import MOST_BYTES
 
@@ -21,7 +22,7 @@ def open_pictures(run: RunDirectory) -> Mapping[int, bytes]:
         BadInput: the journal cannot be read, or the camera file is shorter than what it tells of.
         RecordingError: there is no camera file, and the recording cannot be read.
     """
-    sizes = list(_sizes(read_records(run.journal)))
+    sizes = [_size(record) for record in Timeline(run.journal).of_kind(CameraPicture)]
     if sizes and not run.camera.is_file():
         from logs.reader import read_frames
 
@@ -38,32 +39,27 @@ def camera_bytes(run: RunDirectory) -> int:
     return run.camera.stat().st_size if run.camera.is_file() else 0
 
 
-def _sizes(decisions: Iterable[DecisionRecord]) -> Iterator[tuple[int, int]]:
-    """(number, bytes) of every picture that was seen, in the order in which they came."""
-    for record in (record for decision in decisions for record in decision.observed if is_a(record, CameraPicture)):
-        try:
-            number, size = int(record.fields["number"]), int(record.fields["jpeg"]["bytes"])
-            if not 0 <= size <= MOST_BYTES:
-                raise ValueError
-            yield number, size
-        except (KeyError, TypeError, ValueError):
-            raise BadInput(f"{record.ref}: expected a picture's number and length, got {record.fields!r}") from None
+def _size(record: EntryRecord[CameraPicture]) -> tuple[int, int]:
+    """Number and bytes of a picture that was seen."""
+    try:
+        number, size = int(record.fields["number"]), int(record.fields["jpeg"]["bytes"])
+        if not 0 <= size <= MOST_BYTES:
+            raise ValueError
+        return number, size
+    except (KeyError, TypeError, ValueError):
+        raise BadInput(f"{record.ref}: expected a picture's number and length, got {record.fields!r}") from None
 
 
 def find_picture(run: RunDirectory, cycle: int) -> EntryRecord[CameraPicture]:
     """The newest picture that the board had seen in a cycle. Raises BadInput where there is none, or no such cycle."""
-    newest, first, last = None, 0, 0
-    for decision in read_records(run.journal):
-        last = decision.cycle
-        for record in decision.changes:
-            if is_a(record, CameraPicture) and record.is_new:
-                first = first or last
-                newest = record if last <= cycle else newest
-    if first == 0:
+    history = Timeline(run.journal)
+    pictures = list(history.of_kind(CameraPicture))
+    if not pictures:
         raise BadInput(f"--picture: expected a run with pictures, got {run.path}, which has none")
-    if newest is None or cycle > last:
+    first, last = pictures[0].cycle, history.cycles[-1]
+    if not first <= cycle <= last:
         raise BadInput(f"--picture: expected a cycle from the first picture to the end, {first} to {last}, got {cycle}")
-    return newest
+    return [picture for picture in pictures if picture.cycle <= cycle][-1]
 
 
 LINE_COLOURS: Mapping[str, str] = {"found": "#9adfff", "expected": "#ffd84a", "agreed": "#54f08f"}

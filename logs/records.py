@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Generic, TypeGuard, TypeVar, cast, get_args
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeGuard, TypeVar, cast, get_args
 
 import numpy as np
 
@@ -363,13 +363,8 @@ def _get(data: Any, key: str, kind: type | tuple[type, ...]) -> Any:
     return value
 
 
-@dataclass(frozen=True, slots=True)
-class Originals:
-    """What the journal names only by reference.
-
-    Attributes:
-        pictures: number -> JPEG bytes.
-        frames: of the world's locales.
+class Originals(NamedTuple):
+    """What the journal names only by reference: JPEG bytes by number of the picture, and frames of the world's locales.
     """
 
     pictures: Mapping[int, bytes]
@@ -388,24 +383,23 @@ def effect_of(record: EntryRecord[Any], originals: Originals, view: View, kinds:
     """
     because = refs_of(record.because)
     if record.is_new:
-        return Post(original_of(record, originals, kinds), because)
+        return Post(value_of(record, kinds, *originals), because)
     entry = view.get(record.id)
     if entry is None:
         raise BadInput(f"{record.ref}: expected an entry on the board, got none")
     if record.is_gone:
         return Retract(entry, refs_of(record.retracted_because))
-    return Revise(entry, original_of(record, originals, kinds), because)
+    return Revise(entry, value_of(record, kinds, *originals), because)
 
 
-def original_of(record: EntryRecord[Any], originals: Originals, kinds: Registry) -> Any:
-    """The value itself, with what the journal keeps by reference. Raises BadInput where it does not fit its kind."""
-    return _value(record, kinds, originals.pictures, originals.frames)
-
-
-def _value(
-    record: EntryRecord[Any], kinds: Registry, pictures: Mapping[int, bytes] | None, frames: FrameStore | None
+def value_of(
+    record: EntryRecord[Any], kinds: Registry, pictures: Mapping[int, bytes] | None = None,
+    frames: FrameStore | None = None,
 ) -> Any:
-    """As :func:`original_of`; without pictures or frames the value has no bytes, or is the reference."""
+    """The value itself; without pictures or frames it has no bytes, or is the reference.
+
+    Raises BadInput where it does not fit its kind.
+    """
     if record.type not in kinds:
         raise BadInput(f"{record.ref}: expected a kind of entry that is known here ({', '.join(sorted(kinds))}), got a "
                        f"{record.type}: is the package that brings it installed?")
@@ -440,7 +434,7 @@ def entry_of(record: EntryRecord[Any], kinds: Registry, store: FrameStore | None
 
     Raises BadInput where the value is of a kind that is not known, or does not fit it.
     """
-    value, ref = _value(record, kinds, None, store), ref_of(record.ref)
+    value, ref = value_of(record, kinds, None, store), ref_of(record.ref)
     return Entry(ref.id, ref.revision, value, record.author, cycle_of_writing(record), refs_of(record.because))
 
 

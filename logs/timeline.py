@@ -1,4 +1,5 @@
-"""Timeline: a recorded run asked by name: every revision of every entry, the decision that made it, what it rests on.
+"""Timeline: a recorded run asked by name: every revision of every entry, the decision that made it, what it rests on;
+and, of a run that goes on, a mirror of its board.
 
 Where each entry stands in the journal is found in one sweep over its bytes, and only the lines that are needed are
 read. No index is kept beside the journal: the sweep over an hour's journal takes a tenth of a second, and what a line
@@ -18,6 +19,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from blackboard import Blackboard, Change, Entry, Retracted, View
 from logs.disk import MOST_JOURNAL_BYTES
 from logs.records import Candidate, DecisionRecord, EntryRecord, check_step, decision_at, is_a
 from logs.run_directory import check_version
@@ -132,6 +134,10 @@ class Timeline:
         """All revisions of locale frames, each by what the journal keeps of it."""
         return cast(Iterator[EntryRecord[FrameReference]], self.of_kind(LocaleFrame, until=until))
 
+    def last(self, kind: type[K]) -> EntryRecord[K] | None:
+        """The last revision of the newest entry of a kind; None where there is none."""
+        return next(iter([*self.last_of_kind(kind)][-1:]), None)
+
     def last_of_kind(self, kind: type[K]) -> Iterator[EntryRecord[K]]:
         """The last revision of each entry of a kind, in the order in which the entries came about."""
         return (record for id in self.ids_of(kind) if (record := self.entry(self.newest[id])) is not None)
@@ -191,8 +197,8 @@ class Timeline:
         if not self.newest:
             self.verify()
             raise BadInput(f"{self.source}: expected at least one entry, got none")
-        outcomes = self.ids_of(Outcome)
-        return self.newest[outcomes[-1]] if outcomes else self.refs[-1]
+        last = self.last(Outcome)
+        return self.refs[-1] if last is None else last.ref
 
     @property
     def cut_off(self) -> int | None:
@@ -247,6 +253,13 @@ class Timeline:
             if found.fields["basis"] not in ("tracks", "odometry") and found.author != YAW_CALIBRATOR:
                 return found
         return None
+
+    def held(self, until: int | None = None) -> EntryRecord[Hypothesis] | None:
+        """The newest belief that was held in a cycle or before it, or at the end."""
+        refs = [ref for ref in self.refs if ref.startswith("Hypothesis-")]
+        past = refs if until is None else refs[: bisect_right(refs, until, key=self.cycle_of_ref)]
+        records = (record for ref in reversed(past) if (record := self.entry(ref)) is not None)
+        return next((record for record in records if record.field("status") == "held"), None)
 
     def resolve(self, text: str) -> str:
         """The ref that a user means: ``MotorCommand-12.3``, or ``MotorCommand-12`` for its last revision.
@@ -337,3 +350,27 @@ def time_told(get: Callable[[str], Any]) -> float | None:
     if isinstance(since, int | float) and isinstance(waited, int | float):
         value = since + waited
     return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+
+
+KEPT = 64
+"""So many entries of a type are remembered, the newest: nothing older is asked for, and a long run does not grow."""
+
+
+class Mirror(View):
+    """A view of the newest entries of each type."""
+
+    def __init__(self, kept: int = KEPT) -> None:
+        super().__init__(Blackboard())
+        self._kept = kept
+
+    def take(self, *changes: Change) -> None:
+        """Follow some changes."""
+        for change in changes:
+            self._board.follow(change)
+            if not isinstance(change, Retracted) and len(same := self.all(type(change.entry.value))) > self._kept:
+                self._board.forget(same[0].id)
+
+
+def find_belief(board: View) -> Entry[Hypothesis] | None:
+    """The hypothesis that is acted on."""
+    return board.latest(Hypothesis, lambda value: value.is_held)

@@ -22,10 +22,9 @@ from blackboard.journal import decision_record, plain
 from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler
 from harvey.agent import Agent, build_agent
-from harvey.replay.why_not_again import why_absent
+from harvey.replay.why_not_again import Fate, in_cycle, why_absent
 from harvey.runner.replay import open_originals, replay
 from logs.explain.phrases import describe_decision
-from logs.explain.why_not import Fate, in_cycle
 from logs.records import WHAT_IF, DecisionRecord, EntryRecord, decision_of
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead

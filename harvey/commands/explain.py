@@ -15,7 +15,7 @@ from logs.disk import is_being_written
 from logs.run_directory import RunDirectory, open_run
 
 if TYPE_CHECKING:
-    from logs.explain.why import Story
+    from logs.explain.phrases import Story
     from logs.timeline import Timeline
 
 
@@ -39,6 +39,8 @@ def _add_why_arguments(parser: ArgumentParser) -> None:
 def _run_why(args: Namespace) -> int:
     from logs.explain.questions_in_words import is_question
     from logs.explain.story import opening
+    from logs.explain.web import cycle_lines, explain
+    from logs.explain.why import LEGEND, lines_of
     from logs.timeline import Timeline
 
     asked = [name for name in ("entry", "milestone", "not_") if getattr(args, name) is not None]
@@ -48,31 +50,35 @@ def _run_why(args: Namespace) -> int:
         raise BadInput("expected one of NAME, --at, --milestone, --not and --check; --not and a question also go with"
                        " --at")
     run = open_run(args.run)
-    history = Timeline(run.journal)
+    history, of_the_end = Timeline(run.journal), not asked and args.at is None
     if args.check:
         return _print_check(history, args.json)
     if args.not_ is not None:
-        _print_not(run, history, args)
-        return 0
+        return _print_not(run, history, args)
     stories = list(_stories(run, history, args))
-    if not asked and args.at is None and history.cut_off is not None:
+    if of_the_end and history.cut_off is not None:
         print(_describe_unfinished(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
     if args.json:
         print(json.dumps([_record(one) for one in stories], indent=2))
-    else:
-        if not asked and args.at is None:
-            print("\n".join([*opening(run, history), ""]))
-        print("\n".join(_paragraphs(history, args, stories)))
+        return 0
+    parts = [[*opening(run, history)]] * of_the_end
+    if args.at is not None and args.entry is None:
+        parts.append([*cycle_lines(history.decision(args.at), history.candidates(args.at))])
+    parts += [[*lines_of(one)] for one in stories] or [[]]
+    refs = [one.ref for one in stories if args.milestone is None and one.ref and history.find(one.ref) is not None]
+    if args.depth is not None and refs:
+        parts.append(["Entry by entry:", *explain(history, refs, args.depth)])
+    parts += [[LEGEND]] * of_the_end
+    print("\n\n".join("\n".join(lines) for lines in parts))
     return 0
 
 
 def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
     """What to say first of a run that has no outcome."""
-    if is_being_written(run.journal):
-        return f"The run is still going on, in cycle {cycle} or later.\nThe last thing that its journal tells of:\n"
-    go_on = f"harvey resume {run.path} goes on with it"
-    return (f"The run was cut off in cycle {cycle}, before it had an outcome: {go_on}.\n"
-            "The last thing that its journal tells of:\n")
+    what = (f"The run is still going on, in cycle {cycle} or later." if is_being_written(run.journal) else
+            f"The run was cut off in cycle {cycle}, before it had an outcome: harvey resume {run.path} goes on with"
+            " it.")
+    return f"{what}\nThe last thing that its journal tells of:\n"
 
 
 def _stories(run: RunDirectory, history: Timeline, args: Namespace) -> Iterator[Story]:
@@ -83,59 +89,41 @@ def _stories(run: RunDirectory, history: Timeline, args: Namespace) -> Iterator[
     world = WorldFile(run)
     if args.entry is not None and is_question(args.entry):
         yield from answers(history, args.entry, args.at, run)
-        return
-    if args.milestone is None:
+    elif args.milestone is not None:
+        yield from (milestone_story(history, id, world) for id in milestones(history, args.milestone))
+    else:
         yield from stories_of(history, args.entry if args.at is None else args.at, world)
-        return
-    yield from (milestone_story(history, id, world) for id in milestones(history, args.milestone))
-
-
-def _paragraphs(history: Timeline, args: Namespace, stories: list[Story]) -> Iterator[str]:
-    from logs.explain.web import cycle_lines, explain
-    from logs.explain.why import LEGEND, lines_of
-
-    if args.at is not None and args.entry is None:
-        yield from cycle_lines(history.decision(args.at), history.candidates(args.at))
-        yield ""
-    for number, one in enumerate(stories):
-        yield from ("",) * (number > 0)
-        yield from lines_of(one)
-    refs = [one.ref for one in stories if args.milestone is None and one.ref and history.find(one.ref) is not None]
-    if args.depth is not None and refs:
-        yield "\nEntry by entry:"
-        yield from explain(history, refs, args.depth)
-    if args.entry is None and args.at is None and args.milestone is None:
-        yield "\n" + LEGEND
 
 
 def _record(one: Story) -> dict[str, Any]:
-    steps = [{"label": step.label, "text": step.text, "entries": list(step.refs)} for step in one.steps]
+    steps = [{"label": step.label, "text": step.text, "entries": step.refs} for step in one.steps]
     return {"entry": one.ref, "headline": one.headline, "decided": one.decided, "steps": steps}
 
 
 def _print_check(history: Timeline, as_json: bool) -> int:
-    from logs.explain.web import KINDS, check, ground_names
+    from logs.explain.web import check
 
     found = check(history)
     if not found.decisions:
         raise BadInput(f"{history.source}: expected at least one decision, got none")
     if as_json:
         print(json.dumps({"decisions": found.decisions, "acts": found.acts, "reached": found.reached, **found.by_kind,
-                          "failing": [one.decision.cycle for one in found.failing]}, indent=2))
+                          "failing": list(found.failing)}, indent=2))
     else:
-        kinds = ", ".join(f"{found.by_kind[kind]} {words}" for kind, words in zip(KINDS, ground_names(), strict=True))
-        print(f"{found.reached} of {found.decisions} decisions rest on something ({kinds}).")
-        for one in found.failing:
-            lacking = ", ".join(ref for ref, grounds in one.grounds.items() if not grounds.hold)
-            print(f"  cycle {one.decision.cycle}: nothing is below {lacking}")
+        goal, model, sensor = found.by_kind.values()
+        print(f"{found.reached} of {found.decisions} decisions rest on something ({goal} reach the goal, {model} the"
+              f" model, {sensor} a camera frame).")
+        for cycle, lacking in found.failing.items():
+            print(f"  cycle {cycle}: nothing is below {', '.join(lacking)}")
     return 0 if not found.failing else 1
 
 
-def _print_not(run: RunDirectory, history: Timeline, args: Namespace) -> None:
+def _print_not(run: RunDirectory, history: Timeline, args: Namespace) -> int:
     from harvey.replay.why_not_again import answers
 
     lines = list(answers(run, history, args.not_, args.at))
     print(json.dumps({"not": args.not_, "at": args.at, "because": lines}, indent=2) if args.json else "\n".join(lines))
+    return 0
 
 
 WHY = CliCommand(

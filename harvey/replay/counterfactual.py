@@ -13,11 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from blackboard.board import View
-from blackboard.change import Change
-from blackboard.effect import Post
-from blackboard.journal import Decision, decision_record, plain
-from blackboard.scheduler import Scheduler
+from blackboard import Change, Decision, Post, Scheduler, View
+from blackboard.journal import decision_record, plain
 from harvey.agent import Agent, build_agent
 from harvey.campaign.campaign import make_room
 from harvey.campaign.summary import format_error

@@ -15,10 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from blackboard.board import View
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
-from blackboard.scheduler import Scheduler
+from blackboard import Effect, Entry, Post, Revise, Scheduler, View
 from harvey.agent_settings import build_believed
 from harvey.errors import BadInput
 from knowledge_sources.plan.line_finder import LineFinder

@@ -1,5 +1,6 @@
-"""``harvey why RUN --not NAME``: the answers about a knowledge source or an entry; and asking a knowledge source again:
-could it have acted in a cycle, and if not, what did it find on the board?
+"""``harvey why RUN --not NAME``: what a knowledge source or an entry could have brought about and did not, and what
+decided; read from the journal, and, of a knowledge source that the journal does not name in a cycle, asked again: could
+it have acted, and if not, what did it find on the board?
 
 The board as it stood is rebuilt from the journal, and ``bind`` is asked once more. That is honest as far as ``bind`` is
 what it has to be, a pure function of the board; no act is repeated and no picture is looked at.
@@ -11,25 +12,194 @@ import ast
 import difflib
 import inspect
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from enum import Enum
+from typing import Any, NamedTuple, TypeVar
 
-from blackboard.board import Blackboard, View
-from blackboard.change import Change, Posted, Retracted, Revised
-from blackboard.effect import Effect, MissingEntryError, Post, Retract, Revise
-from blackboard.entry import Entry
-from blackboard.entry_store import Index
+from blackboard import (
+    Blackboard,
+    Change,
+    Entry,
+    Index,
+    KnowledgeSource,
+    Level,
+    MissingEntryError,
+    Posted,
+    Retracted,
+    View,
+)
 from blackboard.kinds import Registry, always
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
 from harvey.errors import BadInput
-from logs.explain.why_not import Fate, in_cycle, in_run, of_entry, tell_fates
-from logs.records import EntryRecord, cycle_of_writing, entry_of, refs_of
+from logs.explain import phrases
+from logs.records import CHANGES, Candidate, DecisionRecord, EntryRecord, entry_of
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline
 from world_models import words
 from world_models.frame_store import FrameStore
-from world_models.words import sentence
+from world_models.words import count, sentence
+
+LEVELS = ("action", "plan", "goal")
+REVISED = re.compile(r"is now|no longer held")
+"""Reasons that only say that the same entry has changed again."""
+SHOWN = 12
+"""So many occasions are told."""
+
+
+class Fate(Enum):
+    """What became of a knowledge source in a cycle."""
+
+    ACTED = "acted"
+    ASKED = "asked for what it lacked"
+    REFUSED = "acted, and was refused"
+    DROPPED = "was dropped"
+    OUTRANKED = "was not chosen"
+
+
+class Occasion(NamedTuple):
+    """One time that a knowledge source could have acted: when, what came of it, on what, and what decided."""
+
+    cycle: int
+    fate: Fate
+    trigger: str
+    why: str
+
+
+def in_cycle(history: Timeline, source: str, cycle: int) -> tuple[Occasion, ...]:
+    """What became of a knowledge source in one cycle, for each trigger; none where the journal does not name it.
+
+    Raises BadInput where the run has no such cycle.
+    """
+    decision = history.decision(cycle)
+    found = [Occasion(cycle, Fate.DROPPED, c.trigger, _tell_drop(c)) for c in decision.obviated if c.source == source]
+    for c in history.candidates(cycle):
+        if c.source == source:
+            is_chosen = decision.chosen is not None and c.number == decision.chosen.number
+            fate, why = _act(decision) if is_chosen else (Fate.OUTRANKED, _tell_ranking(c, decision))
+            why = f"it was the best there was, rated {c.rating:.2f}" if fate is Fate.ACTED else why
+            found.append(Occasion(cycle, fate, c.trigger, why))
+    return tuple(found)
+
+
+def in_run(history: Timeline, source: str) -> tuple[Occasion, ...]:
+    """Every time in a run that a knowledge source was woken, and what came of it in the end."""
+    open_: dict[int, Candidate] = {}
+    ended, last = list[Occasion](), 0
+    for decision in history.decisions():
+        last = decision.cycle
+        open_ |= {c.number: c for c in decision.activated if c.source == source}
+        ended += [Occasion(last, Fate.DROPPED, c.trigger, _tell_drop(c)) for c in decision.obviated
+                  if open_.pop(c.number, None) is not None]
+        chosen = decision.chosen
+        if decision.asks is None and chosen is not None and open_.pop(chosen.number, None) is not None:
+            ended.append(Occasion(last, _act(decision)[0], chosen.trigger, _act(decision)[1]))
+    ended += [Occasion(last, Fate.OUTRANKED, c.trigger, "it was still waiting when the run ended")
+              for c in open_.values()]
+    return tuple(ended)
+
+
+def _act(decision: DecisionRecord) -> tuple[Fate, str]:
+    """What became of the act that was chosen."""
+    if decision.refused:
+        last = decision.refused.rstrip().splitlines()[-1]
+        return Fate.REFUSED, f"its act was refused, and nothing of it applied: {last}"
+    if decision.asks is not None:
+        return Fate.ASKED, f"its act waited for the answer to {decision.asks.ref}: {phrases.sentence(decision.asks)}"
+    return Fate.ACTED, f"it made {', '.join(r.ref for r in decision.made) or 'nothing'}"
+
+
+def _tell_drop(c: Candidate) -> str:
+    waited = f"it had waited since cycle {c.since}, rated {c.rating:.2f}; " if c.rating else ""
+    reason = {"trigger no longer holds": "what woke it no longer held"}.get(c.reason, c.reason)
+    return f"{waited}{reason}"
+
+
+def _tell_ranking(c: Candidate, decision: DecisionRecord) -> str:
+    """By what the chosen activation came before this one: focus, then rating, then age."""
+    chosen = decision.chosen
+    if chosen is None:
+        return f"nobody acted ({_act(decision)[1]})" if decision.refused else "nobody acted"
+    who = f"the {words.source(chosen.source)} (on {chosen.trigger})"
+    ours, theirs = _distance(c, decision.focus), _distance(chosen, decision.focus)
+    if ours != theirs:
+        return (f"the {decision.focus} level was in focus, and {who} works at the {chosen.level} level, it at the"
+                f" {c.level} level (rated {chosen.rating:.2f} and {c.rating:.2f})")
+    if c.rating != chosen.rating:
+        return f"{who} was rated {chosen.rating:.2f}, it {c.rating:.2f}"
+    return f"{who} was rated as well as it, {c.rating:.2f}, and had waited longer"
+
+
+def _distance(c: Candidate, focus: str) -> int:
+    if c.level not in LEVELS or focus not in LEVELS:
+        return 0
+    return abs(LEVELS.index(c.level) - LEVELS.index(focus))
+
+
+def tell_fates(source: str, occasions: tuple[Occasion, ...]) -> Iterator[str]:
+    """What became of a knowledge source, in sentences; one that always acted is said to have."""
+    tally = Counter(o.fate for o in occasions)
+    if not occasions:
+        yield f"The {words.source(source)} was never able to act in this run."
+        return
+    parts = [f"{fate.value} {count(tally[fate], 'time')}" for fate in Fate if tally[fate]]
+    yield f"The {words.source(source)} was able to act {count(len(occasions), 'time')}: it {', '.join(parts)}."
+    late = [o for o in occasions if o.fate is Fate.DROPPED and REVISED.search(o.why)]
+    if late:
+        yield (f"  {count(len(late), 'time')} what had woken it was revised before its turn came, first in cycle"
+               f" {late[0].cycle}: {late[0].why}.")
+    missed = [o for o in occasions if o.fate is not Fate.ACTED and o not in late]
+    for o in missed[:SHOWN]:
+        yield f"  cycle {o.cycle}: on {o.trigger} it {o.fate.value}: {o.why}."
+    if len(missed) > SHOWN:
+        yield f"  and {len(missed) - SHOWN} more times."
+
+
+def of_entry(history: Timeline, ref: str) -> Iterator[str]:
+    """Why an entry did not stay or did not count: what replaced it, who withdrew it, whom it woke, what rests on it."""
+    record = history.entry(ref)
+    if record is None:
+        yield f"The journal says nothing of {ref}."
+        return
+    yield f"{phrases.headline(record)}  [{ref}, cycle {record.cycle}]"
+    yield from _end(history, record)
+    yield from _use(history, record)
+
+
+def _end(history: Timeline, record: EntryRecord[Any]) -> Iterator[str]:
+    gone = history.retraction(record.ref)
+    if (after := history.entry(f"{record.id}.{record.revision + 1}")) is not None:
+        yield (f"It was superseded in cycle {after.cycle} by {after.ref}, which the {words.source(after.author)} wrote:"
+               f" {phrases.sentence(after)}.")
+        yield from _grounds(history, after.because, after.ref, record.ref)
+    elif gone is not None:
+        decision = history.decision(gone.cycle)
+        who = f" by the {words.source(decision.chosen.source)}" if decision.chosen else ""
+        yield f"It was withdrawn in cycle {gone.cycle}{who}."
+        yield from _grounds(history, gone.retracted_because, "the withdrawal", record.ref)
+    else:
+        yield "Nothing took its place: it stood until the run ended."
+
+
+def _grounds(history: Timeline, refs: tuple[str, ...], of: str, without: str) -> Iterator[str]:
+    for ref in refs:
+        ground = history.entry(ref)
+        if ground is not None and ref != without:
+            yield f"  {of} rests on {ref}: {phrases.sentence(ground)}."
+
+
+def _use(history: Timeline, record: EntryRecord[Any]) -> Iterator[str]:
+    """Who was woken by it and what came of that; what rests on it."""
+    resting, fates = list[str](), list[str]()
+    for decision in history.naming(record.ref):
+        resting += [r.ref for r in decision.made if record.ref in r.because]
+        fates += [f"  cycle {decision.cycle}: it woke the {words.source(c.source)}, which was dropped: {_tell_drop(c)}."
+                  for c in decision.obviated if c.trigger == record.ref]
+        if decision.chosen is not None and decision.chosen.trigger == record.ref:
+            fate, what = _act(decision)
+            how = f", and {what}" if fate is Fate.ASKED else f", which acted: {what}"
+            fates.append(f"  cycle {decision.cycle}: it woke the {words.source(decision.chosen.source)}{how}.")
+    yield from fates or ["  It woke nobody who then acted."]
+    yield f"Resting on it: {', '.join(dict.fromkeys(resting))}." if resting else "Nothing rests on it."
 
 
 def answers(run: RunDirectory, history: Timeline, name: str, cycle: int | None) -> Iterator[str]:
@@ -45,69 +215,47 @@ def answers(run: RunDirectory, history: Timeline, name: str, cycle: int | None) 
     if cycle is None:
         occasions = in_run(history, source)
         if not occasions:
-            yield from _never(run, source)
+            yield from _ask_again(run, history, source, None)
         yield from tell_fates(source, occasions)
         return
-    found = in_cycle(history, source, cycle)
-    if found:
-        for one in found:
-            yield f"In cycle {cycle} the {words.source(source)} {one.fate.value} on {one.trigger}: {one.why}."
-    else:
+    found, decision = in_cycle(history, source, cycle), history.decision(cycle)
+    for one in found:
+        yield f"In cycle {cycle} the {words.source(source)} {one.fate.value} on {one.trigger}: {one.why}."
+    if not found:
         yield from _ask_again(run, history, source, cycle)
-    yield from _instead(history, cycle, any(one.fate in (Fate.ACTED, Fate.ASKED) for one in found))
-
-
-def _instead(history: Timeline, cycle: int, acted: bool) -> Iterator[str]:
-    decision = history.decision(cycle)
-    chosen = decision.chosen
-    if chosen is None:
+    if decision.chosen is None:
         yield f"Nobody acted in cycle {cycle}."
-    elif not acted:
-        made = ", ".join(r.ref for r in decision.made) or "nothing"
+    elif not any(one.fate in (Fate.ACTED, Fate.ASKED) for one in found):
+        chosen, made = decision.chosen, ", ".join(r.ref for r in decision.made) or "nothing"
         yield (f"The {words.source(chosen.source)} acted, on {chosen.trigger}, rated {chosen.rating:.2f}, with the"
                f" {decision.focus} level in focus: it made {made}.")
 
 
-def _never(run: RunDirectory, source: str) -> Iterator[str]:
+def _ask_again(run: RunDirectory, history: Timeline, source: str, cycle: int | None) -> Iterator[str]:
+    """Whether it sat at the board at all; of a cycle, it is asked once more, on the board as it was."""
     from harvey.agent import build_agent
     from logs.run_head import RunHead
-
-    agent = build_agent(RunHead.read(run.path))
-    named = _find(source, agent.sources)
-    if not agent.servoing.allows(named.closes):
-        yield f"The {named.closes} level of servoing was off, and the {words.source(source)} closes it."
-
-
-def _ask_again(run: RunDirectory, history: Timeline, source: str, cycle: int) -> Iterator[str]:
-    """The knowledge source is asked once more, on the board as it was."""
-    from harvey.agent import build_agent
-    from logs.run_head import RunHead
-
 
     head = RunHead.read(run.path)
     if source in head.without:
         yield f"The {words.source(source)} was left out of this run."
         return
     agent = build_agent(head)
-    named = _find(source, agent.sources)
-    if not agent.servoing.allows(named.closes):
-        yield f"The {named.closes} level of servoing was off, and the {words.source(source)} closes it."
-    else:
-        yield from why_absent(history, named, cycle, agent.kinds, agent.store)
-
-
-def _find(source: str, sources: tuple[KnowledgeSource, ...]) -> KnowledgeSource:
-    names = [one.name for one in sources]
-    if source not in names:
-        near = difflib.get_close_matches(source, names, n=4, cutoff=0.5) or names
+    sources = {one.name: one for one in agent.sources}
+    if source not in sources:
+        near = difflib.get_close_matches(source, sources, n=4, cutoff=0.5) or sources
         raise BadInput(
             f"--not: expected a knowledge source as {', '.join(near)}, or an entry as Goal-1, got {source!r}")
-    return sources[names.index(source)]
+    closes = sources[source].closes
+    if not agent.servoing.allows(closes):
+        yield f"The {closes} level of servoing was off, and the {words.source(source)} closes it."
+    elif cycle is not None:
+        yield from why_absent(history, sources[source], cycle, agent.kinds, agent.store)
 
 
+T = TypeVar("T")
 MOST_OF_A_VALUE = 120
 """Letters of a value that a condition asked for."""
-CHANGES: Mapping[str, type[Change]] = {"Posted": Posted, "Revised": Revised, "Retracted": Retracted}
 
 
 def why_absent(
@@ -230,35 +378,27 @@ class AskedView(View):
         super().__init__(board)
         self.asked: list[tuple[str, list[str]]] = []
 
-    def _note(self, question: str, found: Iterable[Entry[Any] | None]) -> None:
+    def _note(self, question: str, found: T) -> T:
         if not self.asked or self.asked[-1][0] != question:
             self.asked.append((question, []))
-        self.asked[-1][1].extend(str(e.ref) for e in found if e is not None)
+        entries: Any = (found,) if isinstance(found, Entry) else found or ()
+        self.asked[-1][1].extend(str(entry.ref) for entry in entries)
+        return found
 
     def get(self, id: str) -> Entry[Any] | None:
-        found = super().get(id)
-        self._note(f"what {id} is now", (found,))
-        return found
+        return self._note(f"what {id} is now", super().get(id))
 
     def latest(self, kind: type[Any], where: Callable[[Any], bool] = always) -> Entry[Any] | None:
-        found = super().latest(kind, where)
-        self._note(f"the newest {kind.__name__}{_with_condition(where)}", (found,))
-        return found
+        return self._note(f"the newest {kind.__name__}{_with_condition(where)}", super().latest(kind, where))
 
     def where(self, kind: type[Any], predicate: Callable[[Any], bool]) -> tuple[Entry[Any], ...]:
-        found = super().where(kind, predicate)
-        self._note(f"every {kind.__name__}{_with_condition(predicate)}", found)
-        return found
+        return self._note(f"every {kind.__name__}{_with_condition(predicate)}", super().where(kind, predicate))
 
     def newest(self, index: Index[Any], key: Any) -> Entry[Any] | None:
-        found = super().newest(index, key)
-        self._note(f"the newest {_by(index, key)}", (found,))
-        return found
+        return self._note(f"the newest {_by(index, key)}", super().newest(index, key))
 
     def having(self, index: Index[Any], key: Any) -> tuple[Entry[Any], ...]:
-        found = super().having(index, key)
-        self._note(f"every {_by(index, key)}", found)
-        return found
+        return self._note(f"every {_by(index, key)}", super().having(index, key))
 
 
 def _by(index: Index[Any], key: Any) -> str:
@@ -279,27 +419,13 @@ def changes(history: Timeline, cycle: int, kinds: Registry, store: FrameStore) -
 
 def board_at(history: Timeline, cycle: int, kinds: Registry, store: FrameStore) -> Blackboard:
     """The board as knowledge sources saw it when they were asked in a cycle. Raises BadInput."""
-    told: list[EntryRecord[Any]] = []
+    last: dict[str, EntryRecord[Any]] = {}  # older revisions cannot be seen any more
     for one in history.cycles:
-        if one > cycle:
-            break
-        decision = history.decision(one)
-        told += (*decision.observed, *(decision.made if one < cycle else ()))
-    last = {record.id: record for record in told}
-    # older revisions cannot be seen any more, so each value is made once
-    values = {id: entry_of(record, kinds, store).value for id, record in last.items()}
+        if one <= cycle:
+            decision = history.decision(one)
+            last |= {record.id: record for record in (decision.changes if one < cycle else decision.observed)}
     board = Blackboard()
-    for record in told:
-        board.apply([_effect(board, record, values[record.id])], author=record.author, cycle=cycle_of_writing(record))
+    for record in last.values():
+        if not record.is_gone:
+            board.follow(Posted(entry_of(record, kinds, store)))
     return board
-
-
-def _effect(board: Blackboard, record: EntryRecord[Any], value: Any) -> Effect:
-    if record.is_new:
-        return Post(value, refs_of(record.because))
-    entry = board.view.get(record.id)
-    if entry is None:
-        raise BadInput(f"{record.ref}: expected it on the board in cycle {record.cycle}, where it is not")
-    if record.is_gone:
-        return Retract(entry, refs_of(record.retracted_because))
-    return Revise(entry, value, refs_of(record.because))

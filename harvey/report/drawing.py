@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from logs.explain.questions_in_words import TrueError
+from logs.explain.true_errors import TrueError
 from world_models.words import count
 
 if TYPE_CHECKING:

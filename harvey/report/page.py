@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from html import escape
 from importlib.resources import files
@@ -15,8 +15,8 @@ from harvey.errors import BadInput
 from harvey.report import data
 from harvey.report.data import draw_plans, read_pictures
 from harvey.report.drawing import draw_errors
-from logs.explain.questions_in_words import read_errors
 from logs.explain.story import RunStory, run_name, tell_run
+from logs.explain.true_errors import read_errors
 from logs.pictures import open_pictures
 from logs.reader import read_true_track
 from logs.run_directory import RunDirectory
@@ -115,8 +115,8 @@ def _opening(story: RunStory) -> str:
 
 def _sections(story: RunStory) -> Iterator[str]:
     for section in story.sections:
-        yield f"<h3>{escape(section.title)}</h3>\n<table>"
-        for one in section.sentences:
+        yield f"<h3>{escape(section.headline)}</h3>\n<table>"
+        for one in section.steps:
             time = "" if one.time_s is None else f"{one.time_s:.1f} s"
             refs = " ".join(_reference(ref) for ref in one.refs)
             yield f"<tr><td>{_cycle(one.cycle)}</td><td>{time}</td><td>{escape(one.text)} {refs}</td></tr>"
@@ -125,14 +125,10 @@ def _sections(story: RunStory) -> Iterator[str]:
 
 def _milestones(story: RunStory) -> Iterator[str]:
     for row in story.milestones:
-        numbers: Sequence[str] = (
-            "" if row.time_s is None else f"{row.time_s:.1f}", f"{row.matched} of {row.expected}",
-            "" if row.deviation_m is None else f"{1e3 * row.deviation_m:.1f}",
-            *("" if p is None else f"{p:.2g}" for p in (row.p_wrong, row.most_p_wrong)))
-        when, *others = (f"<td>{escape(cell)}</td>" for cell in numbers)
+        when, lines, off_mm, _, *odds = (f"<td>{escape(cell)}</td>" for cell in row.cells(""))
         name = f"<td>{escape(row.name)} {' '.join(_reference(ref) for ref in row.refs[:1])}</td>"
         verdict = f'<td class="{escape(row.verdict.replace(" ", "-"))}">{escape(row.verdict)}</td>'
-        yield f"<tr><td>{_cycle(row.cycle)}</td>{when}{name}{verdict}{''.join(others)}</tr>"
+        yield f"<tr><td>{_cycle(row.cycle)}</td>{when}{name}{verdict}{''.join((lines, off_mm, *odds))}</tr>"
 
 
 def _cycle(cycle: int | None) -> str:

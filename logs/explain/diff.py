@@ -6,9 +6,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict
+from itertools import islice, zip_longest
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from logs.explain.phrases import sentence
 from logs.records import Candidate, DecisionRecord, EntryRecord, as_line, is_a
@@ -149,8 +149,7 @@ def _to_text(value: Any) -> str:
     return "nothing" if value in (None, "") else str(value).rstrip().splitlines()[-1]
 
 
-@dataclass(frozen=True, slots=True)
-class Parting:
+class Parting(NamedTuple):
     """Where two runs part.
 
     Attributes:
@@ -169,24 +168,22 @@ class Parting:
 
 def parting(ours: Timeline, theirs: Timeline, agreed: int) -> Parting:
     """Where two runs part that agree in their first ``agreed`` decisions."""
-    observation, motion, decision, source = "", "", 0, 0
-    for cycle in ours.cycles[agreed:]:
-        one, other = ours.cycle_of(cycle), theirs.cycle_of(cycle)
-        if one is None or other is None:
-            break
-        acts_otherwise = _to_action(one) != _to_action(other)
-        observation = observation or _first(one.observed, other.observed)
-        source = source or cycle * acts_otherwise
-        decision = decision or cycle * bool(acts_otherwise or _first(one.made, other.made)
-                                            or one.refused != other.refused)
-        motion = motion or _first(*([r for r in d.made if r.kind is MotorCommand] for d in (one, other)))
-        if observation and decision and motion and source:
-            break
-    return Parting(observation, decision, motion, source)
+    def pairs() -> Iterator[tuple[DecisionRecord, DecisionRecord]]:
+        return zip(islice(ours.decisions(), agreed, None), islice(theirs.decisions(), agreed, None), strict=False)
+
+    def motions(decision: DecisionRecord) -> Records:
+        return [record for record in decision.made if record.kind is MotorCommand]
+
+    return Parting(
+        next((ref for a, b in pairs() if (ref := _first(a.observed, b.observed))), ""),
+        next((a.cycle for a, b in pairs() if _acted(a) != _acted(b) or _first(a.made, b.made)
+              or a.refused != b.refused), 0),
+        next((ref for a, b in pairs() if (ref := _first(motions(a), motions(b)))), ""),
+        next((a.cycle for a, b in pairs() if _acted(a) != _acted(b)), 0))
 
 
 def _first(ours: Records, theirs: Records) -> str:
-    """The first entry that is not the same in both."""
+    """The first entry that is not the same in both; "" where all are."""
     differing = (a or b for a, b in zip_longest(ours, theirs) if not same(a, b))
     return next((one.ref for one in differing if one is not None), "")
 
@@ -196,7 +193,7 @@ def same(a: Maybe, b: Maybe) -> bool:
     return a == b if a is None or b is None else a == b and as_line(a.fields) == as_line(b.fields)
 
 
-def _to_action(d: DecisionRecord) -> tuple[str, str]:
+def _acted(d: DecisionRecord) -> tuple[str, str]:
     return ("", "") if d.chosen is None else (d.chosen.source, d.chosen.trigger)
 
 
@@ -251,7 +248,11 @@ def because(ours: Timeline, theirs: Timeline, agreed: int, settings: tuple[str, 
     """Why the runs part, in sentences. The runs are called first and second."""
     where = parting(ours, theirs, agreed)
     if where.observation:
-        yield from _tell_observation(ours, theirs, where)
+        late = where.decision and _cycle(ours, theirs, where.observation) > where.decision
+        later = ", after they had decided differently" if late else ""
+        yield from _tell_entry(ours, theirs, where.observation, "observation", later)
+        if all(is_a(history.entry(where.observation), CameraPicture) for history in (ours, theirs)):
+            yield "  (the same picture was asked for, and another came: other noise, or the robot stood elsewhere)"
     if where.decision:
         yield from _tell_decision(ours, theirs, where, settings)
     if where.motion and where.motion != where.observation:
@@ -261,12 +262,8 @@ def because(ours: Timeline, theirs: Timeline, agreed: int, settings: tuple[str, 
         yield from _others(ours, theirs, where.source)
 
 
-def _tell_observation(ours: Timeline, theirs: Timeline, where: Parting) -> Iterator[str]:
-    cycle = _cycle(ours, theirs, where.observation)
-    later = "" if not where.decision or cycle <= where.decision else ", after they had decided differently"
-    yield from _tell_entry(ours, theirs, where.observation, "observation", later)
-    if all(is_a(history.entry(where.observation), CameraPicture) for history in (ours, theirs)):
-        yield "  (the same picture was asked for, and another came: other noise, or the robot stood elsewhere)"
+def _cycle(ours: Timeline, theirs: Timeline, ref: str) -> int:
+    return ours.cycle_of_ref(ref) or theirs.cycle_of_ref(ref)
 
 
 def _tell_entry(ours: Timeline, theirs: Timeline, ref: str, what: str, later: str = "") -> Iterator[str]:
@@ -274,27 +271,22 @@ def _tell_entry(ours: Timeline, theirs: Timeline, ref: str, what: str, later: st
     yield from _both(ours.entry(ref), theirs.entry(ref))
 
 
-def _cycle(ours: Timeline, theirs: Timeline, ref: str) -> int:
-    return ours.cycle_of_ref(ref) or theirs.cycle_of_ref(ref)
-
-
 def _both(a: Maybe, b: Maybe) -> Iterator[str]:
     yield f"  first:  {sentence(a) if a else 'none'}"
     yield f"  second: {sentence(b) if b else 'none'}"
-    if a is not None and b is not None:
-        leaves = list(differing_leaves(a.fields, b.fields))
-        if leaves and sentence(a) == sentence(b):
-            yield f"  (they differ in {', '.join(path for path, _, _ in leaves[:4])})"
+    if a is not None and b is not None and sentence(a) == sentence(b) and not same(a, b):
+        paths = [path for path, _, _ in differing_leaves(a.fields, b.fields)]
+        yield f"  (they differ in {', '.join(paths[:4])})"
 
 
 def _tell_decision(ours: Timeline, theirs: Timeline, where: Parting, settings: tuple[str, ...]) -> Iterator[str]:
     one, other = ours.decision(where.decision), theirs.decision(where.decision)
     head = "The first decision that differs is in cycle"
-    if _to_action(one) != _to_action(other):
+    if _acted(one) != _acted(other):
         yield from _others(ours, theirs, where.decision, head)
     else:
         ref = _first(one.made, other.made)
-        yield f"{head} {where.decision}, of the {words.source(_to_action(one)[0])}: {ref or 'nothing'}"
+        yield f"{head} {where.decision}, of the {words.source(_acted(one)[0])}: {ref or 'nothing'}"
         yield from _both(*(next((r for r in d.made if r.ref == ref), None) for d in (one, other)))
         if one.refused != other.refused:
             yield f"  refused in the {'first' if one.refused else 'second'}: {(one.refused or other.refused).strip()}"

@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from logs.explain import phrases
+from logs.explain.phrases import Sentence, by_landmark, said
 from logs.records import EntryRecord
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
@@ -29,8 +28,6 @@ MAX_LISTED = 4
 """So many frames or landmarks are named."""
 MAX_NEAR, MIN_SIMILARITY = 4, 0.5
 NOT_THERE = "not in the world's file"
-Sentence = tuple[str, tuple[str, ...]]
-"""A sentence, and the entries that say so."""
 
 
 def find_frames(history: Timeline, refs: Iterable[str]) -> dict[str, EntryRecord[FrameReference]]:
@@ -53,16 +50,17 @@ def tell_used(history: Timeline, record: EntryRecord[Any]) -> Iterator[Sentence]
     parts = [f"what was known of {listed([*named, *list(frames)[len(named):]], len(named))}"] * bool(named)
     parts += [f"the revised model of the robot itself ({', '.join(revised)})"] * bool(revised)
     if parts:
-        said = "".join(f"; {text}" for text in _changes(frames[name] for name in changed))
-        yield f"The act went by {' and by '.join(parts)}{said}.", (*(frames[name].ref for name in named), *revised)
+        changes = "".join(f"; {text}" for text in _changes(frames[name] for name in changed))
+        refs = (*(frames[name].ref for name in named), *revised)
+        yield Sentence(f"The act went by {' and by '.join(parts)}{changes}.", refs, label="known")
 
 
-def tell_changes(history: Timeline, record: EntryRecord[Any]) -> Iterator[tuple[str, EntryRecord[Any]]]:
+def tell_changes(history: Timeline, record: EntryRecord[Any]) -> Iterator[Sentence]:
     """What the frames that an entry rests on hold otherwise than the world's file; of equal ones the first."""
     told = [(listed(_changes([frame]), MAX_LISTED), frame) for frame in find_frames(history, record.because).values()]
     for number, (text, frame) in enumerate(told):
         if text and text not in (before for before, _ in told[:number]):
-            yield f"It was known otherwise than in the world's file: {text}.", frame
+            yield said(f"It was known otherwise than in the world's file: {text}.", frame, label="changed")
 
 
 def _changes(frames: Iterable[EntryRecord[FrameReference]]) -> list[str]:
@@ -81,7 +79,7 @@ def tell_model_lines(history: Timeline, fix: EntryRecord[Any], world: WorldFile 
         return
     used = (*history.decision(expected.cycle).used, *history.decision(match.cycle).used)
     frames = find_frames(history, (*expected.because, *used))
-    names = [name for name, _ in phrases.by_landmark(history, fix.value, match)]
+    names = [name for name, _ in by_landmark(history, fix.value, match)]
     locales = [locale for locale in dict.fromkeys(_find_holder(name, frames, world) for name in names) if locale]
     if not locales:
         return
@@ -90,7 +88,7 @@ def tell_model_lines(history: Timeline, fix: EntryRecord[Any], world: WorldFile 
     text = f"The model lines come from what is known of {listed(locales, MAX_LISTED)}"
     text += f": {listed(where, MAX_LISTED)}" if where else ""
     lost = f" From which lines of the world's file cannot be told: {world.missing}." if world and world.missing else ""
-    yield f"{text}.{lost}", tuple(frames[locale].ref for locale in locales[:MAX_LISTED])
+    yield Sentence(f"{text}.{lost}", tuple(frames[locale].ref for locale in locales[:MAX_LISTED]), label="model")
 
 
 def _find_holder(name: str, frames: Mapping[str, EntryRecord[Any]], world: WorldFile | None) -> str:
@@ -101,16 +99,9 @@ def _find_holder(name: str, frames: Mapping[str, EntryRecord[Any]], world: World
     return next((locale for locale in locales if locale in frames), "")
 
 
-
-
-@dataclass(frozen=True, slots=True)
-class Element:
-    """A part of the building's description.
-
-    Attributes:
-        kind: in a word: ``desk``, ``open door``, ``wall``.
-        locales: whose frames hold it.
-        source: file:line of its description; the file relative to the project where it comes with it.
+class Element(NamedTuple):
+    """A part of the building's description: its kind in a word (``desk``, ``open door``, ``wall``), whose frames hold
+    it, and file:line of its description; the file relative to the project where it comes with it.
     """
 
     kind: str
@@ -139,8 +130,8 @@ class WorldFile:
             return Element(locale.kind, (name,), _brief(locale.source))
         if (passage := world.find_passage(name)) is not None:
             return Element(getattr(passage, "kind", "open door"), tuple(passage.between), _brief(passage.source))
-        frame = self._frame(name)
-        return None if frame is None else _find_in(frame, name)
+        elements = () if (frame := self._frame(name)) is None else _elements(frame)
+        return next((element for called, element in elements if called == name), None)
 
     def near(self, name: str) -> list[str]:
         """Names in the world that a user may have meant."""
@@ -182,18 +173,13 @@ def tell_source(world: WorldFile, name: str) -> str:
         f"{name} is described in {element.source} ({element.kind}).")
 
 
-def _find_in(frame: LocaleFrame, name: str) -> Element | None:
-    thing = next((thing for thing in frame.things if thing.name == name), None)
-    if thing is not None:
-        return Element(thing.kind, (frame.name,), _brief(thing.source))
+def _elements(frame: LocaleFrame) -> Iterator[tuple[str, Element]]:
+    """The things, landmarks and faces of a frame by their names."""
+    yield from ((thing.name, Element(thing.kind, (frame.name,), _brief(thing.source))) for thing in frame.things)
     for part in frame.parts:
         locales = (part.locale, *((part.neighbour,) if part.neighbour else ()))
-        mark = next((mark for _, mark in part.landmarks if mark.name == name), None)
-        if mark is not None:
-            return Element(mark.kind, locales, _brief(mark.source))
-        if any(face.name == name for _, face in part.faces):
-            return Element("face", locales, _brief(frame.locale.source))
-    return None
+        yield from ((mark.name, Element(mark.kind, locales, _brief(mark.source))) for _, mark in part.landmarks)
+        yield from ((face.name, Element("face", locales, _brief(frame.locale.source))) for _, face in part.faces)
 
 
 def _brief(source: str) -> str:

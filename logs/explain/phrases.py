@@ -1,4 +1,4 @@
-"""The phrase book: what an entry, a decision, and an entry with its neighbours say in whole sentences.
+"""The phrase book: what a sentence is, and what an entry, a decision, and an entry with its neighbours say.
 
 One entry is told by the sentence of its own kind. A run of another version, whose values do not fit their kinds, raises
 BadInput.
@@ -9,20 +9,21 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
 
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from logs.records import WHAT_IF, Candidate, EntryRecord
+from blackboard import Discrepancy, Level
+from logs.records import WHAT_IF, Candidate, EntryRecord, is_a
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
 from world_models import words
 from world_models.building.locale_frame import FrameRequest
-from world_models.entries.body import Course, MotionReport, MotorCommand
+from world_models.entries.body import Course, MotionReport, MotorCommand, PictureRequest
 from world_models.entries.location import Hypothesis, Place, PlaceSearch
 from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
-from world_models.entries.task import Certificate, Goal, Leg, Milestone, PlanSketch
+from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, PlanSketch
+from world_models.entries.user_reports import Redirection, UserReport
 from world_models.words import count, degrees, landmark, listed, metres, point, quantity, size, turn
 
 MAX_LISTED = 4
@@ -34,6 +35,49 @@ CORRECTED_BY: Mapping[Level, str] = {
 }
 Find = Callable[[type[Any]], Any]
 """Gives the value of the first entry of a kind that something rests on; None where there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sentence:
+    """Something that is said of a run.
+
+    Attributes:
+        text: one sentence or two.
+        refs: the entries that say so; none for what only the simulator knows.
+        cycle: when it was so; None for what is so during the whole run.
+        label: what it is about, in a word or two.
+        time_s: of the cycle, since the run began, by the body's clock; None where nothing told it.
+    """
+
+    text: str
+    refs: tuple[str, ...] = ()
+    cycle: int | None = None
+    label: str = ""
+    time_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """Sentences under a headline: why an entry came about, or a part of what happened in a run.
+
+    Attributes:
+        headline: what the entry is, of a motion the whole chain in one sentence; or the part's title.
+        steps: the reasons, from the entry downward; or what happened.
+        ref: the entry; "" where it is about none.
+        decided: who decided it, when, against what.
+    """
+
+    headline: str
+    steps: tuple[Sentence, ...] = ()
+    ref: str = ""
+    decided: str = ""
+
+
+def said(text: str, *records: EntryRecord[Any] | None, label: str = "") -> Sentence:
+    """A sentence that some entries say, in the cycle of the first."""
+    known = [record for record in records if record is not None]
+    refs = dict.fromkeys(record.ref for record in known)
+    return Sentence(text, tuple(refs), known[0].cycle if known else None, label)
 
 
 def capital(text: str) -> str:
@@ -94,7 +138,7 @@ def _tell_questions(history: Timeline, record: EntryRecord[Any], chosen: Candida
     return f" It had waited for an answer first: it asked for {listed(wanted, MAX_LISTED)}." if wanted else ""
 
 
-def tell_answer(history: Timeline, request: EntryRecord[Any]) -> Iterator[tuple[str, tuple[str, ...]]]:
+def tell_answer(history: Timeline, request: EntryRecord[Any]) -> Iterator[Sentence]:
     """What became of the act that asked."""
     asked = history.entry(f"{request.id}.0") or request
     act = history.decision(asked.cycle).chosen
@@ -102,8 +146,8 @@ def tell_answer(history: Timeline, request: EntryRecord[Any]) -> Iterator[tuple[
         if act is not None and later.cycle > asked.cycle and later.chosen and later.chosen.number == act.number:
             refs = tuple(record.ref for record in later.made)
             made = listed(refs, MAX_LISTED) or "nothing"
-            yield (f"The act waited for the answer, and came again in cycle {later.cycle}: it made {made}.",
-                   refs[:MAX_LISTED])
+            yield Sentence(f"The act waited for the answer, and came again in cycle {later.cycle}: it made {made}.",
+                           refs[:MAX_LISTED], label="answered")
             return
 
 
@@ -228,6 +272,11 @@ def milestone_name(milestone: Milestone) -> str:
     return f"milestone {milestone.name()}" if milestone.sketch else f"the {milestone.name()}"
 
 
+def milestone_of(record: EntryRecord[Any]) -> str:
+    """As :meth:`~world_models.entries.task.Milestone.name`, without decoding its lines."""
+    return str(record.fields["what"]).partition(", because")[0]
+
+
 def expectation(milestone: Milestone) -> str:
     """What a milestone says should be seen."""
     name = milestone_name(milestone)
@@ -317,3 +366,51 @@ def _tell_match(history: Timeline, belief: EntryRecord[Any]) -> Iterator[str]:
         yield f"{'' if belief.value.basis == 'tracks' else 'where its pose was '}made from match {match.id} of {best}"
     elif anchor is not None:
         yield f"made from pose {anchor.ref} by {anchor.value.basis}"
+
+
+def headline(record: EntryRecord[Any]) -> str:
+    """What the entry is, as something that Harvey did where it is an act."""
+    if record.kind in (MotorCommand, Course):
+        return f"Harvey was told to {sentence(record)}."
+    if record.kind in (UserReport, Redirection):
+        return f"It {sentence(record)}."
+    if is_a(record, PictureRequest):
+        return f"A picture was taken {words.purpose(record.value.purpose)}."
+    if is_a(record, Hypothesis) and record.value.is_held:
+        if record.value.basis == "relocalization":
+            return f"It found out where it is: at {pose(record.value)}."
+        return believed(record.value)
+    return plainly(record) if sentence(record) else record.ref
+
+
+def phrase(history: Timeline, record: EntryRecord[Any]) -> str:
+    """A whole sentence of an entry, as the phrase book has it for its kind; else the kind's own."""
+    say = PHRASES.get(record.kind)
+    return plainly(record) if say is None else say(history, record)
+
+
+def tell(
+    history: Timeline, record: EntryRecord[Any] | None, label: str, *others: EntryRecord[Any] | None
+) -> list[Sentence]:
+    """The phrase of an entry, which others say too; nothing where there is no such entry."""
+    return [] if record is None else [said(phrase(history, record), record, *others, label=label)]
+
+
+def _line_of_plan(history: Timeline, record: EntryRecord[Leg]) -> str:
+    sketch = history.nearest(record, PlanSketch)
+    return line(record.value, sketch.value if sketch and sketch.id == record.value.sketch else None)
+
+
+PHRASES: Mapping[type[Any], Callable[[Timeline, EntryRecord[Any]], str]] = {
+    Leg: _line_of_plan,
+    Hypothesis: lambda _, r: believed(r.value),
+    Milestone: lambda _, r: expectation(r.value),
+    Discrepancy: lambda _, r: doubt(r.value),
+    PlanSketch: lambda _, r: plan(r.value),
+    Goal: lambda _, r: goal(r.value),
+    UserReport: lambda _, r: headline(r),
+    Redirection: lambda _, r: headline(r),
+    Command: lambda _, r: f"The user asked for it: {r.value.text}.",
+    PoseFix: lambda history, r: describe_line_match(history, r),
+    Certificate: lambda history, r: capital(verdict(r.value, history.because(r, Milestone))),
+}

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy
 from logs.explain import phrases, turning_points
-from logs.explain.phrases import capital, named, plainly, sentence, wrap
+from logs.explain.phrases import Sentence, Story, capital, named, plainly, said, sentence, wrap
 from logs.explain.turning_points import (
+    COLLISION,
+    SIMULATOR,
     TurningPoint,
-    read_collisions,
-    read_happenings,
+    read_truth,
     read_turning_points,
     turn_lines,
 )
@@ -41,7 +42,6 @@ WITHOUT: Mapping[str, str] = {
 """What it means that a level is off."""
 WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, UserReport, Redirection)
 """What changes the knowledge of a locale."""
-PLANS: tuple[type[Any], ...] = (Goal, PlanSketch)
 MOST_PLACES = 4
 """So many places that came into question are told, the newest."""
 COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong", "at most")
@@ -52,31 +52,6 @@ LEGEND = """\
 Places are in metres in each room's own frame. Times are by the body's clock. All of it is from the journal, as the
 robot knew it, except where the simulator is named. Names in brackets are entries: ask on with harvey why RUN NAME, or
 with harvey why RUN --at CYCLE."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sentence:
-    """Something that happened.
-
-    Attributes:
-        text: one sentence or two.
-        cycle: when; None for what is so during the whole run.
-        time_s: since the run began, by the body's clock; None where nothing told it.
-        refs: the entries that say so; none for what only the simulator knows.
-    """
-
-    text: str
-    cycle: int | None = None
-    time_s: float | None = None
-    refs: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """A part of a story under its title."""
-
-    title: str
-    sentences: tuple[Sentence, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +82,15 @@ class MilestoneRow:
     most_p_wrong: float | None
     refs: tuple[str, ...]
 
+    def cells(self, unknown: str) -> tuple[str, ...]:
+        """Time [s], lines, deviation [mm, degrees], and the two probabilities, as a table for people has them."""
+        off_m, off_rad = self.deviation_m, self.deviation_rad
+        return (
+            unknown if self.time_s is None else f"{self.time_s:.1f}", f"{self.matched} of {self.expected}",
+            unknown if off_m is None else f"{1e3 * off_m:.1f}",
+            unknown if off_rad is None else f"{math.degrees(abs(off_rad)):.1f}",
+            *(unknown if p is None else f"{p:.2g}" for p in (self.p_wrong, self.most_p_wrong)))
+
 
 @dataclass(frozen=True, slots=True)
 class RunStory:
@@ -121,12 +105,15 @@ class RunStory:
 
     opening: tuple[str, ...]
     turning_points: tuple[TurningPoint, ...]
-    sections: tuple[Section, ...]
+    sections: tuple[Story, ...]
     milestones: tuple[MilestoneRow, ...]
 
     def record(self) -> dict[str, Any]:
         """As JSON types."""
-        return asdict(self)
+        keys = "text", "cycle", "time_s", "refs"
+        return asdict(self) | {"sections": [
+            {"title": one.headline, "sentences": [{key: getattr(step, key) for key in keys} for step in one.steps]}
+            for one in self.sections]}
 
 
 def run_name(run: RunDirectory) -> str:
@@ -160,7 +147,7 @@ def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
         history.verify()
         raise BadInput(f"{history.source}: expected at least one decision, got none")
     with reading(history.source):
-        outcome = _outcome(history)
+        outcome = history.last(Outcome)
         cycle = history.cycles[-1] if outcome is None else outcome.cycle
         time_s = history.time_at(cycle)
         when = f"in cycle {cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run")
@@ -181,38 +168,37 @@ def tell_run(run: RunDirectory, history: Timeline) -> RunStory:
     """The story of a run. Raises BadInput where journal or ``result.json`` cannot be read as this version's."""
     first, result = tuple(opening(run, history)), run.read_result()
     with reading(history.source):
-        turns = tuple(read_turning_points(history))
-        sections = (
-            tell_errand(history), tell_happenings(history, result), tell_plans(history), tell_lost(history),
-            tell_contacts(history, turns, result),
-            tell_things(turns), tell_camera(history), tell_end(history, result))
+        turns, sections = tuple(read_turning_points(history)), tuple(
+            tell_part(history, title, result) for title in PARTS if title != TROUBLE)
         return RunStory(first, turns, sections, read_milestones(history))
 
 
-def _said(history: Timeline, text: str, record: EntryRecord[Any], *others: EntryRecord[Any] | None) -> Sentence:
-    """A sentence that a record tells, in its cycle; ``others`` say so too."""
-    refs = dict.fromkeys(one.ref for one in (record, *others) if one is not None)
-    return Sentence(text, record.cycle, history.time_at(record.cycle), tuple(refs))
+def tell_part(history: Timeline, title: str, result: Mapping[str, Any]) -> Story:
+    """A part of the story, by its title in PARTS; ``result``: ``result.json``, or nothing."""
+    tell, nothing = PARTS[title]
+    told = list(tell(history, result)) or [Sentence(nothing)] * bool(nothing)
+    return Story(title, tuple(
+        one if one.cycle is None else replace(one, time_s=history.time_at(one.cycle)) for one in told))
 
 
-def tell_errand(history: Timeline) -> Section:
+def _tell_errand(history: Timeline, _: Mapping[str, Any]) -> Iterator[Sentence]:
     """What was asked for, and what it was told on the way."""
-    told = [_said(history, plainly(r), r) for r in history.of_kind(Command, UserReport, Redirection) if r.observed]
-    return Section("What it was to do", tuple(told))
+    asked = history.of_kind(Command, UserReport, Redirection)
+    return (said(plainly(one), one) for one in asked if one.observed)
 
 
-def tell_happenings(history: Timeline, result: Mapping[str, Any]) -> Section:
+def _tell_happenings(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
     """What the simulator did to the robot and its building, as far as its result says."""
-    told = [Sentence(f"{capital(one.text)}.", one.cycle, one.time_s) for one in read_happenings(history, result)]
-    if not told and result.get("happened") is None:
-        told = [Sentence("What was done to the robot nobody recorded: there is no result of the simulator.")]
-    return Section("What was done to it", tuple(told) or (Sentence("The simulator did nothing to it."),))
+    yield from _points(read_truth(history, result), SIMULATOR)
+    if result.get("happened") is None:
+        yield Sentence("What was done to the robot nobody recorded: there is no result of the simulator.")
 
 
-def tell_plans(history: Timeline) -> Section:
+def _tell_plans(history: Timeline, _: Mapping[str, Any]) -> Iterator[Sentence]:
     """Each goal, each sketch, and each that was withdrawn."""
-    told = [(_plan(history, record), record) for record in history.of_kind(*PLANS)]
-    return Section("How it planned", tuple(_said(history, text, record) for text, record in told if text))
+    for record in history.of_kind(Goal, PlanSketch):
+        if text := _plan(history, record):
+            yield said(text, record)
 
 
 def _plan(history: Timeline, record: EntryRecord[Any]) -> str:
@@ -246,16 +232,14 @@ def _cause(history: Timeline, ref: str) -> str:
     return sentence(record).partition(";")[0]
 
 
-def tell_lost(history: Timeline) -> Section:
+def _tell_lost(history: Timeline, _: Mapping[str, Any]) -> Iterator[Sentence]:
     """Each time that it was lost."""
-    told: list[Sentence] = []
     found = [one for one in history.of_kind(Hypothesis)
              if turning_points.may_turn(one) and turning_points.is_found(one.value)]
     for record in history.of_kind(Discrepancy):
         if turning_points.may_turn(record) and turning_points.is_lost(record.value):
             until = next((one for one in found if one.cycle >= record.cycle), None)
-            told += sorted(_tell_loss(history, record, until), key=lambda one: one.cycle or 0)
-    return Section("Lost and found", tuple(told) or (Sentence("It was never lost."),))
+            yield from sorted(_tell_loss(history, record, until), key=lambda one: one.cycle or 0)
 
 
 def _tell_loss(
@@ -263,23 +247,23 @@ def _tell_loss(
 ) -> Iterator[Sentence]:
     what, below = lost.value.what, history.nearest(lost, Hypothesis)
     where = "" if below is None else f" {phrases.believed(below.value)}"
-    yield _said(history, f"It was lost: {what}.{where}", lost, below)
+    yield said(f"It was lost: {what}.{where}", lost, below)
     if (certificate := history.nearest(lost, Certificate)) is not None:
         verdict = f"{certificate.value.verdict}: {certificate.value.reason}"
-        yield _said(history, f"The last verdict on a milestone was {verdict}.", certificate)
+        yield said(f"The last verdict on a milestone was {verdict}.", certificate)
     began = next((one for one in history.within(lost) if is_a(one, Discrepancy) and one.value.what != what), None)
     if began is not None:
-        yield _said(history, f"It began to doubt: {began.value.what}.", history.entry(f"{began.id}.0") or began)
+        yield said(f"It began to doubt: {began.value.what}.", history.entry(f"{began.id}.0") or began)
     yield from _tell_search(history, lost, history.cycles[-1] if found is None else found.cycle)
     if found is None:
-        yield Sentence("It did not find out where it was.", history.cycles[-1], history.time_at(history.cycles[-1]))
+        yield Sentence("It did not find out where it was.", cycle=history.cycles[-1])
         return
     now, then_s, now_s = found.value, history.time_at(lost.cycle), history.time_at(found.cycle)
     later = f"{count(found.cycle - lost.cycle, 'cycle')} later"
     later += "" if then_s is None or now_s is None else f", after {now_s - then_s:.1f} s"
     how = f": {now.evidence}" if now.evidence else ""
     where = f"{phrases.pose(now)}{'' if below is None else _apart(below.value, now)}{how}"
-    yield _said(history, f"It found out where it was, {later}: at {where}.", found)
+    yield said(f"It found out where it was, {later}: at {where}.", found)
 
 
 def _tell_search(history: Timeline, lost: EntryRecord[Any], last: int) -> Iterator[Sentence]:
@@ -295,7 +279,7 @@ def _tell_search(history: Timeline, lost: EntryRecord[Any], last: int) -> Iterat
         places = [f"{record.value.place()} ({record.value.weight:.0%})" for record in candidates]
         text += f"; it may have stood at {listed(places, MOST_PLACES)}"
     first = min((*looks, *candidates), key=lambda record: record.cycle)
-    yield _said(history, f"{text}.", first, *candidates)
+    yield said(f"{text}.", first, *candidates)
 
 
 def _apart(before: Hypothesis, now: Hypothesis) -> str:
@@ -305,61 +289,49 @@ def _apart(before: Hypothesis, now: Hypothesis) -> str:
     return f", {metres(now.locale_from_robot.distance_to(before.locale_from_robot))} from where it had believed"
 
 
-def tell_contacts(history: Timeline, turns: tuple[TurningPoint, ...], result: Mapping[str, Any]) -> Section:
+def _tell_contacts(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
     """What it felt; and, where the simulator says so, what it truly touched."""
-    truly = [Sentence(f"It truly touched something at {point.text}.", point.cycle, point.time_s)
-             for point in read_collisions(history, result)]
-    told = [*(_points(turns, "contact") or [Sentence("It felt no contact.")]), *truly]
+    yield from _points(read_turning_points(history, told=True), "contact") or [Sentence("It felt no contact.")]
+    truly = [point for point in read_truth(history, result) if point.kind == COLLISION]
+    yield from (Sentence(f"It truly touched something at {point.text}.", cycle=point.cycle) for point in truly)
     if result.get("collisions") is None:
-        told += [Sentence("What it touched without feeling it nobody recorded: there is no result of the simulator.")]
+        yield Sentence("What it touched without feeling it nobody recorded: there is no result of the simulator.")
     elif (missing := result["collisions"] - len(truly)) > 0:
-        told += [Sentence(f"The simulator counts {missing} more, and does not say where.")]
-    return Section("What it touched", tuple(told))
+        yield Sentence(f"The simulator counts {missing} more, and does not say where.")
 
 
-def tell_things(turns: tuple[TurningPoint, ...]) -> Section:
+def _tell_things(history: Timeline, _: Mapping[str, Any]) -> list[Sentence]:
     """Doors found shut, things in the way, and what became of them; faults of its body."""
-    nothing = Sentence("No door was found otherwise than known, nothing stood in the way, and nothing failed.")
-    told = _points(turns, "door", "thing", "fault", "resumed") or [nothing]
-    return Section("Doors, things in the way and faults", tuple(told))
+    return _points(read_turning_points(history, told=True), "door", "thing", "fault", "resumed")
 
 
-def _points(turns: tuple[TurningPoint, ...], *kinds: str) -> list[Sentence]:
+def _points(turns: Iterable[TurningPoint], *kinds: str) -> list[Sentence]:
     """The turning points of some kinds."""
-    return [Sentence(f"{capital(point.text)}.", point.cycle, point.time_s) for point in turns if point.kind in kinds]
+    return [Sentence(f"{capital(point.text)}.", cycle=point.cycle) for point in turns if point.kind in kinds]
 
 
-def tell_camera(history: Timeline) -> Section:
+def _tell_camera(history: Timeline, _: Mapping[str, Any]) -> Iterator[Sentence]:
     """What has turned out to be otherwise about the camera than told: each since when it was so to the end."""
-    records, told = list(history.of_kind(CameraState)), list[Sentence]()
+    records = list(history.of_kind(CameraState))
     lessons = [find_camera_lessons(records[0].value, record.value) for record in records]
     for lesson in lessons[-1] if lessons else ():
         has_it = [any(one.what == lesson.what for one in then) for then in lessons]
         since = max((i for i, has in enumerate(has_it) if not has), default=-1) + 1
-        told.append(_said(history, f"The {lesson.text()}; known since then.", records[since], records[-1]))
-    return Section("The camera", tuple(told) or (Sentence("The camera was found to be as told."),))
+        yield said(f"The {lesson.text()}; known since then.", records[since], records[-1])
 
 
-def _outcome(history: Timeline) -> EntryRecord[Outcome] | None:
-    """The outcome of a run; None where it has none."""
-    return next(iter([*history.of_kind(Outcome)][-1:]), None)
-
-
-def tell_end(history: Timeline, result: Mapping[str, Any]) -> Section:
+def _tell_end(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
     """The outcome, the last belief, and the errors that only the simulator knows."""
-    outcome = _outcome(history)
-    told = [] if outcome is None else [_said(history, plainly(outcome), outcome)]
-    beliefs = (history.entry(ref) for ref in reversed(history.refs) if ref.startswith("Hypothesis-"))
-    last = next((record for record in beliefs if record is not None and record.value.is_held), None)
-    if last is not None:
+    if (outcome := history.last(Outcome)) is not None:
+        yield said(plainly(outcome), outcome)
+    if (last := history.held()) is not None:
         now = history.newest[last.id] == last.ref and history.retraction(last.ref) is None
         text = "It believed that it stood at" if now else "The last place where it had believed to stand was"
-        told.append(_said(history, f"{text} {phrases.pose(last.value)}.", last))
-    told += [Sentence(f"{capital(text)}.") for text in result.get("starved") or ()]
+        yield said(f"{text} {phrases.pose(last.value)}.", last)
+    yield from (Sentence(f"{capital(text)}.") for text in result.get("starved") or ())
     truth = ", ".join(_truth(result))
-    told.append(Sentence(f"In truth, by the simulator's result.json: {truth}." if truth else
-                         "Where it truly was nobody recorded: there is no result of the simulator."))
-    return Section("How it ended", tuple(told))
+    yield Sentence(f"In truth, by the simulator's result.json: {truth}." if truth else
+                   "Where it truly was nobody recorded: there is no result of the simulator.")
 
 
 def _truth(result: Mapping[str, Any]) -> Iterator[str]:
@@ -376,26 +348,48 @@ def _truth(result: Mapping[str, Any]) -> Iterator[str]:
         yield f"and accepted {count(wrong, 'milestone')} wrongly" if wrong else "and accepted no milestone wrongly"
 
 
+def _tell_trouble(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
+    """What a short account of the run does not leave out."""
+    truly = (point for point in read_truth(history, result) if point.kind != COLLISION)
+    points = sorted([*truly, *read_turning_points(history, told=True)], key=lambda point: point.cycle)
+    yield from (Sentence(f"{point.kind}: {point.text}.", cycle=point.cycle) for point in points)
+    if not points:
+        yield Sentence("Nothing went wrong." if history.last(Outcome) is not None else
+                       "Nothing had gone wrong when the run was cut off.")
+
+
+TROUBLE, HAPPENED, LOST, TOUCHED, ENDED = (
+    "What went wrong", "What was done to it", "Lost and found", "What it touched", "How it ended")
+PARTS: Mapping[str, tuple[Callable[[Timeline, Mapping[str, Any]], Iterable[Sentence]], str]] = {
+    "What it was to do": (_tell_errand, ""),
+    HAPPENED: (_tell_happenings, "The simulator did nothing to it."),
+    "How it planned": (_tell_plans, ""),
+    LOST: (_tell_lost, "It was never lost."),
+    TOUCHED: (_tell_contacts, ""),
+    "Doors, things in the way and faults": (
+        _tell_things, "No door was found otherwise than known, nothing stood in the way, and nothing failed."),
+    "The camera": (_tell_camera, "The camera was found to be as told."),
+    ENDED: (_tell_end, ""),
+    TROUBLE: (_tell_trouble, ""),
+}
+"""Each part of a story by its title: what tells it, and what is said where there is nothing to tell."""
+
+
 def read_milestones(history: Timeline) -> tuple[MilestoneRow, ...]:
     """Every verdict of a run, and every milestone that got none, in the order of time."""
     rows: list[MilestoneRow] = []
     for record in history.of_kind(Certificate):
         if not record.is_gone:
             c, below = record.value, history.reason(record, Milestone)
-            name, ref = (c.milestone, f"{c.milestone}.0") if below is None else (_name(below), below.ref)
+            name, ref = (c.milestone, f"{c.milestone}.0") if below is None else (phrases.milestone_of(below), below.ref)
             rows.append(MilestoneRow(
                 record.cycle, history.time_at(record.cycle), name, c.verdict, c.expected, c.matched, c.deviation_m,
                 c.deviation_rad, c.p_wrong, c.most_p_wrong, (record.ref, ref)))
     judged = {ref.rpartition(".")[0] for row in rows for ref in row.refs}
-    rows += [MilestoneRow(one.cycle, history.time_at(one.cycle), _name(one), str(one.fields["status"]),
+    rows += [MilestoneRow(one.cycle, history.time_at(one.cycle), phrases.milestone_of(one), str(one.fields["status"]),
                           len(one.fields["expected"]), 0, None, None, None, None, (one.ref,))
              for one in history.last_of_kind(Milestone) if one.id not in judged]
     return tuple(sorted(rows, key=lambda row: row.cycle))
-
-
-def _name(record: EntryRecord[Any]) -> str:
-    """As :meth:`~world_models.entries.task.Milestone.name`, without decoding its lines."""
-    return str(record.fields["what"]).partition(", because")[0]
 
 
 def milestone_lines(rows: Sequence[MilestoneRow]) -> Iterator[str]:
@@ -409,16 +403,11 @@ def milestone_lines(rows: Sequence[MilestoneRow]) -> Iterator[str]:
         shown = sorted({*failed, *rows[-MOST_ROWS // 2 :]}, key=lambda row: row.cycle)
     if len(shown) < len(rows):
         yield f"Of {len(rows)} these {len(shown)}; --json has them all."
-    yield from table(COLUMNS, [_cells(row) for row in shown]).splitlines()
-
-
-def _cells(row: MilestoneRow) -> tuple[str, ...]:
-    off_m, off_rad = row.deviation_m, row.deviation_rad
-    return (
-        str(row.cycle), "-" if row.time_s is None else f"{row.time_s:.1f}", row.name, row.verdict,
-        f"{row.matched} of {row.expected}", "-" if off_m is None else f"{1e3 * off_m:.1f}",
-        "-" if off_rad is None else f"{math.degrees(abs(off_rad)):.1f}",
-        *("-" if p is None else f"{p:.2g}" for p in (row.p_wrong, row.most_p_wrong)))
+    lines = []
+    for row in shown:
+        time, *others = row.cells("-")
+        lines.append((str(row.cycle), time, row.name, row.verdict, *others))
+    yield from table(COLUMNS, lines).splitlines()
 
 
 def story_lines(story: RunStory) -> Iterator[str]:
@@ -426,14 +415,14 @@ def story_lines(story: RunStory) -> Iterator[str]:
     yield from story.opening
     *before, last = story.sections
     for section in before:
-        yield from ("", section.title, *_section_lines(section))
+        yield from ("", section.headline, *_section_lines(section))
     yield from ("", MILESTONES, *(f"  {line}" for line in milestone_lines(story.milestones)))
-    yield from ("", last.title, *_section_lines(last))
+    yield from ("", last.headline, *_section_lines(last))
     yield from ("", LEGEND)
 
 
-def _section_lines(section: Section) -> Iterator[str]:
-    heads = ["" if one.cycle is None else turning_points.at(one.cycle, one.time_s) for one in section.sentences]
+def _section_lines(section: Story) -> Iterator[str]:
+    heads = ["" if one.cycle is None else turning_points.at(one.cycle, one.time_s) for one in section.steps]
     width = max(map(len, heads), default=0)
-    for head, one in zip(heads, section.sentences, strict=True):
+    for head, one in zip(heads, section.steps, strict=True):
         yield wrap(named(one.text, one.refs), f"  {head:<{width}}" + "  " * (width > 0))

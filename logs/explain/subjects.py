@@ -10,9 +10,9 @@ from typing import Any
 from blackboard.servoing import Discrepancy
 from logs.explain import phrases
 from logs.explain.model import MAX_LISTED, WorldFile, tell_changes, tell_model_lines, tell_source
-from logs.explain.phrases import capital, sentence
+from logs.explain.phrases import Sentence, Story, capital, describe_decision, said, sentence, tell
 from logs.explain.web import find_refs
-from logs.explain.why import Step, Story, step, story_of, tell_stories
+from logs.explain.why import tell_stories
 from logs.records import WHAT_IF, EntryRecord
 from logs.run_errors import UNREADABLE, BadInput
 from logs.timeline import Timeline
@@ -69,8 +69,8 @@ def milestone_story(history: Timeline, id: str, world: WorldFile | None = None) 
     try:
         revisions = [one for number in range(REVISIONS) if (one := history.entry(f"{id}.{number}")) is not None]
         head = f"{capital(phrases.milestone_name(last.value))}: {last.fields['status']}."
-        return story_of(history, revisions[0] if revisions else last, head, _tell(history, revisions, last, world),
-                        ref=last.ref)
+        first = revisions[0] if revisions else last
+        return Story(head, tuple(_tell(history, revisions, last, world)), last.ref, describe_decision(history, first))
     except UNREADABLE as error:
         what = "expected a milestone and its evidence as this version writes them, got others"
         raise BadInput(f"{id}: {what} ({error!r})") from None
@@ -78,46 +78,37 @@ def milestone_story(history: Timeline, id: str, world: WorldFile | None = None) 
 
 def _tell(
     history: Timeline, revisions: Sequence[EntryRecord[Any]], last: EntryRecord[Any], world: WorldFile | None
-) -> Iterator[Step]:
+) -> Iterator[Sentence]:
     first = revisions[0] if revisions else last
     verdicts = (history.reason(record, Certificate) for record in reversed(revisions))
     certificate = next((found for found in verdicts if found is not None), None)
-    if (doubt := history.reason(first, Discrepancy)) is not None:
-        yield step("wanted", phrases.doubt(doubt.value), doubt)
-    if (sketch := history.reason(first, PlanSketch)) is not None:
-        yield step("wanted", phrases.plan(sketch.value), sketch)
     looked = (None if certificate is None else history.reason(certificate, Milestone)) or last
-    if (belief := history.reason(looked, Hypothesis)) is not None:
-        yield step("believed", phrases.believed(belief.value), belief)
-    yield step("expected", phrases.expectation(looked.value), looked)
+    yield from tell(history, history.reason(first, Discrepancy), "wanted")
+    yield from tell(history, history.reason(first, PlanSketch), "wanted")
+    yield from tell(history, history.reason(looked, Hypothesis), "believed")
+    yield from tell(history, looked, "expected")
     if certificate is not None:
-        yield from _tell_verdict(history, certificate, world)
+        fix, *below = history.chain(certificate, PoseFix, LineMatch, Segments, CameraPicture)
+        yield from tell(history, fix, "seen", *below)
+        yield from () if fix is None else tell_model_lines(history, fix, world)
+        yield from tell(history, certificate, "judged")
         yield from _tell_consequences(history, certificate)
     elif last.fields["status"] != "withdrawn":
-        yield step("judged", f"It was never judged: when the run ended it was {last.fields['status']}.", last)
+        yield said(f"It was never judged: when the run ended it was {last.fields['status']}.", last, label="judged")
     if last.fields["status"] == "withdrawn":
-        yield step("withdrawn", f"The {words.source(last.author)} withdrew it in cycle {last.cycle}.", last)
-        yield from (step("changed", text, frame) for text, frame in tell_changes(history, last))
+        yield said(f"The {words.source(last.author)} withdrew it in cycle {last.cycle}.", last, label="withdrawn")
+        yield from tell_changes(history, last)
 
 
-def _tell_verdict(history: Timeline, certificate: EntryRecord[Any], world: WorldFile | None) -> Iterator[Step]:
-    fix, match, segments, frame = history.chain(certificate, PoseFix, LineMatch, Segments, CameraPicture)
-    if fix is not None:
-        yield step("seen", phrases.describe_line_match(history, fix), fix, match, segments, frame)
-        yield from (Step("model", *told) for told in tell_model_lines(history, fix, world))
-    said = phrases.verdict(certificate.value, history.because(certificate, Milestone))
-    yield step("judged", capital(said), certificate)
-
-
-def _tell_consequences(history: Timeline, certificate: EntryRecord[Any]) -> Iterator[Step]:
+def _tell_consequences(history: Timeline, certificate: EntryRecord[Any]) -> Iterator[Sentence]:
     """What those did whom the verdict woke."""
     for record in history.written_by(certificate.cycle):
         for decision in history.naming(record.ref) if record.kind in FOLLOWED else ():
             if decision.chosen is not None and decision.chosen.trigger == record.ref:
-                said = "; ".join(f"{r.ref}: {sentence(r)}" for r in decision.made if r.kind is not Discrepancy)
-                said = said or "; ".join(map(sentence, decision.made)) or decision.refused or "it changed nothing"
+                came = "; ".join(f"{r.ref}: {sentence(r)}" for r in decision.made if r.kind is not Discrepancy)
+                came = came or "; ".join(map(sentence, decision.made)) or decision.refused or "it changed nothing"
                 who = words.source(decision.chosen.source)
-                yield step("followed", f"In cycle {decision.cycle} the {who} acted: {said}.", record)
+                yield said(f"In cycle {decision.cycle} the {who} acted: {came}.", record, label="followed")
 
 
 def stories_of(history: Timeline, what: str | int | None, world: WorldFile) -> Iterator[Story]:
@@ -148,24 +139,24 @@ def element_story(history: Timeline, name: str, world: WorldFile) -> Story:
         near = ", ".join(world.near(name) or history.near(name)) or "none"
         raise BadInput(f"expected an entry of the run, or a landmark, thing, door or room of its world, as {near}, got"
                        f" {name!r}")
-    steps = (step("described", tell_source(world, name)), *_tell_frames(history, held, name),
+    steps = (said(tell_source(world, name), label="described"), *_tell_frames(history, held, name),
              *_tell_milestones(expecting, name), *_tell_plans(history, name))
-    return Story(name, f"What the run knew of {landmark(name)}.", "", steps)
+    return Story(f"What the run knew of {landmark(name)}.", steps, name)
 
 
-def _tell_frames(history: Timeline, held: Sequence[EntryRecord[FrameReference]], name: str) -> Iterator[Step]:
+def _tell_frames(history: Timeline, held: Sequence[EntryRecord[FrameReference]], name: str) -> Iterator[Sentence]:
     """When the frames came that hold it, who had asked for them, and who said otherwise of it."""
     for record in held:
         reference, request = record.value, history.reason(record, FrameRequest)
         if record.is_new:
             asked = f", as the {words.source(request.author)} had asked for it" if request is not None else ""
             text = f"What is known of {reference.locale} came to the board in cycle {record.cycle}{asked}."
-            yield step("known", text, record, request)
-        said = [change.sentence() for change in reference.changes if name in (change.name, reference.locale)]
-        if said:
+            yield said(text, record, request, label="known")
+        changes = [change.sentence() for change in reference.changes if name in (change.name, reference.locale)]
+        if changes:
             who = "the question what if" if record.author == WHAT_IF else f"the {words.source(record.author)}"
-            text = f"In cycle {record.cycle} {who} wrote: {listed(said, MAX_LISTED)}."
-            yield Step("changed", text, (record.ref, *record.because))
+            text = f"In cycle {record.cycle} {who} wrote: {listed(changes, MAX_LISTED)}."
+            yield Sentence(text, (record.ref, *record.because), label="changed")
 
 
 def _is_part(mark: str, name: str) -> bool:
@@ -173,24 +164,24 @@ def _is_part(mark: str, name: str) -> bool:
     return mark == name or mark.startswith(f"{name}/")
 
 
-def _tell_milestones(expecting: Sequence[EntryRecord[Milestone]], name: str) -> Iterator[Step]:
+def _tell_milestones(expecting: Sequence[EntryRecord[Milestone]], name: str) -> Iterator[Sentence]:
     for record in expecting[:MAX_MILESTONES]:
         milestone = record.value
         of_it = [_is_part(mark, name) for mark in milestone.landmarks]
         lines, all_lines = sum(of_it[mark] for mark in milestone.landmark_of), len(milestone.expected)
         title = f"{capital(phrases.milestone_name(milestone))} ({milestone.status})"
-        yield step("expected", f"{title} expected {lines} of its {count(all_lines, 'model line')} there.", record)
+        yield said(f"{title} expected {lines} of its {count(all_lines, 'model line')} there.", record, label="expected")
     if rest := expecting[MAX_MILESTONES:]:
         text = f"{count(len(rest), 'more milestone')} expected lines of it."
-        yield Step("expected", text, (rest[0].ref, rest[-1].ref))
+        yield said(text, rest[0], rest[-1], label="expected")
     if not expecting:
-        yield step("expected", "No milestone expected to see anything of it.")
+        yield said("No milestone expected to see anything of it.", label="expected")
 
 
-def _tell_plans(history: Timeline, name: str) -> Iterator[Step]:
+def _tell_plans(history: Timeline, name: str) -> Iterator[Sentence]:
     """The plan sketches that lead through it."""
     for id in history.ids_of(PlanSketch):
         first = history.entry(f"{id}.0")
         subgoals = () if first is None else first.field("subgoals", ())
         if first is not None and any(name in (s.get("passage"), s["destination"]["locale"]) for s in subgoals):
-            yield step("planned", phrases.plainly(first), first)
+            yield said(phrases.plainly(first), first, label="planned")

@@ -5,22 +5,16 @@ They are found while the run goes on, or read from its journal; the collisions a
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from blackboard.change import Change, Posted, Retracted
-from blackboard.entry import Entry
-from blackboard.journal import Decision
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from logs.explain.phrases import wrap
-from logs.mirror import Mirror, find_belief
-from logs.records import EntryRecord, Opaque, is_a
+from blackboard import Decision, Discrepancy, Level, Posted, Retracted
+from logs.explain.phrases import milestone_of, wrap
+from logs.records import EntryRecord, Opaque
 from logs.run_errors import BadInput
-from logs.timeline import Timeline, time_told
+from logs.timeline import Mirror, Timeline, find_belief, time_told
 from world_models import words
 from world_models.entries.body import BodyFault
 from world_models.entries.door_state import DoorState
@@ -40,11 +34,13 @@ TOLD_KINDS: tuple[type[Any], ...] = (BodyFault, Contact, DoorState, Obstacle, Re
 KINDS: tuple[type[Any], ...] = (*TOLD_KINDS, Goal, PlanSketch, Certificate, Outcome)
 NOTHING = "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
 ENDED_EARLY = "Nothing had gone wrong when the run was cut off: what would have come of it nobody knows."
-SIMULATOR = "simulator"
-"""The kind of what the simulator did."""
-Get = Callable[[str], Entry[Any] | None]
-"""Gives the current revision of an entry by its id."""
-Believed = Callable[[int], Entry[Hypothesis] | None]
+SIMULATOR, COLLISION = "simulator", "collision"
+"""The kinds of what the simulator did, and of what only it knows to have been touched."""
+Revision = tuple[str, Any, bool]
+"""Id and value of an entry, and whether it is new."""
+NameOf = Callable[[str], str]
+"""Gives the name of a milestone by its id."""
+Believed = Callable[[int], Hypothesis | None]
 """Gives where the robot believed to be in a cycle."""
 
 
@@ -92,6 +88,12 @@ class Collision:
     y_m: float
     speed_m_per_s: float | None = None
 
+    def turning_point(self) -> TurningPoint:
+        """As a turning point, which the robot knows nothing of. Raises TypeError, ValueError for other values."""
+        place = Place(self.locale, float(self.x_m), float(self.y_m)).words()
+        speed = "" if self.speed_m_per_s is None else f" at {self.speed_m_per_s:.2f} m/s"
+        return TurningPoint(self.cycle, COLLISION, f"{place}{speed}, as only the simulator knows")
+
 
 @dataclass(frozen=True, slots=True)
 class Happening:
@@ -100,9 +102,9 @@ class Happening:
     cycle: int
     what: str
 
-    def turning_point(self, time_s: float | None = None) -> TurningPoint:
-        """As a turning point, which the robot knows nothing of."""
-        return TurningPoint(self.cycle, SIMULATOR, f"{self.what}, as only the simulator knows", time_s)
+    def turning_point(self) -> TurningPoint:
+        """As a turning point, which the robot knows nothing of. Raises TypeError for what is no text."""
+        return TurningPoint(self.cycle, SIMULATOR, self.what + ", as only the simulator knows")
 
 
 class TurningPointFinder:
@@ -117,11 +119,17 @@ class TurningPointFinder:
         """The turning points of the next decision."""
         before, changes = find_belief(self._mirror), (*decision.observed, *decision.made)
         self._mirror.take(*changes)
+        belief = find_belief(self._mirror) or before
         times = [time_told(partial(_get, change.entry.value)) for change in decision.observed]
         self._time_s = max((time_s for time_s in times if time_s is not None), default=self._time_s)
-        found = _turns(changes, decision.cycle, self._mirror.get, lambda _: find_belief(self._mirror) or before,
-                       self._states)
+        revisions = [(change.entry.id, change.entry.value, isinstance(change, Posted)) for change in changes
+                     if not isinstance(change, Retracted)]
+        found = _turns(revisions, decision.cycle, self._name, lambda _: belief and belief.value, self._states)
         return [replace(point, time_s=self._time_s) for point in found]
+
+    def _name(self, id: str) -> str:
+        entry = self._mirror.get(id)
+        return entry.value.name() if entry is not None and isinstance(entry.value, Milestone) else id
 
 
 def _get(value: Any, name: str) -> Any:
@@ -144,31 +152,29 @@ def is_found(value: Hypothesis) -> bool:
 
 
 def _turns(
-    changes: Iterable[Change], cycle: int, get: Get, believed: Believed, states: dict[str, str]
+    revisions: Iterable[Revision], cycle: int, name_of: NameOf, believed: Believed, states: dict[str, str]
 ) -> Iterator[TurningPoint]:
-    """The turning points among the changes of a cycle; of doors and things it is noted how they were before."""
-    for change in changes:
-        value, id = change.entry.value, change.entry.id
-        if not isinstance(change, Retracted):
-            yield from _turn(value, isinstance(change, Posted), cycle, get, believed, states.get(id, ""))
+    """The turning points among what a cycle wrote; of doors and things it is noted how they were before."""
+    for id, value, is_new in revisions:
+        yield from _turn(value, is_new, cycle, name_of, believed, states.get(id, ""))
         if isinstance(value, Obstacle | DoorState):
             states[id] = value.status if isinstance(value, Obstacle) else value.state
 
 
-def _turn(value: Any, is_new: bool, cycle: int, get: Get, believed: Believed, was: str) -> Iterator[TurningPoint]:
+def _turn(
+    value: Any, is_new: bool, cycle: int, name_of: NameOf, believed: Believed, was: str
+) -> Iterator[TurningPoint]:
     """The turning point that a new revision is, if it is one; ``was``: the state of the thing or door before."""
     if isinstance(value, Goal) and (is_new or not value.is_active):
         yield TurningPoint(cycle, "goal", f"{value.destination.locale}{'' if is_new else ': ' + value.status}")
     elif isinstance(value, PlanSketch) and is_new:
         yield TurningPoint(cycle, "plan", f"{value.where()}, {count(len(value.subgoals), 'part')}")
     elif isinstance(value, Certificate):
-        entry = get(value.milestone)
-        what = entry.value.name() if entry is not None and isinstance(entry.value, Milestone) else value.milestone
         said = f"{words.metres(value.deviation_m)} off" if value.verdict == "verified" else value.reason
-        yield TurningPoint(cycle, value.verdict, f"{what}: {said}")
+        yield TurningPoint(cycle, value.verdict, f"{name_of(value.milestone)}: {said}")
     elif isinstance(value, Discrepancy) and value.status == "escalated":
         belief = believed(cycle) if is_lost(value) else None
-        where = "" if belief is None else f"{belief.value.place()} by its belief; "
+        where = "" if belief is None else f"{belief.place()} by its belief; "
         yield TurningPoint(cycle, "lost" if is_lost(value) else "doubt", f"{where}{value.what}")
     elif isinstance(value, Hypothesis) and is_found(value):
         yield TurningPoint(cycle, "found", f"{value.place()}; {value.evidence or 'it knows again where it is'}")
@@ -176,7 +182,7 @@ def _turn(value: Any, is_new: bool, cycle: int, get: Get, believed: Believed, wa
         yield TurningPoint(cycle, "fault", f"{value.part}: {value.what}{'' if value.is_open else ', over'}")
     elif isinstance(value, Contact):
         belief = believed(cycle)
-        where = "" if belief is None else f", at {belief.value.place()} by its belief"
+        where = "" if belief is None else f", at {belief.place()} by its belief"
         yield TurningPoint(cycle, "contact", f"{words.brief(value)}{where}")
     elif isinstance(value, DoorState) and value.is_passable is (was == "shut"):
         yield TurningPoint(cycle, "door", words.brief(value))
@@ -202,13 +208,16 @@ def read_turning_points(history: Timeline, *, told: bool = False) -> Iterator[Tu
     marks, kinds = ((*MARKS, *NOT_VERIFIED), TOLD_KINDS) if told else (MARKS, KINDS)
     cycles = {decision.cycle for mark in marks for decision in history.naming(mark)}
     cycles |= {record.cycle for record in history.of_kind(*kinds)}
-    beliefs = [ref for ref in history.refs if ref.startswith("Hypothesis-")]
     states: dict[str, str] = {}
+
+    def name_of(id: str) -> str:
+        record = history.entry(history.newest.get(id, ""))
+        return id if record is None or record.kind is not Milestone else milestone_of(record)
+
     for cycle in sorted(cycles):
         records = filter(may_turn, history.decision(cycle).changes)
-        changes = [change for change in map(_change_of, records) if change is not None]
-        found = _turns(changes, cycle, lambda id: _newest(history, id),
-                       lambda then: _belief(history, beliefs, then), states)
+        revisions = [(one.id, value, one.is_new) for one in records if (value := _value(one)) is not None]
+        found = _turns(revisions, cycle, name_of, lambda then: _value(history.held(then)), states)
         yield from (replace(point, time_s=history.time_at(cycle)) for point in found if point.is_told or not told)
 
 
@@ -221,63 +230,30 @@ def may_turn(record: EntryRecord[Any]) -> bool:
     return not record.is_gone and record.kind in KINDS
 
 
-def _change_of(record: EntryRecord[Any]) -> Change | None:
+def _value(record: EntryRecord[Any] | None) -> Any:
     """None for one of another version, or of a kind that is not known here."""
     try:
-        return None if record.kind is Opaque else record.change_of_board
+        return None if record is None or record.kind is Opaque else record.value
     except BadInput:
         return None
 
 
-def _entry_of(record: EntryRecord[Any] | None) -> Entry[Any] | None:
-    change = None if record is None else _change_of(record)
-    return None if change is None else change.entry
+def read_truth(history: Timeline, result: Mapping[str, Any]) -> Iterator[TurningPoint]:
+    """What the simulator did, and where the robot truly touched something, as ``result.json`` says.
 
-
-def _belief(history: Timeline, refs: list[str], cycle: int) -> Entry[Hypothesis] | None:
-    """The newest belief that was held in a cycle, or until then."""
-    for ref in reversed(refs[: bisect_right(refs, cycle, key=history.cycle_of_ref)]):
-        entry = _entry_of(history.entry(ref))
-        if entry is not None and entry.value.is_held:
-            return entry
-    return None
-
-
-def _newest(history: Timeline, id: str) -> Entry[Any] | None:
-    """An entry as it was last; of a milestone without its lines, which take long to decode and are not told."""
-    record = history.entry(history.newest[id]) if id in history.newest else None
-    if is_a(record, Milestone) and isinstance(record.fields, dict):
-        record = replace(record, fields={k: [] if isinstance(v, list) else v for k, v in record.fields.items()})
-    return _entry_of(record)
-
-
-def read_collisions(history: Timeline, result: Mapping[str, Any]) -> Iterator[TurningPoint]:
-    """Where the robot truly touched something, as ``result.json`` says. Raises BadInput where that is malformed."""
-    for record in result.get("contacts") or ():
-        try:
-            contact = Collision(**record)
-            place = Place(contact.locale, float(contact.x_m), float(contact.y_m)).words()
-            speed = "" if contact.speed_m_per_s is None else f" at {contact.speed_m_per_s:.2f} m/s"
-        except (TypeError, ValueError) as error:
-            raise BadInput(f"result.json: contacts: expected cycle and place of each, got {record!r}") from error
-        if history.cycle_of(contact.cycle) is None:
-            have = f"1 to {len(history.cycles)}"
-            raise BadInput(f"result.json: contacts: expected cycles of the journal, {have}, got {contact.cycle!r}")
-        text = f"{place}{speed}, as only the simulator knows"
-        yield TurningPoint(contact.cycle, "collision", text, history.time_at(contact.cycle))
-
-
-def read_happenings(history: Timeline, result: Mapping[str, Any]) -> Iterator[TurningPoint]:
-    """What the simulator did, as ``result.json`` says. Raises BadInput where that is malformed."""
-    for record in result.get("happened") or ():
-        try:
-            one = Happening(**record)
-            is_told = isinstance(one.what, str)
-        except TypeError:
-            is_told = False
-        if not is_told or history.cycle_of(one.cycle) is None:
-            raise BadInput(f"result.json: happened: expected a cycle of the journal and words, got {record!r}")
-        yield one.turning_point(history.time_at(one.cycle))
+    Raises BadInput where that is malformed.
+    """
+    for key, kind, of_each in (("happened", Happening, "words"), ("contacts", Collision, "a place")):
+        for record in result.get(key) or ():
+            try:
+                point = kind(**record).turning_point()
+                is_known = history.cycle_of(point.cycle) is not None
+            except (TypeError, ValueError):
+                is_known = False
+            if not is_known:
+                have = f"a cycle of the journal, 1 to {len(history.cycles)},"
+                raise BadInput(f"result.json: {key}: expected {have} and {of_each}, got {record!r}")
+            yield replace(point, time_s=history.time_at(point.cycle))
 
 
 def turn_lines(history: Timeline, result: Mapping[str, Any], *, is_whole: bool = True) -> Iterator[str]:
@@ -286,9 +262,8 @@ def turn_lines(history: Timeline, result: Mapping[str, Any], *, is_whole: bool =
     ``is_whole``: the run has an outcome.
     """
     told = read_turning_points(history, told=True)
-    truly = (*read_happenings(history, result), *read_collisions(history, result))
-    points = sorted([*truly, *told], key=lambda point: point.cycle)
-    unplaced = (result.get("collisions") or 0) - sum(point.kind == "collision" for point in points)
+    points = sorted([*read_truth(history, result), *told], key=lambda point: point.cycle)
+    unplaced = (result.get("collisions") or 0) - sum(point.kind == COLLISION for point in points)
     if not points and unplaced <= 0:
         yield NOTHING if is_whole else ENDED_EARLY
         return

@@ -3,7 +3,7 @@ on something: a goal, the model or what the camera saw."""
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TextIO
@@ -36,7 +36,8 @@ GROUNDS: Mapping[type[Any], str] = {
 """The kinds of entries that are such an end themselves; what the robot is told of the model is a part of it."""
 NAMING: Mapping[type[Any], str] = {Milestone: "landmarks", Tracks: "items", PlanSketch: "subgoals"}
 """The fields by which others name what is in the model."""
-Kind = Callable[[EntryRecord[Any]], str | None]
+Ends = frozenset[str]
+"""What some entry ends in: some of KINDS, and the names of the reasons of which the journal says nothing."""
 
 
 def printing(out: TextIO, *, whole: bool) -> Sink:
@@ -104,71 +105,44 @@ def _change_line(word: str, change: EntryRecord[Any]) -> str:
     return f"  {word:<9} {change.ref} by {change.author}: {sentence(change)}"
 
 
-@dataclass(frozen=True, slots=True)
-class Reason:
-    """One line of the explanation.
+def walk(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Iterator[tuple[int, str, str]]:
+    """Each entry, then what it rests on, depth first; what is shared is told once, nearest to what is explained.
 
-    Attributes:
-        depth: 0 for what is explained.
-        ref: of the entry.
-        record: what the journal says of it; None where it says nothing.
-        after: the entry that rests on it; None for what is explained.
-        known: ``above`` or ``below``, where it is told already or, nearer to what is explained, told yet.
-        hidden: how many reasons of its own are left out because they lie too deep.
+    Returns:
+        steps down, ref, sentence; of an earlier revision of what rests on it only what little was different.
     """
-
-    depth: int
-    ref: str
-    record: EntryRecord[Any] | None
-    after: EntryRecord[Any] | None = None
-    known: str = ""
-    hidden: int = 0
-
-    def text(self) -> str:
-        """The sentence; of an earlier revision of what rests on it, only what little was different, if it was little.
-        """
-        if self.known:
-            return f"{self.ref}, as {self.known}"
-        if self.record is None:
-            return f"{self.ref}, of which the journal says nothing"
-        tail = f" (and so on: {count(self.hidden, 'reason')} below)" if self.hidden else ""
-        before = list(differing_leaves(self.record.fields, self.after.fields)) if (
-            self.after is not None and self.after.id == self.record.id) else []
-        if 0 < len(before) <= FEW:
-            return f"{self.ref}: before that, {', '.join(f'{path} = {then}' for path, then, _ in before)}{tail}"
-        return f"{self.ref}: {sentence(self.record)}{tail}"
-
-
-def walk(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Iterator[Reason]:
-    """Each entry, then what it rests on, depth first; what is shared is told once, nearest to what is explained."""
-    told: set[str] = set()
-    nearest = _distances(history, refs, depth)
+    told, nearest = set[str](), _distances(history, refs, depth)
     stack: list[tuple[int, str, EntryRecord[Any] | None]] = [(0, ref, None) for ref in reversed(refs)]
     while stack:
         level, name, after = stack.pop()
         record = history.entry(name)
-        known = "above" if name in told else "below" if nearest[name] < level else ""
-        if known or record is None:
-            yield Reason(level, name, record, after, known)
-            continue
-        told.add(name)
-        hidden = len(record.because) if level >= depth else 0
-        yield Reason(level, name, record, after, hidden=hidden)
-        if not hidden:
-            stack += [(level + 1, reason, record) for reason in reversed(record.because)]
+        if name in told or nearest[name] < level:
+            yield level, name, f"{name}, as {'above' if name in told else 'below'}"
+        elif record is None:
+            yield level, name, f"{name}, of which the journal says nothing"
+        else:
+            told.add(name)
+            is_revised = after is not None and after.id == record.id
+            before = list(differing_leaves(record.fields, after.fields)) if after is not None and is_revised else []
+            text = f"{name}: {sentence(record)}" if not 0 < len(before) <= FEW else (
+                f"{name}: before that, {', '.join(f'{path} = {then}' for path, then, _ in before)}")
+            if level < depth:
+                stack += [(level + 1, reason, record) for reason in reversed(record.because)]
+                yield level, name, text + ", because" * bool(record.because)
+            else:
+                tail = f" (and so on: {count(len(record.because), 'reason')} below)"
+                yield level, name, text + tail * bool(record.because)
 
 
 def _distances(history: Timeline, refs: Sequence[str], depth: int) -> dict[str, int]:
     """The fewest steps from what is explained to each entry that is at most ``depth`` steps away."""
-    nearest = dict.fromkeys(refs, 0)
-    queue = deque(refs)
-    while queue:
-        name = queue.popleft()
-        record = history.entry(name) if nearest[name] < depth else None
-        for reason in () if record is None else record.because:
-            if reason not in nearest:
-                nearest[reason] = nearest[name] + 1
-                queue.append(reason)
+    nearest, layer = dict.fromkeys(refs, 0), list(refs)
+    for steps in range(1, depth + 1):
+        records = [record for ref in layer if (record := history.entry(ref)) is not None]
+        layer = [*dict.fromkeys(ref for record in records for ref in record.because if ref not in nearest)]
+        nearest |= dict.fromkeys(layer, steps)
+        if not layer:
+            break
     return nearest
 
 
@@ -178,16 +152,16 @@ def explain(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Itera
     Raises BadInput where a reason is missing, and so is a line of the journal, or a part of one.
     """
     reasons = list(walk(history, refs, depth))
-    if any(reason.record is None for reason in reasons):
+    if any(history.entry(ref) is None for _, ref, _ in reasons):
         history.verify()
-    for index, reason in enumerate(reasons):
-        if reason.depth == 0 and reason.record is not None:
-            yield from [""] * (index > 0)
-            yield wrap(f"{reason.ref}: {describe_decision(history, reason.record)}")
-        leads_on = index + 1 < len(reasons) and reasons[index + 1].depth > reason.depth
-        indent = "  " * min(reason.depth, DEEPEST_INDENT)
-        yield wrap(reason.text() + (", because" if leads_on else ""), indent, indent + "    ")
-    if any(reason.hidden for reason in reasons):
+    for number, (level, ref, text) in enumerate(reasons):
+        record = history.entry(ref)
+        if level == 0 and record is not None:
+            yield from [""] * (number > 0)
+            yield wrap(f"{ref}: {describe_decision(history, record)}")
+        indent = "  " * min(level, DEEPEST_INDENT)
+        yield wrap(text, indent, indent + "    ")
+    if any(text.endswith(" below)") for _, _, text in reasons):
         yield f"(--depth {depth + 1} goes on where it says \"and so on\")"
 
 
@@ -211,37 +185,6 @@ def _rank(record: EntryRecord[Any]) -> int:
     return 1 + (PRINCIPAL.index(record.kind) if record.kind in PRINCIPAL else len(PRINCIPAL))
 
 
-@dataclass(frozen=True, slots=True)
-class Grounds:
-    """What some entries rest on.
-
-    Attributes:
-        kinds: which of KINDS they reach, in that order.
-        lacking: reasons of which the journal says nothing.
-    """
-
-    kinds: tuple[str, ...]
-    lacking: tuple[str, ...] = ()
-
-    @property
-    def hold(self) -> bool:
-        """Whether there is something at the bottom, and no step of the way is missing."""
-        return bool(self.kinds) and not self.lacking
-
-
-@dataclass(frozen=True, slots=True)
-class Accounted:
-    """A decision, what it is to be explained by, and what each of these rests on."""
-
-    decision: DecisionRecord
-    grounds: Mapping[str, Grounds]
-
-    @property
-    def holds(self) -> bool:
-        """Whether everything that it did rests on something; so it does where nothing was decided."""
-        return all(grounds.hold for grounds in self.grounds.values())
-
-
 def kind_of(record: EntryRecord[Any]) -> str | None:
     """The kind of ground that an entry is itself; None where it is none."""
     names_the_model = record.kind in NAMING and record.field(NAMING[record.kind])
@@ -261,50 +204,56 @@ def explained_by(decision: DecisionRecord) -> tuple[str, ...]:
     return tuple(dict.fromkeys(c.trigger for c in decision.obviated))
 
 
-def trace_grounds(decisions: Iterable[DecisionRecord], kind_of: Kind = kind_of) -> Iterator[Accounted]:
-    """Each decision of a run with what it rests on; reasons are older than what rests on them, so one pass does."""
-    known: dict[str, Grounds] = {}
+def trace_grounds(
+    decisions: Iterable[DecisionRecord], kind_of: Callable[[EntryRecord[Any]], str | None] = kind_of
+) -> Iterator[tuple[DecisionRecord, Mapping[str, Ends]]]:
+    """Each decision of a run, and in what each of those ends that it is explained by.
+
+    Reasons are older than what rests on them, so one pass does.
+    """
+    known: dict[str, Ends] = {}
     for decision in decisions:
         for record in decision.changes:
             if not record.is_gone or record.ref not in known:
-                below = [known.get(ref, Grounds((), (ref,))) for ref in record.because]
-                kinds = {kind_of(record), *(kind for grounds in below for kind in grounds.kinds)}
-                lacking = sorted({ref for grounds in below for ref in grounds.lacking})
-                known[record.ref] = Grounds(tuple(k for k in KINDS if k in kinds), tuple(lacking))
-        yield Accounted(decision, {ref: known.get(ref, Grounds((), (ref,))) for ref in explained_by(decision)})
+                own = frozenset(filter(None, [kind_of(record)]))
+                known[record.ref] = own.union(*(known.get(ref, Ends([ref])) for ref in record.because))
+        yield decision, {ref: known.get(ref, Ends([ref])) for ref in explained_by(decision)}
 
 
-def ground_names() -> tuple[str, ...]:
-    """The kinds of grounds in words, as those who reach them."""
-    return "reach the goal", "the model", "a camera frame"
+def holds(ends: Ends) -> bool:
+    """Whether there is something at the bottom, and no step of the way is missing."""
+    return bool(ends) and ends.issubset(KINDS)
 
 
 @dataclass(frozen=True, slots=True)
 class RestingCount:
-    """How many decisions of a run rest on something.
+    """How many decisions of a run rest on something; so do those in which nothing was decided.
 
     Attributes:
         decisions: all cycles; acts: those in which somebody was chosen.
-        reached: how many rest on something.
         by_kind: how many reach each of KINDS.
-        failing: those that do not.
+        failing: of those that do not, by cycle: the entries below which nothing is.
     """
 
     decisions: int
     acts: int
-    reached: int
     by_kind: Mapping[str, int]
-    failing: tuple[Accounted, ...]
+    failing: Mapping[int, Sequence[str]]
+
+    @property
+    def reached(self) -> int:
+        """How many rest on something."""
+        return self.decisions - len(self.failing)
 
 
 def check(history: Timeline) -> RestingCount:
     """Every decision of a run. Raises BadInput where a line of its journal is malformed."""
     decisions = acts = 0
-    by_kind, failing = dict.fromkeys(KINDS, 0), list[Accounted]()
-    for one in trace_grounds(history.decisions()):
+    by_kind, failing = Counter[str](dict.fromkeys(KINDS, 0)), dict[int, Sequence[str]]()
+    for decision, ends in trace_grounds(history.decisions()):
         decisions += 1
-        acts += one.decision.chosen is not None
-        for kind in sorted({kind for grounds in one.grounds.values() for kind in grounds.kinds}):
-            by_kind[kind] += 1
-        failing += [one] * (not one.holds)
-    return RestingCount(decisions, acts, decisions - len(failing), by_kind, tuple(failing))
+        acts += decision.chosen is not None
+        by_kind.update(frozenset[str]().union(*ends.values()).intersection(KINDS))
+        if lacking := [ref for ref, below in ends.items() if not holds(below)]:
+            failing[decision.cycle] = lacking
+    return RestingCount(decisions, acts, by_kind, failing)

@@ -13,11 +13,9 @@ from typing import Any, Literal, TypeVar
 import rerun.blueprint as rrb
 from rerun.encodings import TimeRange
 
-from blackboard.change import Change, Retracted
-from blackboard.entry import Entry
-from blackboard.journal import Decision, decision_line
-from logs.mirror import Mirror
+from blackboard import Change, Decision, Entry, Retracted, decision_line
 from logs.recording.stream import RecordingStream
+from logs.timeline import Mirror
 from world_models.building.geometry.faces import Face
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount

@@ -8,11 +8,11 @@ from importlib import import_module
 from pathlib import Path
 
 from blackboard.journal import Decision, decision_line
-from logs.mirror import Mirror, find_belief
 from logs.recording import loggers as built_in
 from logs.recording.logger import Difference, Held, Logger, Moment, Subject, blueprint
 from logs.recording.stream import LIVE_PORT, RecordingStream
 from logs.run_errors import RecordingError
+from logs.timeline import Mirror, find_belief
 from world_models.building.geometry.faces import Face
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount

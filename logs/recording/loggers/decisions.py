@@ -9,9 +9,7 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard.change import Change, Retracted, Revised
-from blackboard.journal import Decision
-from blackboard.servoing import Discrepancy
+from blackboard import Change, Decision, Discrepancy, Retracted, Revised
 from logs.recording.logger import Logger, Moment, Panel, Subject, log_view
 from logs.recording.palette import DONE, LEVELS, REJECTED
 from logs.recording.paths import RECORDS, TABLE

@@ -7,10 +7,8 @@ from collections.abc import Mapping, Sequence
 import rerun as rr
 import rerun.blueprint as rrb
 
+from blackboard import Discrepancy, Level, View
 from blackboard.agenda import Activation
-from blackboard.board import View
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
 from logs.recording.logger import NEAR, Logger, Moment, Panel, Subject
 from logs.recording.palette import ACTIVITIES, LEVELS, REJECTED, Colour
 from logs.recording.paths import FAULTS, FOCUS, HARVEY

@@ -10,8 +10,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard.board import View
-from blackboard.entry import Entry
+from blackboard import Entry, View
 from logs.recording.logger import Logger, Moment, Panel
 from logs.recording.palette import DONE, EXPECTED, PLANNED, VERDICTS, WAITING, Colour, faint
 from logs.recording.paths import GOAL, LANDMARKS, LEG, PATH, SKETCH

@@ -9,18 +9,16 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard.board import View
-from blackboard.entry import Entry
+from blackboard import Discrepancy, Entry, View
 from blackboard.kinds import always
-from blackboard.servoing import Discrepancy
 from logs.explain import phrases
 from logs.explain.turning_points import SIMULATOR, Happening, TurningPoint, TurningPointFinder
-from logs.mirror import find_belief
 from logs.recording.logger import Logger, Moment, Panel, Subject, log_view
 from logs.recording.loggers.lanes import ACTIVITY_KINDS, activity, doubts, leg_under_way
 from logs.recording.palette import BELIEVED, DONE, LEVELS, MATCHED, PLANNED, REJECTED, REVISED, TRUE, VERDICTS, Colour
 from logs.recording.paths import CHAPTERS, DESCRIPTION, WHY
 from logs.recording.stream import RecordingStream, viewable
+from logs.timeline import find_belief
 from world_models import words
 from world_models.entries.body import BodyFault, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis

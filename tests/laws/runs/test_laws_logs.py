@@ -15,9 +15,9 @@ from blackboard.journal import Decision, decision_record
 from blackboard.level import Level
 from journals import read_journal
 from logs.journal_file import JournalFile
-from logs.mirror import Mirror
 from logs.recording.loggers.plan import outline
 from logs.recording.loggers.robots import SIGMA_SCALE, ring
+from logs.timeline import Mirror
 from strategies import Note, Tally
 from world_models.entries.location import Place
 from world_models.entries.task import Goal, PlanSketch, Subgoal

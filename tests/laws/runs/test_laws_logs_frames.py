@@ -13,12 +13,12 @@ from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Entry, Ref
 from blackboard.journal import Decision
 from blackboard.level import Level
-from logs.mirror import Mirror
 from logs.recording.logger import Moment, Subject
 from logs.recording.loggers.surroundings.locale_frames import LocaleFrames, marks_path, outline_path
 from logs.recording.palette import KNOWN, REVISED
 from logs.recording.paths import FRAME_LIST
 from logs.recording.stream import RecordingStream
+from logs.timeline import Mirror
 from scripted_mission import CAMERA, MOUNT, house
 from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.building.world import World

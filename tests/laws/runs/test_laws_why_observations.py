@@ -18,7 +18,7 @@ from blackboard.entry import Ref
 from blackboard.journal import change_record, plain
 from blackboard.scheduler import registry_of
 from harvey.errors import BadInput
-from logs.records import EntryRecord, Originals, effect_of, original_of
+from logs.records import EntryRecord, Originals, effect_of, value_of
 from scripted_mission import HOUSE
 from world_models.actuator import ActuatorModel
 from world_models.building.locale_frame import FrameAnswer, FrameChange, FrameRequest, LocaleFrame
@@ -81,7 +81,7 @@ def originals_of(value: Any) -> Originals:
 @settings(deadline=None, max_examples=200)
 @given(observations)
 def test_an_observation_comes_back_as_it_was(value: Any) -> None:
-    again = original_of(recorded(value), originals_of(value), KNOWN)
+    again = value_of(recorded(value), KNOWN, *originals_of(value))
     assert type(again) is type(value)
     assert json.dumps(plain(again)) == json.dumps(plain(value))
     effect = effect_of(recorded(value), originals_of(value), Blackboard().view, KNOWN)
@@ -98,16 +98,16 @@ def test_a_value_of_other_fields_is_refused(value: Any, data: st.DataObject) -> 
     lacking = {k: v for k, v in record.fields.items() if k != key}
     for broken in (lacking, {**record.fields, key: other}, {**record.fields, "x": 1}):
         with pytest.raises(BadInput, match="expected"):
-            original_of(replace(record, fields=broken), originals_of(value), KNOWN)
+            value_of(replace(record, fields=broken), KNOWN, *originals_of(value))
 
 
 @given(st.binary(max_size=9), st.binary(max_size=9))
 def test_a_picture_must_be_the_one_that_was_seen(seen: bytes, kept: bytes) -> None:
     record = recorded(CameraPicture(seen, 7, 0.5))
     if hashlib.sha256(seen).digest() == hashlib.sha256(kept).digest():
-        assert original_of(record, originals(CameraPicture(kept, 7, 0.5)), KNOWN).jpeg == seen
+        assert value_of(record, KNOWN, *originals(CameraPicture(kept, 7, 0.5))).jpeg == seen
         return
     with pytest.raises(BadInput, match="another one"):
-        original_of(record, originals(CameraPicture(kept, 7, 0.5)), KNOWN)
+        value_of(record, KNOWN, *originals(CameraPicture(kept, 7, 0.5)))
     with pytest.raises(BadInput, match="picture 7"):
-        original_of(record, originals(CameraPicture(seen, 8, 0.5)), KNOWN)
+        value_of(record, KNOWN, *originals(CameraPicture(seen, 8, 0.5)))

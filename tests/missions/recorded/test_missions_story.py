@@ -17,8 +17,8 @@ from harvey.campaign.campaign import Task, run_task
 from harvey.cli import main
 from harvey.runner.replay import replay
 from headless_viewer import look_or_skip
-from logs.explain.questions_in_words import error_at, read_errors
 from logs.explain.story import RunStory, story_lines, tell_run
+from logs.explain.true_errors import read_errors
 from logs.explain.turning_points import read_turning_points
 from logs.pictures import open_pictures
 from logs.reader import read_series
@@ -101,7 +101,7 @@ def test_it_tells_how_the_run_went(told: tuple[str, Path], story: RunStory) -> N
 def test_each_sentence_has_a_cycle_of_the_journal_and_entries_that_it_made(
     story: RunStory, history: Timeline
 ) -> None:
-    sentences = [sentence for section in story.sections for sentence in section.sentences]
+    sentences = [sentence for section in story.sections for sentence in section.steps]
     known = set(history.refs)
     for sentence in sentences:
         assert sentence.cycle is None or sentence.cycle in history.cycles
@@ -134,16 +134,9 @@ def test_every_verdict_of_the_journal_is_a_row(story: RunStory, history: Timelin
 def test_each_contact_is_told_with_its_cycle(told: tuple[str, Path], story: RunStory, history: Timeline) -> None:
     felt = [record.cycle for record in history.of_kind(Contact)]
     truly = [contact["cycle"] for contact in RunDirectory(told[1]).read_result()["contacts"]]
-    (section,) = (section for section in story.sections if section.title == "What it touched")
-    assert [s.cycle for s in section.sentences if s.cycle is not None] == [*felt, *truly]
-    assert all(re.search(r"\(-?[0-9.]+, -?[0-9.]+\) m", s.text) for s in section.sentences if s.cycle is not None)
-
-
-def test_its_first_lines_open_why(
-    told: tuple[str, Path], story: RunStory, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["why", str(told[1])]) == 0
-    assert capsys.readouterr().out.startswith("\n".join(story.opening))
+    (section,) = (section for section in story.sections if section.headline == "What it touched")
+    assert [s.cycle for s in section.steps if s.cycle is not None] == [*felt, *truly]
+    assert all(re.search(r"\(-?[0-9.]+, -?[0-9.]+\) m", s.text) for s in section.steps if s.cycle is not None)
 
 
 def test_the_story_of_a_replayed_run_is_the_same(told: tuple[str, Path], story: RunStory) -> None:
@@ -190,24 +183,9 @@ def test_how_far_off_it_was_is_what_the_recording_has_drawn(told: tuple[str, Pat
     errors = {error.cycle: error for error in read_errors(run, history)}
     assert errors and errors.keys() <= drawn.keys()
     for cycle, values in drawn.items():  # it is drawn also where a candidate is posted beside the belief
-        error = errors.get(cycle) or error_at(run, history, cycle)
-        assert error is not None and 1e3 * error.off_m == pytest.approx(math.hypot(*values), abs=0.01)
-    assert error_at(run, history, max(errors)) == errors[max(errors)]
-
-
-def test_the_questions_after_a_bad_run_are_answered_without_the_viewer(
-    told: tuple[str, Path], history: Timeline, story: RunStory, capsys: pytest.CaptureFixture[str]
-) -> None:
-    run = str(told[1])
-    for question, kind in (("when was it lost?", "lost"), ("where did it touch anything?", "contact")):
-        assert main(["why", run, question]) == 0
-        answer = capsys.readouterr().out
-        assert all(f"In cycle {point.cycle}" in answer for point in story.turning_points if point.kind == kind)
-    last = history.cycles[-1]
-    assert main(["why", run, "how far off was it in truth?", "--at", str(last)]) == 0
-    assert f"In cycle {last} it stood " in capsys.readouterr().out
-    assert main(["why", run, "how far off was it?", "--at", str(last + 1)]) == 2
-    assert f"got {last + 1}" in capsys.readouterr().err
+        (error,) = [errors[cycle]] if cycle in errors else read_errors(run, history, cycle)
+        assert 1e3 * error.off_m == pytest.approx(math.hypot(*values), abs=0.01)
+    assert read_errors(run, history, max(errors)) == [errors[max(errors)]]
 
 
 def test_without_the_recording_nothing_is_said_of_the_truth(

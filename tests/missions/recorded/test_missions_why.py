@@ -5,7 +5,6 @@ Two seeds of one mission across Allen's office, in which somebody bumps into Har
 
 from __future__ import annotations
 
-import json
 import re
 import subprocess
 import sys
@@ -18,13 +17,11 @@ from blackboard.scheduler import registry_of
 from experiments.scale.explanations import write_hour
 from harvey.agent import Agent, build_agent
 from harvey.cli import main
-from harvey.replay.why_not_again import AskedView, board_at, changes, why_absent
+from harvey.replay.why_not_again import AskedView, board_at, changes, in_cycle, why_absent
 from logs.explain.diff import grounds, parting, same
 from logs.explain.phrases import describe_decision
-from logs.explain.subjects import milestone_story, milestones
 from logs.explain.web import check
 from logs.explain.why import lines_of, story
-from logs.explain.why_not import in_cycle
 from logs.run_head import RunHead
 from logs.timeline import Timeline
 from recorded_runs import Recorded
@@ -111,16 +108,6 @@ def test_the_numbers_of_a_story_are_those_of_the_entries(history: Timeline) -> N
             assert away**2 == pytest.approx(leg.fields["to_go_m"] ** 2 + leg.fields["left_m"] ** 2, abs=1e-6)
 
 
-def test_a_milestone_tells_what_was_expected_seen_and_judged_and_what_followed(history: Timeline) -> None:
-    told = [milestone_story(history, id) for id in milestones(history, "M0")]
-    assert told
-    for one in told:
-        labels = [step.label for step in one.steps]
-        assert [label for label in ("wanted", "believed", "expected", "seen", "judged", "followed")
-                if label not in labels] == []
-        assert "probability" in next(step.text for step in one.steps if step.label == "judged")
-
-
 def test_who_is_not_named_could_not_act_and_who_is_says_so_again(
     history: Timeline, agent: Agent
 ) -> None:
@@ -141,28 +128,6 @@ def test_who_is_not_named_could_not_act_and_who_is_says_so_again(
     assert asked > 100
 
 
-def test_why_not_is_answered_on_the_command_line(
-    runs: tuple[Path, Path], history: Timeline, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def said(*more: str) -> str:
-        assert main(["why", str(runs[0]), *more]) == 0
-        return capsys.readouterr().out
-
-    assert "watches for" in said("--not", "probe_photographer", "--at", "3")
-    lost = next(d for d in history.decisions() if d.runner_up and d.chosen and d.runner_up.source != d.chosen.source)
-    assert lost.runner_up is not None and lost.chosen is not None
-    out = said("--not", lost.runner_up.source, "--at", str(lost.cycle))
-    assert "was not chosen" in out
-    assert f"{lost.chosen.rating:.2f}" in out and f"{lost.runner_up.rating:.2f}" in out
-    assert "superseded in cycle" in said("--not", "Hypothesis-1.0")
-    assert "was able to act" in said("--not", "motor")
-    assert json.loads(said("--not", "motor", "--json"))["not"] == "motor"
-    assert main(["why", str(runs[0]), "--not", "mtor", "--at", "3"]) == 2
-    assert "motor" in capsys.readouterr().err
-    assert main(["why", str(runs[0]), "--not", "Gaol-1"]) == 2
-    assert "Goal-1" in capsys.readouterr().err
-
-
 def test_a_watch_whose_condition_did_not_hold_is_told_as_that(
     runs: tuple[Path, Path], history: Timeline, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -175,20 +140,6 @@ def test_a_watch_whose_condition_did_not_hold_is_told_as_that(
     told = capsys.readouterr().out
     assert f"came what the probe photographer watches for, {ref} revised, but its watch has a condition" in told
     assert "Nothing that" not in told
-
-
-def test_the_first_lines_tell_the_turning_points_that_the_result_keeps(
-    runs: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
-    for run in runs:
-        assert main(["why", str(run)]) == 0
-        told = capsys.readouterr().out
-        kept = json.loads((run / "result.json").read_text(encoding="utf-8"))
-        assert {point["kind"] for point in kept["turning_points"]} >= {"lost", "found"}
-        assert told.splitlines()[1] == "On the way:"
-        for point in (*kept["turning_points"], *({**c, "kind": "collision"} for c in kept["contacts"])):
-            assert re.search(rf"^  cycle {point['cycle']} +[0-9.]+ s  {point['kind']} ", told, re.MULTILINE)
-        assert len(kept["contacts"]) == kept["collisions"]
 
 
 def test_two_seeds_part_at_an_observation_and_each_later_difference_goes_back_to_one(

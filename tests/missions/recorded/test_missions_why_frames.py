@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from harvey.cli import main
+from harvey.replay.why_not_again import Fate, in_cycle, in_run
 from logs.explain.model import WorldFile
-from logs.explain.phrases import describe_decision
+from logs.explain.phrases import Sentence, Story, describe_decision
 from logs.explain.web import check
-from logs.explain.why import Step, Story, lines_of, story
-from logs.explain.why_not import Fate, in_cycle, in_run
+from logs.explain.why import lines_of, story
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
 from logs.timeline import Timeline
@@ -55,7 +55,7 @@ def value_in(history: Timeline, ref: str) -> dict[str, Any]:
     return dict(record.fields)
 
 
-def step(of: Story, label: str) -> Step:
+def step(of: Story, label: str) -> Sentence:
     found = next((one for one in of.steps if one.label == label), None)
     assert found is not None, f"{of.ref} tells no {label!r}"
     return found
@@ -140,11 +140,6 @@ def test_every_line_of_every_explanation_ends_in_goal_model_or_sensor(history: T
     found = check(history)
     assert found.reached == found.decisions > 100
     assert found.by_kind["model"] > 100
-
-
-def test_what_was_told_is_in_the_first_lines(run: RunDirectory, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["why", str(run.path)]) == 0
-    assert re.search(rf"^  cycle \d+ .* told  {DOOR} is shut", capsys.readouterr().out, re.MULTILINE)
 
 
 def test_a_door_a_landmark_and_a_room_are_answered_by_name(

@@ -75,14 +75,6 @@ def test_why_goes_down_to_the_command(run: Path, capsys: pytest.CaptureFixture[s
     assert "CameraPicture-1.0: picture of 0.1 s into the run; to verify a milestone" in out
 
 
-def test_why_without_an_entry_tells_the_outcome(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["why", str(run)]) == 0
-    out = capsys.readouterr().out
-    assert "The mission ended: failed" in out
-    assert "s into the run.\n" in out
-    assert "The user asked for it: (ptrans" in out
-
-
 def test_why_at_a_cycle_tells_what_it_did(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["why", str(run), "--at", "1"]) == 0
     out = capsys.readouterr().out

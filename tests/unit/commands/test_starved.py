@@ -59,7 +59,7 @@ def test_who_starves_is_told_at_the_end(driven: tuple[harvey.MissionResult, RunD
     assert f"  starved       {told}\n" in format_result(result, None)
     assert run.read_result()["starved"] == [told]
     story = tell_run(run, Timeline(run.journal))
-    assert any(one.text.startswith("Onlooker acted ") for one in story.sections[-1].sentences)
+    assert any(one.text.startswith("Onlooker acted ") for one in story.sections[-1].steps)
 
 
 def test_what_decisions_yields_is_exported(driven: tuple[harvey.MissionResult, RunDirectory]) -> None:

@@ -14,7 +14,7 @@ from blackboard.level import Level
 from harvey.cli import main
 from harvey.errors import BadInput
 from logs.explain.questions_in_words import answers
-from logs.explain.story import MOST_ROWS, MilestoneRow, milestone_lines, story_lines, tell_lost, tell_run
+from logs.explain.story import LOST, MOST_ROWS, MilestoneRow, milestone_lines, story_lines, tell_part, tell_run
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline
 from scripted_turns import decisions
@@ -68,7 +68,7 @@ def test_a_run_is_told_up_to_where_it_was_cut_off(
     story = tell_run(run, history)
     end = f"failed in cycle {whole}." if whole == len(LINES) else f"cut off in cycle {whole}."
     assert story.opening[0].endswith(end) and (history.cut_off is None) is (whole == len(LINES))
-    assert {s.cycle for section in story.sections for s in section.sentences} <= {None, *history.cycles}
+    assert {s.cycle for section in story.sections for s in section.steps} <= {None, *history.cycles}
 
 
 def test_a_line_that_the_story_has_no_need_of_is_checked_too(
@@ -94,7 +94,7 @@ def test_an_older_run_with_other_fields_is_one_error(tmp_path: Path) -> None:
 
 def test_lost_and_found_are_told_with_place_and_reason(tmp_path: Path) -> None:
     run = run_of(tmp_path, "".join(LINES).encode())
-    told = [sentence.text for sentence in tell_lost(Timeline(run.journal)).sentences]
+    told = [sentence.text for sentence in tell_part(Timeline(run.journal), LOST, {}).steps]
     assert told[0].startswith("It was lost: M2 is refuted. It believed that it stood at (1.00, 2.00) m of kitchen")
     assert told[-1].startswith("It found out where it was, 1 cycle later: at (3.00, 1.00) m of kitchen")
     assert "2.24 m from where it had believed" in told[-1]
@@ -115,7 +115,7 @@ def test_the_page_has_every_section_once(tmp_path: Path) -> None:
     run = run_of(tmp_path, "".join(LINES).encode())
     story = tell_run(run, Timeline(run.journal))
     lines = "\n".join(story_lines(story)).splitlines()
-    for title in ("Milestones", *(section.title for section in story.sections)):
+    for title in ("Milestones", *(section.headline for section in story.sections)):
         assert lines.count(title) == 1
     assert [line for line in lines if len(line) > 120] == []
 

@@ -20,8 +20,8 @@ from harvey.campaign.summary import format_result
 from harvey.errors import BadInput
 from harvey.runner.result import MissionResult, RunCounts
 from harvey.simulation.contacts import ContactWatch
-from logs.explain.phrases import describe_decision
-from logs.explain.story import levels_off, tell_happenings
+from logs.explain.phrases import describe_decision, headline
+from logs.explain.story import HAPPENED, levels_off, tell_part
 from logs.explain.turning_points import (
     Collision,
     Happening,
@@ -30,7 +30,7 @@ from logs.explain.turning_points import (
     read_turning_points,
     turn_lines,
 )
-from logs.explain.why import headline, story
+from logs.explain.why import story
 from logs.records import DecisionRecord, decision_of
 from logs.run_directory import RunDirectory
 from memory_timeline import MemoryTimeline
@@ -116,11 +116,11 @@ def test_what_the_simulator_did_is_told_as_that() -> None:
     happened = [{"cycle": 3, "what": "somebody carries the robot off"}]
     lines = list(turn_lines(MemoryTimeline(records()), {"happened": happened}))
     assert lines[2] == "  cycle 3  simulator  somebody carries the robot off, as only the simulator knows"
-    told = tell_happenings(MemoryTimeline(records()), {"happened": happened})
-    assert [(one.cycle, one.text) for one in told.sentences] == [
+    told = tell_part(MemoryTimeline(records()), HAPPENED, {"happened": happened})
+    assert [(one.cycle, one.text) for one in told.steps] == [
         (3, "Somebody carries the robot off, as only the simulator knows.")]
-    (nothing,) = tell_happenings(MemoryTimeline(records()), {"happened": []}).sentences
-    (unknown,) = tell_happenings(MemoryTimeline(records()), {}).sentences
+    (nothing,) = tell_part(MemoryTimeline(records()), HAPPENED, {"happened": []}).steps
+    (unknown,) = tell_part(MemoryTimeline(records()), HAPPENED, {}).steps
     assert nothing.text == "The simulator did nothing to it." and "nobody recorded" in unknown.text
 
 

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 
 from blackboard.journal import plain
+from harvey.replay.why_not_again import Fate, in_run
 from logs.explain.model import tell_changes, tell_used
-from logs.explain.phrases import sentence
+from logs.explain.phrases import Sentence, sentence
 from logs.explain.subjects import milestone_story
 from logs.explain.web import MODEL, Trace, kind_of
 from logs.explain.why import story
-from logs.explain.why_not import Fate, in_run
 from logs.records import Candidate, DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
 from world_models.building.locale_frame import FrameChange, FrameReference, FrameRequest
@@ -69,15 +69,16 @@ def test_what_an_act_went_by_is_told_shortly(used: tuple[str, ...], text: str | 
             frame("LocaleFrame-3.1", "study", SHUT), entry("Footprint-1.1", Footprint(0.36), author="robot"))
     made = entry("Note-1.0", 0)
     found = list(tell_used(MemoryTimeline([decision(made, observed=seen, used=used)]), made))
-    assert found == ([] if text is None else [(f"The act went by {text}", refs)])
+    assert found == ([] if text is None else [Sentence(f"The act went by {text}", refs, label="known")])
 
 
 def test_equal_changes_of_two_frames_are_told_once() -> None:
     frames = (frame("LocaleFrame-1.1", "hallway", SHUT), frame("LocaleFrame-2.1", "library", SHUT),
               frame("LocaleFrame-3.0", "study"))
     made = entry("Note-1.0", 0, tuple(f.ref for f in frames))
-    assert list(tell_changes(MemoryTimeline([decision(made, observed=frames)]), made)) == [
-        ("It was known otherwise than in the world's file: library-door is shut (user).", frames[0])]
+    (told,) = tell_changes(MemoryTimeline([decision(made, observed=frames)]), made)
+    assert told.text == "It was known otherwise than in the world's file: library-door is shut (user)."
+    assert told.refs == (frames[0].ref,)
 
 
 def test_a_withdrawn_milestone_says_what_it_rested_on() -> None:

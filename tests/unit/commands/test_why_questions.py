@@ -55,15 +55,6 @@ def test_names_of_entries_and_doors_are_no_questions() -> None:
     assert not any(map(is_question, ("MotorCommand-12", "allens-office/desk", "library-door")))
 
 
-def test_what_is_in_the_way_is_told_down_to_pixels() -> None:
-    (story,) = answers(RUN, "what is in the way?")
-    assert story.ref == "Obstacle-1.1" and "at (0.25, 0.25) m of hallway is in the way" in story.headline
-    texts = [step.text for step in story.steps]
-    assert any("pixels (10, 20) to (30, 40)" in text for text in texts)
-    assert "What is known of hallway had it from cycle 4 on." in texts
-    assert any("CameraPicture-3.0" in step.refs for step in story.steps)
-
-
 def test_with_a_cycle_it_is_told_as_it_was_known_then() -> None:
     (story,) = answers(RUN, "what is in the way?", 2)
     assert story.ref == "Obstacle-1.0" and "may be in the way" in story.headline
@@ -126,7 +117,7 @@ def test_a_detour_is_told_with_the_plan_before_and_after_and_what_lay_between() 
         steps = {step.label: step.text for step in story.steps}
         assert story.headline == "In cycle 6 it planned another way through hallway."
         assert steps["before"] == "It was to go to (2.00, 0.15) m of hallway."
-        assert "its middle is 100 mm from the line of that plan" in steps["between"]
+        assert "its middle is 0.10 m from the line of that plan" in steps["between"]
         assert steps["after"] == "In cycle 8 it was to go to (0.20, 0.90) m of hallway, then (2.00, 0.15) m of hallway."
 
 

@@ -5,11 +5,11 @@ from blackboard.change import Retracted
 from blackboard.effect import Post
 from blackboard.entry import Ref
 from blackboard.journal import Decision
-from logs.mirror import Mirror
 from logs.recording.loggers.decisions import COLUMNS, Messages, log_level, row, sentence
 from logs.recording.loggers.lanes import activity
 from logs.recording.loggers.plan import NO_SKETCH, outline
 from logs.recording.loggers.why_panel import THOUGHTS, compose
+from logs.timeline import Mirror
 from scripted_mission import play
 from world_models.entries.body import BodyFault, MotorCommand, Recovery
 from world_models.entries.location import Hypothesis

@@ -9,8 +9,7 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard.change import Change, Retracted
-from blackboard.entry import Entry
+from blackboard import Change, Entry, Retracted
 from logs.recording.logger import Logger, Moment, Panel, Subject
 from logs.recording.loggers.surroundings.model_building import Strip, across, strip
 from logs.recording.palette import KNOWN, REVISED
