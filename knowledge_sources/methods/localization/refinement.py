@@ -52,7 +52,7 @@ TURN_SEARCH_SIGMAS = 2.5  # reach of the search for an uncertain turn, in standa
 MAX_VIEW_SURPRISE = 11.3
 """Largest squared normalized error of a view by the others, with which they still agree; three unknowns, 99 %."""
 MIN_VIEW_LINES = 8  # fewest predicted lines by which a single view counts
-MIN_P_LOOK = 0.05  # least probability of how many lines a look shows at a pose, by what the others show there
+MIN_P_LOOKS = 0.05  # least probability of the look that shows the fewest lines, of all looks at a pose
 MIN_EXPLAINED_LENGTH_PX = 25.0  # shortest segment that should be explained by the model
 EXPLAINED_TOLERANCE_PX = 3.0  # distance of a segment from the model line that explains it
 MIN_EXPLAINING_LENGTH_PX = 4.0  # shortest model line that explains a segment
@@ -276,7 +276,7 @@ class PoseLikelihood:
     def contradicts_itself(self) -> bool:
         """Whether half of the lines of one look are missing, though others show more, as they do not among bricks."""
         return any(_is_half_missing(visible, matched) and compute_p_share(
-            matched, visible, self.matched - matched, self.visible - visible) < MIN_P_LOOK
+            matched, visible, self.matched - matched, self.visible - visible) < MIN_P_LOOKS / len(self.looks)
             for visible, matched, _ in self.looks)
 
     def is_sufficient(self, settings: LocalizationSettings = DEFAULT.localization) -> bool:
