@@ -147,9 +147,9 @@ def _new(name: str, rooms: str) -> int:
 def print_check(world: World, file: str) -> int:
     """Print the faults of a world; the exit code."""
     from world_models.building.checks import check_world
-    from world_models.files.packed import PackedWorld
+    from world_models.files.packed import PackedFrames
 
-    if isinstance(world, PackedWorld):
+    if isinstance(world.frames, PackedFrames):
         world.frames.verify()
     faults = check_world(world, with_bar)
     for fault in faults:
