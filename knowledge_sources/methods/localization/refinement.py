@@ -305,9 +305,10 @@ class PoseLikelihood:
 def refine_to_likelier(
     robot: RobotModel, views: Sequence[CameraView], rough: Pose2, settings: Settings = DEFAULT
 ) -> tuple[Pose2, Floats, PoseLikelihood]:
-    """Refine a rough pose of the robot now, or keep it: what makes all views likelier; with its covariance (3, 3).
+    """Refine a rough pose of the robot now, with its covariance (3, 3), or keep it where all views are likelier there.
 
-    The last view may move a pose off the lines of those before it. One that is kept is no surer than refining moves it.
+    The last view may move a pose off the lines of those before it. By less than chance makes of so many views, the
+    refined one is kept. One that is not refined is no surer than refining moves it.
     """
     refined, covariance = refine_pose(robot, views, rough, settings)
     off = rough.minus(refined)
@@ -315,7 +316,8 @@ def refine_to_likelier(
     for pose, spread in ((refined, covariance), (rough, covariance + np.outer(off, off))):
         moved = refine_view_motions(robot, views, pose, spread, settings)
         tried.append((pose, spread, compute_pose_likelihood(robot, moved, pose, settings)))
-    return max(tried, key=lambda one: one[2].log_likelihood)
+    lost = tried[1][2].log_likelihood - tried[0][2].log_likelihood
+    return tried[lost > settings.localization.alike_log_noise * len(views)]
 
 
 def compute_pose_likelihood(
