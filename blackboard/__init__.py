@@ -5,23 +5,28 @@ this order: entry, kinds, change, effect, entry_store, board, level, condition, 
 servoing, journal, retention, scheduler, decoding, history.
 """
 
+from blackboard.agenda import Activation
 from blackboard.board import Blackboard, StaleError, View
 from blackboard.change import Change, Posted, Quiescence, Retracted, Revised, Watch
-from blackboard.effect import Effect, MissingEntryError, Post, Retract, Revise
+from blackboard.condition import Condition
+from blackboard.decoding import Decoders, MisfitError, brief, decode, fields_of
+from blackboard.effect import Effect, MissingEntryError, Post, Retract, Revise, to_say
 from blackboard.entry import Entry, Ref
 from blackboard.entry_store import Index
 from blackboard.history import History
-from blackboard.journal import Decision, decision_line
-from blackboard.kinds import inference, observation, request
+from blackboard.journal import Decision, NOT_FINITE, Sink, decision_line, decision_record, plain
+from blackboard.kinds import Registry, Role, always, inference, is_request, kind_of, kinds_in, observation, request
 from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
+from blackboard.level import Level, highest
 from blackboard.rule import rule
-from blackboard.scheduler import Port, Scheduler
-from blackboard.servoing import Discrepancy, Servoing
+from blackboard.scheduler import Port, RAISED, Scheduler, registry_of
+from blackboard.servoing import Discrepancy, OPEN, Servoing, last_escalated
 
 __all__ = [
-    "Blackboard", "Change", "Decision", "Discrepancy", "Effect", "Entry", "History", "Index", "KnowledgeSource",
-    "Level", "MissingEntryError", "Port", "Post", "Posted", "Quiescence", "Ref", "Retract", "Retracted", "Revise",
-    "Revised", "Scheduler", "Servoing", "StaleError", "View", "Watch", "decision_line", "inference", "observation",
-    "request", "rule",
+    "NOT_FINITE", "OPEN", "RAISED", "Activation", "Blackboard", "Change", "Condition", "Decision", "Decoders",
+    "Discrepancy", "Effect", "Entry", "History", "Index", "KnowledgeSource", "Level", "MisfitError",
+    "MissingEntryError", "Port", "Post", "Posted", "Quiescence", "Ref", "Registry", "Retract", "Retracted", "Revise",
+    "Revised", "Role", "Scheduler", "Servoing", "Sink", "StaleError", "View", "Watch", "always", "brief",
+    "decision_line", "decision_record", "decode", "fields_of", "highest", "inference", "is_request", "kind_of",
+    "kinds_in", "last_escalated", "observation", "plain", "registry_of", "request", "rule", "to_say",
 ]

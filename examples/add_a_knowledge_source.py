@@ -6,7 +6,7 @@ from pathlib import Path
 
 import harvey
 from harvey import Change, Effect, Entry, Level, Post, Revise, Revised, View, Watch
-from world_models.entries.location import Hypothesis
+from world_models.entries import Hypothesis
 
 OUT = Path("runs") / "largest-correction"
 

@@ -4,7 +4,7 @@ from collections import Counter
 from pathlib import Path
 
 import harvey
-from world_models.entries.task import Certificate
+from world_models.entries import Certificate
 
 OUT = Path("runs") / "example"
 

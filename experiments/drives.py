@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, Self, TypeVar
 
-from blackboard.journal import Decision, Sink
+from blackboard import Decision, Sink
 from experiments.report import Cell, Claim, Report
 from experiments.trials import RESULTS, at_least, at_most, campaign_folder, judge_rare, judge_share, run_trials
 from harvey.campaign.campaign import Task, run_task
 from harvey.runner.result import MissionResult
-from knowledge_sources.methods.belief.odds import to_probability
+from knowledge_sources.methods.belief import to_probability
 from sim.ground_truth.table import TrueDoor
-from world_models.entries.door_state import DoorState
+from world_models.entries import DoorState
 
 WORST_SHOWN = 6
 NO_PEER = "no peer with one camera and a building's model is known."

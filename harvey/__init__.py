@@ -31,15 +31,15 @@ check_packages()
 importlib.import_module("logs.decided_by").settle()
 
 if TYPE_CHECKING:
-    from blackboard.board import View
-    from blackboard.change import Change, Posted, Retracted, Revised, Watch
-    from blackboard.effect import Effect, Post, Retract, Revise
-    from blackboard.entry import Entry
-    from blackboard.journal import Decision
-    from blackboard.kinds import inference, observation, request
-    from blackboard.knowledge_source import KnowledgeSource
-    from blackboard.level import Level
-    from blackboard.scheduler import Scheduler
+    from blackboard import View
+    from blackboard import Change, Posted, Retracted, Revised, Watch
+    from blackboard import Effect, Post, Retract, Revise
+    from blackboard import Entry
+    from blackboard import Decision
+    from blackboard import inference, observation, request
+    from blackboard import KnowledgeSource
+    from blackboard import Level
+    from blackboard import Scheduler
     from harvey.api import RecordedRun, RunPicture, TrackPoint, build_world, open_run, run
     from harvey.errors import BadInput
     from harvey.runner.result import MissionResult
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     )
     from logs.records import Candidate, DecisionRecord, EntryRecord
     from sim.scenario import load_scenario
-    from world_models.building.world import World
+    from world_models.building import World
     from world_models.camera import Camera, CameraMount
     from world_models.files.world_files import load_world
     from world_models.frames import Pose, Pose2

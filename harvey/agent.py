@@ -11,19 +11,16 @@ from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
-from blackboard.kinds import Registry
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.scheduler import Scheduler, registry_of
-from blackboard.servoing import Servoing
+from blackboard import KnowledgeSource, Registry, Scheduler, Servoing, registry_of
 from harvey.agent_settings import build_settings
 from harvey.errors import BadInput
 from harvey.replay.what_if import SegmentHider, WhatIf, check_removals, is_segment, parse_segments
 from harvey.wiring import build, foreign_sources, knowledge_sources, servoing
-from knowledge_sources.plan.line_finder import LineFinder
+from knowledge_sources.milestone.line_finder import LineFinder
 from knowledge_sources.settings import Settings
 from logs.run_head import RunHead
-from world_models.building.world import World
-from world_models.entries.entry_kinds import KINDS
+from world_models.building import World
+from world_models.entries import KINDS
 from world_models.files.toml.settings_reader import parse_value, suggest_keys
 from world_models.frame_store import FrameStore
 from world_models.plugins import GUESTS_GROUP

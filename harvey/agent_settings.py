@@ -14,7 +14,7 @@ from typing import Any
 from harvey.errors import BadInput
 from knowledge_sources.settings import DEFAULT, Row, Settings, list_rows, replace_value
 from world_models.actuator import ActuatorModel
-from world_models.entries.robot_state import CameraState, Footprint, Wheels
+from world_models.entries import CameraState, Footprint, Wheels
 from world_models.files.toml.settings_reader import parse_value, spellings, suggest_keys
 from world_models.units import Bounds, bounds_of
 

@@ -21,9 +21,7 @@ from typing import Any, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard import Decision, Entry, KnowledgeSource
-from blackboard.kinds import Registry
-from blackboard.scheduler import registry_of
+from blackboard import Decision, Entry, KnowledgeSource, Registry, registry_of
 from harvey import wiring
 from harvey.agent import Sources, build_agent
 from harvey.agent_settings import split_settings
@@ -46,10 +44,8 @@ from logs.run_head import RunHead
 from logs.timeline import Timeline
 from sim.scenario import FORMAT, Scenario, ScenarioError, load_scenario, with_settings
 from sim.stage import build_stage
-from world_models.building.locale_frame import LocaleFrame
-from world_models.building.world import World
-from world_models.entries.body import CameraPicture
-from world_models.entries.location import Hypothesis
+from world_models.building import LocaleFrame, World
+from world_models.entries import CameraPicture, Hypothesis
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import load_world, read_world
 from world_models.frame_store import FrameStore
@@ -158,7 +154,7 @@ class RunPicture:
 
     def pixels(self) -> NDArray[np.uint8]:
         """(height, width, 3) red, green, blue."""
-        from knowledge_sources.methods.features.picture import read_picture
+        from knowledge_sources.methods.features import read_picture
 
         return np.asarray(read_picture(self.jpeg).color)
 

@@ -11,32 +11,54 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Quiescence, Revised, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.journal import Sink
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
-from blackboard.scheduler import RAISED, Scheduler
+from blackboard import (
+    RAISED,
+    Change,
+    Effect,
+    KnowledgeSource,
+    Level,
+    Post,
+    Posted,
+    Quiescence,
+    Revise,
+    Revised,
+    Scheduler,
+    Sink,
+    View,
+    Watch,
+)
 from harvey.runner.world_port import build_scheduler
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.verification.color_check import predict_color_check
-from knowledge_sources.methods.verification.line_check import check_lines, compute_view_quality, predict_lines
-from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, compute_evidence
-from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from knowledge_sources.methods.verification.view_quality import (
+from knowledge_sources.methods.verification import (
     CHECK_TOLERANCE_M,
     MAX_SIGMA_PART,
     MAX_SIGMA_RAD,
     MIN_LINES,
+    POSE_CONFIDENCE,
+    check_lines,
+    compute_evidence,
+    compute_view_quality,
+    predict_color_check,
+    predict_face_colors,
+    predict_lines,
 )
-from knowledge_sources.questions import find_belief, find_robot
+from knowledge_sources.reads import find_belief, find_robot
 from knowledge_sources.settings import DEFAULT, Settings, VerificationSettings
-from world_models.building.world import World
-from world_models.entries.body import MotionReport, MotorCommand, Ride, RideReport
-from world_models.entries.location import Hypothesis, Place, diagonal
-from world_models.entries.task import Command, Milestone, Outcome, PlanSketch
+from world_models.building import World
+from world_models.entries import (
+    Command,
+    Hypothesis,
+    Milestone,
+    MotionReport,
+    MotorCommand,
+    Outcome,
+    Place,
+    PlanSketch,
+    Ride,
+    RideReport,
+    diagonal,
+)
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 MARKS: Mapping[str, str] = {
-    "blackboard": "scheduler", "world_models": "robot", "knowledge_sources": "questions", "sim": "stage",
+    "blackboard": "scheduler", "world_models": "robot", "knowledge_sources": "priority", "sim": "stage",
     "logs": "journal_file",
 }
 """Each package that harvey imports, and a module by which it is recognized."""

@@ -1,127 +1,37 @@
 """The knowledge sources round the board: those of the project, and those of other installed packages.
 
-A new knowledge source of the project takes one file in its level's folder and one line here. One of another package
-takes an entry point of the group ``harvey.knowledge_sources`` there, and no edit here.
+A new knowledge source of the project takes one file in the folder of its subject: it is found there. One of another
+package takes an entry point of the group ``harvey.knowledge_sources``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
 
-from blackboard.kinds import Registry
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
-from blackboard.scheduler import registry_of
-from blackboard.servoing import Servoing
-from knowledge_sources.action.correlator_tracker import CorrelatorTracker
-from knowledge_sources.action.dead_reckoner import DeadReckoner
-from knowledge_sources.action.dependency_withdrawer import DependencyWithdrawer
-from knowledge_sources.action.door_toucher import DoorToucher
-from knowledge_sources.action.door_watcher import DoorWatcher
-from knowledge_sources.action.elevator_rider import ElevatorRider
-from knowledge_sources.action.fault_handler import FaultHandler
-from knowledge_sources.action.floor_changer import FloorChanger
-from knowledge_sources.action.floor_watcher import FloorWatcher
-from knowledge_sources.action.goal_changer import GoalChanger
-from knowledge_sources.action.halt_explainer import HaltExplainer
-from knowledge_sources.action.landmark_chooser import LandmarkChooser
-from knowledge_sources.action.model_reviser import ModelReviser
-from knowledge_sources.action.motor import Motor
-from knowledge_sources.action.path_follower import PathFollower
-from knowledge_sources.action.range_watcher import RangeWatcher
-from knowledge_sources.action.thing_mapper import ThingMapper
-from knowledge_sources.action.thing_mover import ThingMover
-from knowledge_sources.action.touch_finder import TouchFinder
-from knowledge_sources.action.travel_breaker import TravelBreaker
-from knowledge_sources.action.yaw_calibrator import YawCalibrator
-from knowledge_sources.goal.goal_closer import GoalCloser
-from knowledge_sources.goal.goal_renewer import GoalRenewer
-from knowledge_sources.goal.interpreter import Interpreter
-from knowledge_sources.goal.localizer import Localizer
-from knowledge_sources.goal.mission_monitor import MissionMonitor
-from knowledge_sources.goal.panorama_builder import PanoramaBuilder
-from knowledge_sources.goal.pose_adopter import PoseAdopter
-from knowledge_sources.goal.probe_photographer import ProbePhotographer
-from knowledge_sources.goal.prober import Prober
-from knowledge_sources.plan.alias_monitor import AliasMonitor
-from knowledge_sources.plan.belief_checker import BeliefChecker
-from knowledge_sources.plan.camera_calibrator import CameraCalibrator
-from knowledge_sources.plan.detour_finder import DetourFinder
-from knowledge_sources.plan.discrepancy_raiser import DiscrepancyRaiser
-from knowledge_sources.plan.goal_sketcher import GoalSketcher
-from knowledge_sources.plan.line_finder import LineFinder
-from knowledge_sources.plan.lookout_planner import LookoutPlanner
-from knowledge_sources.plan.matcher import Matcher
-from knowledge_sources.plan.med_r_and_t import MedRAndT
-from knowledge_sources.plan.milestone_judge import MilestoneJudge
-from knowledge_sources.plan.milestone_passer import MilestonePasser
-from knowledge_sources.plan.obstruction_finder import ObstructionFinder
-from knowledge_sources.plan.plan_adjuster import PlanAdjuster
-from knowledge_sources.plan.refiner import Refiner
-from knowledge_sources.plan.shut_door_explainer import ShutDoorExplainer
-from knowledge_sources.plan.sketch_advancer import SketchAdvancer
-from knowledge_sources.plan.view_chooser import ViewChooser
-from knowledge_sources.plan.view_predictor import ViewPredictor
-from knowledge_sources.plan.view_updater import ViewUpdater
+from blackboard import KnowledgeSource, Level, Registry, Servoing, registry_of
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.entries.entry_kinds import KINDS
+from world_models.entries import KINDS
 from world_models.files.toml.mission import Servo
 from world_models.plugins import SOURCES_GROUP, PluginError, load_plugin_classes
 
-KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = (
-    Interpreter,
-    GoalSketcher,
-    Refiner,
-    MilestonePasser,
-    SketchAdvancer,
-    DetourFinder,
-    LookoutPlanner,
-    ViewChooser,
-    BeliefChecker,
-    ViewPredictor,
-    ViewUpdater,
-    Motor,
-    PathFollower,
-    ElevatorRider,
-    FloorChanger,
-    DeadReckoner,
-    CorrelatorTracker,
-    LandmarkChooser,
-    LineFinder,
-    ObstructionFinder,
-    Matcher,
-    MedRAndT,
-    MilestoneJudge,
-    CameraCalibrator,
-    YawCalibrator,
-    TravelBreaker,
-    PlanAdjuster,
-    DiscrepancyRaiser,
-    ProbePhotographer,
-    PanoramaBuilder,
-    Localizer,
-    Prober,
-    PoseAdopter,
-    GoalRenewer,
-    AliasMonitor,
-    FaultHandler,
-    ModelReviser,
-    GoalChanger,
-    FloorWatcher,
-    RangeWatcher,
-    ThingMapper,
-    TouchFinder,
-    HaltExplainer,
-    ThingMover,
-    DoorWatcher,
-    DoorToucher,
-    ShutDoorExplainer,
-    DependencyWithdrawer,
-    GoalCloser,
-    MissionMonitor,
-)
+SUBJECTS = ("sketcher", "milestone_selector", "action", "milestone", "relocalizer", "goal", "model", "robot")
+"""The folders of knowledge sources, in the order in which a mission meets them."""
+
+
+def _find_sources() -> Iterator[type[RobotKnowledgeSource]]:
+    for subject in SUBJECTS:
+        package = import_module(f"knowledge_sources.{subject}")
+        for file in sorted(found.name for found in iter_modules(package.__path__)):
+            module = import_module(f"{package.__name__}.{file}")
+            own = (kind for kind in vars(module).values() if getattr(kind, "__module__", "") == module.__name__)
+            yield from (kind for kind in own if isinstance(kind, type) and issubclass(kind, RobotKnowledgeSource))
+
+
+KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = tuple(_find_sources())
 """Every knowledge source. The order does not matter: control comes from triggers, ratings and levels."""
 
 

@@ -1,1 +1,4 @@
-"""The knowledge sources round the blackboard, one a file by servo level: when and why; ``methods``: how."""
+"""The knowledge sources round the blackboard, one a file by subject: when and why.
+
+``reads``: what they ask of the board. ``methods``: how it is computed.
+"""

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from blackboard.knowledge_source import KnowledgeSource
+from blackboard import KnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building.locale_frame import FrameRequest
+from world_models.building import FrameRequest
 
 
 class RobotKnowledgeSource(KnowledgeSource):
     """A knowledge source of a robot: it has its settings, and reads everything else from the view.
 
-    The building and the robot are entries too (:mod:`knowledge_sources.questions`). Where a locale frame is missing the
-    act is broken off, asks for it, and comes again when it is there; so each may write a FrameRequest.
+    The building and the robot are entries too (:mod:`knowledge_sources.reads.questions`). Where a locale frame is
+    missing the act is broken off, asks for it, and comes again when it is there; so each may write a FrameRequest.
     """
 
     def __init_subclass__(cls, **more: Any) -> None:

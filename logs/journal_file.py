@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from blackboard.journal import Decision, decision_line
-from blackboard.kinds import is_request
+from blackboard import Decision, decision_line, is_request
 from logs.disk import Appended
 
 HELD_LINES = 64

@@ -11,7 +11,7 @@ from logs.records import EntryRecord
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
-from world_models.entries.body import CameraPicture
+from world_models.entries import CameraPicture
 from world_models.files.regular_files import MOST_BYTES
 
 

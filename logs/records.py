@@ -20,21 +20,32 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeGuard, TypeVar, 
 
 import numpy as np
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Quiescence, Retracted, Revised
-from blackboard.decoding import Decoders, brief, decode
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.entry import Entry, Ref
-from blackboard.kinds import Registry
-from blackboard.servoing import Discrepancy
+from blackboard import (
+    Change,
+    Decoders,
+    Discrepancy,
+    Effect,
+    Entry,
+    Post,
+    Posted,
+    Quiescence,
+    Ref,
+    Registry,
+    Retract,
+    Retracted,
+    Revise,
+    Revised,
+    View,
+    brief,
+    decode,
+)
 from logs.disk import MOST_JOURNAL_BYTES
 from logs.mjpeg_file import Pictures
 from logs.run_directory import check_version
 from logs.run_errors import BadInput
 from world_models import words
-from world_models.building.locale_frame import FrameReference, FrameRequest, LocaleFrame
-from world_models.entries.body import CameraPicture
-from world_models.entries.entry_kinds import KINDS
+from world_models.building import FrameReference, FrameRequest, LocaleFrame
+from world_models.entries import KINDS, CameraPicture
 from world_models.files.regular_files import open_regular
 
 if TYPE_CHECKING:  # an explanation starts fast only where no world is imported that it does not need
@@ -77,8 +88,7 @@ def knowing(kinds: Registry) -> Iterator[None]:
 
 @cache
 def _foreign_kinds() -> Registry:
-    from blackboard.knowledge_source import KnowledgeSource
-    from blackboard.scheduler import registry_of
+    from blackboard import KnowledgeSource, registry_of
     from world_models.plugins import SOURCES_GROUP, load_plugin_classes
 
     return registry_of(load_plugin_classes(SOURCES_GROUP, KnowledgeSource).values(), KINDS)

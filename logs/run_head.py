@@ -10,16 +10,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from blackboard.decoding import MisfitError, decode, fields_of
-from blackboard.journal import plain
+from blackboard import MisfitError, decode, fields_of, plain
 from logs.decided_by import arithmetic, calculating_libraries, deciding_code
 from logs.disk import write_whole
 from logs.run_directory import JOURNAL_VERSION, read_json, refuse_version
 from logs.run_errors import BadInput
 from world_models.actuator import ActuatorModel
-from world_models.building.world import World
+from world_models.building import World
 from world_models.camera import NOT_STATED, Camera, CameraDeviation, CameraMount
-from world_models.entries.task import Command
+from world_models.entries import Command
 from world_models.files.toml.mission import ROOT, Servo
 from world_models.files.world_files import fingerprint, load_world
 from world_models.plugins import SOURCES_GROUP, list_plugins

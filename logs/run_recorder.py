@@ -8,19 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blackboard.change import Change
-from blackboard.effect import Effect, Retract
-from blackboard.journal import Decision, Sink, decision_line
-from blackboard.scheduler import Port
+from blackboard import Change, Decision, Effect, Port, Retract, Sink, decision_line
 from logs.disk import sync_folder
 from logs.journal_file import JournalFile
 from logs.mjpeg_file import MjpegFile
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
+from world_models.building import World
 from world_models.building.geometry.faces import Face
-from world_models.building.world import World
-from world_models.entries.body import CameraPicture
-from world_models.entries.location import Place
+from world_models.entries import CameraPicture, Place
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from blackboard.board import View
-from blackboard.change import Change
-from blackboard.effect import Effect
-from blackboard.knowledge_source import KnowledgeSource
+from blackboard import Change, Effect, KnowledgeSource, View
 
 
 def answer(source: KnowledgeSource, view: View, trigger: Change) -> tuple[Effect, ...] | None:

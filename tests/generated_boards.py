@@ -16,21 +16,41 @@ import numpy as np
 from hypothesis import strategies as st
 
 from acting import answer
-from blackboard.board import Blackboard, View
-from blackboard.change import Change, Posted, Revised
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.entry import Entry, Ref
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.action.model_reviser import ModelReviser
+from blackboard import (
+    Blackboard,
+    Change,
+    Discrepancy,
+    Effect,
+    Entry,
+    KnowledgeSource,
+    Level,
+    Post,
+    Posted,
+    Ref,
+    Retract,
+    Revise,
+    Revised,
+    View,
+)
+from knowledge_sources.model.model_reviser import ModelReviser
 from world_models.actuator import ActuatorModel
-from world_models.building.world import World
+from world_models.building import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import MotionReport, MotorCommand
-from world_models.entries.location import Covariance, Hypothesis, Place, covariance_tuple, diagonal
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.task import Goal, Leg, Milestone, PlanSketch, Subgoal
+from world_models.entries import (
+    Goal,
+    Hypothesis,
+    Leg,
+    Milestone,
+    MotionReport,
+    MotorCommand,
+    Obstacle,
+    Place,
+    PlanSketch,
+    Subgoal,
+    covariance_tuple,
+    diagonal,
+)
+from world_models.entries.location import Covariance
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frame_store import FrameStore

@@ -6,13 +6,8 @@ import re
 from collections.abc import Collection, Hashable, Iterable, Iterator
 from typing import Any, TypeVar
 
-from blackboard.board import Blackboard, TracedView, View
-from blackboard.change import Change
-from blackboard.effect import Effect, Post, Retract
-from blackboard.entry import Entry, Ref
-from blackboard.entry_store import Index
-from blackboard.journal import plain
-from blackboard.kinds import kind_of
+from blackboard import Blackboard, Change, Effect, Entry, Index, Post, Ref, Retract, View, kind_of, plain
+from blackboard.board import TracedView
 from harvey.wiring import load_kinds
 
 T = TypeVar("T")

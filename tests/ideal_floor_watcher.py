@@ -8,17 +8,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import shapely
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, Post
-from blackboard.entry import Entry
-from blackboard.level import Level
-from knowledge_sources.methods.floor.seen_floor import find_floor
-from knowledge_sources.questions import find_belief, find_building, find_robot
+from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
+from knowledge_sources.methods.floor import find_floor
+from knowledge_sources.reads import find_belief, find_building, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import CameraPicture
-from world_models.entries.floor import FreeFloor
-from world_models.entries.location import Hypothesis
+from world_models.entries import CameraPicture, FreeFloor, Hypothesis
 from world_models.frames import Pose2
 
 FAR_M = 8.0

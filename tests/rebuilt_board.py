@@ -8,12 +8,21 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from acting import answer
-from blackboard.board import Blackboard, TracedView
-from blackboard.change import Change, Posted, Retracted, Revised
-from blackboard.effect import Effect, MissingEntryError, Post
-from blackboard.entry import Entry, Ref
+from blackboard import (
+    Blackboard,
+    Change,
+    Effect,
+    Entry,
+    MissingEntryError,
+    Post,
+    Posted,
+    Ref,
+    Retracted,
+    Revised,
+    kind_of,
+)
+from blackboard.board import TracedView
 from blackboard.journal import change_record
-from blackboard.kinds import kind_of
 from harvey.agent import build_agent
 from harvey.runner.replay import open_originals
 from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds

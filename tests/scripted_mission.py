@@ -10,21 +10,44 @@ from typing import Any
 import cv2
 import numpy as np
 
-from blackboard.board import View
-from blackboard.change import Change, Watch
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.journal import Sink
-from blackboard.kinds import inference
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
-from blackboard.scheduler import Scheduler
-from blackboard.servoing import Discrepancy
-from world_models.building.world import World
+from blackboard import (
+    Change,
+    Discrepancy,
+    Effect,
+    KnowledgeSource,
+    Level,
+    Post,
+    Retract,
+    Revise,
+    Scheduler,
+    Sink,
+    View,
+    Watch,
+    inference,
+)
+from world_models.building import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import CameraPicture, MotionReport, MotorCommand, PictureRequest
-from world_models.entries.location import Hypothesis, Place, diagonal
-from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
-from world_models.entries.task import Certificate, Goal, Leg, Milestone, Outcome, PlanSketch, Subgoal
+from world_models.entries import (
+    CameraPicture,
+    Certificate,
+    Goal,
+    Hypothesis,
+    Leg,
+    LineMatch,
+    Milestone,
+    MotionReport,
+    MotorCommand,
+    Outcome,
+    PictureRequest,
+    Place,
+    PlanSketch,
+    PoseFix,
+    Segments,
+    Subgoal,
+    Track,
+    Tracks,
+    diagonal,
+)
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2

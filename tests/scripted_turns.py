@@ -4,14 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from blackboard.board import Blackboard
-from blackboard.effect import Effect, Post, Revise
-from blackboard.journal import Decision
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from world_models.entries.body import BodyFault, Recovery
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.task import Certificate, Milestone, Outcome
+from blackboard import Blackboard, Decision, Discrepancy, Effect, Level, Post, Revise
+from world_models.entries import BodyFault, Certificate, Hypothesis, Milestone, Outcome, Recovery, diagonal
 from world_models.frames import Pose2
 
 CERTIFICATE = Certificate("Milestone-1", "", "refuted", "1 of 9 lines", 9, 3, 1, 0.1, 1.0, 0.1, 0.0, 9.0, 30.0, 1.0,

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.journal import Decision
+from blackboard import Decision
 from experiments.robustness.serial_chaos import NOISES, Trial
 from experiments.robustness.serial_line import Findings, Killed, Noise, NoisyLine
 from harvey.hardware.bases import base_kinds
@@ -28,8 +28,8 @@ from sim.emulators.emulator_registry import emulator_kinds
 from sim.emulators.line import PseudoTerminalLink
 from sim.faults.fault_registry import find_fault_class
 from sim.stage import Stage
-from world_models.entries.body import BodyFault, MotorCommand, Recovery
-from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD
+from world_models.entries import AROUND_SIGMA_RAD, BodyFault, MotorCommand, Recovery
+from world_models.entries.obstacle import AHEAD_SIGMA_RAD
 
 NEAR_M, NEAR_RAD = 0.011, math.radians(1.0)
 MUDDLED_M, MUDDLED_RAD = 0.015, math.radians(1.2)

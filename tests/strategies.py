@@ -8,14 +8,20 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Revised, Watch
-from blackboard.effect import Effect
-from blackboard.journal import Decision
-from blackboard.kinds import inference, request
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
-from blackboard.scheduler import Scheduler
+from blackboard import (
+    Change,
+    Decision,
+    Effect,
+    KnowledgeSource,
+    Level,
+    Posted,
+    Revised,
+    Scheduler,
+    View,
+    Watch,
+    inference,
+    request,
+)
 
 
 @inference()

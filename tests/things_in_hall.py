@@ -7,27 +7,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from blackboard.change import Change
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.scheduler import Scheduler
+from blackboard import Change, Effect, Entry, KnowledgeSource, Post, Revise, Scheduler
 from harvey.runner.world_port import WorldPort
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.action.halt_explainer import HaltExplainer
-from knowledge_sources.action.model_reviser import ModelReviser
-from knowledge_sources.action.thing_mapper import ThingMapper
-from knowledge_sources.action.thing_mover import ThingMover
-from knowledge_sources.action.touch_finder import TouchFinder
+from knowledge_sources.model.halt_explainer import HaltExplainer
+from knowledge_sources.model.model_reviser import ModelReviser
+from knowledge_sources.model.thing_mapper import ThingMapper
+from knowledge_sources.model.thing_mover import ThingMover
+from knowledge_sources.model.touch_finder import TouchFinder
 from sim.scenario import load_scenario
-from world_models.building.locale_frame import FRAME_OF, LocaleFrame
-from world_models.building.world import World
-from world_models.entries.body import MotorCommand
-from world_models.entries.entry_kinds import KINDS
-from world_models.entries.floor import FloorThing, FreeFloor
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.obstacle import Contact, Obstacle
-from world_models.entries.task import Certificate, MilestoneVerdict
+from world_models.building import FRAME_OF, LocaleFrame, World
+from world_models.entries import (
+    KINDS,
+    Certificate,
+    Contact,
+    FloorThing,
+    FreeFloor,
+    Hypothesis,
+    MilestoneVerdict,
+    MotorCommand,
+    Obstacle,
+    diagonal,
+)
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
 

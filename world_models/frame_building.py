@@ -6,8 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Literal, NamedTuple, TypeVar
 
-from blackboard.board import View
-from blackboard.effect import MissingEntryError
+from blackboard import MissingEntryError, View
 from world_models.building.building import Building
 from world_models.building.locale_frame import ANSWERED, CHANGED, FRAME_OF, ROOT, FrameAnswer, FrameRequest, LocaleFrame
 from world_models.building.locales import Doorway

@@ -6,9 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-from blackboard.kinds import Registry, Role
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
+from blackboard import KnowledgeSource, Level, Registry, Role
 
 PICTURE = Path(__file__).parents[1] / "architecture.svg"
 WIDTH, MARGIN, GAP = 1000, 16, 40

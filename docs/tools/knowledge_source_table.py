@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from blackboard.knowledge_source import KnowledgeSource
+from blackboard import KnowledgeSource
 from harvey.wiring import KNOWLEDGE_SOURCES, foreign_sources
 from knowledge_sources.priority import Priority
-from world_models.building.locale_frame import FrameRequest
+from world_models.building import FrameRequest
 
 EVERYBODY_WRITES = (FrameRequest,)
 """Left out of the table: each knowledge source of a robot may ask for a locale frame."""

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from blackboard.journal import Decision
+from blackboard import Decision
 from experiments import drives
 from experiments.drives import Driven, End, Trial
 from experiments.generated.door_missions import write_door_mission
 from experiments.report import Claim, Report
 from harvey.campaign.campaign import Task
 from sim.scenario import load_scenario
-from world_models.entries.door_state import DoorState
+from world_models.entries import DoorState
 from world_models.words import listed
 
 SHARES: Mapping[str, float] = {

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from blackboard.journal import Decision
+from blackboard import Decision
 from experiments import drives
 from experiments.drives import DoorBeliefs, Driven, End, Mission, Trial
 from experiments.generated.missions import WHEELS_WORSE, write_inexact_mission
@@ -27,8 +27,7 @@ from harvey.simulation.simulated_run import SimulatedRun, build_head
 from logs.run_recorder import RunRecorder
 from sim.body.simulated_body import SimulatedBody
 from sim.ground_truth.inexact import EXACT, TrueInexact
-from world_models.entries.percepts import PoseFix
-from world_models.entries.task import Certificate
+from world_models.entries import Certificate, PoseFix
 from world_models.frames import wrap_angle
 from world_models.units import INCH_M
 

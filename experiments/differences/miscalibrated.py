@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from blackboard.journal import Decision
+from blackboard import Decision
 from experiments import drives
 from experiments.drives import Driven, End, Trial
 from experiments.generated.missions import write_camera_mission
@@ -23,8 +23,7 @@ from harvey.campaign.campaign import Task
 from sim.faults.built_in_faults import CameraKnocked
 from sim.scenario import Scenario, load_scenario
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, subtract_cameras
-from world_models.entries.body import MotionReport
-from world_models.entries.robot_state import CameraState
+from world_models.entries import CameraState, MotionReport
 from world_models.units import INCH_M
 
 FAR_M = 10.0

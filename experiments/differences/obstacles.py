@@ -17,9 +17,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from blackboard.change import Change
-from blackboard.entry import Ref
-from blackboard.journal import Decision
+from blackboard import Change, Decision, Ref
 from experiments import drives
 from experiments.drives import Driven, End, Trial
 from experiments.generated.free_floor import find_free_floor, find_shortest_way
@@ -31,11 +29,8 @@ from sim.body.collision import Obstacles
 from sim.ground_truth.table import NO_DIFFERENCES
 from sim.stage import Stage, build_stage
 from world_models.actuator import ActuatorModel
-from world_models.building.locale_frame import LocaleFrame
-from world_models.building.world import World
-from world_models.entries.body import MotorCommand, PictureRequest
-from world_models.entries.location import Hypothesis
-from world_models.entries.obstacle import Contact, Obstacle
+from world_models.building import LocaleFrame, World
+from world_models.entries import Contact, Hypothesis, MotorCommand, Obstacle, PictureRequest
 from world_models.frames import Pose2
 
 Segments = NDArray[np.float64]

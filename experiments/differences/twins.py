@@ -13,18 +13,14 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from blackboard.entry import Ref
-from blackboard.journal import Decision
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Decision, Discrepancy, Level, Ref
 from experiments import drives
 from experiments.drives import Driven, GoalEnd, Trial
 from experiments.generated.missions import write_twin_mission
 from experiments.report import Cell, Claim, Report
 from experiments.trials import at_least, at_most, judge_rare
 from harvey.campaign.campaign import Task
-from world_models.entries.location import PlaceOdds, TwinOdds
-from world_models.entries.task import Outcome
+from world_models.entries import Outcome, PlaceOdds, TwinOdds
 
 RIGHT, WRONG = "right", "wrong"
 MISSIONS, QUICK_MISSIONS = 3_000, 4

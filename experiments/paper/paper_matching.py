@@ -12,9 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
-from knowledge_sources.methods.matching import Match, match_lines
-from knowledge_sources.methods.matching.matching_kernels import count_cover
-from knowledge_sources.methods.matching.search import MAX_MOVES_PER_PAIR, PairSpace, SearchResult, Terms, fit_state
+from knowledge_sources.methods.matching import (
+    MAX_MOVES_PER_PAIR,
+    Match,
+    PairSpace,
+    SearchResult,
+    Terms,
+    count_cover,
+    fit_state,
+    match_lines,
+)
 from knowledge_sources.settings import MatchingSettings
 
 OMISSION_ALPHA = 0.5  # weight of the omission error (§6.1.3, alpha)

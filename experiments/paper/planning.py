@@ -16,17 +16,15 @@ from unittest.mock import patch
 import numpy as np
 from tqdm import tqdm
 
-from blackboard.change import Quiescence
-from blackboard.effect import Post
-from blackboard.journal import Decision
+from blackboard import Decision, Post, Quiescence
 from experiments.report import Report
 from harvey.dry_run import build_dry_run
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.methods.localization.aliasing import precompute_views
-from knowledge_sources.plan import view_predictor
+from knowledge_sources.methods.localization import precompute_views
+from knowledge_sources.milestone_selector import view_predictor
 from sim.scenario import Scenario, load_scenario
-from world_models.building.world import World
-from world_models.entries.task import Milestone, Outcome, PlanSketch
+from world_models.building import World
+from world_models.entries import Milestone, Outcome, PlanSketch
 from world_models.files.world_files import load_world
 
 PAPER_MS = 5 * 60 * 1000.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian, invert_information
+from knowledge_sources.methods.pose import build_line_set, compute_image_jacobian, invert_information
 from world_models.camera import Camera
 from world_models.frames import Pose
 

@@ -12,34 +12,33 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Mask
-from knowledge_sources.methods.pose.estimate import (
+from knowledge_sources.methods.pose import (
     FEW_LINES,
+    IMAGE,
     MAX_ITERATIONS,
     MIN_LINES,
-    Minimum,
-    PoseEstimate,
-    build_estimate,
-    build_prior_estimate,
-    compute_covariance,
-    compute_weak_information,
-    knows_more,
-    minimise,
-    reject_behind,
-)
-from knowledge_sources.methods.pose.kernels import IMAGE, PLANES, TINY, RigidMotion
-from knowledge_sources.methods.pose.line_set import (
+    PLANES,
+    SUBSET_SIZE,
+    TINY,
     LandmarkIds,
     LineSet,
-    build_line_set,
-    check_landmarks,
-    compute_squared_distances,
-    cross,
-    measure_lines,
-)
-from knowledge_sources.methods.pose.r_and_t import (
-    SUBSET_SIZE,
+    Minimum,
+    PoseEstimate,
+    RigidMotion,
     add_concentrated,
+    build_estimate,
+    build_line_set,
+    build_prior_estimate,
+    check_landmarks,
+    compute_covariance,
+    compute_squared_distances,
+    compute_weak_information,
+    cross,
     keep_possible,
+    knows_more,
+    measure_lines,
+    minimise,
+    reject_behind,
     solve_from_subsets,
 )
 from knowledge_sources.settings import DEFAULT, PoseSettings

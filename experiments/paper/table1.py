@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.journal import Decision
+from blackboard import Decision
 from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
 from experiments.trials import RESULTS, campaign_folder, run_trials
 from harvey.agent import build_agent
@@ -22,7 +22,7 @@ from logs.run_directory import RunDirectory, check_vacant
 from logs.run_recorder import RunRecorder
 from sim.stage import Stage
 from sim.truth import Truth
-from world_models.entries.body import MotionReport, MotorCommand
+from world_models.entries import MotionReport, MotorCommand
 from world_models.units import FOOT_M, INCH_M
 
 SCENARIO = "forty-foot-hallway"

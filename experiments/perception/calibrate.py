@@ -16,15 +16,8 @@ from tqdm import tqdm
 
 from experiments.generated.scenes import chessboard_picture, chessboard_renderer, chessboard_view
 from experiments.report import Cell, Report
-from knowledge_sources.methods.calibration.intrinsics import (
-    PARAMETERS,
-    BoardView,
-    Calibration,
-    Pattern,
-    calibrate,
-    find_corners,
-)
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.calibration import PARAMETERS, BoardView, Calibration, Pattern, calibrate, find_corners
+from knowledge_sources.methods.features import read_picture
 from sim.render.optics import Optics
 from sim.render.renderer import Renderer
 from sim.render.sensor import SensorParameters

@@ -26,8 +26,8 @@ from experiments.perception.rivals import MIN_LINE_LENGTH_PX
 from experiments.report import Cell, Claim, Report
 from experiments.shared_data import CORRIDOR, describe_absence
 from experiments.trials import campaign_folder, judge_rare, judge_share, run_trials
-from knowledge_sources.methods.features.lines import find_lines
-from knowledge_sources.methods.verification.line_check import compute_coverage
+from knowledge_sources.methods.features import find_lines
+from knowledge_sources.methods.verification import compute_coverage
 
 Array = NDArray[np.float64]
 

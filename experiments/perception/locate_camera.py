@@ -26,12 +26,10 @@ from experiments.perception.rivals import (
     project_leaders,
 )
 from knowledge_sources.methods.arrays import Floats, Indices
-from knowledge_sources.methods.features.lines import LineSegments, find_lines
-from knowledge_sources.methods.matching import match_in_space
-from knowledge_sources.methods.matching.pose_matching import CameraParameters, build_camera_parameters
-from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml
-from knowledge_sources.methods.pose.r_and_t import MIN_NOISE_PART
-from knowledge_sources.methods.verification.line_check import Agreement, compute_agreement, compute_p_false
+from knowledge_sources.methods.features import LineSegments, find_lines
+from knowledge_sources.methods.matching import CameraParameters, build_camera_parameters, match_in_space
+from knowledge_sources.methods.pose import MIN_NOISE_PART, PoseEstimate, med_r_and_t, r_and_t_ml
+from knowledge_sources.methods.verification import Agreement, compute_agreement, compute_p_false
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose

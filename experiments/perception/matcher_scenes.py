@@ -9,14 +9,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.matching import Similarity2, match_in_space
-from knowledge_sources.methods.matching.image_matching import (
+from knowledge_sources.methods.matching import (
     PairTable,
+    Similarity2,
     build_line_table,
     build_pair_table,
+    compute_best_fits,
     compute_model_motion,
+    match_in_space,
 )
-from knowledge_sources.methods.matching.search import compute_best_fits
 from world_models.camera import Camera
 from world_models.frames import Pose
 

@@ -26,7 +26,7 @@ from experiments.perception.milestones_trials import (
 )
 from experiments.report import Cell, Claim, Report
 from experiments.trials import campaign_folder, judge_rare, run_trials
-from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE
+from knowledge_sources.methods.verification import POSE_CONFIDENCE
 
 FLOORS, EACH = 25, 210
 QUICK_FLOORS, QUICK_EACH = 1, 30

@@ -18,7 +18,7 @@ from experiments.perception.milestones_cases import has_identical_doors
 from experiments.perception.milestones_trials import JudgedCase
 from experiments.report import Report
 from experiments.trials import campaign_folder
-from knowledge_sources.methods.verification.pose_confidence import (
+from knowledge_sources.methods.verification import (
     EVIDENCE_NAMES,
     POSE_CONFIDENCE,
     TERMS,

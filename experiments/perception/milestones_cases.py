@@ -16,15 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.generated.floors import Floor, generated_floor
-from knowledge_sources.methods.verification.view_quality import choose_heading, predict_milestone
+from knowledge_sources.methods.verification import choose_heading, predict_milestone
 from knowledge_sources.settings import DEFAULT
 from sim.body.simulated_building import SimulatedBuilding
 from sim.render.sensor import Occluder, SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
 from world_models.building.geometry.outlines import inside_polygon
-from world_models.entries.location import Hypothesis
-from world_models.entries.task import Milestone
+from world_models.entries import Hypothesis, Milestone
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

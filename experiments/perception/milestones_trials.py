@@ -8,20 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from blackboard.board import View
-from blackboard.effect import Effect, Post
+from blackboard import Effect, Post, View
 from experiments.perception.milestones_cases import MIN_DIFFERENCE, Case, Site, generate_cases, get_site
 from harvey.runner.world_port import build_scheduler
-from knowledge_sources.methods.verification.weigh import Weighed
-from knowledge_sources.plan.line_finder import LineFinder
-from knowledge_sources.plan.matcher import Matcher
-from knowledge_sources.plan.med_r_and_t import MedRAndT
-from knowledge_sources.plan.milestone_judge import Case as JudgesCase
-from knowledge_sources.plan.milestone_judge import MilestoneJudge
+from knowledge_sources.methods.verification import Weighed
+from knowledge_sources.milestone.line_finder import LineFinder
+from knowledge_sources.milestone.matcher import Matcher
+from knowledge_sources.milestone.med_r_and_t import MedRAndT
+from knowledge_sources.milestone.milestone_judge import Case as JudgesCase
+from knowledge_sources.milestone.milestone_judge import MilestoneJudge
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.body import CameraPicture
-from world_models.entries.percepts import PoseFix
-from world_models.entries.task import Certificate
+from world_models.entries import CameraPicture, Certificate, PoseFix
 from world_models.frames import wrap_angle
 
 MAX_SIGMAS, MARGIN_M, MARGIN_RAD = 3.0, 0.05, math.radians(0.6)

@@ -21,8 +21,7 @@ from experiments.perception.rivals import MIN_LINE_LENGTH_PX
 from experiments.report import OURS, PEER, chart
 from experiments.shared_data import CORRIDOR, data_path, describe_absence
 from harvey.errors import BadInput
-from knowledge_sources.methods.features.lines import LineSegments, find_lines
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.features import LineSegments, find_lines, read_picture
 from knowledge_sources.methods.pose import med_r_and_t
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera

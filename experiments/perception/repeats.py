@@ -19,7 +19,7 @@ from experiments.perception.repeats_scenes import CAMERA, KINDS, MAX_PITCHES, Re
 from experiments.perception.rivals import find_self_motions
 from experiments.report import Cell, Claim, Report
 from experiments.trials import RESULTS, at_least, at_most, campaign_folder, judge_rare, judge_share, run_trials
-from knowledge_sources.methods.matching.pose_matching import build_camera_parameters
+from knowledge_sources.methods.matching import build_camera_parameters
 from world_models.frames import Pose
 
 TOLERANCE_PITCHES, TOLERANCE_RAD = 0.25, 0.03

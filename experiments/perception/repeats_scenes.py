@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.features.lines import LineSegments
+from knowledge_sources.methods.features import LineSegments
 from world_models.camera import Camera
 from world_models.frames import Pose
 

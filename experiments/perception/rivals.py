@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices
-from knowledge_sources.methods.verification.line_check import LINE_TOLERANCE_RAD, MAX_LINE_WEIGHT_PX, compute_coverage
+from knowledge_sources.methods.verification import LINE_TOLERANCE_RAD, MAX_LINE_WEIGHT_PX, compute_coverage
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose

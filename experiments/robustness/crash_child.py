@@ -19,7 +19,7 @@ from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import Around, resume_mission, run_mission
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
-from world_models.entries.body import BodyFault, MotionReport, MotorCommand
+from world_models.entries import BodyFault, MotionReport, MotorCommand
 
 MOTION_S = 0.05
 """Duration of a motion, so that a kill may fall in the middle of one."""

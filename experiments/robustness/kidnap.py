@@ -18,11 +18,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from blackboard.board import Blackboard
-from blackboard.effect import Post
-from blackboard.level import Level
-from blackboard.scheduler import Scheduler
-from blackboard.servoing import Discrepancy, Servoing
+from blackboard import Blackboard, Discrepancy, Level, Post, Scheduler, Servoing
 from experiments.generated.floors import Floor, generated_floor
 from experiments.report import Cell, Claim, Report
 from experiments.trials import RESULTS, campaign_folder, judge_rare, judge_share, run_trials
@@ -31,26 +27,23 @@ from harvey.runner.run import run_to_outcome
 from harvey.runner.world_port import build_scheduler
 from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.goal.goal_renewer import GoalRenewer
-from knowledge_sources.goal.localizer import Localizer
 from knowledge_sources.goal.mission_monitor import MissionMonitor
-from knowledge_sources.goal.panorama_builder import PanoramaBuilder
-from knowledge_sources.goal.pose_adopter import PoseAdopter
-from knowledge_sources.goal.probe_photographer import ProbePhotographer
-from knowledge_sources.goal.prober import Prober
-from knowledge_sources.methods.localization.pose_candidates import get_visibility_map
-from knowledge_sources.methods.motion.routes import compute_free_space
-from knowledge_sources.plan.line_finder import LineFinder
+from knowledge_sources.methods.localization import get_visibility_map
+from knowledge_sources.methods.motion import compute_free_space
+from knowledge_sources.milestone.line_finder import LineFinder
+from knowledge_sources.relocalizer.localizer import Localizer
+from knowledge_sources.relocalizer.panorama_builder import PanoramaBuilder
+from knowledge_sources.relocalizer.pose_adopter import PoseAdopter
+from knowledge_sources.relocalizer.probe_photographer import ProbePhotographer
+from knowledge_sources.relocalizer.prober import Prober
 from knowledge_sources.settings import DEFAULT
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
 from world_models.actuator import ActuatorModel
-from world_models.building.world import World
+from world_models.building import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import BodyFault, CameraPicture
-from world_models.entries.entry_kinds import KINDS
-from world_models.entries.location import Hypothesis, Place, diagonal
-from world_models.entries.percepts import Panorama
+from world_models.entries import KINDS, BodyFault, CameraPicture, Hypothesis, Panorama, Place, diagonal
 from world_models.frame_building import FrameBuilding
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2

@@ -18,7 +18,7 @@ from harvey.hardware.drivers.base_driver import Base, BaseFault
 from harvey.hardware.drivers.denning import DenningBase
 from sim.emulators.emulator import IdealGround
 from sim.emulators.emulator_registry import emulator_kinds
-from world_models.entries.body import MotionReport, MotorCommand
+from world_models.entries import MotionReport, MotorCommand
 
 
 class Trial:

@@ -11,13 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from blackboard.board import View
-from blackboard.change import Change, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.kinds import inference
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
-from blackboard.scheduler import Scheduler
+from blackboard import Change, Effect, KnowledgeSource, Level, Post, Revise, Scheduler, View, Watch, inference
 from logs.journal_file import JournalFile
 
 STEPS = 20

@@ -8,14 +8,20 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.kinds import inference
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
-from blackboard.scheduler import Scheduler
-from blackboard.servoing import Discrepancy
+from blackboard import (
+    Change,
+    Discrepancy,
+    Effect,
+    KnowledgeSource,
+    Level,
+    Post,
+    Posted,
+    Revise,
+    Scheduler,
+    View,
+    Watch,
+    inference,
+)
 from logs.journal_file import JournalFile
 
 DOUBT_EVERY = 20

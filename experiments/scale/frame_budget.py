@@ -11,17 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from blackboard.board import View
-from blackboard.effect import Effect
-from blackboard.journal import Decision
-from blackboard.knowledge_source import KnowledgeSource
+from blackboard import Decision, Effect, KnowledgeSource, View
 from experiments.report import Cell, Report
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario, with_settings
 from sim.stage import build_stage
-from world_models.entries.body import CameraPicture
+from world_models.entries import CameraPicture
 
 SCENARIOS, QUICK_SCENARIOS = ("forty-foot-hallway", "lab-to-allens-office"), ("forty-foot-hallway",)
 DRIVES = 6

@@ -16,11 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from blackboard.change import Change
-from blackboard.effect import Effect, Post, Retract
-from blackboard.journal import decision_record, plain
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.scheduler import Scheduler
+from blackboard import Change, Effect, KnowledgeSource, Post, Retract, Scheduler, decision_record, plain
 from harvey.agent import Agent, build_agent
 from harvey.replay.why_not_again import Fate, in_cycle, why_absent
 from harvey.runner.replay import open_originals, replay

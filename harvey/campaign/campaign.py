@@ -16,7 +16,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from blackboard.journal import Sink
+from blackboard import Sink
 from harvey.errors import BadInput
 from logs.decided_by import DIGITS
 from logs.run_directory import RunDirectory, prepare_directory

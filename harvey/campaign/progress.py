@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, TextIO
 
 from tqdm import tqdm
 
-from blackboard.journal import Decision, Sink
+from blackboard import Decision, Sink
 from harvey.campaign.campaign import Follow, Task
 from harvey.campaign.case_work import Killed
 from harvey.campaign.summary import format_error
 from logs.explain.turning_points import TurningPoint, TurningPointFinder
-from world_models.entries.location import Hypothesis
-from world_models.entries.task import Goal, Milestone
+from world_models.entries import Goal, Hypothesis, Milestone
 from world_models.words import count
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from world_models.words import count, degrees
 if TYPE_CHECKING:
     from harvey.dry_run import MilestonePreview
     from harvey.runner.result import MissionResult
-    from world_models.entries.task import Outcome
+    from world_models.entries import Outcome
 
 COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "wrong", "sketches", "replans",
            "relocated", "collisions", "path m", "robot s", "cycles", "wall s")

@@ -126,7 +126,7 @@ def _perhaps(head: RunHead, elsewhere: str) -> str:
 
 
 def _difference(agreed: int, decision: ReplayedDecision) -> str:
-    from blackboard.journal import decision_record
+    from blackboard import decision_record
     from logs.explain.diff import describe
     from logs.records import decision_of
 

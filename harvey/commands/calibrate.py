@@ -16,7 +16,7 @@ from harvey.errors import BadInput
 if TYPE_CHECKING:
     from harvey.hardware.calibration import Grey, Mounted
     from harvey.hardware.drivers.video_camera import VideoCamera
-    from knowledge_sources.methods.calibration.intrinsics import Calibration, Pattern
+    from knowledge_sources.methods.calibration import Calibration, Pattern
 
 PATTERN = re.compile(r"(\d{1,3})x(\d{1,3})", re.ASCII)
 
@@ -70,8 +70,7 @@ def _run(args: Namespace) -> int:
         grey_of,
         report,
     )
-    from knowledge_sources.methods.calibration.calibration_picture import draw_calibration
-    from knowledge_sources.methods.calibration.intrinsics import Pattern
+    from knowledge_sources.methods.calibration import Pattern, draw_calibration
     from world_models.files.toml.camera_file import camera_text
 
     board = _check_options(args)
@@ -128,7 +127,7 @@ def _pictures(args: Namespace, pattern: Pattern) -> Iterator[tuple[str, Grey]]:
 def _live_place(args: Namespace) -> Grey:
     """A picture that is taken when the user says so."""
     from harvey.hardware.drivers.capture import CameraFault
-    from knowledge_sources.methods.features.picture import read_picture
+    from knowledge_sources.methods.features import read_picture
 
     where = "flat on the floor" if args.mount_board == "floor" else "upright on the floor"
     try:
@@ -154,7 +153,7 @@ def _open_camera(source: str) -> VideoCamera:
 
 
 def _notes(calibration: Calibration, args: Namespace) -> tuple[str, ...]:
-    from knowledge_sources.methods.calibration.intrinsics import PARAMETERS
+    from knowledge_sources.methods.calibration import PARAMETERS
 
     sure = ", ".join(f"{name} {sigma:.2g}" for name, sigma in zip(PARAMETERS, calibration.deviations, strict=False))
     lines = [f"Written by harvey calibrate: {len(calibration.views)} views, {calibration.rms_px:.3f} px RMS.",

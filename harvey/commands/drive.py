@@ -16,7 +16,7 @@ from harvey.errors import BadInput
 from logs.run_directory import RUNS, check_vacant, expect_unwritten
 
 if TYPE_CHECKING:
-    from blackboard.journal import Decision
+    from blackboard import Decision
     from harvey.agent_settings import Pairs
     from harvey.hardware.hardware_mission import HardwareMission
     from harvey.hardware.preflight import Check, Preflight
@@ -168,8 +168,7 @@ def summary(result: MissionResult, out: Path) -> str:
 
 def follow(decision: Decision) -> None:
     """A line for every milestone, and for whatever is wrong with the body."""
-    from world_models.entries.body import BodyFault
-    from world_models.entries.task import Milestone
+    from world_models.entries import BodyFault, Milestone
 
     for change in (*decision.observed, *decision.made):
         value, said = change.entry.value, ""

@@ -13,16 +13,17 @@ from numpy.typing import NDArray
 from harvey.errors import BadInput
 from harvey.hardware.drivers.capture import CameraFault
 from harvey.hardware.drivers.video_camera import VideoCamera
-from knowledge_sources.methods.calibration.intrinsics import (
+from knowledge_sources.methods.calibration import (
     PARAMETERS,
     BoardView,
     Calibration,
+    Mounting,
     Pattern,
     calibrate,
+    estimate_mounting,
     find_corners,
 )
-from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.features import read_picture
 from world_models.camera import CameraDeviation, CameraMount
 from world_models.words import by_numbers, count
 

@@ -11,18 +11,19 @@ from typing import Protocol
 from harvey.hardware.drivers.base_driver import Base, BaseFault
 from harvey.hardware.drivers.capture import CameraFault
 from harvey.hardware.drivers.video_camera import VideoCamera
-from world_models.entries.body import (
+from world_models.entries import (
     STOP_KEY,
     BodyFault,
     CameraPicture,
+    Contact,
     Course,
     MotionReport,
     MotorCommand,
     Odometry,
+    Ranges,
     Ride,
     RideReport,
 )
-from world_models.entries.obstacle import Contact, Ranges
 
 BASE_WORDS: Mapping[str, str] = {
     "silent": "link lost",

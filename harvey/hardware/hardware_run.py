@@ -13,9 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from blackboard.effect import Effect, Post
-from blackboard.entry import Entry
-from blackboard.journal import Sink
+from blackboard import Effect, Entry, Post, Sink
 from harvey.agent import build_agent
 from harvey.agent_settings import Pairs
 from harvey.errors import BadInput
@@ -34,9 +32,8 @@ from logs.records import EntryRecord, read_records
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import Extent, RunRecorder
-from world_models.building.world import World
-from world_models.entries.body import BodyFault, CameraPicture
-from world_models.entries.user_reports import GO_ON
+from world_models.building import World
+from world_models.entries import GO_ON, BodyFault, CameraPicture
 from world_models.robot import RobotModel
 
 Around = Callable[[HardwareBody, Callable[[], None]], Body]

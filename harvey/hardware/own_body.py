@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.journal import Sink
+from blackboard import Sink
 from harvey.agent import build_agent
 from harvey.agent_settings import Pairs
 from harvey.errors import BadInput
@@ -24,8 +24,17 @@ from harvey.runner.run import Run, RunReferee
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead, load_known_world
 from logs.run_recorder import RunRecorder
-from world_models.entries.body import BodyFault, CameraPicture, Course, MotionReport, MotorCommand, Ride, RideReport
-from world_models.entries.obstacle import Contact, Ranges
+from world_models.entries import (
+    BodyFault,
+    CameraPicture,
+    Contact,
+    Course,
+    MotionReport,
+    MotorCommand,
+    Ranges,
+    Ride,
+    RideReport,
+)
 from world_models.files.toml.camera_file import load_camera
 from world_models.files.toml.source import WorldError
 from world_models.robot import RobotModel

@@ -18,13 +18,12 @@ from harvey.hardware.drivers.base_driver import Base, BaseFault
 from harvey.hardware.drivers.capture import CameraFault
 from harvey.hardware.drivers.video_camera import VideoCamera
 from harvey.hardware.hardware_mission import HardwareMission
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.features import read_picture
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building.checks import check_world
-from world_models.building.world import World
+from world_models.building import World, check_world
 from world_models.camera import Camera, CameraDeviation, CameraMount
 from world_models.commands import parse_command
-from world_models.entries.location import Place
+from world_models.entries import Place
 from world_models.files.toml.camera_file import load_camera
 from world_models.files.toml.source import WorldError
 from world_models.files.world_files import load_world

@@ -13,8 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from blackboard import Change, Decision, Post, Scheduler, View
-from blackboard.journal import decision_record, plain
+from blackboard import Change, Decision, Post, Scheduler, View, decision_record, plain
 from harvey.agent import Agent, build_agent
 from harvey.campaign.campaign import make_room
 from harvey.campaign.summary import format_error
@@ -33,10 +32,8 @@ from logs.records import WHAT_IF, DecisionRecord, EntryRecord, Originals, as_lin
 from logs.run_directory import RunDirectory
 from logs.run_head import SIMULATOR, RunHead
 from logs.run_recorder import RunRecorder
-from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.body import CameraPicture, MotionReport, RideReport
-from world_models.entries.task import Outcome
-from world_models.entries.user_reports import Redirection, UserReport
+from world_models.building import LocaleFrame
+from world_models.entries import CameraPicture, MotionReport, Outcome, Redirection, RideReport, UserReport
 from world_models.words import count, listed
 
 

@@ -26,10 +26,11 @@ from blackboard import (
     Level,
     MissingEntryError,
     Posted,
+    Registry,
     Retracted,
     View,
+    always,
 )
-from blackboard.kinds import Registry, always
 from harvey.errors import BadInput
 from logs.explain import phrases
 from logs.records import CHANGES, Candidate, DecisionRecord, EntryRecord, entry_of

@@ -18,13 +18,9 @@ from logs.explain.phrases import sentence
 from logs.records import EntryRecord
 from logs.timeline import Timeline
 from world_models import words
-from world_models.building.plan_view import SCALE, DrawnStorey, draw_storeys, drawing_svg
-from world_models.building.world import World
+from world_models.building import SCALE, DrawnStorey, World, draw_storeys, drawing_svg
 from world_models.camera import Camera
-from world_models.entries.body import CameraPicture
-from world_models.entries.location import Hypothesis
-from world_models.entries.percepts import LineMatch, PoseFix, Segments
-from world_models.entries.task import Milestone
+from world_models.entries import CameraPicture, Hypothesis, LineMatch, Milestone, PoseFix, Segments
 
 
 def cycles(history: Timeline) -> Iterator[dict[str, Any]]:

@@ -9,22 +9,21 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from blackboard.change import Change, Posted, Retracted
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
-from knowledge_sources.methods.features.picture import read_picture
-from world_models.entries.body import (
+from blackboard import Change, Effect, Entry, Post, Posted, Retracted, Revise
+from knowledge_sources.methods.features import read_picture
+from world_models.entries import (
     BodyFault,
     CameraPicture,
+    Contact,
     Course,
     MotionReport,
     MotorCommand,
     PictureRequest,
+    Ranges,
     Recovery,
     Ride,
     RideReport,
 )
-from world_models.entries.obstacle import Contact, Ranges
 
 
 class Body(Protocol):

@@ -11,9 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from blackboard.change import Change
-from blackboard.journal import Decision, decision_line
-from blackboard.scheduler import Scheduler
+from blackboard import Change, Decision, Scheduler, decision_line
 from harvey.errors import BadInput
 from logs.pictures import open_pictures
 from logs.records import DecisionRecord, EntryRecord, Originals, effect_of, read_records

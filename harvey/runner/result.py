@@ -8,15 +8,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from blackboard.agenda import Activation
-from blackboard.change import Posted
-from blackboard.journal import Decision
+from blackboard import Activation, Decision, Posted
 from logs.explain.turning_points import Collision, Happening, TurningPoint, TurningPointFinder, is_adjusted
-from world_models.building.locale_frame import FrameRequest
-from world_models.entries.body import CameraPicture, MotionReport, PictureRequest
-from world_models.entries.location import Hypothesis
-from world_models.entries.robot_state import CameraLesson, CameraState, find_camera_lessons
-from world_models.entries.task import Milestone, Outcome, PlanSketch
+from world_models.building import FrameRequest
+from world_models.entries import (
+    CameraLesson,
+    CameraPicture,
+    CameraState,
+    Hypothesis,
+    Milestone,
+    MotionReport,
+    Outcome,
+    PictureRequest,
+    PlanSketch,
+    find_camera_lessons,
+)
 from world_models.words import count
 
 PARTS = ("contacts", "happened", "turning_points", "camera")

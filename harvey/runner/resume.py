@@ -13,10 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from blackboard.change import Change, Posted, Retracted
-from blackboard.effect import Effect, Post
-from blackboard.entry import Entry
-from blackboard.journal import Decision
+from blackboard import Change, Decision, Effect, Entry, Post, Posted, Retracted
 from harvey.errors import BadInput
 from harvey.runner.replay import Live, check_same, open_originals, replay
 from harvey.runner.run import Run
@@ -25,8 +22,7 @@ from logs.pictures import camera_bytes, open_pictures
 from logs.records import read_records
 from logs.run_directory import RunDirectory
 from logs.run_recorder import Extent
-from world_models.entries.body import Course, MotorCommand
-from world_models.entries.task import Outcome, Resumed
+from world_models.entries import Course, MotorCommand, Outcome, Resumed
 
 RESUME = "resume"
 """The author of what a run is told that goes on after a crash."""

@@ -10,10 +10,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Protocol
 
-from blackboard.change import Quiescence
-from blackboard.effect import Post
-from blackboard.journal import Decision, Sink
-from blackboard.scheduler import RAISED, Scheduler
+from blackboard import RAISED, Decision, Post, Quiescence, Scheduler, Sink
 from harvey.agent import Agent
 from harvey.errors import BadInput
 from harvey.runner.ports import Body, BodyPort
@@ -26,9 +23,7 @@ from logs.run_errors import RecordingError
 from logs.run_head import RunHead
 from logs.run_recorder import RunRecorder
 from world_models.camera import CameraDeviation
-from world_models.entries.location import Hypothesis
-from world_models.entries.robot_state import CameraState
-from world_models.entries.task import Goal, Outcome
+from world_models.entries import CameraState, Goal, Hypothesis, Outcome
 from world_models.files.toml.camera_file import camera_text
 from world_models.files.toml.mission import Limits, Telling
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
 
-from blackboard.effect import Post
-from blackboard.scheduler import Scheduler
-from world_models.entries.user_reports import Redirection, UserReport
+from blackboard import Post, Scheduler
+from world_models.entries import Redirection, UserReport
 from world_models.files.toml.mission import Telling
 
 USER, PAGE = "user", "live page"

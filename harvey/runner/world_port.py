@@ -5,12 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from blackboard.change import Change, Posted
-from blackboard.effect import Effect, Post, Revise
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.scheduler import Port, Scheduler
-from world_models.building.locale_frame import FrameRequest
-from world_models.building.world import World
+from blackboard import Change, Effect, KnowledgeSource, Port, Post, Posted, Revise, Scheduler
+from world_models.building import FrameRequest, World
 from world_models.frame_store import FrameStore
 from world_models.robot import RobotModel
 

@@ -13,18 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from blackboard.change import Change, Posted
-from blackboard.effect import Effect, Retract
-from blackboard.entry import Entry
-from blackboard.journal import plain
-from blackboard.scheduler import Port
+from blackboard import Change, Effect, Entry, Port, Posted, Retract, plain
 from harvey.errors import BadInput
 from harvey.runner.replay import Live
 from logs.records import EntryRecord, as_line
 from sim.body.simulated_body import SimulatedBody
 from sim.body.wheel_errors import ActuatorParameters
-from world_models.entries.body import Course, MotorCommand
-from world_models.entries.task import Resumed
+from world_models.entries import Course, MotorCommand, Resumed
 
 
 class BodyReplay:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from blackboard.journal import Decision
+from blackboard import Decision
 from harvey.runner.result import MissionResult
 from harvey.simulation.contacts import ContactWatch
 from harvey.simulation.happenings import HappeningWatch
@@ -12,11 +12,8 @@ from logs.explain.turning_points import Collision, Happening
 from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage
 from sim.truth import cross_track_m
-from world_models.building.world import World
-from world_models.entries.location import Hypothesis
-from world_models.entries.percepts import PoseFix
-from world_models.entries.task import Certificate, Goal, Leg
-from world_models.entries.user_reports import Redirection
+from world_models.building import World
+from world_models.entries import Certificate, Goal, Hypothesis, Leg, PoseFix, Redirection
 from world_models.frames import Pose2, wrap_angle
 
 MAX_TRUE_ERROR_M = 0.15

@@ -13,40 +13,33 @@ from statistics import median
 
 import numpy as np
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.conditions import HELD, MEASURED, NOT_LOST, PICTURE, Belief
-from knowledge_sources.followed_landmarks import (
+from blackboard import Change, Discrepancy, Effect, Level, Post, Posted, Revise, View, Watch
+from knowledge_sources.methods.arrays import Image
+from knowledge_sources.methods.calibration import compute_camera_covariance
+from knowledge_sources.methods.features import Template
+from knowledge_sources.methods.tracking import TrackUpdate, action_px, correct_pose, cut_template, follow_landmarks
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import (
+    HELD,
+    MEASURED,
+    NOT_LOST,
+    PICTURE,
+    Belief,
     Following,
     Renewed,
+    find_camera,
     find_missing_floors,
     find_near_frames,
+    find_robot,
+    open_discrepancy,
     post_or_revise,
     rectify,
     take_new,
     tell_worst,
     with_anchors,
 )
-from knowledge_sources.methods.arrays import Image
-from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
-from knowledge_sources.methods.features.correlation import Template
-from knowledge_sources.methods.tracking.template_tracking import (
-    TrackUpdate,
-    correct_pose,
-    cut_template,
-    follow_landmarks,
-)
-from knowledge_sources.methods.tracking.tolerance import action_px
-from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_camera, find_robot, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import CameraPicture
-from world_models.entries.location import Hypothesis
-from world_models.entries.percepts import Anchor, Track, Tracks
-from world_models.entries.robot_state import Drift
+from world_models.entries import Anchor, CameraPicture, Drift, Hypothesis, Track, Tracks
 
 MIN_LANDMARKS = 5  # with fewer tracked landmarks than this, new ones are always taken
 ENOUGH_LANDMARKS = 9  # with this many tracked landmarks or more, no new ones are taken

@@ -9,23 +9,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.conditions import HELD, Belief
-from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
-from knowledge_sources.place_believed import PLACED_BY
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch
+from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_camera, find_contact
+from knowledge_sources.reads import HELD, PLACED_BY, Belief, find_camera, find_contact
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.camera import YAW
-from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand, PictureRequest
-from world_models.entries.location import Hypothesis, Travel, begin_travel
-from world_models.entries.robot_state import Drift
+from world_models.entries import (
+    BodyFault,
+    Course,
+    Drift,
+    Hypothesis,
+    MotionReport,
+    MotorCommand,
+    PictureRequest,
+    Travel,
+    begin_travel,
+)
 from world_models.frames import Pose2
 
 MIN_CLAIMED_PART = 0.7  # if the wheels claim less than this part of a move, something stopped the robot

@@ -5,16 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Revised, Watch
-from blackboard.effect import Effect, Post
-from blackboard.entry import Entry
-from blackboard.level import Level
-from knowledge_sources.conditions import GOING_ON, HELD, NO_DOUBT_ABOVE, SKETCH, SOUND, STANDING, Belief
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revised, View, Watch
 from knowledge_sources.priority import Priority
+from knowledge_sources.reads import GOING_ON, HELD, NO_DOUBT_ABOVE, SKETCH, SOUND, STANDING, Belief
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import BodyFault, Ride
-from world_models.entries.task import PlanSketch, Subgoal
+from world_models.entries import BodyFault, PlanSketch, Ride, Subgoal
 
 
 class Case(NamedTuple):

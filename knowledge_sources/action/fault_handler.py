@@ -6,20 +6,23 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Revised, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.conditions import NOT_GIVEN_UP
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import EMERGENCY_STOPS, OPEN_FAULT, find_stop, open_discrepancy
+from knowledge_sources.reads import EMERGENCY_STOPS, NOT_GIVEN_UP, OPEN_FAULT, find_stop, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import STOP_KEY, BodyFault, Course, MotorCommand, PictureRequest, Recovery, Ride
-from world_models.entries.obstacle import Contact
-from world_models.entries.task import Impasse
-from world_models.entries.user_reports import GO_ON, Redirection
+from world_models.entries import (
+    GO_ON,
+    STOP_KEY,
+    BodyFault,
+    Contact,
+    Course,
+    Impasse,
+    MotorCommand,
+    PictureRequest,
+    Recovery,
+    Redirection,
+    Ride,
+)
 
 WORD_WAIT_S = 1.0  # so long it waits before it looks again whether somebody has said go on
 

@@ -8,19 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, Revise
-from blackboard.entry import Entry
-from blackboard.level import Level
-from knowledge_sources.conditions import GOING_ON, HELD, Belief
+from blackboard import Change, Effect, Entry, Level, Posted, Revise, View, Watch
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_building
+from knowledge_sources.reads import GOING_ON, HELD, Belief, find_building
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import Ride, RideReport
-from world_models.entries.location import Hypothesis
-from world_models.entries.percepts import Tracks
-from world_models.entries.task import PlanSketch
+from world_models.entries import Hypothesis, PlanSketch, Ride, RideReport, Tracks
 from world_models.frames import Pose2
 
 ELEVATOR_SIGMA_M = 0.01  # standard deviation of where an elevator car stops, from floor to floor

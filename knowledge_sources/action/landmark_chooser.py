@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from blackboard.board import View
-from blackboard.change import Change, Revised, Watch
-from blackboard.effect import Effect, Revise
-from blackboard.level import Level
-from knowledge_sources.conditions import HELD, MEASURED, NOT_LOST, PICTURE
-from knowledge_sources.followed_landmarks import Following, post_or_revise, rectify, take_new
-from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
+from blackboard import Change, Effect, Level, Revise, Revised, View, Watch
+from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_camera, rests_on
+from knowledge_sources.reads import (
+    HELD,
+    MEASURED,
+    NOT_LOST,
+    PICTURE,
+    Following,
+    find_camera,
+    post_or_revise,
+    rectify,
+    rests_on,
+    take_new,
+)
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.location import Hypothesis
-from world_models.entries.percepts import Tracks
-from world_models.entries.robot_state import Drift
+from world_models.entries import Drift, Hypothesis, Tracks
 
 
 class LandmarkChooser(RobotKnowledgeSource):

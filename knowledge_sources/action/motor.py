@@ -6,25 +6,25 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Revised, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.conditions import GOING_ON, HELD, SOUND, STANDING, Belief
-from knowledge_sources.floor_ahead import FloorAhead
-from knowledge_sources.methods.motion.increments import (
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
+from knowledge_sources.methods.motion import (
     MAX_HEADING_ERROR_RAD,
     MAX_LOOK_ERROR_RAD,
     count_increment,
     find_aim,
+    lay_leg,
     plan_increment,
     plan_turn,
+    update_leg,
 )
-from knowledge_sources.methods.motion.pure_pursuit import lay_leg, update_leg
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import (
+from knowledge_sources.reads import (
+    GOING_ON,
+    HELD,
+    SOUND,
+    STANDING,
+    Belief,
+    FloorAhead,
     current_leg,
     deepest_sketch,
     is_in_doubt,
@@ -33,10 +33,7 @@ from knowledge_sources.questions import (
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import BodyFault, MotorCommand
-from world_models.entries.location import Hypothesis
-from world_models.entries.robot_state import Drift
-from world_models.entries.task import Leg, Milestone, PlanSketch
+from world_models.entries import BodyFault, Drift, Hypothesis, Leg, Milestone, MotorCommand, PlanSketch
 
 
 class Turn(NamedTuple):

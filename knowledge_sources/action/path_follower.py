@@ -7,15 +7,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Revised, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.conditions import HELD, SOUND, Belief
-from knowledge_sources.floor_ahead import FloorAhead
-from knowledge_sources.methods.motion.pure_pursuit import (
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
+from knowledge_sources.methods.motion import (
     ROLLING_STOP_MARGIN_M,
     choose_speed,
     compute_bearing,
@@ -25,7 +18,11 @@ from knowledge_sources.methods.motion.pure_pursuit import (
     update_leg,
 )
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import (
+from knowledge_sources.reads import (
+    HELD,
+    SOUND,
+    Belief,
+    FloorAhead,
     current_leg,
     is_in_doubt,
     is_over,
@@ -37,10 +34,7 @@ from knowledge_sources.questions import (
     rolling_course,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.body import Course
-from world_models.entries.location import Hypothesis
-from world_models.entries.robot_state import Drift
-from world_models.entries.task import Leg, Milestone, PlanSketch
+from world_models.entries import Course, Drift, Hypothesis, Leg, Milestone, PlanSketch
 
 ROLLING_LOOKAHEAD_M = 0.75  # distance ahead on the line at which the path follower steers (pure pursuit)
 MIN_ROLLING_LEG_M = 0.3  # shortest rest of a leg, beyond the stopping distance, that is driven without stopping

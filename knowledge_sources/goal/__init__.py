@@ -1,1 +1,5 @@
-"""Knowledge sources of the goal level (§2): the command, finding the robot when it is lost, and the outcome."""
+"""Goal (§3.1, §4): what is wanted, and how a mission ends.
+
+Read ``interpreter`` (a command becomes a goal), ``goal_changer`` and ``goal_renewer`` (another goal, or the same from
+another place), ``discrepancy_raiser`` (a difference climbs a servo level), ``goal_closer`` and ``mission_monitor``.
+"""

@@ -6,14 +6,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
-from blackboard.board import View
-from blackboard.change import Change, Revised, Watch
-from blackboard.effect import Effect, Revise
-from blackboard.entry import Entry
-from blackboard.level import Level
+from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch
 from knowledge_sources.priority import Priority
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.task import Goal, PlanSketch
+from world_models.entries import Goal, PlanSketch
 
 
 class Case(NamedTuple):

@@ -6,17 +6,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
-from blackboard.board import View
-from blackboard.change import Change, Revised, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Revise, Revised, View, Watch
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import active_goal, find_building, open_discrepancy
+from knowledge_sources.reads import active_goal, find_building, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.location import Hypothesis, Place
-from world_models.entries.task import Goal
+from world_models.entries import Goal, Hypothesis, Place
 
 
 class Case(NamedTuple):

@@ -5,17 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, Post
-from blackboard.entry import Entry
-from blackboard.level import Level
+from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_building
+from knowledge_sources.reads import find_building
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.commands import read_places
-from world_models.entries.location import Hypothesis, Place
-from world_models.entries.task import Command, Goal, Impasse
+from world_models.entries import Command, Goal, Hypothesis, Impasse, Place
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 

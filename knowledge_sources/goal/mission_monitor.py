@@ -6,17 +6,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Quiescence, Revised, Watch
-from blackboard.effect import Effect, Post
-from blackboard.entry import Entry
-from blackboard.level import Level
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Quiescence, Revised, View, Watch
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_camera, open_discrepancy, open_impasse, open_milestone
+from knowledge_sources.reads import find_camera, open_discrepancy, open_impasse, open_milestone
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries.location import Hypothesis, Place, TwinOdds
-from world_models.entries.obstacle import Obstruction
-from world_models.entries.task import Goal, Impasse, Outcome
+from world_models.entries import Goal, Hypothesis, Impasse, Obstruction, Outcome, Place, TwinOdds
 
 SURE_PLACE = 0.999
 """Where the place is less probable than this against those that look like it, the end says so."""

@@ -17,9 +17,7 @@ from logs.run_errors import UNREADABLE
 from logs.tables import table
 from logs.timeline import Timeline
 from world_models import words
-from world_models.entries.body import CameraPicture, MotorCommand
-from world_models.entries.location import Hypothesis
-from world_models.entries.task import Goal, Milestone, PlanSketch
+from world_models.entries import CameraPicture, Goal, Hypothesis, Milestone, MotorCommand, PlanSketch
 from world_models.words import count, metres
 
 if TYPE_CHECKING:

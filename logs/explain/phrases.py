@@ -18,12 +18,29 @@ from logs.records import WHAT_IF, Candidate, EntryRecord, is_a
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
 from world_models import words
-from world_models.building.locale_frame import FrameRequest
-from world_models.entries.body import Course, MotionReport, MotorCommand, PictureRequest
-from world_models.entries.location import Hypothesis, Place, PlaceSearch
-from world_models.entries.percepts import LineMatch, PoseFix, Segments, Track, Tracks
-from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, PlanSketch
-from world_models.entries.user_reports import Redirection, UserReport
+from world_models.building import FrameRequest
+from world_models.entries import (
+    Certificate,
+    Command,
+    Course,
+    Goal,
+    Hypothesis,
+    Leg,
+    LineMatch,
+    Milestone,
+    MotionReport,
+    MotorCommand,
+    PictureRequest,
+    Place,
+    PlaceSearch,
+    PlanSketch,
+    PoseFix,
+    Redirection,
+    Segments,
+    Track,
+    Tracks,
+    UserReport,
+)
 from world_models.words import count, degrees, landmark, listed, metres, point, quantity, size, turn
 
 MAX_LISTED = 4

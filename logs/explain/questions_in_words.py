@@ -22,12 +22,21 @@ from logs.records import EntryRecord, is_a
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
-from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.body import CameraPicture, MotorCommand
-from world_models.entries.door_state import DoorState
-from world_models.entries.obstacle import Contact, Obstacle, Ranges
-from world_models.entries.task import Leg, Outcome, PlanSketch, Subgoal
-from world_models.entries.user_reports import Redirection, UserReport
+from world_models.building import LocaleFrame
+from world_models.entries import (
+    CameraPicture,
+    Contact,
+    DoorState,
+    Leg,
+    MotorCommand,
+    Obstacle,
+    Outcome,
+    PlanSketch,
+    Ranges,
+    Redirection,
+    Subgoal,
+    UserReport,
+)
 from world_models.words import count, metres
 
 MOST_STORIES = 6

@@ -24,14 +24,24 @@ from logs.run_directory import RunDirectory, read_head
 from logs.run_errors import BadInput, reading
 from logs.tables import table
 from logs.timeline import Timeline
-from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.body import PictureRequest
-from world_models.entries.door_state import DoorState
-from world_models.entries.location import Hypothesis
-from world_models.entries.obstacle import Contact, Obstacle
-from world_models.entries.robot_state import CameraState, find_camera_lessons
-from world_models.entries.task import Certificate, Command, Goal, Milestone, Outcome, PlanSketch
-from world_models.entries.user_reports import Redirection, UserReport
+from world_models.building import LocaleFrame
+from world_models.entries import (
+    CameraState,
+    Certificate,
+    Command,
+    Contact,
+    DoorState,
+    Goal,
+    Hypothesis,
+    Milestone,
+    Obstacle,
+    Outcome,
+    PictureRequest,
+    PlanSketch,
+    Redirection,
+    UserReport,
+    find_camera_lessons,
+)
 from world_models.words import count, listed, metres
 
 WITHOUT: Mapping[str, str] = {

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy
 from logs.explain import phrases
 from logs.explain.model import MAX_LISTED, WorldFile, tell_changes, tell_model_lines, tell_source
 from logs.explain.phrases import Sentence, Story, capital, describe_decision, said, sentence, tell
@@ -17,11 +17,17 @@ from logs.records import WHAT_IF, EntryRecord
 from logs.run_errors import UNREADABLE, BadInput
 from logs.timeline import Timeline
 from world_models import words
-from world_models.building.locale_frame import FrameReference, FrameRequest
-from world_models.entries.body import CameraPicture
-from world_models.entries.location import Hypothesis
-from world_models.entries.percepts import LineMatch, PoseFix, Segments
-from world_models.entries.task import Certificate, Milestone, PlanSketch
+from world_models.building import FrameReference, FrameRequest
+from world_models.entries import (
+    CameraPicture,
+    Certificate,
+    Hypothesis,
+    LineMatch,
+    Milestone,
+    PlanSketch,
+    PoseFix,
+    Segments,
+)
 from world_models.words import count, landmark, listed
 
 FOLLOWED = (Certificate, Milestone, Discrepancy)

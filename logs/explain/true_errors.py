@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
-from world_models.entries.location import Hypothesis
+from world_models.entries import Hypothesis
 from world_models.frames import Pose2, wrap_angle
 from world_models.words import degrees, metres
 

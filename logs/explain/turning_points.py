@@ -16,12 +16,22 @@ from logs.records import EntryRecord, Opaque
 from logs.run_errors import BadInput
 from logs.timeline import Mirror, Timeline, find_belief, time_told
 from world_models import words
-from world_models.entries.body import BodyFault
-from world_models.entries.door_state import DoorState
-from world_models.entries.location import Hypothesis, Place
-from world_models.entries.obstacle import Contact, Obstacle
-from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch, Resumed
-from world_models.entries.user_reports import Redirection, UserReport
+from world_models.entries import (
+    BodyFault,
+    Certificate,
+    Contact,
+    DoorState,
+    Goal,
+    Hypothesis,
+    Milestone,
+    Obstacle,
+    Outcome,
+    Place,
+    PlanSketch,
+    Redirection,
+    Resumed,
+    UserReport,
+)
 from world_models.words import count
 
 TOLD = ("refuted", "not testable", "lost", "found", "fault", "contact", "door", "thing", "resumed", "told")

@@ -8,18 +8,32 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TextIO
 
-from blackboard.journal import Decision, Sink, decision_record
+from blackboard import Decision, Sink, decision_record
 from logs.explain.diff import differing_leaves
 from logs.explain.phrases import describe_decision, sentence, wrap
 from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of
 from logs.timeline import Timeline, ranked
-from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.body import CameraPicture, MotorCommand, PictureRequest, Recovery
-from world_models.entries.location import Hypothesis
-from world_models.entries.percepts import Tracks
-from world_models.entries.robot_state import CameraState, Footprint, Wheels
-from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, Outcome, PlanSketch
-from world_models.entries.user_reports import Redirection, UserReport
+from world_models.building import LocaleFrame
+from world_models.entries import (
+    CameraPicture,
+    CameraState,
+    Certificate,
+    Command,
+    Footprint,
+    Goal,
+    Hypothesis,
+    Leg,
+    Milestone,
+    MotorCommand,
+    Outcome,
+    PictureRequest,
+    PlanSketch,
+    Recovery,
+    Redirection,
+    Tracks,
+    UserReport,
+    Wheels,
+)
 from world_models.words import count
 
 DEEPEST_INDENT, FEW = 20, 2

@@ -29,26 +29,48 @@ from logs.explain.phrases import (
 from logs.records import EntryRecord, is_a
 from logs.run_errors import UNREADABLE, BadInput
 from logs.timeline import Timeline
-from world_models.building.locale_frame import FrameRequest, LocaleFrame
-from world_models.entries.body import (
+from world_models.building import FrameRequest, LocaleFrame
+from world_models.entries import (
     BodyFault,
     CameraPicture,
+    CameraState,
+    Certificate,
+    Command,
+    Contact,
     Course,
+    DoorState,
+    Drift,
+    FloorAppearance,
+    FloorView,
+    Footprint,
+    FreeFloor,
+    Goal,
+    Hypothesis,
+    Leg,
+    LineMatch,
+    Milestone,
     MotionReport,
     MotorCommand,
+    Obstacle,
+    Obstruction,
+    Outcome,
+    Panorama,
     PictureRequest,
+    PlaceSearch,
+    PlanSketch,
+    PoseFix,
+    Ranges,
     Recovery,
+    Redirection,
+    Resumed,
     Ride,
     RideReport,
+    Segments,
+    Tracks,
+    Travel,
+    UserReport,
+    Wheels,
 )
-from world_models.entries.door_state import DoorState
-from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor
-from world_models.entries.location import Hypothesis, PlaceSearch, Travel
-from world_models.entries.obstacle import Contact, Obstacle, Obstruction, Ranges
-from world_models.entries.percepts import LineMatch, Panorama, PoseFix, Segments, Tracks
-from world_models.entries.robot_state import CameraState, Drift, Footprint, Wheels
-from world_models.entries.task import Certificate, Command, Goal, Leg, Milestone, Outcome, PlanSketch, Resumed
-from world_models.entries.user_reports import Redirection, UserReport
 
 MOST, MOST_PLAIN, MOST_MET = 24, 12, 200
 """So many things are told at the most, of a run of another version, and so many entries come to."""

@@ -7,17 +7,16 @@ from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 
-from blackboard.journal import Decision, decision_line
+from blackboard import Decision, decision_line
 from logs.recording import loggers as built_in
 from logs.recording.logger import Difference, Held, Logger, Moment, Subject, blueprint
 from logs.recording.stream import LIVE_PORT, RecordingStream
 from logs.run_errors import RecordingError
 from logs.timeline import Mirror, find_belief
+from world_models.building import World
 from world_models.building.geometry.faces import Face
-from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import CameraPicture, MotionReport
-from world_models.entries.location import Place
+from world_models.entries import CameraPicture, MotionReport, Place
 from world_models.frames import Pose2
 from world_models.plugins import PluginError, load_plugin_classes
 

@@ -16,7 +16,7 @@ from sim.render.optics import Optics
 from sim.render.sensor import Occluder, SensorParameters, compress_jpeg, expose, skip_noise_draws
 from sim.truth import Truth
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import CameraPicture
+from world_models.entries import CameraPicture
 from world_models.frames import Pose
 
 MOTION_BLUR_SAMPLES = 3

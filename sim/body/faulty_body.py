@@ -10,8 +10,17 @@ from dataclasses import replace
 
 from sim.body.simulated_body import SimulatedBody
 from sim.faults.fault import DeviceFault
-from world_models.entries.body import BodyFault, CameraPicture, Course, MotionReport, MotorCommand, Ride, RideReport
-from world_models.entries.obstacle import Contact, Ranges
+from world_models.entries import (
+    BodyFault,
+    CameraPicture,
+    Contact,
+    Course,
+    MotionReport,
+    MotorCommand,
+    Ranges,
+    Ride,
+    RideReport,
+)
 
 
 class FaultyBody:

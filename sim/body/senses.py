@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.body.collision import ROBOT_RADIUS_M
-from world_models.entries.obstacle import Contact, Ranges
+from world_models.entries import Contact, Ranges
 from world_models.frames import Pose2
 from world_models.units import Bounded, bounded
 

@@ -25,9 +25,18 @@ from sim.render.lighting import Lighting
 from sim.render.sensor import Occluder, SensorParameters
 from sim.truth import Truth
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import BodyFault, CameraPicture, Course, MotionReport, MotorCommand, Ride, RideReport
-from world_models.entries.location import Place
-from world_models.entries.obstacle import Contact, Ranges
+from world_models.entries import (
+    BodyFault,
+    CameraPicture,
+    Contact,
+    Course,
+    MotionReport,
+    MotorCommand,
+    Place,
+    Ranges,
+    Ride,
+    RideReport,
+)
 from world_models.frames import Pose2, wrap_angle
 from world_models.words import degrees, metres
 

@@ -14,8 +14,7 @@ from typing import Protocol
 from sim.body.collision import ROBOT_RADIUS_M
 from sim.body.senses import Bumper, RangeRing
 from sim.emulators.emulator import EmulatorKind, Ground
-from world_models.entries.body import MotionReport, MotorCommand
-from world_models.entries.obstacle import Contact, Ranges
+from world_models.entries import Contact, MotionReport, MotorCommand, Ranges
 from world_models.frames import Pose2
 
 RING = RangeRing(sensors=24)

@@ -11,7 +11,7 @@ import numpy as np
 
 from sim.faults.fault import DURATION, DeviceFault, Fault, FaultTarget
 from sim.render.sensor import Occluder
-from world_models.entries.location import Place
+from world_models.entries import Place
 from world_models.frames import Pose2
 from world_models.units import Bounds
 

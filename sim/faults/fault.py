@@ -11,7 +11,7 @@ import numpy as np
 
 from sim.render.sensor import Occluder
 from sim.truth import Truth
-from world_models.entries.location import Place
+from world_models.entries import Place
 from world_models.frames import Pose2
 from world_models.units import Bounds, check_bounds
 

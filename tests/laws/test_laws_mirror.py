@@ -15,28 +15,24 @@ from hypothesis import strategies as st
 
 from generated_boards import Bench, effect_on, mirrored, plain_robot, to_world
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_LOG_RATIO, PRIOR_LOG_ODDS, update_door
-from knowledge_sources.methods.features.lines import find_lines
-from knowledge_sources.methods.motion.pure_pursuit import (
+from knowledge_sources.methods.doors import MAX_LOG_ODDS, MIN_LOG_RATIO, PRIOR_LOG_ODDS, update_door
+from knowledge_sources.methods.features import find_lines
+from knowledge_sources.methods.motion import (
     compute_bearing,
-    compute_curvature_to,
+    compute_free_space,
     find_aim_point,
+    find_free_space,
     measure_progress,
 )
-from knowledge_sources.methods.motion.routes import (
-    compute_free_space,
-    find_free_space,
-    find_shortest_route,
-    list_obstacles,
-)
+from knowledge_sources.methods.motion.pure_pursuit import compute_curvature_to
+from knowledge_sources.methods.motion.routes import find_shortest_route, list_obstacles
 from knowledge_sources.methods.pose import planar_from_points
 from knowledge_sources.methods.tracking.edge_alignment import _Edges, _solve
-from knowledge_sources.methods.verification.color_check import predict_color_check
-from knowledge_sources.plan.view_predictor import ViewPredictor
+from knowledge_sources.methods.verification import predict_color_check
+from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.task import Leg, Milestone
+from world_models.entries import DoorPicture, DoorState, Leg, Milestone
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, wrap_angle
 

@@ -13,21 +13,19 @@ from hypothesis import strategies as st
 
 from generated_boards import HALL, HOUSE, mirrored, plain_robot, to_world
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.doors.belief import update_door
-from knowledge_sources.methods.doors.leaf import predict_opening
-from knowledge_sources.methods.localization.place_odds import compute_place_odds, is_within_reach
-from knowledge_sources.methods.matching import match_lines, match_on_floor
-from knowledge_sources.methods.motion.footprints import (
-    build_free_floor,
+from knowledge_sources.methods.doors import predict_opening, update_door
+from knowledge_sources.methods.floor import build_free_floor, list_corners
+from knowledge_sources.methods.floor.footprints import (
     deepen,
     join_footprints,
-    list_corners,
     measure_common_directions,
     measure_free_part,
     take_free,
 )
-from knowledge_sources.methods.verification.line_check import predict_lines
-from world_models.entries.door_state import DoorPicture, DoorState
+from knowledge_sources.methods.localization.place_odds import compute_place_odds, is_within_reach
+from knowledge_sources.methods.matching import match_lines, match_on_floor
+from knowledge_sources.methods.verification import predict_lines
+from world_models.entries import DoorPicture, DoorState
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2, flattened, wrap_angle

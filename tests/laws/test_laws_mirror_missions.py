@@ -13,17 +13,13 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from blackboard.change import Quiescence, Retracted
-from blackboard.effect import Post
-from blackboard.journal import Decision
+from blackboard import Decision, Post, Quiescence, Retracted
 from generated_boards import HALL, HOUSE, STUDY, WIDTH_M, plain_robot
 from harvey.dry_run import build_dry_run
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.building.world import World
-from world_models.entries.body import MotorCommand
-from world_models.entries.location import Hypothesis, Place, diagonal
-from world_models.entries.task import Command, Leg, Milestone, Outcome, PlanSketch
+from world_models.building import World
+from world_models.entries import Command, Hypothesis, Leg, Milestone, MotorCommand, Outcome, Place, PlanSketch, diagonal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2, wrap_angle

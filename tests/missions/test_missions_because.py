@@ -16,10 +16,7 @@ from typing import Any
 
 import pytest
 
-from blackboard.board import Blackboard, View
-from blackboard.change import Change
-from blackboard.effect import Effect
-from blackboard.knowledge_source import KnowledgeSource
+from blackboard import Blackboard, Change, Effect, KnowledgeSource, View
 from experiments.generated.missions import OFFICE, fault
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blackboard.journal import Decision
+from blackboard import Decision
 from harvey.simulation.simulated_run import run_mission
 from sim.faults.built_in_faults import CameraKnocked
 from sim.scenario import load_scenario, with_settings
 from sim.stage import build_stage
 from world_models.camera import CAMERA_UNKNOWNS, YAW, subtract_cameras
-from world_models.entries.robot_state import CameraState
+from world_models.entries import CameraState
 
 WRONG = {"truth.camera.tilt_deg": "-2", "truth.camera.roll_deg": "1.5", "truth.camera.height_m": "0.06",
          "truth.camera.focal_px": "9"}

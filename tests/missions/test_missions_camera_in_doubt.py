@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from blackboard.effect import Revise
+from blackboard import Revise
 from experiments.robustness.kidnap import Kidnap, _build_lost_agent, _draw_poses, _is_found, _scene, get_floor
 from harvey.runner.run import run_to_outcome
 from knowledge_sources.settings import DEFAULT
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
 from world_models.camera import CAMERA_UNKNOWNS
-from world_models.entries.location import Hypothesis
-from world_models.entries.robot_state import CameraState
+from world_models.entries import CameraState, Hypothesis
 from world_models.frames import Pose2
 
 MOST = DEFAULT.localization.max_doubted_pictures

@@ -7,15 +7,14 @@ from typing import Any
 
 import pytest
 
-from blackboard.journal import Decision
+from blackboard import Decision
 from harvey.runner.result import MissionResult
 from harvey.simulation.simulated_run import run_mission
 from sim.faults.built_in_faults import CameraUnplugged, LinkLost, Stall
 from sim.faults.fault import DeviceFault
 from sim.faults.fault_registry import BUILT_IN
 from sim.stage import Stage
-from world_models.entries.body import BodyFault, MotionReport, MotorCommand, Recovery
-from world_models.entries.task import Milestone
+from world_models.entries import BodyFault, Milestone, MotionReport, MotorCommand, Recovery
 
 MID_MOVE_M = 0.7
 """The second increment has just begun."""

@@ -10,13 +10,7 @@ from typing import Any
 
 import pytest
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, Post
-from blackboard.journal import Decision
-from blackboard.kinds import inference
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
+from blackboard import Change, Decision, Effect, KnowledgeSource, Level, Post, Posted, View, Watch, inference
 from experiments.generated.missions import OFFICE
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, knowledge_sources
@@ -29,10 +23,9 @@ from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from sim.truth import Truth
 from world_models.actuator import ActuatorModel
-from world_models.building.building import Building
+from world_models.building import Building
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import MotionReport
-from world_models.entries.robot_state import CameraState
+from world_models.entries import CameraState, MotionReport
 from world_models.robot import RobotModel
 
 FROM_VIEW = Building | RobotModel | Camera | CameraMount | ActuatorModel | View

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from blackboard.journal import Decision
+from blackboard import Decision
 from experiments.generated.missions import HALLWAY, fault
 from harvey.simulation.simulated_run import run_mission
 from logs.records import read_records
@@ -12,8 +12,7 @@ from recorded_runs import Recorded
 from sim.faults.built_in_faults import Occlusion
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
-from world_models.entries.obstacle import Obstruction
-from world_models.entries.task import Milestone
+from world_models.entries import Milestone, Obstruction
 
 HIDDEN = fault("occluded", "hallway", 3.0, part=0.2, duration_s=1000.0)
 

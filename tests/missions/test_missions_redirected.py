@@ -8,9 +8,7 @@ from typing import Any
 
 import pytest
 
-from blackboard.change import Retracted
-from blackboard.journal import Decision
-from blackboard.scheduler import Scheduler
+from blackboard import Decision, Retracted, Scheduler
 from harvey.cli import main
 from harvey.replay.counterfactual import what_if
 from harvey.runner.result import MissionResult
@@ -23,8 +21,7 @@ from recorded_runs import cut_off
 from sim.scenario import ScenarioError
 from sim.stage import Stage
 from two_doors import two_doors
-from world_models.entries.task import Goal, Milestone, PlanSketch
-from world_models.entries.user_reports import Redirection
+from world_models.entries import Goal, Milestone, PlanSketch, Redirection
 
 SEED = 3
 BACK = "(study (4,4,0))"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from blackboard.journal import decision_line
+from blackboard import decision_line
 from recorded_runs import Recorded
 from serial_bench import check_a_failing_line_is_waited_for, drive_over
 from sim.stage import Stage

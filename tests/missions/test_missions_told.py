@@ -9,9 +9,7 @@ from typing import Any
 
 import pytest
 
-from blackboard.effect import Post
-from blackboard.journal import Decision
-from blackboard.knowledge_source import KnowledgeSource
+from blackboard import Decision, KnowledgeSource, Post
 from harvey.agent import build_agent
 from harvey.cli import main
 from harvey.runner.result import MissionResult
@@ -23,10 +21,8 @@ from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
 from two_doors import two_doors
-from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.body import Course
-from world_models.entries.task import PlanSketch
-from world_models.entries.user_reports import UserReport
+from world_models.building import LocaleFrame
+from world_models.entries import Course, PlanSketch, UserReport
 
 SEED = 3
 SHUT = (3.0, "north-door", "shut")

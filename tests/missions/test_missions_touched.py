@@ -12,22 +12,15 @@ from pathlib import Path
 import pytest
 
 from acting import answer
-from blackboard.board import Blackboard
-from blackboard.change import Revised
-from blackboard.effect import Post, Revise
-from blackboard.journal import Decision
-from blackboard.knowledge_source import KnowledgeSource
+from blackboard import Blackboard, Decision, KnowledgeSource, Post, Revise, Revised
 from harvey.simulation.simulated_run import build_robot_model, run_mission
 from harvey.wiring import knowledge_sources
-from knowledge_sources.action.touch_finder import TouchFinder
+from knowledge_sources.model.touch_finder import TouchFinder
 from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario, parse_scenario
 from sim.stage import build_stage
-from world_models.building.locale_frame import LocaleFrame
-from world_models.building.world import World
-from world_models.entries.body import MotorCommand
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.obstacle import Contact, Obstacle
+from world_models.building import LocaleFrame, World
+from world_models.entries import Contact, Hypothesis, MotorCommand, Obstacle, diagonal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2

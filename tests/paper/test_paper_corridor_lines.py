@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.features.lines import find_lines
+from knowledge_sources.methods.features import find_lines
 from world_models.camera import Camera
 from world_models.frames import Pose
 

@@ -12,12 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any, Literal
 
-from blackboard.board import View
-from blackboard.entry import Entry
-from blackboard.entry_store import Index
-from blackboard.kinds import observation, request
-from blackboard.level import Level
-from blackboard.servoing import OPEN
+from blackboard import OPEN, Entry, Index, Level, View, observation, request
 from world_models import words
 from world_models.building.changes import add_extra, remove_element, remove_thing, shut_door
 from world_models.building.geometry.scene import LocaleGeometry

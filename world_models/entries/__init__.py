@@ -8,3 +8,39 @@ way. ``location``: pose hypotheses, and the way since a known place. ``obstacle`
 the way, what stands before the camera. ``floor``: free floor, and what floors look like. ``door_state``: which doors
 are seen open or shut. ``entry_kinds``: all of them.
 """
+
+from world_models.entries.body import (
+    BodyFault, CameraPicture, Course, MotionReport, MotorCommand, Odometry, PictureRequest, Recovery, Ride,
+    RideReport, STOP_KEY,
+)
+from world_models.entries.door_state import DoorCondition, DoorPicture, DoorState
+from world_models.entries.entry_kinds import KINDS
+from world_models.entries.floor import (
+    FloorAppearance, FloorEnd, FloorThing, FloorView, FreeFloor, LAST_VIEWS, Light, Point,
+)
+from world_models.entries.location import (
+    Hypothesis, LocalePoses, Place, PlaceOdds, PlaceSearch, Travel, Twin, TwinOdds, begin_travel, covariance_tuple,
+    diagonal, turn_about_camera,
+)
+from world_models.entries.obstacle import (
+    AROUND_SIGMA_RAD, Contact, Corners, Obstacle, ObstacleStatus, Obstruction, Ranges, Sense,
+)
+from world_models.entries.percepts import Anchor, Glimpse, LineMatch, Panorama, PoseFix, Segments, Track, Tracks
+from world_models.entries.robot_state import CameraLesson, CameraState, Drift, Footprint, Wheels, find_camera_lessons
+from world_models.entries.task import (
+    Certificate, Command, Goal, Impasse, Leg, Milestone, MilestoneVerdict, Outcome, PlanSketch, Resumed, SketchStatus,
+    Subgoal,
+)
+from world_models.entries.user_reports import DOOR_STATES, GO_ON, Redirection, UserReport
+
+__all__ = [
+    "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "KINDS", "LAST_VIEWS", "STOP_KEY", "Anchor", "BodyFault",
+    "CameraLesson", "CameraPicture", "CameraState", "Certificate", "Command", "Contact", "Corners", "Course",
+    "DoorCondition", "DoorPicture", "DoorState", "Drift", "FloorAppearance", "FloorEnd", "FloorThing", "FloorView",
+    "Footprint", "FreeFloor", "Glimpse", "Goal", "Hypothesis", "Impasse", "Leg", "Light", "LineMatch", "LocalePoses",
+    "Milestone", "MilestoneVerdict", "MotionReport", "MotorCommand", "Obstacle", "ObstacleStatus", "Obstruction",
+    "Odometry", "Outcome", "Panorama", "PictureRequest", "Place", "PlaceOdds", "PlaceSearch", "PlanSketch", "Point",
+    "PoseFix", "Ranges", "Recovery", "Redirection", "Resumed", "Ride", "RideReport", "Segments", "Sense",
+    "SketchStatus", "Subgoal", "Track", "Tracks", "Travel", "Twin", "TwinOdds", "UserReport", "Wheels",
+    "begin_travel", "covariance_tuple", "diagonal", "find_camera_lessons", "turn_about_camera",
+]

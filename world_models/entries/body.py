@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from blackboard.board import View
-from blackboard.entry import Entry
-from blackboard.kinds import observation, request
+from blackboard import Entry, View, observation, request
 from world_models import words
 
 FaultStatus = Literal["open", "over"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from blackboard.kinds import inference
+from blackboard import inference
 
 DoorCondition = Literal["open", "shut", "unknown"]
 

@@ -1,6 +1,6 @@
 """All kinds of entries that come with the project; a knowledge source of another package brings its own."""
 
-from blackboard.kinds import kinds_in
+from blackboard import kinds_in
 from world_models.building import locale_frame
 from world_models.entries import body, door_state, floor, location, obstacle, percepts, robot_state, task, user_reports
 

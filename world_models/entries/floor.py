@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from blackboard.kinds import inference
+from blackboard import inference
 from world_models import words
 
 FloorSense = Literal["camera", "ranges"]

@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.kinds import inference
+from blackboard import inference
 from world_models import words
 from world_models.frames import Pose, Pose2, flattened, wrap_angle
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.kinds import inference, observation
+from blackboard import inference, observation
 from world_models import words
 
 Sense = Literal["bumper", "stall"]

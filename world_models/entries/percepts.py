@@ -8,11 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.board import View
-from blackboard.entry import Entry
-from blackboard.kinds import inference
-from blackboard.level import Level
-from blackboard.servoing import OPEN
+from blackboard import OPEN, Entry, Level, View, inference
 from world_models import words
 from world_models.entries.location import Covariance
 from world_models.frames import Pose2

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from blackboard.kinds import inference, observation
+from blackboard import inference, observation
 from world_models import words
 from world_models.actuator import MAX_INNOVATION_SIGMAS, ActuatorModel
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, move_camera, subtract_cameras

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from blackboard.kinds import inference, observation
+from blackboard import inference, observation
 from world_models import words
 from world_models.building.model_errors import LineErrors, unpack_errors
 from world_models.entries.location import Covariance, Place

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from blackboard.kinds import observation
+from blackboard import observation
 
 ReportedState = Literal["shut", "open", "gone", "there"]
 DOOR_STATES: tuple[ReportedState, ...] = ("shut", "open")

@@ -18,9 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from blackboard.journal import NOT_FINITE
-from blackboard.kinds import Role, kind_of
-from blackboard.level import Level
+from blackboard import NOT_FINITE, Level, Role, kind_of
 from docs.tools.site.markdown import describe_fields, escape, summary, table
 from harvey.wiring import load_kinds
 from logs.run_directory import JOURNAL_VERSION

@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 from harvey_timekeeper.timekeeper import BATTERY_S
 from logs.recording.logger import Logger, Moment, Panel
 from logs.recording.stream import RecordingStream
-from world_models.entries.body import MotionReport
+from world_models.entries import MotionReport
 
 BATTERY = "battery"
 

@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from harvey.hardware.drivers.base_driver import BaseKind, Driver
-from world_models.entries.body import MotionReport, MotorCommand, Odometry
+from world_models.entries import MotionReport, MotorCommand, Odometry
 from world_models.frames import Pose2
 
 BAUD = 115200

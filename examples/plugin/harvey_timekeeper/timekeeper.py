@@ -5,14 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, Post
-from blackboard.entry import Entry
-from blackboard.kinds import inference
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
-from world_models.entries.body import MotionReport
+from blackboard import Change, Effect, Entry, KnowledgeSource, Level, Post, Posted, View, Watch, inference
+from world_models.entries import MotionReport
 
 BATTERY_S = 20.0
 """What the battery lasts; the warning comes when half of it is left."""

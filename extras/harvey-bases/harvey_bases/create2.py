@@ -22,8 +22,7 @@ from dataclasses import dataclass
 
 from harvey.hardware.drivers.base_driver import LOOK_S, BaseKind, BytePipe, Driver, FaultKind
 from harvey_bases.counters import step
-from world_models.entries.body import MotionReport, MotorCommand, Odometry
-from world_models.entries.obstacle import Contact, Ranges
+from world_models.entries import Contact, MotionReport, MotorCommand, Odometry, Ranges
 from world_models.frames import Pose2, wrap_angle
 
 START, SAFE, DRIVE_DIRECT, STREAM, STREAM_RESUME = 128, 131, 145, 148, 150

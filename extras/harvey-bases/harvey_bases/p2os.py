@@ -23,8 +23,7 @@ from dataclasses import dataclass
 
 from harvey.hardware.drivers.base_driver import LOOK_S, BaseKind, BytePipe, Driver
 from harvey_bases.counters import step
-from world_models.entries.body import MotionReport, MotorCommand, Odometry
-from world_models.entries.obstacle import Contact, Ranges
+from world_models.entries import Contact, MotionReport, MotorCommand, Odometry, Ranges
 from world_models.frames import Pose2, wrap_angle
 
 HEADER = b"\xfa\xfb"

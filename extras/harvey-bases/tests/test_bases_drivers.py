@@ -31,7 +31,7 @@ from tests.serial_bench import (
     over_terminal,
 )
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import MotorCommand
+from world_models.entries import MotorCommand
 from world_models.frames import Pose2
 
 KINDS = ("p2os", "create2")

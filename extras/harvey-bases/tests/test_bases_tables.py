@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harvey_bases import create2, p2os
-from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD
+from world_models.entries import AROUND_SIGMA_RAD
+from world_models.entries.obstacle import AHEAD_SIGMA_RAD
 
 P2OS_COMMANDS = {
     "SYNC0": 0, "SYNC1": 1, "SYNC2": 2, "PULSE": 0, "OPEN": 1, "CLOSE": 2, "ENABLE": 4, "SETA": 5, "SETV": 6,

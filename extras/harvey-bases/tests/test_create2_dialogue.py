@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from harvey.hardware.drivers.base_driver import BaseFault
 from harvey_bases.create2 import Create2Base
-from world_models.entries.body import MotorCommand
-from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD
+from world_models.entries import AROUND_SIGMA_RAD, MotorCommand
+from world_models.entries.obstacle import AHEAD_SIGMA_RAD
 
 AXLE_M, TICK_S = 0.235, 0.02
 TURN, MOVE = MotorCommand(1.5, 0.0), MotorCommand(0.0, 0.5)

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from harvey.hardware.drivers.base_driver import BaseFault
 from harvey_bases.p2os import P2osBase
-from world_models.entries.body import MotionReport, MotorCommand
-from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD
+from world_models.entries import AROUND_SIGMA_RAD, MotionReport, MotorCommand
+from world_models.entries.obstacle import AHEAD_SIGMA_RAD
 
 PULSE, OPEN, CLOSE, ENABLE, SETV, MOVE, SETRV, HEAD, SONAR, ESTOP = 0, 1, 2, 4, 6, 8, 10, 12, 28, 55
 UNIT_RAD = math.tau / 4096

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from blackboard.journal import Decision, Sink
+from blackboard import Decision, Sink
 from harvey.agent_settings import Pairs
 from harvey.hardware.hardware_mission import HardwareMission, load_mission
 from harvey.hardware.own_body import build_robot, drive_body
@@ -21,11 +21,9 @@ from harvey.runner.result import MissionResult
 from harvey_miniworld.drawn_floor import picture_aspects
 from harvey_miniworld.miniworld_body import MiniworldBody
 from harvey_miniworld.textured_floor import CHAIR_M, FloorRoom, StandingThing, TexturedFloor, generate_floor
-from world_models.building.world import World
+from world_models.building import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.location import Hypothesis
-from world_models.entries.percepts import PoseFix
-from world_models.entries.task import Certificate, Milestone
+from world_models.entries import Certificate, Hypothesis, Milestone, PoseFix
 from world_models.files.toml.camera_file import camera_text
 from world_models.frames import Pose2, wrap_angle
 

@@ -13,8 +13,7 @@ from harvey.hardware.own_body import OwnBody
 from harvey_miniworld.drawn_floor import DrawnFloor
 from harvey_miniworld.textured_floor import TexturedFloor
 from world_models.actuator import arc
-from world_models.entries.body import MotionReport, MotorCommand
-from world_models.entries.obstacle import Contact
+from world_models.entries import Contact, MotionReport, MotorCommand
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

@@ -14,7 +14,7 @@ from harvey_miniworld.floor_missions import draw_mission
 from harvey_miniworld.miniworld_body import MiniworldBody
 from harvey_miniworld.textured_floor import StandingThing
 from world_models.actuator import ActuatorModel
-from world_models.entries.body import MotorCommand
+from world_models.entries import MotorCommand
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

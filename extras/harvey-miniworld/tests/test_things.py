@@ -14,8 +14,7 @@ import harvey
 from harvey_miniworld.drawn_floor import DrawnFloor
 from harvey_miniworld.floor_missions import CAMERA, MOUNT, THINGS
 from harvey_miniworld.textured_floor import FLOORS, StandingThing
-from knowledge_sources.methods.floor.see_floor import MotionBetween, Seen, see_free_floor
-from knowledge_sources.methods.floor.weigh_sight import is_telling
+from knowledge_sources.methods.floor import MotionBetween, Seen, is_telling, see_free_floor
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.frames import Pose2

@@ -26,7 +26,7 @@ from harvey_ros2.messages import seconds
 from harvey_ros2.odometry import HASTE, JUMP_S
 from harvey_ros2.picture_message import retrieve_picture
 from harvey_ros2.ros2_company import read_odometry
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.features import read_picture
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
 

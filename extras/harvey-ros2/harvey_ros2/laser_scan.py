@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from harvey_ros2.robot_file import ScanMount
-from world_models.entries.obstacle import Ranges
+from world_models.entries import Ranges
 
 SECTORS = 48
 MOST_M = 6.0

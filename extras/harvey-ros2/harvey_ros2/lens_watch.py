@@ -12,11 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.board import View
-from knowledge_sources.questions import find_belief, find_robot
+from blackboard import View
+from knowledge_sources.reads import find_belief, find_robot
 from world_models.camera import Camera, CameraMount, move_camera
-from world_models.entries.percepts import LineMatch
-from world_models.entries.task import Certificate
+from world_models.entries import Certificate, LineMatch
 from world_models.frames import Pose2
 
 MOST_DEVIATIONS = 5.0

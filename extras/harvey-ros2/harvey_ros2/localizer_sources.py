@@ -12,27 +12,35 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Revised, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
-from blackboard.kinds import inference
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.conditions import HELD, LOST, NO_MILESTONE, NOT_LOST, Belief
-from knowledge_sources.looking import find_robot_and_pose
-from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
-from knowledge_sources.methods.verification.view_quality import list_seen_locales, predict_milestone
-from knowledge_sources.place_believed import PLACED_BY
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch, inference
+from knowledge_sources.methods.calibration import compute_camera_covariance
+from knowledge_sources.methods.verification import list_seen_locales, predict_milestone
 from knowledge_sources.priority import Priority
-from knowledge_sources.questions import find_camera, find_frames
+from knowledge_sources.reads import (
+    HELD,
+    LOST,
+    NO_MILESTONE,
+    NOT_LOST,
+    PLACED_BY,
+    Belief,
+    find_camera,
+    find_frames,
+    find_panorama,
+    find_robot_and_pose,
+)
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.while_lost import find_panorama
 from world_models.camera import YAW
-from world_models.entries.body import CameraPicture, MotionReport
-from world_models.entries.location import Hypothesis, PlaceSearch, Travel, begin_travel
-from world_models.entries.obstacle import Obstruction
-from world_models.entries.task import Certificate, Milestone
+from world_models.entries import (
+    CameraPicture,
+    Certificate,
+    Hypothesis,
+    Milestone,
+    MotionReport,
+    Obstruction,
+    PlaceSearch,
+    Travel,
+    begin_travel,
+)
 from world_models.frames import Pose2, wrap_angle
 
 CONTRADICTED = 2

@@ -21,7 +21,7 @@ from logs.run_directory import RunDirectory
 from logs.run_exporter import RunExporter
 from logs.run_head import RunHead
 from logs.timeline import Timeline
-from world_models.entries.body import CameraPicture
+from world_models.entries import CameraPicture
 
 DISTRO = "jazzy"
 EVER = QosTime(9223372036, 854775807)

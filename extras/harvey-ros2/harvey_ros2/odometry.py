@@ -12,7 +12,7 @@ from typing import Any
 
 from harvey_ros2.messages import MessageError, MessageTypes, seconds
 from harvey_ros2.middleware import Heard
-from world_models.entries.body import Odometry
+from world_models.entries import Odometry
 from world_models.frames import Pose2, wrap_angle
 
 JUMP_S = 2.0

@@ -15,9 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.effect import Effect, Post, Revise
-from blackboard.journal import Decision
-from blackboard.scheduler import Scheduler
+from blackboard import Decision, Effect, Post, Revise, Scheduler
 from harvey.agent import Agent, build_agent
 from harvey.errors import BadInput
 from harvey.runner.ports import STANDS_STILL, StillCamera
@@ -25,31 +23,28 @@ from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.wiring import KNOWLEDGE_SOURCES
 from harvey_ros2.picture_lag import PictureLag
 from harvey_ros2.run_messages import KINDS, RunMessages, TimedMessage
-from knowledge_sources.action.travel_breaker import TravelBreaker
-from knowledge_sources.action.yaw_calibrator import YawCalibrator
-from knowledge_sources.conditions import HELD, LOST
 from knowledge_sources.goal.interpreter import Interpreter
-from knowledge_sources.goal.localizer import Localizer
-from knowledge_sources.goal.panorama_builder import PanoramaBuilder
-from knowledge_sources.goal.pose_adopter import PoseAdopter
-from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
-from knowledge_sources.plan.alias_monitor import AliasMonitor
-from knowledge_sources.plan.camera_calibrator import CameraCalibrator
-from knowledge_sources.plan.line_finder import LineFinder
-from knowledge_sources.plan.matcher import Matcher
-from knowledge_sources.plan.med_r_and_t import MedRAndT
-from knowledge_sources.plan.milestone_judge import MilestoneJudge
-from knowledge_sources.plan.plan_adjuster import PlanAdjuster
-from knowledge_sources.questions import OPEN_FAULT, find_camera
+from knowledge_sources.methods.calibration import compute_camera_covariance
+from knowledge_sources.milestone.line_finder import LineFinder
+from knowledge_sources.milestone.matcher import Matcher
+from knowledge_sources.milestone.med_r_and_t import MedRAndT
+from knowledge_sources.milestone.milestone_judge import MilestoneJudge
+from knowledge_sources.milestone.plan_adjuster import PlanAdjuster
+from knowledge_sources.reads import HELD, LOST, OPEN_FAULT, find_camera
+from knowledge_sources.relocalizer.alias_monitor import AliasMonitor
+from knowledge_sources.relocalizer.localizer import Localizer
+from knowledge_sources.relocalizer.panorama_builder import PanoramaBuilder
+from knowledge_sources.relocalizer.pose_adopter import PoseAdopter
+from knowledge_sources.robot.camera_calibrator import CameraCalibrator
+from knowledge_sources.robot.travel_breaker import TravelBreaker
+from knowledge_sources.robot.yaw_calibrator import YawCalibrator
 from knowledge_sources.settings import DEFAULT
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import RunRecorder
 from world_models.camera import YAW
 from world_models.commands import check_command
-from world_models.entries.body import BodyFault, CameraPicture, MotionReport
-from world_models.entries.location import diagonal
-from world_models.entries.task import Certificate, Command, Outcome
+from world_models.entries import BodyFault, CameraPicture, Certificate, Command, MotionReport, Outcome, diagonal
 from world_models.files.toml.mission import Servo
 from world_models.frames import Pose2
 from world_models.plugins import GUESTS_GROUP, list_plugins

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from blackboard.journal import Sink
+from blackboard import Sink
 from harvey.hardware.drivers.base_driver import Base, BaseFault, BaseKind, BytePipe, LineDriver
 from harvey.runner.teller import Tell
 from harvey_ros2.laser_scan import read_scan
@@ -21,9 +21,8 @@ from harvey_ros2.odometry import Counted, OdometryFault, OdometryReader
 from harvey_ros2.pipe import PipeMessages
 from harvey_ros2.robot_file import SCAN, DriveSettings, RobotFile, ScanMount
 from harvey_ros2.ros2_company import RosCompany
-from world_models.building.world import World
-from world_models.entries.body import MotionReport, MotorCommand, Odometry
-from world_models.entries.obstacle import Contact, Ranges
+from world_models.building import World
+from world_models.entries import Contact, MotionReport, MotorCommand, Odometry, Ranges
 from world_models.frames import wrap_angle
 from world_models.robot import RobotModel
 

@@ -13,18 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Level
 from harvey.runner.ports import STANDS_STILL
 from harvey_ros2.localizer_sources import WheelCheck
 from harvey_ros2.messages import MessageTypes, stamp
 from harvey_ros2.middleware import LATCHED, SENSOR, Delivery, Topic, full_name
 from harvey_ros2.robot_file import FrameNames
-from world_models.building.world import World
+from world_models.building import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import BodyFault, CameraPicture, MotionReport
-from world_models.entries.location import Hypothesis
-from world_models.entries.task import Certificate, Milestone, PlanSketch
+from world_models.entries import BodyFault, CameraPicture, Certificate, Hypothesis, Milestone, MotionReport, PlanSketch
 from world_models.frames import Pose2
 
 CAMERA_FRAME = "camera_optical"

@@ -31,7 +31,7 @@ from harvey_ros2.robot_file import RobotFile
 from harvey_ros2.ros2_base import SAY_S
 from sim.emulators.emulator import IdealGround
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import MotorCommand
+from world_models.entries import MotorCommand
 
 TYPES = message_types("jazzy")
 

@@ -26,7 +26,7 @@ from harvey_ros2.onlooker import FirstGuess
 from harvey_ros2.run_messages import TimedMessage
 from sim.faults.built_in_faults import Kidnap
 from world_models.camera import CameraMount
-from world_models.entries.robot_state import CameraState
+from world_models.entries import CameraState
 from world_models.frames import Pose, Pose2, wrap_angle
 
 WAY = [(5.0, 1.3), (8.5, 0.9), (6.5, 1.2)]

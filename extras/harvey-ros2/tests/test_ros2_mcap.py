@@ -22,7 +22,7 @@ from logs.pictures import open_pictures
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline
 from world_models.camera import CameraMount
-from world_models.entries.location import Hypothesis
+from world_models.entries import Hypothesis
 
 TYPES = message_types("jazzy")
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from blackboard.change import Change, Posted, Retracted, Revised
+from blackboard import Change, Posted, Retracted, Revised
 from harvey.errors import BadInput
 from harvey.runner.result import UNFINISHED
 from harvey_serve.live_state import LiveState, Shown
@@ -15,7 +15,7 @@ from logs.disk import MOST_JOURNAL_BYTES
 from logs.records import DecisionRecord, EntryRecord, decision_of, entry_of, kinds_for, refs_of
 from logs.run_directory import RunDirectory
 from world_models import words
-from world_models.entries.body import CameraPicture
+from world_models.entries import CameraPicture
 from world_models.files.regular_files import open_regular
 
 PERIOD_S = 0.2

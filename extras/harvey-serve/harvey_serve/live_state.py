@@ -8,19 +8,12 @@ from collections import deque
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
-from blackboard.change import Change, Retracted
-from blackboard.entry import Entry
-from blackboard.journal import Decision
-from blackboard.level import Level, highest
-from blackboard.servoing import Discrepancy
+from blackboard import Change, Decision, Discrepancy, Entry, Level, Retracted, highest
 from harvey.report.data import Lenses, placed, shrink
 from world_models import words
-from world_models.building.world import World
+from world_models.building import World
 from world_models.camera import Camera
-from world_models.entries.body import CameraPicture
-from world_models.entries.location import Hypothesis
-from world_models.entries.percepts import LineMatch, PoseFix, Segments
-from world_models.entries.task import Goal, Milestone, PlanSketch
+from world_models.entries import CameraPicture, Goal, Hypothesis, LineMatch, Milestone, PlanSketch, PoseFix, Segments
 
 DECISIONS, MILESTONES = 12, 12
 """So many of the last are shown."""

@@ -8,17 +8,18 @@ from collections.abc import Callable
 from typing import Literal
 
 from harvey.runner.ports import Body
-from world_models.entries.body import (
+from world_models.entries import (
     STOP_KEY,
     BodyFault,
     CameraPicture,
+    Contact,
     Course,
     MotionReport,
     MotorCommand,
+    Ranges,
     Ride,
     RideReport,
 )
-from world_models.entries.obstacle import Contact, Ranges
 
 Order = Literal["pause", "resume", "stop"]
 WHY = "stopped from the page"

@@ -17,9 +17,7 @@ from hypothesis import strategies as st
 pytest.importorskip("starlette", reason="the extra 'serve' is not installed")
 from starlette.testclient import TestClient
 
-from blackboard.change import Change, Posted, Revised
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Change, Discrepancy, Level, Posted, Revised
 from generated_boards import Bench
 from harvey.cli import main
 from harvey.errors import BadInput
@@ -32,9 +30,17 @@ from harvey_serve.run_gate import WHY, Gate, GatedBody
 from harvey_serve.server import bind, serving
 from scripted_turns import decisions
 from world_models.camera import Camera
-from world_models.entries.body import STOP_KEY, BodyFault, MotionReport
-from world_models.entries.location import Hypothesis, Place, diagonal
-from world_models.entries.task import Goal, PlanSketch, Subgoal
+from world_models.entries import (
+    STOP_KEY,
+    BodyFault,
+    Goal,
+    Hypothesis,
+    MotionReport,
+    Place,
+    PlanSketch,
+    Subgoal,
+    diagonal,
+)
 from world_models.files.world_files import load_world
 from world_models.frames import Pose2
 

@@ -16,8 +16,7 @@ from typing import Literal, Protocol, get_args
 
 import serial
 
-from world_models.entries.body import MotionReport, MotorCommand, Odometry
-from world_models.entries.obstacle import Contact, Ranges
+from world_models.entries import Contact, MotionReport, MotorCommand, Odometry, Ranges
 
 FaultKind = Literal["silent", "nonsense", "disconnected", "stalled", "watchdog", "refused", "stopped"]
 """How a base fails.

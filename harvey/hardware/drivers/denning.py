@@ -19,8 +19,7 @@ from dataclasses import dataclass
 from typing import get_args
 
 from harvey.hardware.drivers.base_driver import LOOK_S, BaseFault, BaseKind, BytePipe, Driver
-from world_models.entries.body import MotionReport, MotorCommand, Odometry
-from world_models.entries.obstacle import Contact, Ranges, Sense
+from world_models.entries import Contact, MotionReport, MotorCommand, Odometry, Ranges, Sense
 
 LONGEST = 200
 """Bytes of a line; more without an end is noise."""

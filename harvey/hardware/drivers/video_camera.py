@@ -27,7 +27,7 @@ from harvey.hardware.drivers.capture import (
     picture_of,
     prepare,
 )
-from world_models.entries.body import CameraPicture
+from world_models.entries import CameraPicture
 
 REOPEN_S = 0.5
 """An unplugged camera is looked for so often [s]."""

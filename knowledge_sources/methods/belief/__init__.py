@@ -3,3 +3,13 @@
 ``odds`` adds the log odds of looks, and counts once what two looks show both; ``places`` weighs a place against its
 rivals, by what was believed before and by the picture.
 """
+
+from knowledge_sources.methods.belief.odds import (
+    Alike, Look, add_looks, measure_common, to_log_odds, to_probability, update,
+)
+from knowledge_sources.methods.belief.places import BelievedPlace, bound_p_rivals, compute_chi2, compute_p_rivals
+
+__all__ = [
+    "Alike", "BelievedPlace", "Look", "add_looks", "bound_p_rivals", "compute_chi2", "compute_p_rivals",
+    "measure_common", "to_log_odds", "to_probability", "update",
+]

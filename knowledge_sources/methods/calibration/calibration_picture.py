@@ -9,7 +9,7 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.calibration.intrinsics import Calibration
-from knowledge_sources.methods.features.picture import Rectifier
+from knowledge_sources.methods.features import Rectifier
 
 SIDE_PX = 560
 """Width of each of the three parts."""

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.belief.places import compute_chi2
-from knowledge_sources.methods.pose.with_camera import CameraEstimate
+from knowledge_sources.methods.belief import compute_chi2
+from knowledge_sources.methods.pose import CameraEstimate
 from knowledge_sources.settings import CameraStateSettings, Settings
 from world_models.camera import YAW, Camera
-from world_models.entries.robot_state import CameraState
+from world_models.entries import CameraState
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

@@ -11,18 +11,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.belief.odds import Alike, Look, add_looks, measure_common, to_probability
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.belief import Alike, Look, add_looks, measure_common, to_probability
+from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.matching import match_on_floor
 from knowledge_sources.methods.pose import planar_from_lines
-from knowledge_sources.methods.verification.color_check import check_colors
-from knowledge_sources.methods.verification.line_check import check_lines, predict_lines
-from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, compute_evidence
-from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
+from knowledge_sources.methods.verification import (
+    POSE_CONFIDENCE,
+    check_colors,
+    check_lines,
+    compute_evidence,
+    predict_face_colors,
+    predict_lines,
+)
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building.locales import Doorway
-from world_models.entries.door_state import DoorCondition, DoorPicture, DoorState
-from world_models.entries.location import Hypothesis
+from world_models.building import Doorway
+from world_models.entries import DoorCondition, DoorPicture, DoorState, Hypothesis
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

@@ -1,1 +1,15 @@
 """What is in a picture: lines, regions, corners, template correlation."""
+
+from knowledge_sources.methods.features.correlation import (
+    Correlation, Template, compute_second_peak, correlate, extract_template, lies_inside, measure_corner_strengths,
+)
+from knowledge_sources.methods.features.lines import LineSegments, find_lines
+from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
+from knowledge_sources.methods.features.picture import Rectifier, compute_mean_and_deviation, is_dark, read_picture
+from knowledge_sources.methods.features.regions import segment_regions
+
+__all__ = [
+    "RIGHT_ANGLE_RAD", "Correlation", "LineSegments", "Rectifier", "Template", "compute_mean_and_deviation",
+    "compute_second_peak", "correlate", "extract_template", "find_level_direction", "find_lines", "is_dark",
+    "lies_inside", "measure_corner_strengths", "read_picture", "segment_regions",
+]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats
-from world_models.entries.floor import FloorAppearance
+from world_models.entries import FloorAppearance
 
 MIN_FLOOR_PIXELS = 150  # with fewer pixels of a floor in sight, its looks are not learnt from a picture
 MAX_CHROMA_ERROR = 0.035

@@ -6,10 +6,9 @@ from collections.abc import Iterable, Sequence
 
 import shapely
 
-from knowledge_sources.methods.motion.footprints import build_polygon
+from knowledge_sources.methods.floor.footprints import build_polygon
 from world_models.camera import Camera
-from world_models.entries.floor import FloorThing
-from world_models.entries.obstacle import Obstruction
+from world_models.entries import FloorThing, Obstruction
 
 MIN_FIXED_LOOKS = 3  # in two looks something may be at one place of the picture by chance
 FIXED_PX = 6.0  # sides that are no further apart are one: the floor is looked at every second pixel

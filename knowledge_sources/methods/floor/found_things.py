@@ -9,19 +9,17 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from knowledge_sources.methods.floor.thing_shapes import MIN_COMMON_DIRECTIONS
-from knowledge_sources.methods.motion.footprints import (
+from knowledge_sources.methods.floor.footprints import (
     Corners,
     build_polygon,
     measure_common_directions,
     measure_hull_part,
     measure_width_m,
 )
+from knowledge_sources.methods.floor.thing_shapes import MIN_COMMON_DIRECTIONS
 from knowledge_sources.settings import ActionSettings
-from world_models.building.building import Building
-from world_models.building.locales import EXTRA_KIND, Doorway
-from world_models.entries.location import Place
-from world_models.entries.obstacle import Obstacle, ObstacleStatus
+from world_models.building import EXTRA_KIND, Building, Doorway
+from world_models.entries import Obstacle, ObstacleStatus, Place
 from world_models.frames import Pose2
 
 VAGUE_SIGMA_M = 0.05  # an obstacle of which the place is less sure is not known well

@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats, Ints
-from knowledge_sources.methods.features.picture import compute_mean_and_deviation, is_dark, read_picture
+from knowledge_sources.methods.features import compute_mean_and_deviation, is_dark, read_picture
 from knowledge_sources.methods.floor.appearance import (
     MAX_CHROMA_ERROR,
     compute_looks,
@@ -40,7 +40,7 @@ from knowledge_sources.methods.floor.standing_regions import (
     measure_height,
 )
 from knowledge_sources.settings import DEFAULT, FloorSettings, Settings
-from world_models.entries.floor import FloorAppearance, FloorEnd, FloorThing, FreeFloor, Light
+from world_models.entries import FloorAppearance, FloorEnd, FloorThing, FreeFloor, Light
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

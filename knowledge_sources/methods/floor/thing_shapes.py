@@ -13,14 +13,14 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.motion.footprints import (
+from knowledge_sources.methods.floor.footprints import (
     build_polygon,
     join_footprints,
     list_corners,
     measure_common_directions,
     take_free,
 )
-from world_models.entries.obstacle import Corners, Obstacle
+from world_models.entries import Corners, Obstacle
 
 NEARER = 0.7
 """A sight from less than this part of the distance of another is from clearly nearer."""

@@ -10,8 +10,15 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from knowledge_sources.methods.belief.odds import to_log_odds, update
+from knowledge_sources.methods.belief import to_log_odds, update
 from knowledge_sources.methods.floor.door_beside import find_jamb_beside
+from knowledge_sources.methods.floor.footprints import (
+    build_free_floor,
+    build_polygon,
+    deepen,
+    measure_change_m,
+    measure_free_part,
+)
 from knowledge_sources.methods.floor.found_things import (
     find_before,
     find_open_floor,
@@ -24,17 +31,9 @@ from knowledge_sources.methods.floor.found_things import (
 from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M
 from knowledge_sources.methods.floor.thing_shapes import ThingShape, join_shapes, leave_free
 from knowledge_sources.methods.floor.weigh_touch import TOUCH_MARGIN_M
-from knowledge_sources.methods.motion.footprints import (
-    build_free_floor,
-    build_polygon,
-    deepen,
-    measure_change_m,
-    measure_free_part,
-)
 from knowledge_sources.settings import ActionSettings, Settings
-from world_models.building.building import Building
-from world_models.entries.floor import FloorThing, FreeFloor
-from world_models.entries.obstacle import Obstacle, ObstacleStatus
+from world_models.building import Building
+from world_models.entries import FloorThing, FreeFloor, Obstacle, ObstacleStatus
 
 MIN_FREE_PART = 0.5  # part of an obstacle's footprint that must be seen free to tell that it is not there any more
 MAX_SHARED_PART = 0.25  # where a thing that is seen takes more of the footprint, the rest seen free tells nothing of it

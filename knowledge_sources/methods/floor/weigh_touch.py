@@ -11,12 +11,11 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor.footprints import Corners, build_polygon, list_corners
 from knowledge_sources.methods.floor.found_things import may_be_there, place
-from knowledge_sources.methods.motion.footprints import Corners, build_polygon, list_corners
 from knowledge_sources.settings import ActionSettings
-from world_models.building.building import Building
-from world_models.entries.location import Place
-from world_models.entries.obstacle import Contact, Obstacle
+from world_models.building import Building
+from world_models.entries import Contact, Obstacle, Place
 from world_models.frames import Pose2
 
 TOUCH_MARGIN_M = 0.05  # a wall or thing of the model that is so much further than the robot's rim explains a contact

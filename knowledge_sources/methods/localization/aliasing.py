@@ -21,8 +21,8 @@ from knowledge_sources.methods.localization.next_view import SAME_LINE_PX, SAME_
 from knowledge_sources.methods.localization.pose_candidates import are_distinct, find_pose_candidates
 from knowledge_sources.methods.localization.refinement import refine_to_likelier
 from knowledge_sources.methods.localization.views import CameraView
-from knowledge_sources.methods.pose.displacements import fit_displacements
-from knowledge_sources.methods.verification.line_check import (
+from knowledge_sources.methods.pose import fit_displacements
+from knowledge_sources.methods.verification import (
     LINE_TOLERANCE_RAD,
     MAX_LINE_WEIGHT_PX,
     MIN_COVERED_FRACTION,
@@ -31,8 +31,7 @@ from knowledge_sources.methods.verification.line_check import (
     predict_lines,
 )
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building.building import Building
-from world_models.building.model_errors import LineErrors
+from world_models.building import Building, LineErrors
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 

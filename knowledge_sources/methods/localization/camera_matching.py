@@ -9,8 +9,8 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.matching import Match, PoseMatch, match_in_space
-from knowledge_sources.methods.pose.with_camera import CameraEstimate, estimate_camera_and_pose
-from knowledge_sources.methods.verification.line_check import LINE_TOLERANCE_RAD, MAX_LINE_WEIGHT_PX, compute_coverage
+from knowledge_sources.methods.pose import CameraEstimate, estimate_camera_and_pose
+from knowledge_sources.methods.verification import LINE_TOLERANCE_RAD, MAX_LINE_WEIGHT_PX, compute_coverage
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, move_camera
 from world_models.frames import Pose, Pose2

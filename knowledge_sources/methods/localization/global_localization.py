@@ -36,7 +36,7 @@ from knowledge_sources.methods.localization.refinement import (
     refine_to_likelier,
 )
 from knowledge_sources.methods.localization.views import CameraView, align_headings
-from knowledge_sources.methods.verification.line_check import predict_lines
+from knowledge_sources.methods.verification import predict_lines
 from knowledge_sources.settings import DEFAULT, LocalizationSettings, Settings
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel

@@ -18,11 +18,11 @@ import shapely
 from shapely import affinity
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor.seen_floor import find_floor
-from knowledge_sources.methods.motion.routes import SLACK_M, find_bends, find_free_space, is_clear
-from knowledge_sources.methods.verification.line_check import compute_coverage, predict_lines
+from knowledge_sources.methods.floor import find_floor
+from knowledge_sources.methods.motion import SLACK_M, find_bends, find_free_space, is_clear
+from knowledge_sources.methods.verification import compute_coverage, predict_lines
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building.building import Building
+from world_models.building import Building
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

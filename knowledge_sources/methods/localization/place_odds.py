@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.belief.odds import update
-from knowledge_sources.methods.belief.places import compute_chi2
+from knowledge_sources.methods.belief import compute_chi2, update
 from knowledge_sources.methods.localization.global_localization import (
     LocalizationResult,
     LocalizationStatus,

@@ -17,9 +17,8 @@ from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.methods.localization.views import CameraView, find_lever, join_covariances
-from knowledge_sources.methods.pose import planar_from_lines
-from knowledge_sources.methods.pose.planar import to_pose2
-from knowledge_sources.methods.verification.line_check import (
+from knowledge_sources.methods.pose import planar_from_lines, to_pose2
+from knowledge_sources.methods.verification import (
     DISPLACEMENT_M,
     LINE_TOLERANCE_RAD,
     check_lines,
@@ -36,7 +35,7 @@ from knowledge_sources.methods.verification.line_check import (
 from knowledge_sources.settings import DEFAULT, LocalizationSettings, Settings
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
-from world_models.visibility.lines_and_points import visible_lines
+from world_models.visibility import visible_lines
 
 TURN_STEP_RAD = math.radians(1.5)  # step of the search for an uncertain turn
 

@@ -16,10 +16,10 @@ import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints, Mask
-from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
+from knowledge_sources.methods.features import RIGHT_ANGLE_RAD, find_level_direction
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import Camera
-from world_models.entries.obstacle import Obstruction
+from world_models.entries import Obstruction
 from world_models.frames import Pose, Pose2, wrap_angle
 
 LEVEL_HEADING_SIGMA_RAD = math.radians(0.3)  # standard deviation of a turn measured by level lines

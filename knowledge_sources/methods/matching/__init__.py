@@ -21,17 +21,20 @@ Three lines of a model, of which the data show two, moved by (5, -3) pixels, and
 [5, -3]
 """
 
-from knowledge_sources.methods.matching.image_matching import Match, Peak, match_lines
-from knowledge_sources.methods.matching.pose_matching import FloorMatch, PoseMatch, match_in_space, match_on_floor
-from knowledge_sources.methods.matching.search import Similarity2
+from knowledge_sources.methods.matching.image_matching import (
+    Match, PairTable, Peak, build_line_table, build_pair_table, compute_model_motion, match_lines,
+)
+from knowledge_sources.methods.matching.matching_kernels import count_cover
+from knowledge_sources.methods.matching.pose_matching import (
+    CameraParameters, FloorMatch, PoseMatch, build_camera_parameters, match_in_space, match_on_floor,
+)
+from knowledge_sources.methods.matching.search import (
+    MAX_MOVES_PER_PAIR, PairSpace, SearchResult, Similarity2, Terms, compute_best_fits, fit_state,
+)
 
 __all__ = [
-    "FloorMatch",
-    "Match",
-    "Peak",
-    "PoseMatch",
-    "Similarity2",
-    "match_in_space",
-    "match_lines",
+    "MAX_MOVES_PER_PAIR", "CameraParameters", "FloorMatch", "Match", "PairSpace", "PairTable", "Peak", "PoseMatch",
+    "SearchResult", "Similarity2", "Terms", "build_camera_parameters", "build_line_table", "build_pair_table",
+    "compute_best_fits", "compute_model_motion", "count_cover", "fit_state", "match_in_space", "match_lines",
     "match_on_floor",
 ]

@@ -34,7 +34,7 @@ from knowledge_sources.methods.matching.search import (
     list_pairs,
     search_pairs,
 )
-from knowledge_sources.methods.pose.line_set import LineSet, build_line_set
+from knowledge_sources.methods.pose import LineSet, build_line_set
 from knowledge_sources.settings import DEFAULT, MatchingSettings
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2, frozen

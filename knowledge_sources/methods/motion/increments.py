@@ -12,8 +12,7 @@ from knowledge_sources.methods.motion.pure_pursuit import (
     measure_progress,
 )
 from world_models.actuator import ActuatorModel
-from world_models.entries.body import MotorCommand
-from world_models.entries.task import Leg
+from world_models.entries import Leg, MotorCommand
 from world_models.frames import Pose2, wrap_angle
 
 MAX_HEADING_ERROR_RAD = math.radians(3.0)  # the motor moves when it faces its aim to within this; else it turns

@@ -16,8 +16,7 @@ import shapely
 from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats
-from world_models.building.building import Building
-from world_models.building.locales import EXTRA_KIND
+from world_models.building import EXTRA_KIND, Building
 
 Footprint = tuple[tuple[float, float], ...]
 

@@ -13,8 +13,7 @@ import shapely
 from shapely import Geometry, LineString, Point
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor.seen_floor import find_floor, measure_first_seen_m
-from knowledge_sources.methods.motion.footprints import build_polygon
+from knowledge_sources.methods.floor import build_polygon, find_floor, measure_first_seen_m
 from knowledge_sources.methods.motion.routes import (
     JOINT_M,
     compute_free_passage,
@@ -28,11 +27,8 @@ from knowledge_sources.methods.motion.routes import (
     list_obstacles,
 )
 from knowledge_sources.settings import PlanSettings
-from world_models.building.locales import Doorway, Link, Passage
-from world_models.building.passages import Route
-from world_models.entries.location import Hypothesis, Place
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.task import Subgoal
+from world_models.building import Doorway, Link, Passage, Route
+from world_models.entries import Hypothesis, Obstacle, Place, Subgoal
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

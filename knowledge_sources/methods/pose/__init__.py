@@ -46,16 +46,32 @@ True
 (True, 'too far from the model line')
 """
 
-from knowledge_sources.methods.pose.estimate import PlanarEstimate, PoseEstimate
-from knowledge_sources.methods.pose.planar import planar_from_points
+from knowledge_sources.methods.pose.displacements import fit_displacements
+from knowledge_sources.methods.pose.estimate import (
+    FEW_LINES, MAX_ITERATIONS, MIN_LINES, Minimum, PlanarEstimate, PoseEstimate, build_estimate, build_prior_estimate,
+    compute_covariance, compute_weak_information, knows_more, minimise, reject_behind,
+)
+from knowledge_sources.methods.pose.kernels import IMAGE, PLANES, RigidMotion, TINY
+from knowledge_sources.methods.pose.line_set import (
+    LandmarkIds, LineSet, build_line_set, check_landmarks, compute_image_jacobian, compute_squared_distances, cross,
+    invert_information, measure_lines,
+)
+from knowledge_sources.methods.pose.planar import (
+    compute_camera_poses, compute_point_jacobian, planar_from_points, to_pose2,
+)
 from knowledge_sources.methods.pose.planar_from_lines import planar_from_lines
-from knowledge_sources.methods.pose.r_and_t import med_r_and_t, r_and_t_ml
+from knowledge_sources.methods.pose.r_and_t import (
+    MIN_NOISE_PART, SUBSET_SIZE, add_concentrated, keep_possible, med_r_and_t, r_and_t_ml, solve_from_subsets,
+)
+from knowledge_sources.methods.pose.with_camera import CameraEstimate, compute_pose_slopes, estimate_camera_and_pose
 
 __all__ = [
-    "PlanarEstimate",
-    "PoseEstimate",
-    "med_r_and_t",
-    "planar_from_lines",
-    "planar_from_points",
-    "r_and_t_ml",
+    "FEW_LINES", "IMAGE", "MAX_ITERATIONS", "MIN_LINES", "MIN_NOISE_PART", "PLANES", "SUBSET_SIZE", "TINY",
+    "CameraEstimate", "LandmarkIds", "LineSet", "Minimum", "PlanarEstimate", "PoseEstimate", "RigidMotion",
+    "add_concentrated", "build_estimate", "build_line_set", "build_prior_estimate", "check_landmarks",
+    "compute_camera_poses", "compute_covariance", "compute_image_jacobian", "compute_point_jacobian",
+    "compute_pose_slopes", "compute_squared_distances", "compute_weak_information", "cross",
+    "estimate_camera_and_pose", "fit_displacements", "invert_information", "keep_possible", "knows_more",
+    "measure_lines", "med_r_and_t", "minimise", "planar_from_lines", "planar_from_points", "r_and_t_ml",
+    "reject_behind", "solve_from_subsets", "to_pose2",
 ]

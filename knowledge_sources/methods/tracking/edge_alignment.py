@@ -16,8 +16,7 @@ import cv2
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Image, Ints, Mask
-from knowledge_sources.methods.pose.planar import compute_point_jacobian, to_pose2
-from knowledge_sources.methods.pose.with_camera import compute_pose_slopes
+from knowledge_sources.methods.pose import compute_point_jacobian, compute_pose_slopes, to_pose2
 from knowledge_sources.settings import DEFAULT, TrackingSettings
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Image, Mask
-from knowledge_sources.methods.features.correlation import (
+from knowledge_sources.methods.features import (
     Correlation,
     Template,
     compute_second_peak,
@@ -18,15 +18,15 @@ from knowledge_sources.methods.features.correlation import (
     extract_template,
     lies_inside,
     measure_corner_strengths,
+    read_picture,
 )
-from knowledge_sources.methods.features.picture import read_picture
-from knowledge_sources.methods.pose.planar import compute_point_jacobian, planar_from_points
+from knowledge_sources.methods.pose import compute_point_jacobian, planar_from_points
 from knowledge_sources.settings import DEFAULT, FeaturesSettings, Settings
 from world_models.camera import NEAR_PLANE_M, Camera
-from world_models.entries.percepts import Anchor, Track
+from world_models.entries import Anchor, Track
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
-from world_models.visibility.lines_and_points import visible_points
+from world_models.visibility import visible_points
 
 MIN_LANDMARK_CONTRAST = 0.08  # least contrast of a model point that may be followed
 MIN_CORNER_PER_PX = 3.0  # least corner strength of a landmark's patch (Shi-Tomasi)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import NEAR_PLANE_M
-from world_models.entries.location import Hypothesis
+from world_models.entries import Hypothesis
 from world_models.robot import RobotModel
 
 Floats = NDArray[np.float64]

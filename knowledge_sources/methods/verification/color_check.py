@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats, Image, Ints
-from knowledge_sources.methods.features.regions import segment_regions
+from knowledge_sources.methods.features import segment_regions
 from knowledge_sources.methods.verification.predicted_colors import BORDER_MARGIN_PX, MIN_FACE_POINTS, FaceColor
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import NEAR_PLANE_M

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.belief.places import compute_chi2
-from knowledge_sources.methods.pose.planar import compute_point_jacobian
+from knowledge_sources.methods.belief import compute_chi2
+from knowledge_sources.methods.pose import compute_point_jacobian
 from knowledge_sources.methods.verification.color_check import ColorCheck
 from knowledge_sources.methods.verification.line_check import (
     MAX_LINE_WEIGHT_PX,

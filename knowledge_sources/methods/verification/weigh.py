@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.belief.odds import Alike, Look, add_looks, to_log_odds, update
-from knowledge_sources.methods.belief.places import BelievedPlace
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.belief import Alike, BelievedPlace, Look, add_looks, to_log_odds, update
+from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors
 from knowledge_sources.methods.verification.line_check import (
     LineCheck,
@@ -30,8 +29,7 @@ from knowledge_sources.methods.verification.pose_confidence import (
     compute_motion_tolerance_px,
 )
 from knowledge_sources.settings import PlanSettings, Settings
-from world_models.entries.percepts import PoseFix, Segments
-from world_models.entries.task import Certificate, Milestone, MilestoneVerdict
+from world_models.entries import Certificate, Milestone, MilestoneVerdict, PoseFix, Segments
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

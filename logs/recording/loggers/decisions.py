@@ -15,10 +15,8 @@ from logs.recording.palette import DONE, LEVELS, REJECTED
 from logs.recording.paths import RECORDS, TABLE
 from logs.recording.stream import TROUBLE, Mixed, RecordingStream
 from world_models import words
-from world_models.building.locale_frame import FrameRequest, LocaleFrame, has_answer
-from world_models.entries.location import Hypothesis
-from world_models.entries.robot_state import Drift
-from world_models.entries.task import Leg, Milestone
+from world_models.building import FrameRequest, LocaleFrame, has_answer
+from world_models.entries import Drift, Hypothesis, Leg, Milestone
 
 TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "halted")
 """Statuses of milestones, sketches, goals, hypotheses and legs that stand for something gone wrong."""

@@ -14,18 +14,25 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from blackboard.board import View
+from blackboard import View
 from logs.recording import paths
 from logs.recording.logger import Held, Logger, Moment, Panel, Subject
 from logs.recording.palette import DONE, EXPECTED, FOUND, FREE, MATCHED, NOT_TESTABLE, PLANNED, REJECTED, Colour, faint
 from logs.recording.stream import Mixed, RecordingStream
 from world_models.camera import clip_segments
-from world_models.entries.body import CameraPicture
-from world_models.entries.door_state import DoorState
-from world_models.entries.floor import FloorEnd, FloorThing, FreeFloor
-from world_models.entries.obstacle import Obstruction
-from world_models.entries.percepts import LineMatch, PoseFix, Segments, Tracks
-from world_models.entries.task import Milestone
+from world_models.entries import (
+    CameraPicture,
+    DoorState,
+    FloorEnd,
+    FloorThing,
+    FreeFloor,
+    LineMatch,
+    Milestone,
+    Obstruction,
+    PoseFix,
+    Segments,
+    Tracks,
+)
 from world_models.frames import Pose2, frozen
 from world_models.words import without_locale
 

@@ -15,8 +15,7 @@ from logs.recording.logger import Logger, Moment, Panel
 from logs.recording.palette import DONE, EXPECTED, PLANNED, VERDICTS, WAITING, Colour, faint
 from logs.recording.paths import GOAL, LANDMARKS, LEG, PATH, SKETCH
 from logs.recording.stream import REFUTED, VERIFIED, Mixed, RecordingStream
-from world_models.entries.location import Place
-from world_models.entries.task import Certificate, Goal, Leg, Milestone, PlanSketch, Subgoal
+from world_models.entries import Certificate, Goal, Leg, Milestone, Place, PlanSketch, Subgoal
 from world_models.words import short
 
 Point = tuple[float, float, float]

@@ -25,7 +25,7 @@ from logs.recording.paths import (
 )
 from logs.recording.stream import RecordingStream
 from world_models.camera import Camera
-from world_models.entries.location import Hypothesis
+from world_models.entries import Hypothesis
 from world_models.frames import Pose2, frozen
 
 RADIUS_M = 0.35

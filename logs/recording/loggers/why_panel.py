@@ -9,8 +9,7 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard import Discrepancy, Entry, View
-from blackboard.kinds import always
+from blackboard import Discrepancy, Entry, View, always
 from logs.explain import phrases
 from logs.explain.turning_points import SIMULATOR, Happening, TurningPoint, TurningPointFinder
 from logs.recording.logger import Logger, Moment, Panel, Subject, log_view
@@ -20,10 +19,21 @@ from logs.recording.paths import CHAPTERS, DESCRIPTION, WHY
 from logs.recording.stream import RecordingStream, viewable
 from logs.timeline import find_belief
 from world_models import words
-from world_models.entries.body import BodyFault, MotorCommand, Recovery
-from world_models.entries.location import Hypothesis
-from world_models.entries.percepts import LineMatch, PoseFix, Segments, Tracks
-from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch
+from world_models.entries import (
+    BodyFault,
+    Certificate,
+    Goal,
+    Hypothesis,
+    LineMatch,
+    Milestone,
+    MotorCommand,
+    Outcome,
+    PlanSketch,
+    PoseFix,
+    Recovery,
+    Segments,
+    Tracks,
+)
 from world_models.frames import Pose2
 
 Tell = Callable[[View], str]

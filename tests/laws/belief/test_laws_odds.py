@@ -9,16 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.belief.odds import (
+from knowledge_sources.methods.belief import (
     Alike,
+    BelievedPlace,
     Look,
     add_looks,
+    bound_p_rivals,
+    compute_p_rivals,
     measure_common,
     to_log_odds,
     to_probability,
     update,
 )
-from knowledge_sources.methods.belief.places import BelievedPlace, bound_p_rivals, compute_p_rivals
 from world_models.frames import Pose2, wrap_angle
 
 ALIKE = Alike(step_m=0.6, turn_rad=1.0)

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generated_boards import Bench, plain_robot
-from knowledge_sources.questions import is_standing, is_up_to_date, last_motion
-from world_models.entries.body import Course, MotionReport
+from knowledge_sources.reads import is_standing, is_up_to_date, last_motion
+from world_models.entries import Course, MotionReport
 
 motions = st.lists(st.sampled_from(("command", "course")), min_size=1, max_size=4)
 

@@ -8,11 +8,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from blackboard.agenda import Activation, Agenda
-from blackboard.change import Posted, Revised
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Servoing
+from blackboard import Activation, Entry, Level, Posted, Revised, Servoing
+from blackboard.agenda import Agenda
 from strategies import Note, Scripted, ratings
 
 KNOWLEDGE_SOURCES = [Scripted(f"{level}_{number}", level=level) for level in Level for number in range(2)]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from world_models.actuator import ActuatorModel
 from world_models.commands import parse_ptrans
-from world_models.entries.location import Hypothesis, Place, diagonal
+from world_models.entries import Hypothesis, Place, diagonal
 from world_models.frames import Pose, Pose2, wrap_angle
 from world_models.units import FOOT_M
 

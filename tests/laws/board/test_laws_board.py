@@ -9,11 +9,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from blackboard.board import Blackboard, StaleError
-from blackboard.change import Posted, Retracted, Revised
-from blackboard.effect import Effect, Post, Retract, Revise, to_say
-from blackboard.entry import Entry, Ref
-from blackboard.entry_store import Index
+from blackboard import (
+    Blackboard,
+    Effect,
+    Entry,
+    Index,
+    Post,
+    Posted,
+    Ref,
+    Retract,
+    Retracted,
+    Revise,
+    Revised,
+    StaleError,
+    to_say,
+)
 from strategies import Note, Tally, notes, tallies, values
 
 picks = st.integers(0, 30)

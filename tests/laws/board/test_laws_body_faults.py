@@ -9,27 +9,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard.board import View
-from blackboard.change import Change
-from blackboard.effect import Effect, Post
-from blackboard.journal import Decision
-from blackboard.scheduler import Scheduler
-from blackboard.servoing import Discrepancy
+from blackboard import Change, Decision, Discrepancy, Effect, Post, Scheduler, View
 from harvey.runner.ports import BodyPort
 from knowledge_sources.action.fault_handler import FaultHandler
 from knowledge_sources.goal.mission_monitor import MissionMonitor
 from knowledge_sources.settings import DEFAULT
 from strategies import Note, Scripted
-from world_models.entries.body import (
+from world_models.entries import (
     STOP_KEY,
     BodyFault,
     CameraPicture,
     MotionReport,
     MotorCommand,
+    Outcome,
     PictureRequest,
     Recovery,
 )
-from world_models.entries.task import Outcome
 
 S = DEFAULT.action
 MOST_CYCLES = 2000

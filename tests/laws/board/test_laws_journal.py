@@ -14,9 +14,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.effect import Post, Retract, Revise
-from blackboard.journal import Decision, decision_line, decision_record, entry_record, plain
-from blackboard.scheduler import Scheduler
+from blackboard import Decision, Post, Retract, Revise, Scheduler, decision_line, decision_record, plain
+from blackboard.journal import entry_record
 from strategies import Note, Scripted, run
 
 

@@ -13,11 +13,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Change, Quiescence
-from blackboard.effect import Effect, Post
-from blackboard.kinds import Kind, NotAKindError, Registry, Role, inference, is_kind, kind_of, observation, request
-from blackboard.scheduler import Scheduler, registry_of
-from blackboard.servoing import Discrepancy
+from blackboard import (
+    Change,
+    Discrepancy,
+    Effect,
+    Post,
+    Quiescence,
+    Registry,
+    Role,
+    Scheduler,
+    inference,
+    kind_of,
+    observation,
+    registry_of,
+    request,
+)
+from blackboard.kinds import Kind, NotAKindError, is_kind
 from harvey.runner.ports import BodyPort
 from harvey.runner.world_port import WorldPort
 from harvey.wiring import knowledge_sources
@@ -25,7 +36,7 @@ from journals import read_journal
 from logs import disk
 from logs.journal_file import JournalFile
 from strategies import Note, Scripted
-from world_models.entries.entry_kinds import KINDS
+from world_models.entries import KINDS
 from world_models.words import sentence
 
 ALL = (*KINDS, Discrepancy, Quiescence)

@@ -16,17 +16,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, rule
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Quiescence, Revised, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry, Ref
-from blackboard.journal import Decision
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import (
+    Change,
+    Decision,
+    Discrepancy,
+    Effect,
+    Entry,
+    Level,
+    Post,
+    Posted,
+    Quiescence,
+    Ref,
+    Revise,
+    Revised,
+    View,
+    Watch,
+)
 from harvey.runner.world_port import build_scheduler
 from harvey.simulation.simulated_run import build_robot_model
 from harvey.wiring import KNOWLEDGE_SOURCES
-from knowledge_sources.questions import (
+from knowledge_sources.reads import (
     active_goal,
     find_belief,
     find_building,
@@ -38,12 +47,23 @@ from knowledge_sources.questions import (
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario, with_settings
-from world_models.building.world import World
-from world_models.entries.body import CameraPicture, Course, MotionReport, MotorCommand, PictureRequest
-from world_models.entries.entry_kinds import KINDS
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.percepts import PoseFix
-from world_models.entries.task import Certificate, Goal, Milestone, Outcome, PlanSketch
+from world_models.building import World
+from world_models.entries import (
+    KINDS,
+    CameraPicture,
+    Certificate,
+    Course,
+    Goal,
+    Hypothesis,
+    Milestone,
+    MotionReport,
+    MotorCommand,
+    Outcome,
+    PictureRequest,
+    PlanSketch,
+    PoseFix,
+    diagonal,
+)
 from world_models.files.world_files import load_world
 from world_models.robot import RobotModel
 

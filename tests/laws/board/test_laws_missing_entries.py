@@ -10,16 +10,29 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.agenda import Activation
-from blackboard.board import Blackboard, TracedView, View
-from blackboard.change import Change, Posted
-from blackboard.effect import Effect, MissingEntryError, Post, Revise
-from blackboard.entry import Entry, Ref
-from blackboard.entry_store import Index
-from blackboard.journal import Decision
-from blackboard.kinds import Kind, Role, observation, request
-from blackboard.level import Level
-from blackboard.scheduler import MISSING_RATING, Scheduler
+from blackboard import (
+    Activation,
+    Blackboard,
+    Change,
+    Decision,
+    Effect,
+    Entry,
+    Index,
+    Level,
+    MissingEntryError,
+    Post,
+    Posted,
+    Ref,
+    Revise,
+    Role,
+    Scheduler,
+    View,
+    observation,
+    request,
+)
+from blackboard.board import TracedView
+from blackboard.kinds import Kind
+from blackboard.scheduler import MISSING_RATING
 from strategies import Note, Scripted, Tally, levels, notes, ratings, run, tallies
 
 LETTERS = "abcd"

@@ -11,15 +11,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Retracted, Revised
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.entry import Ref
-from blackboard.entry_store import Index
-from blackboard.journal import Decision, decision_line, entry_record
-from blackboard.kinds import Kind, Role
-from blackboard.level import Level
-from blackboard.scheduler import Scheduler
+from blackboard import (
+    Change,
+    Decision,
+    Effect,
+    Index,
+    Level,
+    Post,
+    Posted,
+    Ref,
+    Retract,
+    Retracted,
+    Revise,
+    Revised,
+    Role,
+    Scheduler,
+    View,
+    decision_line,
+)
+from blackboard.journal import entry_record
+from blackboard.kinds import Kind
 from logs.journal_file import JournalFile
 from logs.timeline import Timeline
 from strategies import Note, Scripted, Tally, levels, ratings, run

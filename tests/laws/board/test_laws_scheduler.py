@@ -11,15 +11,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Retracted, Revised
-from blackboard.condition import Condition
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.entry import Entry
-from blackboard.journal import decision_line
-from blackboard.level import Level
-from blackboard.scheduler import RAISED, Scheduler
-from blackboard.servoing import Discrepancy, Servoing
+from blackboard import (
+    RAISED,
+    Change,
+    Condition,
+    Discrepancy,
+    Effect,
+    Entry,
+    Level,
+    Post,
+    Posted,
+    Retract,
+    Retracted,
+    Revise,
+    Revised,
+    Scheduler,
+    Servoing,
+    View,
+    decision_line,
+)
 from strategies import Note, Scripted, Tally, levels, ratings, run
 
 

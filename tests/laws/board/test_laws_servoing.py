@@ -10,15 +10,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Retracted
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Ref
-from blackboard.journal import Decision
-from blackboard.level import Level
-from blackboard.scheduler import Scheduler
-from blackboard.servoing import Discrepancy
-from knowledge_sources.plan.discrepancy_raiser import DiscrepancyRaiser
+from blackboard import (
+    Change,
+    Decision,
+    Discrepancy,
+    Effect,
+    Level,
+    Post,
+    Posted,
+    Ref,
+    Retracted,
+    Revise,
+    Scheduler,
+    View,
+)
+from knowledge_sources.goal.discrepancy_raiser import DiscrepancyRaiser
 from strategies import Note, Scripted, levels, magnitudes, run
 
 bounds = st.tuples(st.floats(0.0, 5.0), st.floats(0.0, 8.0))

@@ -11,15 +11,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.doors.belief import (
-    MAX_DOUBTED_SIGMAS,
+from knowledge_sources.methods.doors import (
     MAX_LOG_ODDS,
     MIN_LOG_RATIO,
-    MIN_PICTURES,
     SHUT_LOG_ODDS,
+    describe,
+    is_in_view,
     is_near,
+    measure_opening,
+    predict_opening,
     update_door,
+    weigh_leaf,
 )
+from knowledge_sources.methods.doors.belief import MAX_DOUBTED_SIGMAS, MIN_PICTURES
 from knowledge_sources.methods.doors.leaf import (
     JAMB_MARGIN_M,
     MAX_DISTANCE_M,
@@ -27,25 +31,18 @@ from knowledge_sources.methods.doors.leaf import (
     MAX_RIVAL_BETTER,
     MIN_LEAF_SINE,
     LeafEvidence,
-    describe,
     find_largest_share,
-    is_in_view,
-    measure_opening,
-    predict_opening,
-    weigh_leaf,
 )
 from knowledge_sources.methods.doors.rival_views import Views
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.features import read_picture
 from sim.body.simulated_building import SimulatedBuilding
 from sim.ground_truth.table import TrueDoor
 from sim.ground_truth.true_changes import build_leaf
 from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
-from world_models.building.locales import Doorway
-from world_models.building.world import World
-from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.location import Hypothesis, diagonal
+from world_models.building import Doorway, World
+from world_models.entries import DoorPicture, DoorState, Hypothesis, diagonal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.features.correlation import (
+from knowledge_sources.methods.features import (
     Correlation,
     compute_second_peak,
     correlate,

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.arrays import Floats, Image
-from knowledge_sources.methods.features.picture import read_picture
-from knowledge_sources.methods.motion.routes import compute_free_space
-from knowledge_sources.methods.tracking.edge_alignment import EdgeAlignment, _intersect_lines, align_to_edges
+from knowledge_sources.methods.features import read_picture
+from knowledge_sources.methods.motion import compute_free_space
+from knowledge_sources.methods.tracking import align_to_edges
+from knowledge_sources.methods.tracking.edge_alignment import EdgeAlignment, _intersect_lines
 from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
@@ -24,7 +25,7 @@ from sim.stage import Stage, build_stage
 from world_models.camera import move_camera
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
-from world_models.visibility.lines_and_points import visible_lines
+from world_models.visibility import visible_lines
 
 KNOWN, TILT = np.zeros((7, 7)), np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 few = settings(max_examples=30, deadline=None)

@@ -12,14 +12,15 @@ from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
 
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.methods.features.picture import read_picture
-from knowledge_sources.methods.tracking.template_tracking import _compute_anchor_covariance, select_landmarks
+from knowledge_sources.methods.features import read_picture
+from knowledge_sources.methods.tracking import select_landmarks
+from knowledge_sources.methods.tracking.template_tracking import _compute_anchor_covariance
 from knowledge_sources.settings import DEFAULT
 from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
-from world_models.entries.percepts import Anchor, Track
+from world_models.entries import Anchor, Track
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

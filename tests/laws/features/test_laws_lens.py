@@ -11,7 +11,7 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from experiments.generated.scenes import box_room
-from knowledge_sources.methods.features.picture import Rectifier
+from knowledge_sources.methods.features import Rectifier
 from sim.render.optics import Optics, distort, undistort
 from sim.render.renderer import Renderer
 from sim.scenario import ScenarioError, load_scenario, with_settings

@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from knowledge_sources.methods.arrays import Floats, Image
-from knowledge_sources.methods.features.lines import LineSegments, find_lines
+from knowledge_sources.methods.features import LineSegments, find_lines
 from knowledge_sources.settings import DEFAULT
 
 SIZE = 81

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_sources.methods.arrays import Image
-from knowledge_sources.methods.features.regions import find_histogram_valleys, segment_regions
+from knowledge_sources.methods.features import segment_regions
+from knowledge_sources.methods.features.regions import find_histogram_valleys
 from knowledge_sources.settings import DEFAULT
 
 few = settings(deadline=None, max_examples=20)

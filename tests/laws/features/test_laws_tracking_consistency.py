@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from consistency import assert_consistent, compute_error, compute_nees
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.methods.tracking import template_tracking
+from knowledge_sources.methods.tracking import action_px, correct_pose, follow_landmarks, template_tracking
 from knowledge_sources.methods.tracking.template_tracking import (
     MAX_SCALE,
     MAX_SEARCH_PX,
@@ -24,17 +24,13 @@ from knowledge_sources.methods.tracking.template_tracking import (
     MIN_SEARCH_PX,
     SEARCH_MARGIN_PX,
     SEARCH_SIGMAS,
-    correct_pose,
-    follow_landmarks,
 )
-from knowledge_sources.methods.tracking.tolerance import action_px
-from knowledge_sources.questions import NOWHERE
+from knowledge_sources.reads.questions import NOWHERE
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.entries.location import Hypothesis, covariance_tuple, diagonal
-from world_models.entries.percepts import Anchor, Track
+from world_models.entries import Anchor, Hypothesis, Track, covariance_tuple, diagonal
 from world_models.files.world_files import load_world
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

@@ -12,26 +12,23 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.entry import Entry
+from blackboard import Entry
 from generated_boards import HALL, HOUSE, STUDY, Bench, house, plain_robot, to_world
 from ideal_floor_watcher import scan_floor
 from knowledge_sources import floor_ahead
-from knowledge_sources.floor_ahead import (
+from knowledge_sources.methods.floor import Lookout, find_floor
+from knowledge_sources.reads import SEEN_MARGIN_M, FloorAhead, find_robot
+from knowledge_sources.reads.floor_ahead import (
     LOOK_FROM_M,
     MAX_DRIVEN_GAP_M,
     PUT_DOWN_FREE_M,
-    SEEN_MARGIN_M,
-    FloorAhead,
     _find_way_beyond,
     list_free_discs,
 )
-from knowledge_sources.methods.floor.seen_floor import Lookout, find_floor
-from knowledge_sources.questions import find_robot
 from knowledge_sources.settings import DEFAULT
-from world_models.building.locales import EXTRA_KIND
-from world_models.entries.floor import FloorSense, FreeFloor
-from world_models.entries.location import Place, PlaceSearch
-from world_models.entries.task import Subgoal
+from world_models.building import EXTRA_KIND
+from world_models.entries import FreeFloor, Place, PlaceSearch, Subgoal
+from world_models.entries.floor import FloorSense
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2, wrap_angle

@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 
 import harvey
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor import MotionBetween, Seen, is_telling, see_free_floor
 from knowledge_sources.methods.floor.model_floor import build_floor_grid, predict_model_floor
 from knowledge_sources.methods.floor.relief import FLAT, STANDING, UNTOLD, Modelled, Relief, TwoPictures
-from knowledge_sources.methods.floor.see_floor import MotionBetween, Seen, see_free_floor
-from knowledge_sources.methods.floor.weigh_sight import is_telling
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.entries.floor import FreeFloor
+from world_models.entries import FreeFloor
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

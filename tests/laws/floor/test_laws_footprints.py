@@ -11,12 +11,10 @@ import shapely.affinity
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.motion.footprints import (
-    build_free_floor,
-    build_polygon,
+from knowledge_sources.methods.floor import build_free_floor, build_polygon, list_corners
+from knowledge_sources.methods.floor.footprints import (
     deepen,
     join_footprints,
-    list_corners,
     measure_change_m,
     measure_common_directions,
     measure_free_part,

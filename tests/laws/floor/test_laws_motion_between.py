@@ -9,16 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.entry import Entry
+from blackboard import Entry
 from generated_boards import Bench, plain_robot, to_world
-from knowledge_sources.conditions import HELD
-from knowledge_sources.methods.floor.see_floor import MotionBetween
-from knowledge_sources.motion_between import MAX_APART_SIGMAS, add_reports, find_motion_between
+from knowledge_sources.methods.floor import MotionBetween
+from knowledge_sources.reads import HELD, find_motion_between
+from knowledge_sources.reads.motion_between import MAX_APART_SIGMAS, add_reports
 from world_models.actuator import ActuatorModel, arc
-from world_models.entries.body import BodyFault, MotionReport, MotorCommand
-from world_models.entries.floor import FloorView
-from world_models.entries.location import diagonal
-from world_models.entries.robot_state import Drift
+from world_models.entries import BodyFault, Drift, FloorView, MotionReport, MotorCommand, diagonal
 from world_models.frames import Pose2, wrap_angle
 
 ACTUATOR = ActuatorModel()

@@ -12,15 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generated_boards import HALL, house, plain_robot, to_world
+from knowledge_sources.methods.floor import Sight, build_polygon, see_ranges, touch_again
 from knowledge_sources.methods.floor.found_things import find_same
-from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M, see_ranges
+from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M
 from knowledge_sources.methods.floor.thing_shapes import ThingShape
-from knowledge_sources.methods.floor.weigh_sight import Sight, see_again
-from knowledge_sources.methods.floor.weigh_touch import TOUCHED_SIDE_M, Touched, touch_again
-from knowledge_sources.methods.motion.footprints import build_polygon
+from knowledge_sources.methods.floor.weigh_sight import see_again
+from knowledge_sources.methods.floor.weigh_touch import TOUCHED_SIDE_M, Touched
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.floor import FloorThing, FreeFloor
-from world_models.entries.obstacle import Contact, Obstacle, Ranges
+from world_models.entries import Contact, FloorThing, FreeFloor, Obstacle, Ranges
 from world_models.frames import Pose2
 
 NONE = shapely.Polygon()

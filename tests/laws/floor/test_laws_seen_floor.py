@@ -11,17 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ideal_floor_watcher import scan_floor
-from knowledge_sources.floor_ahead import limit_move
-from knowledge_sources.methods.floor.seen_floor import (
-    SeenFloor,
-    Sweep,
-    find_blind,
-    measure_blind_m,
-    measure_free_m,
-    sample_sweep,
-)
+from knowledge_sources.methods.floor import SeenFloor, Sweep, measure_free_m, sample_sweep
+from knowledge_sources.methods.floor.seen_floor import find_blind, measure_blind_m
+from knowledge_sources.reads.floor_ahead import limit_move
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.floor import FreeFloor
+from world_models.entries import FreeFloor
 from world_models.frames import Pose2
 
 ROOM = shapely.box(-3.0, -2.0, 3.0, 2.0)

@@ -11,22 +11,30 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Watch
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Ref
-from blackboard.journal import Decision, decision_record
-from blackboard.kinds import Kind, Registry
-from blackboard.level import Level
-from blackboard.scheduler import Scheduler
+from blackboard import (
+    Change,
+    Decision,
+    Effect,
+    Level,
+    Post,
+    Posted,
+    Ref,
+    Registry,
+    Revise,
+    Scheduler,
+    View,
+    Watch,
+    decision_record,
+)
+from blackboard.kinds import Kind
 from experiments.generated.missions import HALLWAY
 from harvey.agent import build_agent
 from harvey.runner.replay import open_originals
 from harvey.runner.world_port import WorldPort
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import load_kinds
-from knowledge_sources.action.model_reviser import ModelReviser
-from knowledge_sources.questions import find_building, find_frames
+from knowledge_sources.model.model_reviser import ModelReviser
+from knowledge_sources.reads import find_building, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from logs.records import EntryRecord, decision_of, effect_of, read_records
 from logs.run_directory import RunDirectory
@@ -35,11 +43,8 @@ from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from strategies import Note
 from without_frames import list_decided
-from world_models.building.locale_frame import LocaleFrame
-from world_models.building.world import World
-from world_models.entries.entry_kinds import KINDS
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.user_reports import UserReport
+from world_models.building import LocaleFrame, World
+from world_models.entries import KINDS, Hypothesis, UserReport, diagonal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frame_store import FrameStore

@@ -11,18 +11,14 @@ from typing import Any
 
 import pytest
 
-from blackboard.board import View
-from blackboard.change import Change, Watch
-from blackboard.condition import Condition
-from blackboard.effect import Effect
-from blackboard.level import Level
+from blackboard import Change, Condition, Effect, Level, View, Watch
 from harvey.simulation.simulated_run import build_robot_model
 from harvey.wiring import KNOWLEDGE_SOURCES, build, foreign_sources
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
-from world_models.building.world import World
-from world_models.entries.user_reports import UserReport
+from world_models.building import World
+from world_models.entries import UserReport
 from world_models.frame_store import FrameStore
 
 PLAIN = (type(None), bool, int, float, complex, str, bytes, Enum, type, types.ModuleType)

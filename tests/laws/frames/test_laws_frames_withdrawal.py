@@ -10,9 +10,7 @@ import pytest
 from hypothesis import Phase, event, example, given, settings
 from hypothesis import strategies as st
 
-from blackboard.board import View
-from blackboard.effect import Post
-from blackboard.scheduler import RAISED, Scheduler
+from blackboard import RAISED, Post, Scheduler, View
 from harvey.agent import build_agent
 from harvey.replay.what_if import WhatIf
 from harvey.runner.world_port import tell_robot
@@ -20,10 +18,8 @@ from harvey.simulation.simulated_run import SimulatedRun, build_head
 from logs.run_recorder import RunRecorder
 from sim.stage import Stage
 from two_doors import two_doors
-from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.percepts import Tracks
-from world_models.entries.task import Milestone, Outcome, PlanSketch
-from world_models.entries.user_reports import UserReport
+from world_models.building import LocaleFrame
+from world_models.entries import Milestone, Outcome, PlanSketch, Tracks, UserReport
 
 DOORS = ("north-door", "south-door")
 THINGS = ("study/table-1", "study/bookshelf-1", "study/picture-1", "study/notice-board-1", "study/picture-2",

@@ -12,25 +12,19 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.effect import Post, Revise
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.floor_ahead import PUT_DOWN_FREE_M, list_free_discs
+from blackboard import Discrepancy, Level, Post, Revise
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.weigh_sight import FREE_FLOOR_ODDS
-from knowledge_sources.questions import find_building_as_filed
+from knowledge_sources.reads import find_building_as_filed
+from knowledge_sources.reads.floor_ahead import PUT_DOWN_FREE_M, list_free_discs
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, X_M, Y_M, Hall, carton
-from world_models.building.world import World
-from world_models.entries.body import MotorCommand
-from world_models.entries.floor import FloorThing, FreeFloor
-from world_models.entries.location import Hypothesis, Place
-from world_models.entries.obstacle import Contact, Obstacle
-from world_models.entries.task import Goal
+from world_models.building import World
+from world_models.entries import Contact, FloorThing, FreeFloor, Goal, Hypothesis, MotorCommand, Obstacle, Place
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
-from world_models.visibility.lines_and_points import visible_lines
+from world_models.visibility import visible_lines
 
 SCREEN = tuple((X_M + x, Y_M + y) for x, y in ((3.9, 0.6), (4.3, 0.6), (4.3, 1.8), (3.9, 1.8)))
 

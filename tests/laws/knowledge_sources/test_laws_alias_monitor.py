@@ -10,10 +10,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Entry, Level, Posted
 from generated_boards import (
     HALL,
     LENGTH_M,
@@ -27,17 +24,31 @@ from generated_boards import (
     to_world,
     wakes,
 )
-from knowledge_sources.goal.pose_adopter import PoseAdopter
-from knowledge_sources.methods.localization.global_localization import make_alias_test
-from knowledge_sources.methods.localization.next_view import MIN_NEW_VIEW_RAD, MOVE_M
-from knowledge_sources.methods.localization.refinement import compute_pose_likelihood
-from knowledge_sources.methods.localization.views import CameraView
-from knowledge_sources.methods.verification.line_check import predict_lines
-from knowledge_sources.plan.alias_monitor import AliasMonitor
+from knowledge_sources.methods.localization import (
+    MIN_NEW_VIEW_RAD,
+    MOVE_M,
+    CameraView,
+    compute_pose_likelihood,
+    make_alias_test,
+)
+from knowledge_sources.methods.verification import predict_lines
+from knowledge_sources.relocalizer.alias_monitor import AliasMonitor
+from knowledge_sources.relocalizer.pose_adopter import PoseAdopter
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.location import Hypothesis, PlaceOdds, PlaceSearch, Twin, TwinOdds, diagonal
-from world_models.entries.percepts import LineMatch, PoseFix, Segments
-from world_models.entries.task import Certificate, MilestoneVerdict, Outcome
+from world_models.entries import (
+    Certificate,
+    Hypothesis,
+    LineMatch,
+    MilestoneVerdict,
+    Outcome,
+    PlaceOdds,
+    PlaceSearch,
+    PoseFix,
+    Segments,
+    Twin,
+    TwinOdds,
+    diagonal,
+)
 from world_models.frames import Pose2, wrap_angle
 
 SOURCE, S, ROBOT, SMALL = AliasMonitor(), DEFAULT.localization, plain_robot(), 1e-6

@@ -8,15 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Entry, Level
 from generated_boards import Bench, effect_on, plain_robot, poses, reasons, to_world
-from knowledge_sources.looking import list_told
-from knowledge_sources.methods.verification.view_quality import turn_headings
-from knowledge_sources.plan.belief_checker import BeliefChecker
+from knowledge_sources.methods.verification import turn_headings
+from knowledge_sources.milestone_selector.belief_checker import BeliefChecker
+from knowledge_sources.reads import list_told
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.task import Certificate, Milestone, MilestoneStatus, Outcome
+from world_models.entries import Certificate, Milestone, Outcome
+from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2, wrap_angle
 
 SOURCE = BeliefChecker()

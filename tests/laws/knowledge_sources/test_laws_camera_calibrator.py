@@ -9,17 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted
-from blackboard.effect import Revise
-from blackboard.entry import Entry
+from blackboard import Entry, Posted, Revise
 from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
-from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
-from knowledge_sources.plan.camera_calibrator import CameraCalibrator
+from knowledge_sources.methods.calibration import compute_camera_covariance
+from knowledge_sources.robot.camera_calibrator import CameraCalibrator
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.location import Travel, begin_travel, diagonal
-from world_models.entries.percepts import PoseFix
-from world_models.entries.robot_state import CameraState
-from world_models.entries.task import Certificate, MilestoneVerdict
+from world_models.entries import CameraState, Certificate, MilestoneVerdict, PoseFix, Travel, begin_travel, diagonal
 from world_models.frames import Pose2
 
 SOURCE, S = CameraCalibrator(), DEFAULT.camera_state

@@ -17,11 +17,7 @@ import numpy as np
 import pytest
 
 from acting import answer
-from blackboard.board import Blackboard
-from blackboard.change import Change
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Blackboard, Change, Discrepancy, Effect, Level, Post, Retract, Revise
 from generated_boards import reasons
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.action import correlator_tracker
@@ -32,18 +28,24 @@ from knowledge_sources.action.correlator_tracker import (
     MIN_REMAINING_PART,
     CorrelatorTracker,
 )
-from knowledge_sources.methods.features.picture import read_picture
-from knowledge_sources.methods.tracking.template_tracking import select_landmarks
+from knowledge_sources.methods.features import read_picture
+from knowledge_sources.methods.tracking import select_landmarks
 from knowledge_sources.settings import DEFAULT
 from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
-from world_models.entries.body import CameraPicture
-from world_models.entries.floor import FreeFloor
-from world_models.entries.location import Hypothesis, covariance_tuple, diagonal
-from world_models.entries.percepts import Anchor, Track, Tracks
-from world_models.entries.robot_state import Drift
+from world_models.entries import (
+    Anchor,
+    CameraPicture,
+    Drift,
+    FreeFloor,
+    Hypothesis,
+    Track,
+    Tracks,
+    covariance_tuple,
+    diagonal,
+)
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

@@ -11,10 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Effect, Entry, Level, Post, Revise
 from generated_boards import (
     HALL,
     STUDY,
@@ -32,13 +29,22 @@ from generated_boards import (
     to_world,
 )
 from knowledge_sources.action.dead_reckoner import MIN_CLAIMED_PART, DeadReckoner
-from knowledge_sources.place_believed import PLACED_BY
+from knowledge_sources.reads import PLACED_BY
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand, PictureRequest
-from world_models.entries.location import Covariance, Hypothesis, Travel, begin_travel
-from world_models.entries.obstacle import Contact
-from world_models.entries.robot_state import Drift
+from world_models.entries import (
+    BodyFault,
+    Contact,
+    Course,
+    Drift,
+    Hypothesis,
+    MotionReport,
+    MotorCommand,
+    PictureRequest,
+    Travel,
+    begin_travel,
+)
+from world_models.entries.location import Covariance
 from world_models.frames import Pose2
 
 ACTUATOR = ActuatorModel()

@@ -11,19 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acting import answer
-from blackboard.board import Blackboard, View
-from blackboard.change import Revised
-from blackboard.effect import Post, Revise
-from blackboard.entry import Entry
+from blackboard import Blackboard, Entry, Post, Revise, Revised, View
 from generated_boards import HALL, STUDY, Bench, made, plain_robot, reasons, to_world
-from knowledge_sources.action.dependency_withdrawer import DependencyWithdrawer
 from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M
+from knowledge_sources.model.dependency_withdrawer import DependencyWithdrawer
 from knowledge_sources.settings import DEFAULT
-from world_models.building.locale_frame import FrameChange, LocaleFrame
-from world_models.entries.location import Place
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.percepts import Track, Tracks
-from world_models.entries.task import Milestone, MilestoneStatus, PlanSketch, Subgoal
+from world_models.building import FrameChange, LocaleFrame
+from world_models.entries import Milestone, Obstacle, Place, PlanSketch, Subgoal, Track, Tracks
+from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 
 THINGS = ("study/table-1", "study/table-10", "study/rack-1")

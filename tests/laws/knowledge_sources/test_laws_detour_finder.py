@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from blackboard.change import Posted, Revised
-from blackboard.entry import Entry
+from blackboard import Entry, Posted, Revised
 from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, wakes
-from knowledge_sources.plan.detour_finder import DetourFinder
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.location import Place
-from world_models.entries.task import Impasse, Leg, LegStatus, PlanSketch
+from knowledge_sources.sketcher.detour_finder import DetourFinder
+from world_models.entries import Impasse, Leg, Place, PlanSketch
+from world_models.entries.task import LegStatus
 from world_models.frames import Pose2
 
 SOURCE = DetourFinder()

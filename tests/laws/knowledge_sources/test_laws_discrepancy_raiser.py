@@ -6,14 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard.change import Posted
-from blackboard.effect import Revise
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Level, Posted, Revise
 from generated_boards import Bench, effect_on, made, reasons, wakes
-from knowledge_sources.plan.discrepancy_raiser import DiscrepancyRaiser
+from knowledge_sources.goal.discrepancy_raiser import DiscrepancyRaiser
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.task import Impasse, Outcome
+from world_models.entries import Impasse, Outcome
 
 SOURCE = DiscrepancyRaiser()
 BOUNDS = (5.0, 30.0)

@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from blackboard.change import Posted, Revised
-from blackboard.entry import Entry
+from blackboard import Entry, Posted, Revised
 from generated_boards import (
     HALL,
     LENGTH_M,
@@ -19,20 +18,10 @@ from generated_boards import (
     reasons,
     wakes,
 )
-from knowledge_sources.action.door_toucher import DoorToucher
-from knowledge_sources.methods.doors.belief import (
-    MAX_LOG_ODDS,
-    MAX_TOUCH_M,
-    PRIOR_LOG_ODDS,
-    SHUT_LOG_ODDS,
-    TOUCH_LOG_RATIO,
-    touch_door,
-    update_door,
-)
-from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.obstacle import Contact
-from world_models.entries.task import Outcome
+from knowledge_sources.methods.doors import MAX_LOG_ODDS, PRIOR_LOG_ODDS, SHUT_LOG_ODDS, touch_door, update_door
+from knowledge_sources.methods.doors.belief import MAX_TOUCH_M, TOUCH_LOG_RATIO
+from knowledge_sources.model.door_toucher import DoorToucher
+from world_models.entries import Contact, DoorPicture, DoorState, Hypothesis, Outcome, diagonal
 from world_models.frames import Pose2
 
 SOURCE, SMALL = DoorToucher(), 1e-3

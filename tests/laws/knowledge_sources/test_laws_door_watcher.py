@@ -11,24 +11,19 @@ import numpy as np
 import pytest
 
 from acting import answer
-from blackboard.change import Posted, Revised
-from blackboard.effect import Effect, Post, Revise
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.action.door_watcher import DoorWatcher
-from knowledge_sources.action.floor_watcher import FloorWatcher
-from knowledge_sources.doors_in_view import MAX_SIGMA_M, MAX_SIGMA_RAD
-from knowledge_sources.methods.doors.belief import MAX_LOG_ODDS, MIN_PICTURES, PRIOR_LOG_ODDS
+from blackboard import Discrepancy, Effect, Level, Post, Posted, Revise, Revised
+from knowledge_sources.methods.doors import MAX_LOG_ODDS, PRIOR_LOG_ODDS
+from knowledge_sources.methods.doors.belief import MIN_PICTURES
+from knowledge_sources.model.door_watcher import DoorWatcher
+from knowledge_sources.model.floor_watcher import FloorWatcher
+from knowledge_sources.reads import MAX_SIGMA_M, MAX_SIGMA_RAD
 from sim.body.simulated_building import SimulatedBuilding
 from sim.ground_truth.table import TrueDoor
 from sim.ground_truth.true_changes import build_leaf
 from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from things_in_hall import HALL, Hall
-from world_models.building.world import World
-from world_models.entries.body import CameraPicture
-from world_models.entries.door_state import DoorState
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.task import Milestone, Outcome
+from world_models.building import World
+from world_models.entries import CameraPicture, DoorState, Hypothesis, Milestone, Outcome, diagonal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
 

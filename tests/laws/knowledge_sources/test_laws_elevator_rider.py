@@ -8,13 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted
-from blackboard.level import Level
+from blackboard import Level, Posted
 from generated_boards import Bench, all_reasons, effect_on, wakes
 from knowledge_sources.action.elevator_rider import ElevatorRider
-from world_models.entries.body import Ride
-from world_models.entries.location import Place
-from world_models.entries.task import PlanSketch, Subgoal
+from world_models.entries import Place, PlanSketch, Ride, Subgoal
 
 BELOW, ABOVE, FAR = Place("car-1", 1.0, 1.0), Place("car-2", 1.0, 1.0), Place("car-3", 0.0, 0.0)
 UP, ON = Subgoal(BELOW, ABOVE, primitive=False, passage="lift"), Subgoal(ABOVE, FAR, primitive=False, passage="lift")

@@ -13,13 +13,23 @@ from typing import Any, NamedTuple
 import pytest
 
 from acting import answer
-from blackboard.board import Blackboard, StaleError
-from blackboard.change import Change, Retracted
-from blackboard.effect import Effect, MissingEntryError, Post, Retract, Revise, type_of
-from blackboard.entry import Entry, Ref
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import (
+    Blackboard,
+    Change,
+    Discrepancy,
+    Effect,
+    Entry,
+    KnowledgeSource,
+    Level,
+    MissingEntryError,
+    Post,
+    Ref,
+    Retract,
+    Retracted,
+    Revise,
+    StaleError,
+)
+from blackboard.effect import type_of
 from harvey.replay.why_not_again import tell_of_trigger
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import resume_mission
@@ -31,9 +41,18 @@ from logs.run_directory import RunDirectory
 from rebuilt_board import CHANGES, SOURCES, copy_of, rebuild
 from recorded_runs import Recorded, cut_off
 from sim.stage import Stage
-from world_models.entries.body import BodyFault, CameraPicture, MotorCommand
-from world_models.entries.location import Hypothesis, Place
-from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch, Subgoal
+from world_models.entries import (
+    BodyFault,
+    CameraPicture,
+    Goal,
+    Hypothesis,
+    Milestone,
+    MotorCommand,
+    Outcome,
+    Place,
+    PlanSketch,
+    Subgoal,
+)
 
 pytestmark = pytest.mark.slow
 

@@ -13,30 +13,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acting import answer
-from blackboard.board import Blackboard
-from blackboard.change import Posted, Revised
-from blackboard.effect import Post, Revise
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Blackboard, Discrepancy, Entry, Level, Post, Posted, Revise, Revised
 from generated_boards import Bench, made, plain_robot
 from knowledge_sources.action.fault_handler import FaultHandler
 from knowledge_sources.action.motor import Motor
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.body import (
+from world_models.entries import (
+    GO_ON,
     STOP_KEY,
     BodyFault,
+    Command,
+    Contact,
     Course,
+    Impasse,
     MotorCommand,
+    Outcome,
     PictureRequest,
     Recovery,
-    RecoveryStatus,
+    Redirection,
     Ride,
+    diagonal,
 )
-from world_models.entries.location import diagonal
-from world_models.entries.obstacle import Contact
-from world_models.entries.task import Command, Impasse, Outcome
-from world_models.entries.user_reports import GO_ON, Redirection
+from world_models.entries.body import RecoveryStatus
 
 SOURCE, S = FaultHandler(), DEFAULT.action
 MOST = S.max_broken_motions

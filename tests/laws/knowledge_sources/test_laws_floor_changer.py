@@ -14,11 +14,9 @@ from hypothesis import strategies as st
 from generated_boards import Bench, covariances, effect_on, made, plain_robot, reasons
 from knowledge_sources.action.floor_changer import ELEVATOR_SIGMA_M, ELEVATOR_SIGMA_RAD, FloorChanger
 from towers import tower
-from world_models.building.world import World
-from world_models.entries.body import Ride, RideReport
-from world_models.entries.location import Covariance, Hypothesis, Place
-from world_models.entries.percepts import Anchor, Tracks
-from world_models.entries.task import PlanSketch, SketchStatus, Subgoal
+from world_models.building import World
+from world_models.entries import Anchor, Hypothesis, Place, PlanSketch, Ride, RideReport, SketchStatus, Subgoal, Tracks
+from world_models.entries.location import Covariance
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2

@@ -13,12 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted, Revised
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
+from blackboard import Effect, Entry, Post, Posted, Revise, Revised
 from generated_boards import HALL, STUDY, Bench, made, plain_robot, reasons, to_world, wakes
-from knowledge_sources.action import floor_watcher
-from knowledge_sources.action.floor_watcher import (
+from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD
+from knowledge_sources.model import floor_watcher
+from knowledge_sources.model.floor_watcher import (
     CORRECTED_BY,
     FLOOR_STEP_M,
     MAX_FLOOR_SIGMA_M,
@@ -26,13 +25,19 @@ from knowledge_sources.action.floor_watcher import (
     MAX_LIGHT_AGE_S,
     FloorWatcher,
 )
-from knowledge_sources.conditions import HELD
-from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD
-from knowledge_sources.motion_between import find_motion_between
-from world_models.entries.body import CameraPicture, Course, MotionReport
-from world_models.entries.floor import FloorAppearance, FloorView, FreeFloor, Light
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.robot_state import Drift
+from knowledge_sources.reads import HELD, find_motion_between
+from world_models.entries import (
+    CameraPicture,
+    Course,
+    Drift,
+    FloorAppearance,
+    FloorView,
+    FreeFloor,
+    Hypothesis,
+    Light,
+    MotionReport,
+    diagonal,
+)
 from world_models.frames import Pose2
 
 HERE = Pose2(3.0, 2.0, 0.4)

@@ -7,19 +7,13 @@ from itertools import product
 import pytest
 
 from acting import answer
-from blackboard.board import Blackboard
-from blackboard.change import Change
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Blackboard, Change, Discrepancy, Effect, Level, Post, Retract, Revise
 from generated_boards import reasons
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.action.goal_changer import GoalChanger
+from knowledge_sources.goal.goal_changer import GoalChanger
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
-from world_models.entries.location import Hypothesis, Place, diagonal
-from world_models.entries.task import Goal, Milestone
-from world_models.entries.user_reports import Redirection
+from world_models.entries import Goal, Hypothesis, Milestone, Place, Redirection, diagonal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2

@@ -7,10 +7,11 @@ from typing import get_args
 
 import pytest
 
-from blackboard.change import Posted, Revised
+from blackboard import Posted, Revised
 from generated_boards import Bench, all_reasons, effect_on, wakes
 from knowledge_sources.goal.goal_closer import GoalCloser
-from world_models.entries.task import Goal, GoalStatus, SketchStatus
+from world_models.entries import Goal, SketchStatus
+from world_models.entries.task import GoalStatus
 
 SOURCE = GoalCloser()
 

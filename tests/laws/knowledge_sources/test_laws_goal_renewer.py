@@ -8,10 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted, Revised
-from blackboard.effect import Post, Revise
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Level, Post, Posted, Revise, Revised
 from generated_boards import (
     HALL,
     WIDTH_M,
@@ -27,8 +24,7 @@ from generated_boards import (
     wakes,
 )
 from knowledge_sources.goal.goal_renewer import GoalRenewer
-from world_models.entries.location import Place
-from world_models.entries.task import Goal
+from world_models.entries import Goal, Place
 from world_models.frames import Pose2
 
 SOURCE = GoalRenewer()

@@ -8,19 +8,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted, Revised
-from blackboard.effect import Revise
+from blackboard import Posted, Revise, Revised
 from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, to_world, wakes
-from knowledge_sources.action.model_reviser import ModelReviser
-from knowledge_sources.methods.floor.revise_frame import revise_by_thing
-from knowledge_sources.plan.goal_sketcher import GoalSketcher
-from knowledge_sources.questions import find_frames
-from knowledge_sources.sketching import GOAL_TOLERANCE_M
-from world_models.building.locale_frame import LocaleFrame
-from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.location import Place
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.task import Goal, Impasse, Outcome, PlanSketch, SketchStatus
+from knowledge_sources.methods.floor import revise_by_thing
+from knowledge_sources.model.model_reviser import ModelReviser
+from knowledge_sources.reads import find_frames
+from knowledge_sources.reads.sketches import GOAL_TOLERANCE_M
+from knowledge_sources.sketcher.goal_sketcher import GoalSketcher
+from world_models.building import LocaleFrame
+from world_models.entries import (
+    DoorPicture,
+    DoorState,
+    Goal,
+    Impasse,
+    Obstacle,
+    Outcome,
+    Place,
+    PlanSketch,
+    SketchStatus,
+)
 from world_models.frames import Pose2
 
 SOURCE = GoalSketcher()

@@ -11,15 +11,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from acting import answer
-from blackboard.change import Posted, Revised
-from blackboard.effect import Revise
-from knowledge_sources.action.halt_explainer import HaltExplainer
-from knowledge_sources.floor_ahead import SEEN_MARGIN_M
+from blackboard import Posted, Revise, Revised
+from knowledge_sources.model.halt_explainer import HaltExplainer
+from knowledge_sources.reads import SEEN_MARGIN_M
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall
-from world_models.building.world import World
-from world_models.entries.obstacle import Obstacle, ObstacleStatus
-from world_models.entries.task import Leg, LegStatus
+from world_models.building import World
+from world_models.entries import Leg, Obstacle, ObstacleStatus
+from world_models.entries.task import LegStatus
 from world_models.files.world_files import WORLDS, load_world
 
 SOURCE = HaltExplainer()

@@ -9,23 +9,18 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from blackboard.change import Posted, Revised
-from blackboard.effect import Effect, Post, Revise
-from blackboard.level import Level
+from blackboard import Effect, Level, Post, Posted, Revise, Revised
 from generated_boards import Bench, effect_on, made, plain_robot, reasons, to_world, wakes
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.action.landmark_chooser import LandmarkChooser
-from knowledge_sources.methods.features.picture import read_picture
-from knowledge_sources.methods.tracking.template_tracking import select_landmarks
+from knowledge_sources.methods.features import read_picture
+from knowledge_sources.methods.tracking import select_landmarks
 from knowledge_sources.settings import DEFAULT
 from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
-from world_models.entries.body import CameraPicture
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.percepts import Anchor, Segments, Tracks
-from world_models.entries.robot_state import Drift
+from world_models.entries import Anchor, CameraPicture, Drift, Hypothesis, Segments, Tracks, diagonal
 from world_models.frames import Pose2
 
 ROOM, SURE = "robot-laboratory", diagonal(0.004, 0.002)

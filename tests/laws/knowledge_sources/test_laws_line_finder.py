@@ -8,15 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from blackboard.change import Posted, Revised
-from blackboard.entry import Entry
+from blackboard import Entry, Posted, Revised
 from generated_boards import Bench, effect_on, plain_robot, reasons, wakes
-from knowledge_sources.methods.features.lines import find_lines
-from knowledge_sources.methods.features.picture import read_picture
-from knowledge_sources.plan.line_finder import MIN_SEGMENT_LENGTH_PX, LineFinder
+from knowledge_sources.methods.features import find_lines, read_picture
+from knowledge_sources.milestone.line_finder import MIN_SEGMENT_LENGTH_PX, LineFinder
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.body import CameraPicture
-from world_models.entries.percepts import Segments
+from world_models.entries import CameraPicture, Segments
 from world_models.entries.task import MilestoneStatus
 
 SOURCE = LineFinder()

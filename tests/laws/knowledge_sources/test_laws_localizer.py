@@ -10,30 +10,31 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted
-from blackboard.effect import Post, Retract
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Entry, Level, Post, Posted, Retract
 from generated_boards import HALL, Bench, drive, go, made, motions, plain_robot, poses, reasons, to_world, wakes
-from knowledge_sources.action.model_reviser import ModelReviser
-from knowledge_sources.goal.localizer import MAX_PROBES, Localizer, _follow
-from knowledge_sources.methods.localization.global_localization import (
-    LocalizationResult,
-    LocalizationStatus,
-    PlaceCandidate,
-)
+from knowledge_sources.methods.localization import LocalizationStatus, Search
+from knowledge_sources.methods.localization.global_localization import LocalizationResult, PlaceCandidate
 from knowledge_sources.methods.localization.next_view import SensingAction
-from knowledge_sources.methods.localization.place_search import Search
 from knowledge_sources.methods.localization.refinement import PoseLikelihood
-from knowledge_sources.methods.verification.line_check import predict_lines
-from knowledge_sources.questions import find_building
+from knowledge_sources.methods.verification import predict_lines
+from knowledge_sources.model.model_reviser import ModelReviser
+from knowledge_sources.reads import find_building
+from knowledge_sources.relocalizer.localizer import MAX_PROBES, Localizer, _follow
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.entries.location import Hypothesis, PlaceOdds, PlaceSearch, diagonal
-from world_models.entries.obstacle import Contact, Obstacle, Obstruction
-from world_models.entries.percepts import Glimpse, Panorama, Segments
-from world_models.entries.task import Certificate
+from world_models.entries import (
+    Certificate,
+    Contact,
+    Glimpse,
+    Hypothesis,
+    Obstacle,
+    Obstruction,
+    Panorama,
+    PlaceOdds,
+    PlaceSearch,
+    Segments,
+    diagonal,
+)
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, flattened
 
@@ -102,7 +103,7 @@ def test_what_it_has_felt_is_part_of_the_search_and_of_the_reasons(direction: fl
         return LocalizationResult(LocalizationStatus.PROBE, (), SensingAction(1.0, 0.0, 0.0)), len([*robots]) - 1
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("knowledge_sources.goal.localizer.search", note)
+        patch.setattr("knowledge_sources.relocalizer.localizer.search", note)
         effects: Any = bench.ask(SOURCE, look_round(bench, (0.0,)))
     ((felt,),) = [what.touched for what in asked]
     assert felt == pytest.approx(ROBOT.radius_m * np.array([math.cos(direction), math.sin(direction)]))
@@ -130,8 +131,8 @@ def search_says(bench: Bench, panorama: Entry[Panorama], result: LocalizationRes
         return result, which
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("knowledge_sources.goal.localizer.search", answer)
-        patch.setattr("knowledge_sources.goal.localizer.find_far_action", lambda *_: None)
+        patch.setattr("knowledge_sources.relocalizer.localizer.search", answer)
+        patch.setattr("knowledge_sources.relocalizer.localizer.find_far_action", lambda *_: None)
         return bench.ask(SOURCE, panorama), asked
 
 
@@ -196,7 +197,7 @@ def test_what_is_looked_for_is_all_that_it_knows_of_where_it_may_be(is_hidden: b
     seen = bench.put(Segments("CameraPicture-1", "", np.concatenate([own, other]), np.full(4, 0.4), 40.0, 120.0))
     asked: list[Search] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("knowledge_sources.goal.localizer.search", lambda robots, what, _: asked.append(what) or (
+        patch.setattr("knowledge_sources.relocalizer.localizer.search", lambda robots, what, _: asked.append(what) or (
             LocalizationResult(PROBE, (), ACTION), len([*robots]) - 1))
         bench.ask(SOURCE, bench.put(Panorama((Glimpse(seen.id, Pose2(0.0, 0.0, 0.1), diagonal(0.0, 0.0)),))))
     (what,) = asked

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from blackboard.change import Posted, Revised
-from blackboard.entry import Entry
+from blackboard import Entry, Posted, Revised
 from generated_boards import (
     HALL,
     LENGTH_M,
@@ -23,13 +22,10 @@ from generated_boards import (
     wakes,
 )
 from knowledge_sources.methods.motion.subgoals import DOOR_LOOK_APART_M, MIN_DOOR_LOOK_SINE
-from knowledge_sources.plan.lookout_planner import LookoutPlanner
 from knowledge_sources.settings import DEFAULT
-from world_models.building.locale_frame import FRAME_OF
-from world_models.entries.door_state import DoorCondition, DoorPicture, DoorState
-from world_models.entries.location import Place
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.task import Impasse, PlanSketch
+from knowledge_sources.sketcher.lookout_planner import LookoutPlanner
+from world_models.building import FRAME_OF
+from world_models.entries import DoorCondition, DoorPicture, DoorState, Impasse, Obstacle, Place, PlanSketch
 from world_models.frames import Pose2
 
 SOURCE = LookoutPlanner()

@@ -10,23 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blackboard.change import Posted
-from blackboard.entry import Entry
+from blackboard import Entry, Posted
 from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
-from knowledge_sources.methods.calibration.camera_state import (
-    PRIOR_COVARIANCE_FACTOR,
-    PRIOR_SIGMA_M,
-    PRIOR_SIGMA_RAD,
-)
+from knowledge_sources.methods.calibration.camera_state import PRIOR_COVARIANCE_FACTOR, PRIOR_SIGMA_M, PRIOR_SIGMA_RAD
 from knowledge_sources.methods.localization.camera_matching import CameraMatch
-from knowledge_sources.plan import matcher
-from knowledge_sources.plan.matcher import MAX_RIGID_SIGMA_PX, Matcher
-from knowledge_sources.plan.med_r_and_t import MedRAndT
-from knowledge_sources.plan.view_predictor import ViewPredictor
+from knowledge_sources.milestone import matcher
+from knowledge_sources.milestone.matcher import MAX_RIGID_SIGMA_PX, Matcher
+from knowledge_sources.milestone.med_r_and_t import MedRAndT
+from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.location import Covariance, diagonal
-from world_models.entries.percepts import LineMatch, PoseFix, Segments
-from world_models.entries.task import Milestone, MilestoneStatus
+from world_models.entries import LineMatch, Milestone, PoseFix, Segments, diagonal
+from world_models.entries.location import Covariance
+from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

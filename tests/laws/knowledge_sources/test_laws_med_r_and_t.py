@@ -11,17 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted
-from blackboard.entry import Entry
+from blackboard import Entry, Posted
 from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
-from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance, loosen, widen
-from knowledge_sources.plan import med_r_and_t
-from knowledge_sources.plan.med_r_and_t import MedRAndT
-from knowledge_sources.plan.view_predictor import ViewPredictor
+from knowledge_sources.methods.calibration import compute_camera_covariance, loosen, widen
+from knowledge_sources.milestone import med_r_and_t
+from knowledge_sources.milestone.med_r_and_t import MedRAndT
+from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.location import diagonal
-from world_models.entries.percepts import LineMatch, PoseFix
-from world_models.entries.task import Milestone
+from world_models.entries import LineMatch, Milestone, PoseFix, diagonal
 from world_models.frames import Pose2
 
 SOURCE, ROBOT, BELIEF = MedRAndT(), plain_robot(), Pose2(2.0, 1.6, 0.15)

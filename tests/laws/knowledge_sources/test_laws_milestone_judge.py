@@ -18,47 +18,42 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.board import Blackboard, TracedView, View
-from blackboard.change import Change
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.entry import Entry
-from blackboard.entry_store import Index
-from blackboard.level import Level
-from blackboard.servoing import OPEN, Discrepancy
+from blackboard import OPEN, Blackboard, Change, Discrepancy, Effect, Entry, Index, Level, Post, Retract, Revise, View
+from blackboard.board import TracedView
 from experiments.generated.missions import OFFICE
 from generated_boards import effect_on, made, reasons
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
-from knowledge_sources.methods.belief.odds import to_log_odds, update
-from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance
+from knowledge_sources.methods.belief import to_log_odds, update
+from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.localization.aliasing import Alias
-from knowledge_sources.methods.verification.pose_confidence import POSE_CONFIDENCE, compute_motion_tolerance_px
-from knowledge_sources.methods.verification.weigh import (
-    MAX_P_UNMISTAKABLE,
-    Verdict,
-    Weighed,
-    _find_tolerance_px,
-    _median_shift,
-    is_last_look,
-    judge_place,
-)
-from knowledge_sources.place_believed import find_p_not_alias
-from knowledge_sources.plan import milestone_judge
-from knowledge_sources.plan.milestone_judge import (
+from knowledge_sources.methods.verification import POSE_CONFIDENCE, Verdict, Weighed, is_last_look, judge_place
+from knowledge_sources.methods.verification.pose_confidence import compute_motion_tolerance_px
+from knowledge_sources.methods.verification.weigh import MAX_P_UNMISTAKABLE, _find_tolerance_px, _median_shift
+from knowledge_sources.milestone import milestone_judge
+from knowledge_sources.milestone.milestone_judge import (
     MAX_P_FALSE_CLEAR,
     MAX_P_FALSE_UNMISTAKABLE,
     Case,
     MilestoneJudge,
 )
-from knowledge_sources.questions import HELD, find_belief, find_camera, find_followed
+from knowledge_sources.reads import HELD, find_belief, find_camera, find_followed, find_p_not_alias
 from knowledge_sources.settings import DEFAULT, Settings
 from rebuilt_board import copy_of
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 from world_models.camera import YAW
-from world_models.entries.location import Hypothesis, Travel, diagonal
-from world_models.entries.percepts import Segments, Track, Tracks
-from world_models.entries.task import Certificate, Milestone, MilestoneVerdict
+from world_models.entries import (
+    Certificate,
+    Hypothesis,
+    Milestone,
+    MilestoneVerdict,
+    Segments,
+    Track,
+    Tracks,
+    Travel,
+    diagonal,
+)
 from world_models.frames import Pose2
 
 T = TypeVar("T")

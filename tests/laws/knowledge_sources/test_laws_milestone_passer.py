@@ -9,21 +9,30 @@ from typing import Any
 import pytest
 
 from acting import answer
-from blackboard.board import Blackboard
-from blackboard.change import Change, Posted, Revised
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Blackboard, Change, Discrepancy, Effect, Level, Post, Posted, Retract, Revise, Revised
 from generated_boards import Bench, all_reasons, plain_robot, reasons, wakes
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.plan.milestone_passer import MilestonePasser
+from knowledge_sources.reads import has_missed
+from knowledge_sources.reads.sketches import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS
 from knowledge_sources.settings import DEFAULT
-from knowledge_sources.sketching import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS, has_missed
+from knowledge_sources.sketcher.milestone_passer import MilestonePasser
 from sim.scenario import load_scenario
-from world_models.entries.body import MotionReport
-from world_models.entries.location import Hypothesis, Place, PlaceSearch, diagonal
-from world_models.entries.obstacle import Obstacle, ObstacleStatus
-from world_models.entries.task import Goal, Impasse, Milestone, MilestoneStatus, PlanSketch, SketchStatus, Subgoal
+from world_models.entries import (
+    Goal,
+    Hypothesis,
+    Impasse,
+    Milestone,
+    MotionReport,
+    Obstacle,
+    ObstacleStatus,
+    Place,
+    PlaceSearch,
+    PlanSketch,
+    SketchStatus,
+    Subgoal,
+    diagonal,
+)
+from world_models.entries.task import MilestoneStatus
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from blackboard.change import Posted, Quiescence, Revised
-from blackboard.entry import Entry
-from blackboard.level import Level
+from blackboard import Entry, Level, Posted, Quiescence, Revised
 from generated_boards import HALL, Bench, all_reasons, made, plain_robot, wakes
 from knowledge_sources.goal.mission_monitor import MissionMonitor
-from world_models.entries.location import Hypothesis, Twin, TwinOdds, diagonal
-from world_models.entries.obstacle import Obstruction
-from world_models.entries.task import Impasse, Outcome
+from world_models.entries import Hypothesis, Impasse, Obstruction, Outcome, Twin, TwinOdds, diagonal
 from world_models.frames import Pose2
 
 SOURCE = MissionMonitor()

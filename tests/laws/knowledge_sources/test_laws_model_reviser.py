@@ -11,16 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acting import answer
-from blackboard.change import Posted, Retracted, Revised
-from blackboard.effect import Post, Revise
-from knowledge_sources.action.model_reviser import ModelReviser
+from blackboard import Post, Posted, Retracted, Revise, Revised
+from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall
-from world_models.building.locale_frame import FRAME_OF, FrameChange, LocaleFrame
-from world_models.building.world import World
-from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.user_reports import UserReport
+from world_models.building import FRAME_OF, FrameChange, LocaleFrame, World
+from world_models.entries import DoorPicture, DoorState, Obstacle, UserReport
 from world_models.files.world_files import WORLDS, load_world
 
 SOURCE = ModelReviser()

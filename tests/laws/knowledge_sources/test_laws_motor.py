@@ -11,11 +11,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted, Revised
-from blackboard.effect import Effect
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Effect, Entry, Level, Posted, Revised
 from generated_boards import (
     HALL,
     Bench,
@@ -33,17 +29,15 @@ from generated_boards import (
 )
 from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.motor import Motor
-from knowledge_sources.floor_ahead import MIN_INCREMENT_M, TOUCH_HOLDS_M, UNSURE_GAP_M, FloorAhead
-from knowledge_sources.methods.floor.seen_floor import find_floor
-from knowledge_sources.methods.motion.increments import MAX_HEADING_ERROR_RAD, count_increment, plan_increment
+from knowledge_sources.methods.floor import find_floor
+from knowledge_sources.methods.motion import MAX_HEADING_ERROR_RAD, count_increment, plan_increment
 from knowledge_sources.methods.motion.pure_pursuit import MAX_START_OFFSET_M
+from knowledge_sources.reads import FloorAhead
+from knowledge_sources.reads.floor_ahead import MIN_INCREMENT_M, TOUCH_HOLDS_M, UNSURE_GAP_M
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.entries.body import MotorCommand
-from world_models.entries.location import Place
-from world_models.entries.obstacle import Contact, Obstacle
-from world_models.entries.robot_state import Drift
-from world_models.entries.task import Leg, Milestone, MilestoneStatus
+from world_models.entries import Contact, Drift, Leg, Milestone, MotorCommand, Obstacle, Place
+from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 
 ACTUATOR = ActuatorModel()

@@ -8,15 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blackboard.change import Posted
-from blackboard.effect import Post
-from blackboard.entry import Entry
-from blackboard.level import Level
+from blackboard import Entry, Level, Post, Posted
 from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
-from knowledge_sources.plan.obstruction_finder import MIN_OBSTRUCTION_LOOKS, ObstructionFinder
-from world_models.entries.floor import FloorThing, FreeFloor
-from world_models.entries.obstacle import Obstacle, Obstruction
-from world_models.entries.percepts import Segments
+from knowledge_sources.milestone.obstruction_finder import MIN_OBSTRUCTION_LOOKS, ObstructionFinder
+from world_models.entries import FloorThing, FreeFloor, Obstacle, Obstruction, Segments
 
 SOURCE = ObstructionFinder()
 CORNERS = np.array([(70.0, 90.0), (190.0, 90.0), (190.0, 230.0), (70.0, 230.0)])

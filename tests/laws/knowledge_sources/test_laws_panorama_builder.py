@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from blackboard.change import Posted
-from blackboard.entry import Entry
+from blackboard import Entry, Posted
 from generated_boards import Bench, drive, effect_on, go, motions, plain_robot, reasons, wakes
-from knowledge_sources.goal.panorama_builder import PanoramaBuilder
+from knowledge_sources.relocalizer.panorama_builder import PanoramaBuilder
 from world_models.actuator import ActuatorModel
-from world_models.entries.percepts import Panorama, Segments
+from world_models.entries import Panorama, Segments
 from world_models.frames import Pose2
 
 SOURCE = PanoramaBuilder()

@@ -11,11 +11,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted, Revised
-from blackboard.effect import Effect, Revise
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Effect, Entry, Level, Posted, Revise, Revised
 from generated_boards import (
     HALL,
     Bench,
@@ -37,16 +33,14 @@ from knowledge_sources.action.path_follower import (
     ROLLING_LOOKAHEAD_M,
     PathFollower,
 )
-from knowledge_sources.floor_ahead import FloorAhead
-from knowledge_sources.methods.floor.seen_floor import find_floor
-from knowledge_sources.methods.motion.pure_pursuit import MAX_CURVATURE_PER_M, ROLLING_STOP_MARGIN_M, choose_speed
+from knowledge_sources.methods.floor import find_floor
+from knowledge_sources.methods.motion import ROLLING_STOP_MARGIN_M, choose_speed
+from knowledge_sources.methods.motion.pure_pursuit import MAX_CURVATURE_PER_M
 from knowledge_sources.priority import Priority
+from knowledge_sources.reads import FloorAhead
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.entries.body import Course, MotionReport, MotorCommand
-from world_models.entries.location import Place
-from world_models.entries.robot_state import Drift
-from world_models.entries.task import Leg, Outcome
+from world_models.entries import Course, Drift, Leg, MotionReport, MotorCommand, Outcome, Place
 from world_models.frames import Pose2
 
 ACTUATOR = ActuatorModel()

@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from blackboard.change import Posted
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Entry, Level, Posted
 from generated_boards import (
     Bench,
     covariances,
@@ -24,10 +21,9 @@ from generated_boards import (
     to_world,
     wakes,
 )
-from knowledge_sources.plan.plan_adjuster import PlanAdjuster
-from world_models.entries.location import Covariance, Hypothesis
-from world_models.entries.percepts import PoseFix
-from world_models.entries.task import Certificate, MilestoneVerdict
+from knowledge_sources.milestone.plan_adjuster import PlanAdjuster
+from world_models.entries import Certificate, Hypothesis, MilestoneVerdict, PoseFix
+from world_models.entries.location import Covariance
 from world_models.frames import Pose2
 
 SOURCE = PlanAdjuster()

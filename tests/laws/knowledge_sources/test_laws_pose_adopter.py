@@ -9,13 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted
-from blackboard.effect import Retract, Revise
-from blackboard.entry import Entry
+from blackboard import Entry, Posted, Retract, Revise
 from generated_boards import HALL, STUDY, Bench, covariances, effect_on, made, plain_robot, poses, reasons, wakes
-from knowledge_sources.goal.pose_adopter import PoseAdopter
-from world_models.entries.location import Covariance, Hypothesis, PlaceSearch, diagonal
-from world_models.entries.robot_state import CameraState
+from knowledge_sources.relocalizer.pose_adopter import PoseAdopter
+from world_models.entries import CameraState, Hypothesis, PlaceSearch, diagonal
+from world_models.entries.location import Covariance
 from world_models.frames import Pose2
 
 SOURCE = PoseAdopter()

@@ -5,15 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from blackboard.change import Change, Posted, Revised
-from blackboard.entry import Entry
-from blackboard.level import Level
+from blackboard import Change, Entry, Level, Posted, Revised
 from generated_boards import Bench, all_reasons, plain_robot, wakes
-from knowledge_sources.goal.probe_photographer import MAX_DARK_FRAMES, ProbePhotographer
+from knowledge_sources.reads import is_dark
+from knowledge_sources.relocalizer.probe_photographer import MAX_DARK_FRAMES, ProbePhotographer
 from knowledge_sources.settings import DEFAULT
-from knowledge_sources.while_lost import is_dark
-from world_models.entries.body import PictureRequest
-from world_models.entries.percepts import Segments
+from world_models.entries import PictureRequest, Segments
 
 SOURCE = ProbePhotographer()
 

@@ -8,13 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard.change import Posted
-from blackboard.level import Level
+from blackboard import Level, Posted
 from generated_boards import Bench, all_reasons, plain_robot, wakes
-from knowledge_sources.goal.prober import Prober
+from knowledge_sources.relocalizer.prober import Prober
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.body import MotorCommand
-from world_models.entries.location import PlaceSearch
+from world_models.entries import MotorCommand, PlaceSearch
 
 CREEP = DEFAULT.action.creep_speed_m_per_s
 

@@ -22,17 +22,15 @@ from generated_boards import (
     plain_robot,
     to_world,
 )
-from knowledge_sources.action.range_watcher import (
+from knowledge_sources.methods.floor import see_ranges
+from knowledge_sources.model.range_watcher import (
     MAX_BELIEF_SIGMA_M,
     MAX_EARLIER_READINGS,
     MAX_RANGE_AGE_S,
     RangeWatcher,
 )
-from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.floor import FreeFloor
-from world_models.entries.location import diagonal
-from world_models.entries.obstacle import Ranges
+from world_models.entries import FreeFloor, Ranges, diagonal
 from world_models.frames import Pose2
 
 RING = tuple(math.radians(a) for a in range(-150, 151, 30))

@@ -5,12 +5,10 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 
-from blackboard.change import Posted, Revised
-from blackboard.entry import Entry
+from blackboard import Entry, Posted, Revised
 from generated_boards import HALL, HOUSE, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, wakes
-from knowledge_sources.plan.refiner import Refiner
-from world_models.entries.location import Place
-from world_models.entries.task import Impasse, Outcome, PlanSketch, Subgoal
+from knowledge_sources.sketcher.refiner import Refiner
+from world_models.entries import Impasse, Outcome, Place, PlanSketch, Subgoal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2

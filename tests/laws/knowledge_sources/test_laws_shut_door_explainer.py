@@ -9,12 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from blackboard.change import Revised
-from blackboard.entry import Entry
-from blackboard.level import Level
+from blackboard import Entry, Level, Revised
 from generated_boards import Bench, effect_on, made, reasons, wakes
-from knowledge_sources.plan.line_finder import LineFinder
-from knowledge_sources.plan.shut_door_explainer import (
+from knowledge_sources.milestone.line_finder import LineFinder
+from knowledge_sources.model.shut_door_explainer import (
     MAX_DOUBTED_SIGMA_M,
     MAX_DOUBTED_SIGMA_RAD,
     REFUTED_LOG_RATIO,
@@ -26,12 +24,8 @@ from sim.ground_truth.true_changes import build_leaf
 from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
-from world_models.building.locales import Doorway
-from world_models.entries.body import CameraPicture
-from world_models.entries.door_state import DoorState
-from world_models.entries.location import diagonal
-from world_models.entries.percepts import Segments
-from world_models.entries.task import Milestone
+from world_models.building import Doorway
+from world_models.entries import CameraPicture, DoorState, Milestone, Segments, diagonal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, flattened
 from world_models.robot import RobotModel

@@ -7,11 +7,11 @@ from typing import get_args
 
 import pytest
 
-from blackboard.change import Posted, Revised
+from blackboard import Posted, Revised
 from generated_boards import HALL, Bench, all_reasons, effect_on, wakes
-from knowledge_sources.plan.sketch_advancer import SketchAdvancer
-from world_models.entries.location import Place
-from world_models.entries.task import LegStatus, PlanSketch, SketchStatus
+from knowledge_sources.sketcher.sketch_advancer import SketchAdvancer
+from world_models.entries import Place, PlanSketch, SketchStatus
+from world_models.entries.task import LegStatus
 
 SOURCE = SketchAdvancer()
 WAY = tuple(Place(HALL, 1.0 + x, 2.0) for x in range(4))

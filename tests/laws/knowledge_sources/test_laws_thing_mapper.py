@@ -11,13 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acting import answer
-from blackboard.change import Posted, Revised
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Entry
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
-from knowledge_sources.action.thing_mapper import ThingMapper
-from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M
+from blackboard import Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised
+from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M
 from knowledge_sources.methods.floor.weigh_sight import (
     ALIKE_FREE_ODDS,
     FREE_FLOOR_ODDS,
@@ -25,14 +20,22 @@ from knowledge_sources.methods.floor.weigh_sight import (
     MAX_OBSTACLE_SIGMA_M,
     MIN_WAY_M,
 )
+from knowledge_sources.model.thing_mapper import ThingMapper
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall, carton
-from world_models.building.world import World
-from world_models.entries.body import CameraPicture
-from world_models.entries.floor import FloorSense, FreeFloor
-from world_models.entries.location import Place
-from world_models.entries.obstacle import Obstacle, ObstacleStatus
-from world_models.entries.task import Goal, Leg, PlanSketch, Subgoal
+from world_models.building import World
+from world_models.entries import (
+    CameraPicture,
+    FreeFloor,
+    Goal,
+    Leg,
+    Obstacle,
+    ObstacleStatus,
+    Place,
+    PlanSketch,
+    Subgoal,
+)
+from world_models.entries.floor import FloorSense
 from world_models.files.world_files import WORLDS, load_world
 
 SOURCE, S = ThingMapper(), DEFAULT.action

@@ -12,16 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acting import answer
-from blackboard.board import Blackboard
-from blackboard.change import Posted, Revised
-from blackboard.effect import Post, Revise
-from knowledge_sources.action.thing_mover import MAX_DRIFT_M, MAX_DRIFT_RAD, ThingMover
-from knowledge_sources.methods.floor.found_things import move_thing
+from blackboard import Blackboard, Post, Posted, Revise, Revised
+from knowledge_sources.methods.floor import move_thing
+from knowledge_sources.model.thing_mover import MAX_DRIFT_M, MAX_DRIFT_RAD, ThingMover
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.obstacle import Obstacle, ObstacleStatus
-from world_models.entries.task import Certificate, MilestoneVerdict
+from world_models.entries import Certificate, Hypothesis, MilestoneVerdict, Obstacle, ObstacleStatus, diagonal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2

@@ -8,11 +8,10 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard.change import Posted, Revised
-from blackboard.level import Level
+from blackboard import Level, Posted, Revised
 from generated_boards import Bench, all_reasons, wakes
-from knowledge_sources.action.travel_breaker import TravelBreaker
-from world_models.entries.location import begin_travel, diagonal
+from knowledge_sources.robot.travel_breaker import TravelBreaker
+from world_models.entries import begin_travel, diagonal
 from world_models.frames import Pose2
 
 lengths = st.floats(0.0, 9.0)

@@ -8,17 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted, Revised
-from blackboard.effect import Effect
-from blackboard.entry import Entry
-from blackboard.level import Level
+from blackboard import Effect, Entry, Level, Posted, Revised
 from generated_boards import Bench, effect_on, mirrored, mirrored_place, plain_robot, poses, reasons, to_world, wakes
-from knowledge_sources.looking import MAX_LOOK_ERROR_RAD
-from knowledge_sources.methods.verification.view_quality import turn_headings
-from knowledge_sources.plan.view_chooser import ViewChooser
+from knowledge_sources.methods.verification import turn_headings
+from knowledge_sources.milestone_selector.view_chooser import ViewChooser
+from knowledge_sources.reads import MAX_LOOK_ERROR_RAD
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.location import Place
-from world_models.entries.task import Milestone, MilestoneStatus, Outcome, PlanSketch, Subgoal
+from world_models.entries import Milestone, Outcome, Place, PlanSketch, Subgoal
+from world_models.entries.task import MilestoneStatus
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, wrap_angle
 

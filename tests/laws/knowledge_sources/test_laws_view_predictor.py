@@ -7,14 +7,12 @@ import math
 import pytest
 from hypothesis import given, settings
 
-from blackboard.change import Posted, Revised
-from blackboard.level import Level
+from blackboard import Level, Posted, Revised
 from generated_boards import Bench, effect_on, made, plain_robot, poses, reasons, to_world, wakes
-from knowledge_sources.looking import MAX_LOOK_ERROR_RAD
-from knowledge_sources.plan.view_predictor import ViewPredictor
-from world_models.entries.body import PictureRequest
-from world_models.entries.obstacle import Obstruction
-from world_models.entries.task import Milestone, MilestoneStatus, Outcome
+from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
+from knowledge_sources.reads import MAX_LOOK_ERROR_RAD
+from world_models.entries import Milestone, Obstruction, Outcome, PictureRequest
+from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 
 SOURCE = ViewPredictor()

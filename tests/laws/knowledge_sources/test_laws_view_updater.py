@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from blackboard.change import Posted, Revised
-from blackboard.entry import Entry
+from blackboard import Entry, Posted, Revised
 from generated_boards import Bench, effect_on, plain_robot, reasons, to_world, wakes
-from knowledge_sources.plan.view_predictor import ViewPredictor
-from knowledge_sources.plan.view_updater import ViewUpdater
-from world_models.entries.obstacle import Obstruction
-from world_models.entries.task import Milestone, MilestoneStatus
+from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
+from knowledge_sources.milestone_selector.view_updater import ViewUpdater
+from world_models.entries import Milestone, Obstruction
+from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 
 SOURCE = ViewUpdater()

@@ -11,15 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Posted, Revised
-from blackboard.effect import Effect
-from blackboard.entry import Entry
+from blackboard import Effect, Entry, Posted, Revised
 from generated_boards import Bench, effect_on, house, made, plain_robot, reasons, wakes
-from knowledge_sources.action.yaw_calibrator import YawCalibrator
+from knowledge_sources.robot.yaw_calibrator import YawCalibrator
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import CAMERA_UNKNOWNS, YAW
-from world_models.entries.location import Hypothesis, Travel, covariance_tuple, diagonal
-from world_models.entries.robot_state import CameraState, Drift
+from world_models.entries import CameraState, Drift, Hypothesis, Travel, covariance_tuple, diagonal
 from world_models.frames import Pose2
 
 S = DEFAULT.camera_state

@@ -14,7 +14,7 @@ from knowledge_sources.methods.localization.pose_candidates import (
     compute_chamfer_scores,
     sample_lines,
 )
-from knowledge_sources.methods.verification.line_check import compute_agreement, compute_coverage, compute_view_quality
+from knowledge_sources.methods.verification import compute_agreement, compute_coverage, compute_view_quality
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 

@@ -11,18 +11,15 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.localization import aliasing
+from knowledge_sources.methods.localization import aliasing, find_repetitions, list_aliases, precompute_views
 from knowledge_sources.methods.localization.aliasing import (
     VIEW_GRID_M,
     VIEW_GRID_RAD,
     Alias,
-    find_repetitions,
-    list_aliases,
-    precompute_views,
     predict_views_on_grid,
     score_view,
 )
-from knowledge_sources.methods.verification.line_check import compute_coverage, predict_lines
+from knowledge_sources.methods.verification import compute_coverage, predict_lines
 from knowledge_sources.settings import DEFAULT
 from towers import tower
 from world_models.actuator import ActuatorModel

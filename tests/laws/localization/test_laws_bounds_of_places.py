@@ -14,35 +14,33 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Level
 from experiments.generated.floors import generated_floor
-from knowledge_sources.methods.localization import place_search
+from knowledge_sources.methods.localization import (
+    LocalizationStatus,
+    StatedPlace,
+    compute_prior,
+    describe,
+    find_far_action,
+    place_search,
+    prefer_reachable,
+    weigh_told,
+)
 from knowledge_sources.methods.localization.global_localization import (
     LocalizationResult,
-    LocalizationStatus,
     PlaceCandidate,
     decide,
     rank_candidates,
 )
 from knowledge_sources.methods.localization.next_view import SensingAction
-from knowledge_sources.methods.localization.place_odds import (
-    LOG_PLACES,
-    StatedPlace,
-    compute_place_odds,
-    compute_prior,
-    is_within_reach,
-    weigh_told,
-)
-from knowledge_sources.methods.localization.place_search import describe, find_far_action, prefer_reachable
+from knowledge_sources.methods.localization.place_odds import LOG_PLACES, compute_place_odds, is_within_reach
 from knowledge_sources.methods.localization.refinement import PoseLikelihood
-from knowledge_sources.place_believed import count_refuted, find_p_not_alias, find_p_there
+from knowledge_sources.reads import count_refuted, find_p_not_alias, find_p_there
+from knowledge_sources.reads import is_dark as is_picture_dark
 from knowledge_sources.settings import DEFAULT
-from knowledge_sources.while_lost import is_dark as is_picture_dark
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.entries.location import PlaceOdds, TwinOdds
-from world_models.entries.percepts import Segments
+from world_models.entries import PlaceOdds, Segments, TwinOdds
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

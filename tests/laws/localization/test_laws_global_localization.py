@@ -12,9 +12,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from experiments.generated.floors import generated_floor
-from knowledge_sources.methods.features.manhattan import RIGHT_ANGLE_RAD, find_level_direction
-from knowledge_sources.methods.localization import refinement
-from knowledge_sources.methods.localization.global_localization import LocalizationStatus, find_aliases, localize
+from knowledge_sources.methods.features import RIGHT_ANGLE_RAD, find_level_direction
+from knowledge_sources.methods.localization import (
+    CameraView,
+    LocalizationStatus,
+    are_distinct,
+    get_visibility_map,
+    propagate_pose,
+    refinement,
+)
+from knowledge_sources.methods.localization.global_localization import find_aliases, localize
 from knowledge_sources.methods.localization.next_view import (
     PoseHypothesis,
     SensingAction,
@@ -25,10 +32,9 @@ from knowledge_sources.methods.localization.next_view import (
     make_safety_check,
     normalize_log_likelihoods,
 )
-from knowledge_sources.methods.localization.pose_candidates import are_distinct, get_visibility_map
 from knowledge_sources.methods.localization.refinement import PoseLikelihood, refine_pose, refine_view_motions
-from knowledge_sources.methods.localization.views import CameraView, align_headings, propagate_pose
-from knowledge_sources.methods.verification.line_check import predict_lines
+from knowledge_sources.methods.localization.views import align_headings
+from knowledge_sources.methods.verification import predict_lines
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world

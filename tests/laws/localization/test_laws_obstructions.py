@@ -9,24 +9,23 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from knowledge_sources.methods.localization import CameraView, update_obstruction
 from knowledge_sources.methods.localization.views import (
     MAX_OBSTRUCTION_AREA,
     MIN_GROWTH,
-    CameraView,
     find_obstruction,
     has_counterpart,
     is_opaque,
-    update_obstruction,
 )
-from knowledge_sources.methods.verification.line_check import predict_lines
-from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
+from knowledge_sources.methods.verification import predict_face_colors, predict_lines
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.entries.obstacle import MOST_HIDDEN, Obstruction
+from world_models.entries import Obstruction
+from world_models.entries.obstacle import MOST_HIDDEN
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
-from world_models.visibility.lines_and_points import visible_points
+from world_models.visibility import visible_points
 
 Floats = NDArray[np.float64]
 WORLD = load_world(WORLDS / "research_center.toml", details=[])

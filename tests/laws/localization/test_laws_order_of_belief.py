@@ -10,23 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.generated.floors import generated_floor
-from knowledge_sources.methods.localization import pose_candidates
-from knowledge_sources.methods.localization.global_localization import (
-    LocalizationResult,
-    LocalizationStatus,
-    localize,
-)
-from knowledge_sources.methods.localization.pose_candidates import (
-    MIN_SIEVED,
-    VisibilityMap,
-    find_pose_candidates,
-    get_visibility_map,
-)
-from knowledge_sources.methods.localization.views import CameraView
-from knowledge_sources.methods.verification.line_check import predict_lines
+from knowledge_sources.methods.localization import CameraView, LocalizationStatus, get_visibility_map, pose_candidates
+from knowledge_sources.methods.localization.global_localization import LocalizationResult, localize
+from knowledge_sources.methods.localization.pose_candidates import MIN_SIEVED, VisibilityMap, find_pose_candidates
+from knowledge_sources.methods.verification import predict_lines
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.building.building import Building
+from world_models.building import Building
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel

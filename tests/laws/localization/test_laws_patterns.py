@@ -7,15 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.verification.line_check import (
+from knowledge_sources.methods.verification import (
     LINE_TOLERANCE_RAD,
-    MAX_PATTERN_PART,
     MIN_COVERED_FRACTION,
-    PATTERN_REACH_PX,
-    PATTERN_STEP_PX,
     compute_coverage,
     find_distinct,
 )
+from knowledge_sources.methods.verification.line_check import MAX_PATTERN_PART, PATTERN_REACH_PX, PATTERN_STEP_PX
 from knowledge_sources.settings import DEFAULT
 
 Floats = NDArray[np.float64]

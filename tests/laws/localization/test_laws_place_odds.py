@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.localization.place_odds import compute_place_odds, compute_prior, is_within_reach
+from knowledge_sources.methods.localization import compute_prior
+from knowledge_sources.methods.localization.place_odds import compute_place_odds, is_within_reach
 from knowledge_sources.settings import DEFAULT
 from world_models.frames import Pose2
 

@@ -12,35 +12,30 @@ from hypothesis import strategies as st
 
 from experiments.generated.floors import generated_floor
 from experiments.perception.milestones_calibrate import fit_weights, remove_colors
-from knowledge_sources.methods.verification.color_check import (
-    NOT_TESTED,
-    ColorCheck,
-    check_colors,
-    predict_color_check,
-)
-from knowledge_sources.methods.verification.line_check import (
-    Agreement,
-    check_lines,
-    find_errors,
-    list_names,
-    predict_lines,
-)
-from knowledge_sources.methods.verification.pose_confidence import (
+from knowledge_sources.methods.verification import (
     EVIDENCE_NAMES,
     POSE_CONFIDENCE,
     TERMS,
+    Agreement,
     PoseEvidence,
+    check_colors,
+    check_lines,
     compute_evidence,
-    compute_motion_tolerance_px,
     compute_terms,
+    find_errors,
+    list_names,
+    predict_color_check,
+    predict_face_colors,
+    predict_lines,
+    predict_milestone,
 )
-from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from knowledge_sources.methods.verification.view_quality import predict_milestone
+from knowledge_sources.methods.verification.color_check import NOT_TESTED, ColorCheck
+from knowledge_sources.methods.verification.pose_confidence import compute_motion_tolerance_px
 from knowledge_sources.settings import DEFAULT
 from sim.render.renderer import Renderer
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
-from world_models.entries.task import Milestone
+from world_models.entries import Milestone
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2

@@ -12,15 +12,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.motion.routes import (
-    AWAY_PART,
-    AWAY_STEP_M,
-    SLACK_M,
-    TOUCHED_M,
-    compute_free_space,
-    find_shortest_route,
-    is_clear,
-)
+from knowledge_sources.methods.motion import SLACK_M, compute_free_space, is_clear
+from knowledge_sources.methods.motion.routes import AWAY_PART, AWAY_STEP_M, TOUCHED_M, find_shortest_route
 
 ROOM = [(0.0, 0.0), (8.0, 0.0), (8.0, 6.0), (0.0, 6.0)]
 coordinate = st.floats(0.6, 5.4)

@@ -12,12 +12,8 @@ from scipy.integrate import quad
 from scipy.optimize import approx_fprime
 from scipy.stats import beta
 
-from knowledge_sources.methods.verification import line_check
-from knowledge_sources.methods.verification.line_check import (
-    EPSILON_INFORMATION,
-    compute_log_ratio,
-    compute_view_quality,
-)
+from knowledge_sources.methods.verification import compute_log_ratio, compute_view_quality, line_check
+from knowledge_sources.methods.verification.line_check import EPSILON_INFORMATION
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from knowledge_sources.methods.localization.pose_candidates import get_visibility_map
+from knowledge_sources.methods.localization import CameraView, get_visibility_map, propagate_pose
 from knowledge_sources.methods.localization.refinement import refine_pose
-from knowledge_sources.methods.localization.views import CameraView, align_headings, join_covariances, propagate_pose
-from knowledge_sources.methods.verification.line_check import predict_lines
+from knowledge_sources.methods.localization.views import align_headings, join_covariances
+from knowledge_sources.methods.verification import predict_lines
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world

@@ -7,17 +7,11 @@ import math
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.motion.pure_pursuit import (
-    compute_bearing,
-    compute_chord_turn,
-    compute_curvature_to,
-    find_aim_point,
-    measure_progress,
-)
+from knowledge_sources.methods.motion import compute_bearing, find_aim_point, measure_progress
+from knowledge_sources.methods.motion.pure_pursuit import compute_chord_turn, compute_curvature_to
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel, arc
-from world_models.entries.robot_state import Drift
-from world_models.entries.task import Leg
+from world_models.entries import Drift, Leg
 from world_models.frames import Pose2
 
 ACTUATOR, LOOKAHEAD_M = ActuatorModel(), DEFAULT.action.lookahead_m

@@ -12,7 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generated_boards import HALL, HOUSE, LENGTH_M, STUDY, WIDTH_M, Bench, plain_robot, to_world
-from knowledge_sources.methods.floor.seen_floor import find_floor, measure_first_seen_m, sees
+from knowledge_sources.methods.floor import find_floor, measure_first_seen_m
+from knowledge_sources.methods.floor.seen_floor import sees
+from knowledge_sources.methods.motion import SubgoalPlanner
 from knowledge_sources.methods.motion.subgoals import (
     LOOKOUT_DIRECTIONS,
     LOOKOUT_DISTANCES_M,
@@ -20,12 +22,11 @@ from knowledge_sources.methods.motion.subgoals import (
     MIN_DOORWAY_CLEARANCE_M,
     MIN_LOOKOUT_CHANGE_M,
     WAY_TOLERANCE_M,
-    SubgoalPlanner,
 )
-from knowledge_sources.questions import find_robot
+from knowledge_sources.reads import find_robot
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera, CameraMount
-from world_models.entries.location import Place
+from world_models.entries import Place
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2

@@ -19,11 +19,10 @@ from knowledge_sources.methods.localization.next_view import (
     SensingAction,
     make_safety_check,
 )
-from knowledge_sources.while_lost import list_contacts, locate_contact
+from knowledge_sources.reads import list_contacts, locate_contact
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import MotionReport
-from world_models.entries.obstacle import AROUND_SIGMA_RAD, Contact
+from world_models.entries import AROUND_SIGMA_RAD, Contact, MotionReport
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
@@ -92,7 +91,7 @@ def test_a_contact_stays_where_it_was_felt_as_the_robot_moves(
         step = ROBOT.actuator.predict_motion(turn, move)
         at = (at - complex(step.x_m, step.y_m)) * cmath.exp(-1j * step.heading_rad)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("knowledge_sources.while_lost.find_robot", lambda view: ROBOT)
+        patch.setattr("knowledge_sources.reads.lost.find_robot", lambda view: ROBOT)
         found = locate_contact(board([touch], [own, *later]), touch)
     assert found == pytest.approx(np.array([at.real, at.imag]), abs=1e-9)
 

@@ -9,25 +9,26 @@ import numpy as np
 import pytest
 
 from generated_boards import Bench, effect_on, plain_robot
-from knowledge_sources.methods.verification import view_quality
-from knowledge_sources.methods.verification.line_check import ViewQuality, predict_lines
-from knowledge_sources.methods.verification.view_quality import (
-    MAX_COUNTED_CONTRAST,
-    MAX_COUNTED_LENGTH_PX,
+from knowledge_sources.methods.verification import (
     MAX_SIGMA_PART,
     MAX_SIGMA_RAD,
     MIN_LINES,
     choose_heading,
-    is_good_view,
+    predict_lines,
     predict_milestone,
+    view_quality,
 )
-from knowledge_sources.plan.view_predictor import ViewPredictor
-from knowledge_sources.plan.view_updater import ViewUpdater
+from knowledge_sources.methods.verification.line_check import ViewQuality
+from knowledge_sources.methods.verification.view_quality import (
+    MAX_COUNTED_CONTRAST,
+    MAX_COUNTED_LENGTH_PX,
+    is_good_view,
+)
+from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
+from knowledge_sources.milestone_selector.view_updater import ViewUpdater
 from knowledge_sources.settings import DEFAULT
 from towers import tower
-from world_models.entries.location import Place
-from world_models.entries.obstacle import Obstruction
-from world_models.entries.task import Milestone, PlanSketch, Subgoal
+from world_models.entries import Milestone, Obstruction, Place, PlanSketch, Subgoal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world
 from world_models.frames import Pose2

@@ -5,11 +5,10 @@ from __future__ import annotations
 import pytest
 
 from generated_boards import HALL, house, plain_robot, to_world
-from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M, meets
+from knowledge_sources.methods.motion import meets
+from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M
 from knowledge_sources.settings import DEFAULT
-from world_models.entries.location import Place
-from world_models.entries.obstacle import Obstacle, ObstacleStatus
-from world_models.entries.task import PlanSketch, Subgoal
+from world_models.entries import Obstacle, ObstacleStatus, Place, PlanSketch, Subgoal
 from world_models.frames import Pose2
 
 ROBOT, PLAN, SMALL, HALF_M = plain_robot(), DEFAULT.plan, 1e-4, 0.2

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from experiments.paper.paper_matching import PaperSearch, match_as_paper
-from knowledge_sources.methods.matching import Match, Peak, Similarity2, match_lines
-from knowledge_sources.methods.matching.search import compute_best_fits
+from knowledge_sources.methods.matching import Match, Peak, Similarity2, compute_best_fits, match_lines
 from knowledge_sources.settings import MatchingSettings
 
 Array = NDArray[np.float64]

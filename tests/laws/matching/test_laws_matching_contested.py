@@ -15,13 +15,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from experiments.paper.paper_matching import PaperSearch, PaperTerms, build_paper_terms
-from knowledge_sources.methods.matching import Peak, match_lines
+from knowledge_sources.methods.matching import PairSpace, Peak, Terms, match_lines
 from knowledge_sources.methods.matching.matching_kernels import RIGID
 from knowledge_sources.methods.matching.search import (
     POSE_STEP,
     Fitting,
-    PairSpace,
-    Terms,
     build_likelihood_terms,
     evaluate_state,
     search_pairs,

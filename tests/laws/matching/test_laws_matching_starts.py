@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import lomax, norm
 
-from knowledge_sources.methods.matching.image_matching import _suppress_non_maxima, build_line_table, find_hough_peaks
+from knowledge_sources.methods.matching import build_line_table
+from knowledge_sources.methods.matching.image_matching import _suppress_non_maxima, find_hough_peaks
 from knowledge_sources.methods.matching.search import build_likelihood_terms
 from knowledge_sources.settings import DEFAULT
 

@@ -10,18 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from knowledge_sources.methods.matching import build_camera_parameters
 from knowledge_sources.methods.matching.pose_matching import (
     GRID_PX,
     GRID_SIGMAS,
     MAX_GRID_STEPS,
     PoseParameters,
-    build_camera_parameters,
     build_floor_parameters,
     build_scene,
     linearise_pairs,
 )
 from knowledge_sources.methods.matching.search import POSE_STEP
-from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian
+from knowledge_sources.methods.pose import build_line_set, compute_image_jacobian
 from knowledge_sources.methods.pose.planar import compute_line_jacobian
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2

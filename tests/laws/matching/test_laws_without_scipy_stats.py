@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from scipy.stats import binom, norm, qmc
 
 from knowledge_sources.methods.matching.pose_matching import _spread_normal
-from knowledge_sources.methods.verification.line_check import TEST_COUNT, compute_p_false
+from knowledge_sources.methods.verification import compute_p_false
+from knowledge_sources.methods.verification.line_check import TEST_COUNT
 
 
 @given(st.integers(1, 3000))

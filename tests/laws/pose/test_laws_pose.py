@@ -12,9 +12,15 @@ from hypothesis import strategies as st
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
 from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
-from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml
-from knowledge_sources.methods.pose.estimate import compute_weak_information
-from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian, measure_lines
+from knowledge_sources.methods.pose import (
+    PoseEstimate,
+    build_line_set,
+    compute_image_jacobian,
+    compute_weak_information,
+    measure_lines,
+    med_r_and_t,
+    r_and_t_ml,
+)
 from world_models.camera import Camera
 from world_models.frames import Pose
 

@@ -22,11 +22,17 @@ from scipy.stats import binom
 
 from consistency import assert_soon_consistent, compute_error, compute_nees
 from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
-from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, planar_from_lines, planar_from_points, r_and_t_ml
+from knowledge_sources.methods.pose import (
+    PoseEstimate,
+    estimate_camera_and_pose,
+    med_r_and_t,
+    planar_from_lines,
+    planar_from_points,
+    r_and_t_ml,
+)
 from knowledge_sources.methods.pose.estimate import compute_mean_square, compute_spread
-from knowledge_sources.methods.pose.with_camera import estimate_camera_and_pose
 from knowledge_sources.settings import DEFAULT
-from world_models.building.model_errors import LineErrors
+from world_models.building import LineErrors
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 

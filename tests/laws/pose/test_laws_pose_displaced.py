@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from knowledge_sources.methods.pose.displacements import fit_displacements
+from knowledge_sources.methods.pose import fit_displacements
 from knowledge_sources.settings import DEFAULT
-from world_models.building.model_errors import LineErrors
+from world_models.building import LineErrors
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 

@@ -14,15 +14,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from experiments.paper.pose_solvers import TruncatedLoss
-from knowledge_sources.methods.pose import kernels
-from knowledge_sources.methods.pose.estimate import compute_gain
-from knowledge_sources.methods.pose.line_set import LineSet, build_line_set, compute_image_jacobian
-from knowledge_sources.methods.pose.planar import (
+from knowledge_sources.methods.pose import (
+    LineSet,
+    build_line_set,
     compute_camera_poses,
-    compute_line_jacobian,
+    compute_image_jacobian,
     compute_point_jacobian,
-    to_rigid_motion,
+    kernels,
 )
+from knowledge_sources.methods.pose.estimate import compute_gain
+from knowledge_sources.methods.pose.planar import compute_line_jacobian, to_rigid_motion
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 

@@ -11,9 +11,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from knowledge_sources.methods.pose import planar_from_lines, planar_from_points
-from knowledge_sources.methods.pose.line_set import LineSet, build_line_set, compute_image_jacobian
-from knowledge_sources.methods.pose.planar import build_planar_prior, compute_camera_poses, compute_line_jacobian
+from knowledge_sources.methods.pose import (
+    LineSet,
+    build_line_set,
+    compute_camera_poses,
+    compute_image_jacobian,
+    planar_from_lines,
+    planar_from_points,
+)
+from knowledge_sources.methods.pose.planar import build_planar_prior, compute_line_jacobian
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
 

@@ -13,9 +13,15 @@ from hypothesis import strategies as st
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
 from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
-from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml
+from knowledge_sources.methods.pose import (
+    PoseEstimate,
+    build_line_set,
+    compute_image_jacobian,
+    measure_lines,
+    med_r_and_t,
+    r_and_t_ml,
+)
 from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, NO_LENGTH, NO_OVERLAP
-from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian, measure_lines
 from knowledge_sources.settings import DEFAULT
 
 SOLVERS = [r_then_t, r_and_t, r_and_t_ml, med_r_and_t, trunc_r_and_t]

@@ -13,15 +13,10 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from knowledge_sources.methods.calibration.camera_state import widen
+from knowledge_sources.methods.calibration import widen
 from knowledge_sources.methods.localization.camera_matching import compute_space_covariance
-from knowledge_sources.methods.pose.with_camera import (
-    FREE,
-    STILL,
-    CameraEstimate,
-    _Problem,
-    estimate_camera_and_pose,
-)
+from knowledge_sources.methods.pose import CameraEstimate, estimate_camera_and_pose
+from knowledge_sources.methods.pose.with_camera import FREE, STILL, _Problem
 from world_models.camera import YAW, Camera, CameraMount, move_camera, subtract_cameras
 from world_models.frames import Pose2, wrap_angle
 

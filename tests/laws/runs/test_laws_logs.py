@@ -9,18 +9,14 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.board import Blackboard
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.journal import Decision, decision_record
-from blackboard.level import Level
+from blackboard import Blackboard, Decision, Effect, Level, Post, Retract, Revise, decision_record
 from journals import read_journal
 from logs.journal_file import JournalFile
 from logs.recording.loggers.plan import outline
 from logs.recording.loggers.robots import SIGMA_SCALE, ring
 from logs.timeline import Mirror
 from strategies import Note, Tally
-from world_models.entries.location import Place
-from world_models.entries.task import Goal, PlanSketch, Subgoal
+from world_models.entries import Goal, Place, PlanSketch, Subgoal
 from world_models.frames import Pose2
 
 KINDS = st.sampled_from([Note, Tally])

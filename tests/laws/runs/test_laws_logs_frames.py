@@ -8,11 +8,7 @@ from typing import Any, cast
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard.board import Blackboard
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.entry import Entry, Ref
-from blackboard.journal import Decision
-from blackboard.level import Level
+from blackboard import Blackboard, Decision, Effect, Entry, Level, Post, Ref, Retract, Revise
 from logs.recording.logger import Moment, Subject
 from logs.recording.loggers.surroundings.locale_frames import LocaleFrames, marks_path, outline_path
 from logs.recording.palette import KNOWN, REVISED
@@ -20,8 +16,7 @@ from logs.recording.paths import FRAME_LIST
 from logs.recording.stream import RecordingStream
 from logs.timeline import Mirror
 from scripted_mission import CAMERA, MOUNT, house
-from world_models.building.locale_frame import FrameChange, LocaleFrame
-from world_models.building.world import World
+from world_models.building import FrameChange, LocaleFrame, World
 from world_models.frame_store import FrameStore
 
 ROOMS = ("kitchen", "parlour")

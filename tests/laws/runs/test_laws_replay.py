@@ -14,7 +14,7 @@ from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
 from sim.body.wheel_errors import ActuatorParameters
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import CameraPicture, MotorCommand
+from world_models.entries import CameraPicture, MotorCommand
 from world_models.frames import Pose2
 
 BUILDING = SimulatedBuilding.of_faces(box_room(), samples=1)

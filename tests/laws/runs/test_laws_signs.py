@@ -8,18 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rerun.chunk import RrdReader
 
-from blackboard.board import Blackboard
-from blackboard.effect import Effect, Post
-from blackboard.journal import Decision, Sink
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Blackboard, Decision, Discrepancy, Effect, Level, Post, Sink
 from logs.recording.paths import RECORDS
 from logs.recording.stream import REFUTED, SIGNS, TROUBLE, VERIFIED, viewable
 from logs.recording.writer import RecordingWriter
 from scripted_mission import CAMERA, HOUSE, MOUNT, play
-from world_models.entries.body import BodyFault
-from world_models.entries.location import Place
-from world_models.entries.task import Goal, Milestone, Outcome, PlanSketch, Subgoal
+from world_models.entries import BodyFault, Goal, Milestone, Outcome, Place, PlanSketch, Subgoal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 

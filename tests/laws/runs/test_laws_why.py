@@ -12,11 +12,20 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.board import View
-from blackboard.change import Change, Posted, Retracted, Revised
-from blackboard.effect import Effect, Post, Retract, Revise
-from blackboard.journal import Decision, decision_line
-from blackboard.scheduler import Scheduler
+from blackboard import (
+    Change,
+    Decision,
+    Effect,
+    Post,
+    Posted,
+    Retract,
+    Retracted,
+    Revise,
+    Revised,
+    Scheduler,
+    View,
+    decision_line,
+)
 from harvey.errors import BadInput
 from harvey.replay.why_not_again import Fate, in_cycle, in_run, of_entry
 from harvey.wiring import load_kinds

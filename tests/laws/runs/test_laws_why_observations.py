@@ -11,21 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.board import Blackboard
-from blackboard.change import Quiescence
-from blackboard.effect import Post
-from blackboard.entry import Ref
-from blackboard.journal import change_record, plain
-from blackboard.scheduler import registry_of
+from blackboard import Blackboard, Post, Quiescence, Ref, plain, registry_of
+from blackboard.journal import change_record
 from harvey.errors import BadInput
 from logs.records import EntryRecord, Originals, effect_of, value_of
 from scripted_mission import HOUSE
 from world_models.actuator import ActuatorModel
-from world_models.building.locale_frame import FrameAnswer, FrameChange, FrameRequest, LocaleFrame
-from world_models.entries.body import CameraPicture, MotionReport, RideReport
-from world_models.entries.entry_kinds import KINDS
-from world_models.entries.robot_state import Footprint, Wheels
-from world_models.entries.task import Command, Outcome
+from world_models.building import FrameChange, FrameRequest, LocaleFrame
+from world_models.building.locale_frame import FrameAnswer
+from world_models.entries import KINDS, CameraPicture, Command, Footprint, MotionReport, Outcome, RideReport, Wheels
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frame_store import FrameStore

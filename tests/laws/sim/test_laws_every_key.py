@@ -21,7 +21,7 @@ from sim.faults.fault_registry import BUILT_IN
 from sim.ground_truth.things import MovedThing
 from sim.scenario import FORMAT
 from world_models.camera import Camera, CameraMount
-from world_models.entries.location import Place
+from world_models.entries import Place
 from world_models.files.toml.settings_reader import known_keys, read_settings
 from world_models.files.toml.source import Source, WorldError
 from world_models.frames import Pose2
@@ -172,7 +172,7 @@ def test_the_dark_and_an_occluder_last_as_long_as_they_say() -> None:
 def test_noise_depends_on_its_seed_and_on_nothing_else(what: str) -> None:
     """Eight seeds give eight noises of each kind; the same seed gives the same."""
     from sim.body.senses import RangeRing
-    from world_models.entries.body import MotorCommand
+    from world_models.entries import MotorCommand
 
     def draw(seed: int) -> object:
         robot = SimulatedBody(BUILDING, START, CAMERA, CameraMount(1.0), seed=seed, ranges=RangeRing(8),

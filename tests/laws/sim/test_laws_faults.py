@@ -16,8 +16,7 @@ from sim.faults.fault import DeviceFault, Fault
 from sim.faults.fault_registry import BUILT_IN, find_fault_class
 from sim.scenario import ScenarioError, parse_scenario
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import BodyFault, CameraPicture, Course, MotionReport, MotorCommand
-from world_models.entries.location import Place
+from world_models.entries import BodyFault, CameraPicture, Course, MotionReport, MotorCommand, Place
 from world_models.files.toml.settings_reader import known_keys
 from world_models.frames import Pose2
 

@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 
 from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor.ranges import see_ranges
-from knowledge_sources.methods.floor.seen_floor import SeenFloor
+from knowledge_sources.methods.floor import SeenFloor, see_ranges
 from sim.body.collision import Obstacles
 from sim.body.senses import RangeRing
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.entries.floor import FreeFloor
+from world_models.entries import FreeFloor
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

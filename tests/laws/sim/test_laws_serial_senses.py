@@ -14,8 +14,8 @@ from harvey.hardware.drivers.denning import DenningBase
 from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator, InstantMotion
 from sim.emulators.emulator import IdealGround
 from tests.serial_bench import put_on_noisy_line
-from world_models.entries.body import MotionReport, MotorCommand
-from world_models.entries.obstacle import AHEAD_SIGMA_RAD, Contact, Ranges
+from world_models.entries import Contact, MotionReport, MotorCommand, Ranges
+from world_models.entries.obstacle import AHEAD_SIGMA_RAD
 
 ANGLES = st.floats(-math.pi, math.pi)
 WORDS = st.lists(st.text("0123456789.-e", min_size=1, max_size=7) | st.sampled_from(("bumper", "stall", "none")),

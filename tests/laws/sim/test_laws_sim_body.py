@@ -14,7 +14,7 @@ from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
 from sim.body.wheel_errors import ActuatorParameters, arc_displacement, arc_steps
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import MotorCommand
+from world_models.entries import MotorCommand
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)

@@ -9,9 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.board import Blackboard
-from blackboard.change import Posted
-from blackboard.effect import Post
+from blackboard import Blackboard, Post, Posted
 from experiments.generated.scenes import box_room
 from harvey.runner.ports import BodyPort
 from sim.body.collision import ROBOT_RADIUS_M
@@ -20,8 +18,7 @@ from sim.body.senses import RangeRing, find_echo
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import CameraPicture, Course, MotorCommand, PictureRequest
-from world_models.entries.obstacle import Ranges
+from world_models.entries import CameraPicture, Course, MotorCommand, PictureRequest, Ranges
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)

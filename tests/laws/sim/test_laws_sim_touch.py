@@ -11,10 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.board import Blackboard
-from blackboard.change import Posted
-from blackboard.effect import Effect, Post
-from blackboard.entry import Entry
+from blackboard import Blackboard, Effect, Entry, Post, Posted
 from experiments.generated.scenes import box_room
 from harvey.runner.ports import BodyPort
 from sim.body.faulty_body import FaultyBody
@@ -23,8 +20,8 @@ from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
 from sim.body.wheel_errors import ActuatorParameters
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import BodyFault, Course, MotionReport, MotorCommand
-from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD, Contact
+from world_models.entries import AROUND_SIGMA_RAD, BodyFault, Contact, Course, MotionReport, MotorCommand
+from world_models.entries.obstacle import AHEAD_SIGMA_RAD
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)

@@ -19,8 +19,7 @@ from sim.ground_truth.true_changes import TrueChange, find_active
 from sim.scenario import load_scenario, parse_scenario
 from sim.stage import Stage, build_stage
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import Course, MotorCommand, Ride, RideReport
-from world_models.entries.location import Place
+from world_models.entries import Course, MotorCommand, Place, Ride, RideReport
 from world_models.frames import Pose2
 
 CAMERA, MOUNT = Camera.from_field_of_view(math.radians(65.0), 160, 160), CameraMount(1.0)

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harvey.runner.run import build_camera_text
-from knowledge_sources.methods.calibration.camera_state import compute_camera_covariance, has_counted, learn
+from knowledge_sources.methods.calibration import compute_camera_covariance, has_counted, learn
 from knowledge_sources.settings import DEFAULT
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount
-from world_models.entries.robot_state import CameraState, find_camera_lessons
+from world_models.entries import CameraState, find_camera_lessons
 from world_models.files.toml.camera_file import load_camera
 from world_models.frames import Pose2
 

@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from world_models.actuator import arc
-from world_models.entries.location import Travel, begin_travel, turn_about_camera
+from world_models.entries import Travel, begin_travel, turn_about_camera
 from world_models.frames import Pose2, wrap_angle
 
 poses = st.builds(Pose2, st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3))

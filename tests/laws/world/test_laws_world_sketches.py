@@ -8,16 +8,13 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard.change import Quiescence
-from blackboard.effect import Post
-from blackboard.journal import Decision
+from blackboard import Decision, Post, Quiescence
 from experiments.generated.scenes import generate_house
 from harvey.dry_run import build_dry_run
 from world_models.actuator import ActuatorModel
-from world_models.building.world import World
+from world_models.building import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.location import diagonal
-from world_models.entries.task import Command, Outcome, PlanSketch, Subgoal
+from world_models.entries import Command, Outcome, PlanSketch, Subgoal, diagonal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.robot import RobotModel

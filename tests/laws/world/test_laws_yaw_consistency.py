@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from consistency import assert_soon_consistent
-from knowledge_sources.action.yaw_calibrator import YawCalibrator
-from world_models.entries.location import Travel, begin_travel
+from knowledge_sources.robot.yaw_calibrator import YawCalibrator
+from world_models.entries import Travel, begin_travel
 from world_models.frames import Pose2
 
 AT_FIRST_RAD, PLACE_M, HEADING_RAD = 0.03, 0.01, 0.003

@@ -13,7 +13,7 @@ from logs.run_directory import RunDirectory
 from logs.timeline import Timeline
 from recorded_runs import Recorded
 from report_contents import read_contents
-from world_models.entries.body import CameraPicture
+from world_models.entries import CameraPicture
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from blackboard.kinds import Registry
+from blackboard import Registry
 from harvey.simulation.simulated_run import run_mission
 from logs.timeline import Timeline
 from recorded_runs import Recorded

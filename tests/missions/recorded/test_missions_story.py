@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from blackboard.journal import decision_line
+from blackboard import decision_line
 from docs.tools.moments import moments_of
 from harvey.agent import build_agent
 from harvey.campaign.campaign import Task, run_task
@@ -29,8 +29,7 @@ from logs.run_head import RunHead
 from logs.timeline import Timeline
 from memory_timeline import MemoryTimeline
 from recorded_runs import BUMP, Recorded
-from world_models.entries.obstacle import Contact
-from world_models.entries.task import Certificate
+from world_models.entries import Certificate, Contact
 
 TOLD_SHUT = """
 description = "To Allen's office; that its door is shut is told at once."

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from acting import rating
-from blackboard.scheduler import registry_of
+from blackboard import registry_of
 from experiments.scale.explanations import write_hour
 from harvey.agent import Agent, build_agent
 from harvey.cli import main
@@ -25,8 +25,7 @@ from logs.explain.why import lines_of, story
 from logs.run_head import RunHead
 from logs.timeline import Timeline
 from recorded_runs import Recorded
-from world_models.entries.entry_kinds import KINDS
-from world_models.entries.location import Hypothesis
+from world_models.entries import KINDS, Hypothesis
 
 KNOWN = registry_of((), KINDS)
 MOTION = re.compile(

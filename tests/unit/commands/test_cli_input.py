@@ -19,7 +19,7 @@ from harvey.commands import MODULES
 from harvey.commands.world_command import VERBS
 from logs.run_directory import JOURNAL_VERSION, check_version, prepare_directory
 from sim.scenario import SCENARIOS
-from world_models.entries.task import Outcome
+from world_models.entries import Outcome
 
 DECISION = {"cycle": 1, "focus": "action", "observed": [], "seen": [], "activated": [], "obviated": [], "chosen": None,
             "runner_up": None, "pending": 0, "made": [], "refused": ""}

@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 import experiments
-from blackboard.journal import plain
-from blackboard.level import Level
-from blackboard.servoing import Discrepancy
+from blackboard import Discrepancy, Level, plain
 from experiments.paper.levels import _row
 from experiments.report import Report
 from experiments.scale.render_speed import measure_edge_offsets_px
@@ -24,10 +22,7 @@ from harvey.runner.result import MissionResult
 from logs.explain.phrases import sentence
 from logs.records import EntryRecord
 from logs.tables import table
-from world_models.entries.body import MotorCommand
-from world_models.entries.location import Hypothesis, diagonal
-from world_models.entries.percepts import Track, Tracks
-from world_models.entries.task import Leg, Outcome
+from world_models.entries import Hypothesis, Leg, MotorCommand, Outcome, Track, Tracks, diagonal
 from world_models.frames import Pose2
 from world_models.words import degrees, metres, turn
 

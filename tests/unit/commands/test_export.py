@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard.journal import decision_line
+from blackboard import decision_line
 from harvey.cli import main
 from logs.export import DECISIONS, MILESTONES, POSES, TURNS, Table, read_tables, write_csv, write_parquet
 from logs.run_directory import RunDirectory

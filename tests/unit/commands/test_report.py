@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from blackboard.journal import decision_line
+from blackboard import decision_line
 from harvey.cli import main
 from harvey.errors import BadInput
 from harvey.report.data import WIDTH_PX, shrink

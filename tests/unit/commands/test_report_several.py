@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard.journal import decision_line
+from blackboard import decision_line
 from harvey.cli import main
 from harvey.report.drawing import read_fields
 from scripted_turns import decisions

@@ -23,7 +23,7 @@ from harvey.errors import BadInput
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.entries.robot_state import CameraState, Footprint, Wheels
+from world_models.entries import CameraState, Footprint, Wheels
 from world_models.units import bounds_of
 
 ENTRIES = (CameraState(Camera(500.0, 500.0, 255.5, 255.5, 512, 512), CameraMount(1.0, 0.1)), Wheels(ActuatorModel()),

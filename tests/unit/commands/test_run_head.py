@@ -14,8 +14,7 @@ from harvey.errors import BadInput
 from logs.run_head import HARDWARE, RunHead
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraDeviation, CameraMount
-from world_models.entries.location import diagonal
-from world_models.entries.task import Command
+from world_models.entries import Command, diagonal
 from world_models.files.toml.mission import Servo
 from world_models.files.world_files import WORLDS, load_world
 from world_models.robot import RobotModel

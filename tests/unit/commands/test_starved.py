@@ -15,7 +15,7 @@ from harvey.runner.result import MIN_WOKEN
 from logs.explain.story import tell_run
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline
-from world_models.entries.location import Hypothesis
+from world_models.entries import Hypothesis
 
 
 @harvey.inference(keep=2)

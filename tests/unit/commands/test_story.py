@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard.journal import Decision, decision_line
-from blackboard.level import Level
+from blackboard import Decision, Level, decision_line
 from harvey.cli import main
 from harvey.errors import BadInput
 from logs.explain.questions_in_words import answers

@@ -11,10 +11,7 @@ from typing import Any, cast
 
 import pytest
 
-from blackboard.board import Blackboard
-from blackboard.effect import Effect, Post, Revise
-from blackboard.journal import Decision, decision_line
-from blackboard.level import Level
+from blackboard import Blackboard, Decision, Effect, Level, Post, Revise, decision_line
 from harvey.campaign.progress import Lines, Tally
 from harvey.campaign.summary import format_result
 from harvey.errors import BadInput
@@ -38,10 +35,7 @@ from scripted_mission import house
 from scripted_turns import HELD, decisions
 from sim.body.simulated_body import SimulatedBody
 from sim.truth import Truth
-from world_models.entries.body import BodyFault, Recovery
-from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.obstacle import Contact, Obstacle
-from world_models.entries.task import Outcome, PlanSketch
+from world_models.entries import BodyFault, Contact, DoorPicture, DoorState, Obstacle, Outcome, PlanSketch, Recovery
 from world_models.frames import Pose2
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from blackboard.journal import plain
+from blackboard import plain
 from harvey.replay.why_not_again import Fate, in_run
 from logs.explain.model import tell_changes, tell_used
 from logs.explain.phrases import Sentence, sentence
@@ -15,10 +15,8 @@ from logs.explain.web import MODEL, Trace, kind_of
 from logs.explain.why import story
 from logs.records import Candidate, DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
-from world_models.building.locale_frame import FrameChange, FrameReference, FrameRequest
-from world_models.entries.robot_state import Footprint
-from world_models.entries.task import Milestone
-from world_models.entries.user_reports import UserReport
+from world_models.building import FrameChange, FrameReference, FrameRequest
+from world_models.entries import Footprint, Milestone, UserReport
 
 SHUT = FrameChange("shut", "library-door", "user")
 

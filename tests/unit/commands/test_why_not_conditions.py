@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from blackboard.change import Posted, Watch
-from blackboard.kinds import always
+from blackboard import Posted, Watch, always
 from harvey.replay.why_not_again import read_predicate, tell_predicate
 from harvey.wiring import KNOWLEDGE_SOURCES
 

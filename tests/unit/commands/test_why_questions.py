@@ -8,17 +8,23 @@ from typing import Any
 
 import pytest
 
-from blackboard.journal import plain
+from blackboard import plain
 from harvey.errors import BadInput
 from logs.explain.questions_in_words import QUESTIONS, answers, is_question
 from logs.records import DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
-from world_models.building.locale_frame import FrameChange, FrameReference
-from world_models.entries.body import CameraPicture, MotorCommand
-from world_models.entries.door_state import DoorPicture, DoorState
-from world_models.entries.location import Place
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.task import Outcome, PlanSketch, Subgoal
+from world_models.building import FrameChange, FrameReference
+from world_models.entries import (
+    CameraPicture,
+    DoorPicture,
+    DoorState,
+    MotorCommand,
+    Obstacle,
+    Outcome,
+    Place,
+    PlanSketch,
+    Subgoal,
+)
 
 SQUARE = ((0.0, 0.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5))
 BOX = Obstacle("hallway/obstacle-1", "hallway", SQUARE, 0.05, 0.25, 0.25, 0.5, certainty=0.7, by="camera",

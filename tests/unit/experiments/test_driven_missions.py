@@ -18,12 +18,12 @@ from experiments.generated.missions import OFFICE, TwinMission
 from experiments.robustness import missions, soak
 from experiments.scale import large
 from harvey.errors import BadInput
-from knowledge_sources.methods.belief.odds import to_log_odds
+from knowledge_sources.methods.belief import to_log_odds
 from sim.ground_truth.table import TrueDoor
-from world_models.entries.door_state import DoorPicture, DoorState
+from world_models.entries import DoorPicture, DoorState
 
 if TYPE_CHECKING:
-    from blackboard.journal import Decision
+    from blackboard import Decision
 
 COMMON: dict[str, Any] = {
     "outcome": "reached", "reason": "there", "error_m": 0.01, "path_m": 11.0, "verified": 9, "refuted": 0,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from blackboard.effect import Post
-from blackboard.scheduler import Scheduler
+from blackboard import Post, Scheduler
 from experiments.scale import agenda, agenda_memory, agenda_peers
 from experiments.scale.agenda_load import PART_CYCLES, Speed, Task, Worker, measure
 

@@ -36,7 +36,7 @@ def busy_loop(file: str) -> Callable[[], None]:
 
 
 def test_the_split_adds_up_and_a_busy_function_is_seen() -> None:
-    method, act = busy_loop("sim/render/fake.py"), busy_loop("knowledge_sources/plan/fake_source.py")
+    method, act = busy_loop("sim/render/fake.py"), busy_loop("knowledge_sources/sketcher/fake_source.py")
     before_s = time.process_time()
     found = cost.measure(lambda: (method(), act()))
     assert sum(found.parts.values()) == pytest.approx(found.total_s)

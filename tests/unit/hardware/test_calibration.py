@@ -14,9 +14,15 @@ from experiments.generated.scenes import chessboard_picture, chessboard_renderer
 from harvey.cli import main
 from harvey.errors import BadInput
 from harvey.hardware.calibration import Boards, calibrate_camera, find_boards, picture_files
-from knowledge_sources.methods.calibration.intrinsics import BoardView, Calibration, Pattern, calibrate, find_corners
-from knowledge_sources.methods.calibration.mounting import estimate_mounting
-from knowledge_sources.methods.features.picture import read_picture
+from knowledge_sources.methods.calibration import (
+    BoardView,
+    Calibration,
+    Pattern,
+    calibrate,
+    estimate_mounting,
+    find_corners,
+)
+from knowledge_sources.methods.features import read_picture
 from sim.render.optics import Optics
 from sim.render.sensor import SensorParameters
 from world_models.camera import Camera, CameraDeviation, CameraMount

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from knowledge_sources.methods.calibration.intrinsics import BoardView, Calibration, Pattern, calibrate, find_corners
+from knowledge_sources.methods.calibration import BoardView, Calibration, Pattern, calibrate, find_corners
 
 FOLDER = Path(os.environ.get("OPENCV_SAMPLES", "no folder"))
 PATTERN = Pattern(9, 6, 0.025)

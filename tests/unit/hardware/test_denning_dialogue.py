@@ -10,8 +10,8 @@ import pytest
 
 from harvey.hardware.drivers.base_driver import BaseFault
 from harvey.hardware.drivers.denning import DenningBase
-from world_models.entries.body import MotorCommand
-from world_models.entries.obstacle import AHEAD_SIGMA_RAD, AROUND_SIGMA_RAD
+from world_models.entries import AROUND_SIGMA_RAD, MotorCommand
+from world_models.entries.obstacle import AHEAD_SIGMA_RAD
 
 TOKEN, NONCE = "0000002A", "12345678"
 

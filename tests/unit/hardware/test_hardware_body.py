@@ -14,8 +14,7 @@ from harvey.hardware.drivers.video_camera import Health, VideoCamera
 from harvey.hardware.hardware_body import BASE_WORDS, CAMERA_WORDS, HardwareBody, WatchedCamera
 from harvey.hardware.hardware_mission import load_mission
 from harvey.hardware.stopping import Heartbeat
-from world_models.entries.body import STOP_KEY, BodyFault, CameraPicture, MotionReport, MotorCommand, Odometry
-from world_models.entries.obstacle import Ranges
+from world_models.entries import STOP_KEY, BodyFault, CameraPicture, MotionReport, MotorCommand, Odometry, Ranges
 from world_models.files.toml.mission import ROOT
 
 

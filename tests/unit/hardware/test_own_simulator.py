@@ -14,7 +14,7 @@ from harvey.errors import BadInput
 from harvey.hardware.hardware_mission import load_mission
 from harvey.hardware.own_body import OwnBody, build_robot
 from harvey.runner.ports import Body
-from world_models.entries.body import BodyFault, CameraPicture, Course, MotionReport, MotorCommand, Ride
+from world_models.entries import BodyFault, CameraPicture, Course, MotionReport, MotorCommand, Ride
 from world_models.files.toml.camera_file import load_camera
 
 ROOT = Path(__file__).parents[3]
@@ -72,7 +72,7 @@ def test_pictures_are_numbered_and_red_stays_red() -> None:
     first, second = body.look("probe"), body.look("track")
     assert isinstance(first, CameraPicture) and isinstance(second, CameraPicture)
     assert (first.number, second.number, second.purpose, second.sim_time_s) == (0, 1, "track", 1.5)
-    from knowledge_sources.methods.features.picture import read_picture
+    from knowledge_sources.methods.features import read_picture
 
     red, green, blue = read_picture(first.jpeg).color.reshape(-1, 3).mean(axis=0)
     assert red > 150 and green < 80 and blue < 80

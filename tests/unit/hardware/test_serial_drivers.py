@@ -22,7 +22,7 @@ from tests.serial_bench import (
     over_line_in_memory,
     over_terminal,
 )
-from world_models.entries.body import MotionReport, MotorCommand
+from world_models.entries import MotionReport, MotorCommand
 
 
 @pytest.mark.parametrize("check", ON_TERMINAL)

@@ -12,24 +12,17 @@ from typing import Any
 
 import pytest
 
-from blackboard.board import View
-from blackboard.change import Change
-from blackboard.effect import Effect, Post, Retract
-from blackboard.entry import Entry, Ref
-from blackboard.journal import plain
-from blackboard.kinds import Role
-from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
+from blackboard import Change, Effect, Entry, KnowledgeSource, Level, Post, Ref, Retract, Role, View, plain
 from harvey.simulation.simulated_run import run_mission
-from harvey.wiring import knowledge_sources, load_kinds
+from harvey.wiring import SUBJECTS, knowledge_sources, load_kinds
 from knowledge_sources.priority import Priority
 from sim.scenario import load_scenario
 from sim.stage import build_stage
-from world_models.building.locale_frame import FrameRequest, LocaleFrame
-from world_models.entries.task import Outcome
+from world_models.building import FrameRequest, LocaleFrame
+from world_models.entries import Outcome
 
 FOLDER = Path(__file__).parents[3] / "knowledge_sources"
-FILES = {path.stem: path for level in Level for path in sorted((FOLDER / str(level)).glob("[!_]*.py"))}
+FILES = {path.stem: path for subject in SUBJECTS for path in sorted((FOLDER / subject).glob("[!_]*.py"))}
 TREES = {stem: ast.parse(path.read_text(encoding="utf-8")) for stem, path in FILES.items()}
 FROM_OUTSIDE = set(load_kinds().of_role(Role.OBSERVATION))
 """What no knowledge source writes, but the user, the body and the clock of the mission."""
@@ -52,8 +45,9 @@ def test_there_is_one_knowledge_source_a_file_and_the_file_has_its_name() -> Non
     assert all(object.__new__(source).name == stem for stem, source in KNOWLEDGE_SOURCES.items())
 
 
-def test_it_stands_in_the_folder_of_its_level() -> None:
-    assert all(FILES[stem].parent.name == str(source.level) for stem, source in KNOWLEDGE_SOURCES.items())
+def test_each_folder_is_a_subject_or_what_the_sources_share() -> None:
+    folders = {path.parent.name for path in FOLDER.glob("*/__init__.py")}
+    assert folders == {*SUBJECTS, "methods", "reads"}
 
 
 def test_each_has_its_laws() -> None:

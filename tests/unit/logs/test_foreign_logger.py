@@ -9,10 +9,7 @@ from typing import Any
 import pytest
 import rerun.blueprint as rrb
 
-from blackboard.board import Blackboard
-from blackboard.effect import Post
-from blackboard.journal import Decision
-from blackboard.level import Level
+from blackboard import Blackboard, Decision, Level, Post
 from logs.reader import read_series
 from logs.recording.logger import Subject, blueprint
 from logs.recording.paths import TABLE

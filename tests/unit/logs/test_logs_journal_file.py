@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from blackboard.journal import Decision, decision_line, decision_record
+from blackboard import Decision, decision_line, decision_record
 from journals import read_journal
 from logs.journal_file import HELD_LINES, JournalFile, is_acted_on
 from logs.run_errors import BadInput

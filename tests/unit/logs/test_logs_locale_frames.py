@@ -10,12 +10,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from blackboard.board import Blackboard
-from blackboard.change import Change
-from blackboard.effect import Effect, Post, Revise
-from blackboard.entry import Ref
-from blackboard.journal import Decision
-from blackboard.level import Level
+from blackboard import Blackboard, Change, Decision, Effect, Level, Post, Ref, Revise
 from logs.reader import read_series
 from logs.recording.loggers.decisions import Messages
 from logs.recording.loggers.surroundings.locale_frames import (
@@ -32,9 +27,8 @@ from logs.recording.writer import RecordingWriter
 from scripted_mission import CAMERA, MOUNT
 from two_doors import WORLD
 from world_models.actuator import ActuatorModel
-from world_models.building.locale_frame import FRAME_OF, FrameChange, FrameRequest, LocaleFrame
-from world_models.building.world import World
-from world_models.entries.robot_state import CameraState, Footprint, Wheels
+from world_models.building import FRAME_OF, FrameChange, FrameRequest, LocaleFrame, World
+from world_models.entries import CameraState, Footprint, Wheels
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frame_store import FrameStore

@@ -8,8 +8,7 @@ import numpy as np
 
 from logs.recording.loggers.surroundings.found import UNKNOWN_HEIGHT_M, colour_of, edges, outlines
 from logs.recording.palette import EXPECTED, REJECTED
-from world_models.entries.floor import FreeFloor
-from world_models.entries.obstacle import Obstacle
+from world_models.entries import FreeFloor, Obstacle
 
 BOX = Obstacle("hallway/obstacle-1", "hallway", ((0.0, 0.0), (1.0, 0.0), (1.0, 0.5), (0.0, 0.5)), 0.05, 0.5, 0.25, 1.0,
                height_m=0.4, sigma_height_m=0.1)

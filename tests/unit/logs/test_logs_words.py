@@ -1,19 +1,13 @@
 """What the recorder says in words: sentences, levels, the tree's labels and the story."""
 
-from blackboard.board import Blackboard, View
-from blackboard.change import Retracted
-from blackboard.effect import Post
-from blackboard.entry import Ref
-from blackboard.journal import Decision
+from blackboard import Blackboard, Decision, Post, Ref, Retracted, View
 from logs.recording.loggers.decisions import COLUMNS, Messages, log_level, row, sentence
 from logs.recording.loggers.lanes import activity
 from logs.recording.loggers.plan import NO_SKETCH, outline
 from logs.recording.loggers.why_panel import THOUGHTS, compose
 from logs.timeline import Mirror
 from scripted_mission import play
-from world_models.entries.body import BodyFault, MotorCommand, Recovery
-from world_models.entries.location import Hypothesis
-from world_models.entries.task import Leg
+from world_models.entries import BodyFault, Hypothesis, Leg, MotorCommand, Recovery
 from world_models.words import grouped
 from world_models.words import sentence as words_of
 

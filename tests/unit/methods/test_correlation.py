@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from knowledge_sources.methods.features.correlation import correlate, extract_template
+from knowledge_sources.methods.features import correlate, extract_template
 
 
 def scene() -> np.ndarray:

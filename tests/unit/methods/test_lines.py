@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.perception.locate_camera import remove_duplicates
-from knowledge_sources.methods.features.lines import find_lines
+from knowledge_sources.methods.features import find_lines
 
 
 def square() -> np.ndarray:

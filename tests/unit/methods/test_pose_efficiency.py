@@ -13,8 +13,7 @@ from scipy.stats import chi2
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, fragment
 from experiments.paper.pose_solvers import r_and_t, r_then_t
-from knowledge_sources.methods.pose import PoseEstimate, r_and_t_ml
-from knowledge_sources.methods.pose.line_set import build_line_set, compute_image_jacobian
+from knowledge_sources.methods.pose import PoseEstimate, build_line_set, compute_image_jacobian, r_and_t_ml
 
 SIGMA_PX = 0.5
 TRIALS = 150

@@ -14,10 +14,15 @@ from numpy.typing import NDArray
 from experiments.paper import pose_scenes
 from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.matching import Peak, match_in_space, match_lines, match_on_floor
-from knowledge_sources.methods.pose import med_r_and_t, planar_from_lines, planar_from_points, r_and_t_ml
-from knowledge_sources.methods.pose.displacements import fit_displacements
+from knowledge_sources.methods.pose import (
+    fit_displacements,
+    med_r_and_t,
+    planar_from_lines,
+    planar_from_points,
+    r_and_t_ml,
+)
 from knowledge_sources.settings import MatchingSettings, PoseSettings
-from world_models.building.model_errors import LineErrors
+from world_models.building import LineErrors
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
 

@@ -12,9 +12,15 @@ from scipy.optimize import least_squares
 
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
 from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
-from knowledge_sources.methods.pose import med_r_and_t, planar_from_points
-from knowledge_sources.methods.pose.line_set import LineSet, build_line_set, compute_squared_distances
-from knowledge_sources.methods.pose.planar import build_planar_prior, compute_point_jacobian
+from knowledge_sources.methods.pose import (
+    LineSet,
+    build_line_set,
+    compute_point_jacobian,
+    compute_squared_distances,
+    med_r_and_t,
+    planar_from_points,
+)
+from knowledge_sources.methods.pose.planar import build_planar_prior
 from knowledge_sources.methods.pose.r_and_t import count_subsets, list_subsets
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2, wrap_angle

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from knowledge_sources.methods.arrays import Image
-from knowledge_sources.methods.features.picture import Picture, estimate_noise_sigma, read_picture
-from knowledge_sources.methods.features.regions import segment_regions
+from knowledge_sources.methods.features import read_picture, segment_regions
+from knowledge_sources.methods.features.picture import Picture, estimate_noise_sigma
 from world_models.camera import Camera
 
 

@@ -9,16 +9,14 @@ import pytest
 import shapely
 
 from experiments.generated.floors import generated_floor
+from knowledge_sources.methods.motion import SubgoalPlanner
 from knowledge_sources.methods.motion.routes import list_obstacles
-from knowledge_sources.methods.motion.subgoals import SubgoalPlanner
 from knowledge_sources.settings import DEFAULT
 from two_doors import two_doors
 from world_models.actuator import ActuatorModel
-from world_models.building.world import World
+from world_models.building import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries.location import Hypothesis, Place
-from world_models.entries.obstacle import Obstacle
-from world_models.entries.task import Subgoal
+from world_models.entries import Hypothesis, Obstacle, Place, Subgoal
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

@@ -12,7 +12,7 @@ from sim.body.simulated_building import Helper
 from sim.scenario import ScenarioError, parse_scenario, scenario_from_tables
 from sim.stage import Stage, build_stage
 from towers import tower
-from world_models.entries.body import BodyFault, Ride, RideReport
+from world_models.entries import BodyFault, Ride, RideReport
 
 SCENARIO = """
 world = "tower.toml"

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blackboard.board import Blackboard
-from blackboard.effect import Post
+from blackboard import Blackboard, Post
 from experiments.generated.scenes import box_room
 from harvey.runner.ports import MUST_CHANGE_M, STANDS_STILL, BodyPort, StillCamera
 from sim.body.faulty_body import FaultyBody
@@ -18,7 +17,7 @@ from sim.body.simulated_building import SimulatedBuilding
 from sim.faults.built_in_faults import Bump, CameraFrozen, Kidnap, LightsOff, Stall
 from sim.faults.fault import Fault, FaultSchedule
 from world_models.camera import Camera, CameraMount
-from world_models.entries.body import BodyFault, CameraPicture, Course, MotorCommand, PictureRequest, Recovery
+from world_models.entries import BodyFault, CameraPicture, Course, MotorCommand, PictureRequest, Recovery
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 64, 64)

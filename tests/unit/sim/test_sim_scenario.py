@@ -12,7 +12,7 @@ from sim.render.sensor import SensorParameters, expose
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
 from sim.scenario_names import list_scenarios
 from world_models.commands import parse_ptrans
-from world_models.entries.location import Place
+from world_models.entries import Place
 
 MINIMAL = 'world = "w"\ngoal = "(ptrans (a (1,2,0)) (b (3.5,-4,0)))"\n'
 

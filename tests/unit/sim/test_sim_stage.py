@@ -17,7 +17,7 @@ from sim.render.rasterizer import find_visible_patches
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
 from sim.scenario_names import list_scenarios
 from sim.stage import Stage, build_stage
-from world_models.entries.body import MotorCommand
+from world_models.entries import MotorCommand
 from world_models.frames import Pose2
 
 

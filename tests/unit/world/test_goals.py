@@ -10,8 +10,7 @@ from harvey.cli import main
 from harvey.dry_run import dry_run
 from scripted_mission import CAMERA, HOUSE, MOUNT
 from world_models.actuator import ActuatorModel
-from world_models.entries.location import diagonal
-from world_models.entries.task import Command, Outcome
+from world_models.entries import Command, Outcome, diagonal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.robot import RobotModel

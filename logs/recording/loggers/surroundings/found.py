@@ -15,10 +15,7 @@ from logs.recording.palette import BELIEVED, EXPECTED, FREE, MATCHED, REJECTED, 
 from logs.recording.paths import CONTACTS, DOORS, OBSTACLES, RANGES, SEEN_FLOOR
 from logs.recording.stream import RecordingStream
 from world_models import words
-from world_models.entries.door_state import DoorCondition, DoorState
-from world_models.entries.floor import FreeFloor
-from world_models.entries.obstacle import Contact, Obstacle, Ranges
-from world_models.entries.robot_state import Footprint
+from world_models.entries import Contact, DoorCondition, DoorState, Footprint, FreeFloor, Obstacle, Ranges
 
 Points = NDArray[np.float64]
 BUMPER_M, EAR_M = 0.3, 0.6

@@ -1,0 +1,115 @@
+"""Med-R-and-T (§6.2.4): the robot's pose from line matches with outliers, by least median of squares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.calibration import (
+    add_yaw,
+    compute_camera_covariance,
+    compute_knocked_covariance,
+    has_counted,
+    loosen,
+    to_tuples,
+    widen,
+)
+from knowledge_sources.methods.pose import CameraEstimate, PlanarEstimate, estimate_camera_and_pose, planar_from_lines
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import find_belief, find_camera, find_robot
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries import Hypothesis, LineMatch, Milestone, PoseFix
+from world_models.frames import Pose2, frozen
+from world_models.robot import RobotModel
+
+
+class Case(NamedTuple):
+    """The lines that were matched, the milestone that expected them, and the belief near which the pose is sought."""
+
+    match: Entry[LineMatch]
+    milestone: Entry[Milestone]
+    belief: Entry[Hypothesis]
+
+
+class MedRAndT(RobotKnowledgeSource):
+    """Solves for the pose on the floor, and names the pairs that are outliers.
+
+    The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose
+    poses, the median residual of all lines chooses one, and the inliers refine it. How well the camera is known is
+    known too: what the lines say of it beside the pose is posted with the pose, and its uncertainty is part of the
+    pose's covariance. Where the model is inexact, its errors are integrated out, and nothing is learnt of the camera.
+    """
+
+    level, priority = Level.PLAN, Priority.SEE
+    on = (Watch(LineMatch, (Posted,)),)
+    writes = (PoseFix,)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        milestone, belief = view.get(trigger.entry.value.milestone), find_belief(view)
+        return None if milestone is None or belief is None else Case(trigger.entry, milestone, belief)
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        match, milestone, belief = case
+        m = milestone.value
+        own, locale = self._settings.camera_state, belief.value.locale
+        robot, camera = find_robot(view).on_floor_of(locale), find_camera(view)
+        here = belief.value.world_from_robot(robot.world)
+        prior, known = loosen(belief.value.covariance_world(robot.world)), compute_camera_covariance(camera, own)
+        if match.value.is_camera_open:
+            opened = compute_knocked_covariance(camera, own)
+            prior, known = add_yaw(prior, opened, known), opened
+        learnt = None if m.displacement_modes else self._learn(robot, match.value, here, prior, known)
+        moves = learnt is not None and (
+            match.value.is_camera_open or not has_counted(camera, learnt.world_from_robot, own))
+        if learnt is not None and moves:
+            robot = find_robot(view, camera.moved(tuple(learnt.step.tolist()))).on_floor_of(locale)
+        found = self._solve(robot, match.value, here, prior, m)
+        covariance = found.covariance
+        learnt = learnt and replace(learnt, covariance=widen(learnt, here, belief.value.covariance_world(robot.world)))
+        if learnt is not None:
+            spread = learnt.covariance if moves else known
+            covariance = covariance + learnt.pose_slopes @ spread @ learnt.pose_slopes.T
+        yield Post(
+            PoseFix(
+                match.id, found.world_from_robot, frozen(covariance), np.asarray(found.inliers, bool),
+                frozen(found.residuals_px), tuple(reason or "" for reason in found.rejected),
+                () if learnt is None or not moves else tuple(learnt.step.tolist()),
+                () if learnt is None or not moves else to_tuples(learnt.covariance),
+                0.0 if learnt is None or not moves else learnt.prior_chi2,
+            ),
+            (match, milestone, belief),
+        )
+
+    def _learn(
+        self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, known: Floats
+    ) -> CameraEstimate | None:
+        """The camera's state beside the pose; None where the lines say too little."""
+        s = self._settings.camera_state
+        if len(match.pairs) < s.min_lines:
+            return None
+        found = estimate_camera_and_pose(
+            match.lines_world, match.segments_px, robot.camera, robot.mount, here, prior, known,
+            sigma_px=s.line_sigma_px, settings=s)
+        return found if np.count_nonzero(found.inliers) >= s.min_lines else None
+
+    def _solve(
+        self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, milestone: Milestone
+    ) -> PlanarEstimate:
+        """The pose with a camera that is taken as it is."""
+        return planar_from_lines(
+            match.lines_world,
+            match.segments_px,
+            robot.camera,
+            robot.mount.camera_from_robot,
+            here,
+            prior_covariance=prior,
+            landmark_ids=[milestone.landmark_of[i] for i in match.pairs[:, 0]],
+            sigma_px=self._settings.features.sigma_across_px,
+            errors=milestone.errors.take(match.pairs[:, 0]),
+            settings=self._settings.pose,
+        )

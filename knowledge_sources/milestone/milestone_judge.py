@@ -1,0 +1,149 @@
+"""Milestone judge (§4, §6): a milestone is verified, refuted or not testable, with the evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch
+from knowledge_sources.methods.belief import BelievedPlace, bound_p_rivals, compute_p_rivals
+from knowledge_sources.methods.calibration import add_yaw, compute_camera_covariance, is_camera_known
+from knowledge_sources.methods.localization import DISTINCT, list_aliases
+from knowledge_sources.methods.verification import (
+    Before,
+    PictureEvidence,
+    Verdict,
+    Weighed,
+    certify,
+    compute_coverage_elsewhere,
+    is_last_look,
+    judge_place,
+    tell_odds,
+    weigh_picture,
+)
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import (
+    find_belief,
+    find_camera,
+    find_followed,
+    find_p_not_alias,
+    find_robot_in,
+    find_search_here,
+    has_only_turned,
+    open_discrepancy,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries import CameraPicture, Certificate, Hypothesis, LineMatch, Milestone, PoseFix, Segments, Travel
+
+MIN_ALIAS_PART = 0.8  # another place at which this part of the agreement is seen is not ruled out
+MAX_P_FALSE_UNMISTAKABLE = 2e-4  # up to this probability of a wrong place, it is not compared with others
+MAX_P_FALSE_CLEAR = 2e-3
+"""Up to this one, only with places at which the room repeats itself; beyond, with the whole room."""
+
+
+class Case(NamedTuple):
+    """A pose fix, and all that it rests on: the match, the segments, their frame, the milestone and the belief."""
+
+    fix: Entry[PoseFix]
+    match: Entry[LineMatch]
+    segments: Entry[Segments]
+    frame: Entry[CameraPicture]
+    milestone: Entry[Milestone]
+    belief: Entry[Hypothesis]
+
+
+class Rival(NamedTuple):
+    """Where else a picture may have been taken, in words, and how likely that is."""
+
+    said: str
+    p: float
+
+
+class MilestoneJudge(RobotKnowledgeSource):
+    """Certifies a milestone from a pose fix, and posts how far the picture differs from what was expected.
+
+    The evidence are lines and the colours of faces (:mod:`knowledge_sources.methods.verification.weigh`), weighted as
+    fitted on rendered floors. The largest deviation is what the wheels can do since the belief was sure, for a place
+    that is surely seen at least the matcher's window (§6.1.4); where the belief is in doubt, it is that window. Before
+    the first milestone it is what the mission says of how the robot is put down. That landmarks were followed speaks
+    for the place only where the belief leaves little open in the picture: one door further on it sees much the same.
+    """
+
+    level, priority = Level.PLAN, Priority.SEE
+    on = (Watch(PoseFix, (Posted,)),)
+    writes = (Certificate, Milestone, Discrepancy)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        belief, match = find_belief(view), view.get(trigger.entry.value.match)
+        if match is None or belief is None:
+            return None
+        milestone, segments = view.get(match.value.milestone), view.get(match.value.segments)
+        frame = None if segments is None else view.get(segments.value.frame)
+        if milestone is None or milestone.value.status != "expected" or segments is None or frame is None:
+            return None
+        return Case(trigger.entry, match, segments, frame, milestone, belief)
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        milestone = case.milestone
+        weighed = self.weigh(view, case)
+        verdict = self._hold_against_others(view, case, weighed, judge_place(weighed, self._settings))
+        because = case.fix, milestone, *find_followed(view, self._settings.action), *view.all(Travel)
+        certificate = Post(certify((milestone.id, case.fix.id), weighed, verdict, case.fix.value), because)
+        yield certificate
+        yield Revise(milestone, replace(milestone.value, status=verdict.kind), (certificate,))
+        more = not is_last_look(milestone.value, self._settings.plan) or find_search_here(view, milestone.value.sketch)
+        if verdict.kind == "not testable" and more:
+            return
+        most_px = max(self._settings.plan.max_deviation_px, weighed.tolerance_px)
+        is_measured = verdict.kind == "verified" or weighed.shift_px > most_px
+        magnitude = weighed.shift_px if is_measured else math.inf
+        what = f"{milestone.value.what.partition(', because')[0]} is {verdict.kind}"
+        found = Discrepancy(Level.PLAN, what, magnitude, (0.0, most_px), "px")
+        last = open_discrepancy(view, Level.PLAN)
+        yield Post(found, (certificate,)) if last is None else Revise(last, found, (certificate,))
+
+    def weigh(self, view: View, case: Case) -> Weighed:
+        """What the picture says, with the camera as it was solved for, and with what was believed before."""
+        s, fix, belief, camera = self._settings, case.fix.value, case.belief.value, find_camera(view)
+        robot = find_robot_in(view, belief.locale, camera.moved(fix.camera_step) if fix.camera_step else None)
+        known = compute_camera_covariance(camera, s.camera_state)
+        covariance = belief.covariance_world(robot.world)
+        if fix.camera_step:
+            covariance = add_yaw(covariance, np.array(fix.camera_covariance), known)
+        before = Before(
+            belief.world_from_robot(robot.world), covariance, open_discrepancy(view, Level.PLAN) is not None,
+            bool(find_followed(view, s.action)), has_only_turned(view, belief), is_camera_known(robot, known, s))
+        seen = PictureEvidence(case.frame.value.jpeg, case.segments.value, case.milestone.value, fix)
+        return weigh_picture(robot, seen, before, s)
+
+    def _hold_against_others(self, view: View, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:
+        """What would be verified is not testable where the picture may have been taken elsewhere."""
+        rival = self._find_rival(view, case, weighed) if verdict.kind == "verified" else None
+        if rival is None or rival.p <= self._settings.plan.max_p_rival:
+            return verdict
+        odds = rival.p, self._settings.plan.max_p_rival
+        reason = f"{verdict.reason}; but {rival.said}: {tell_odds(*odds)}"
+        return Verdict("not testable", reason, *odds, p_rival=rival.p)
+
+    def _find_rival(self, view: View, case: Case, weighed: Weighed) -> Rival | None:
+        """Where else the picture is most likely taken, by the belief and by the picture; None where nowhere."""
+        least, room, s = MIN_ALIAS_PART * weighed.lines.coverage, case.belief.value.locale, self._settings
+        for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
+            there = other.value.world_from_robot(weighed.robot.world)
+            if compute_coverage_elsewhere(weighed, there, s) >= least:
+                return Rival(f"as much agrees at {other.id}", 0.5)
+        if weighed.p_false <= MAX_P_FALSE_UNMISTAKABLE or not weighed.is_weak:
+            return None
+        p_there, most = find_p_not_alias(view, s.localization), s.localization.max_alike_log_ratio
+        believed = BelievedPlace(weighed.before, weighed.covariance + case.fix.value.covariance, p_there)
+        if bound_p_rivals(believed, weighed.pose, DISTINCT, most) <= s.plan.max_p_rival:
+            return None
+        rivals = list_aliases(weighed.robot, weighed.segments.segments_px, room, weighed.pose,
+                              search=weighed.p_false > MAX_P_FALSE_CLEAR, settings=s)
+        p = compute_p_rivals(believed, weighed.pose, [
+            (alias.world_from_robot, min(max(-alias.margin, -most), most)) for alias in rivals])
+        return Rival(f"it may be another door of {room}, or its other side", p)

@@ -1,0 +1,96 @@
+"""View chooser (§3.3, §4): in which direction the next milestone of a plan sketch is looked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revised, View, Watch
+from knowledge_sources.methods.verification import CHECK_TOLERANCE_M, choose_heading, find_untried, turn_headings
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import (
+    GOING_ON,
+    HELD,
+    MAX_LOOK_ERROR_RAD,
+    MEASURED,
+    NO_MILESTONE,
+    NOT_LOST,
+    SKETCH,
+    STANDING,
+    find_car,
+    find_robot_and_pose,
+    find_tried,
+    list_told,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.building import Building
+from world_models.entries import Hypothesis, Milestone, PlanSketch
+from world_models.frames import Pose2, wrap_angle
+
+
+class Case(NamedTuple):
+    """The sketch whose milestone is due, the belief, and the headings in which it was looked for in vain."""
+
+    sketch: Entry[PlanSketch]
+    belief: Entry[Hypothesis]
+    tried: tuple[float, ...]
+
+
+class ViewChooser(RobotKnowledgeSource):
+    """Chooses the direction in which the milestone before a subgoal is looked for (M0 first).
+
+    The heading that the subgoal before it states; before a leg that begins with a long turn the view along that leg, as
+    the turn leaves the heading open; the view ahead if it is good; the next one on the way; then the one that tells
+    the place best. Where a view was not testable, it tries another.
+    """
+
+    level, priority = Level.PLAN, Priority.LOOK
+    on = (
+        Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and not s.verified),
+        Watch(Discrepancy, (Posted, Revised)),
+        Watch(Hypothesis, (Revised,), lambda h: h.is_held),
+        Watch(Milestone, (Revised,), lambda m: not m.is_open),
+    )
+    needs = (GOING_ON, HELD, STANDING, NOT_LOST, MEASURED, NO_MILESTONE, SKETCH)
+    writes = (Milestone,)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        sketch = SKETCH.of(view)
+        if sketch.value.verified:
+            return None
+        at = sketch.id, sketch.value.at
+        return Case(sketch, HELD.of(view).entry, find_tried(view, lambda m: (m.value.sketch, m.value.index) == at))
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        sketch, belief, tried = case
+        s, (robot, pose) = sketch.value, find_robot_and_pose(view, belief.value)
+        headings = find_untried(self.list_headings(robot.world, s, pose), tried)
+        tolerance_m = s.subgoals[s.at - 1].tolerance_m if s.at else CHECK_TOLERANCE_M
+        heading = choose_heading(robot, pose, headings, tolerance_m, find_car(s, s.at), self._settings)
+        is_ahead = abs(wrap_angle(pose.heading_rad - heading)) <= MAX_LOOK_ERROR_RAD
+        chosen = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}",
+                           pose.heading_rad if is_ahead else heading, tried=tried)
+        yield Post(replace(chosen, told=list_told(view, chosen, self._settings)), (sketch, belief))
+
+    def list_headings(self, building: Building, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
+        """The headings that come into question [rad, world], the first good one is taken."""
+        wanted = sketch.subgoals[sketch.at - 1].destination if sketch.at else None
+        if wanted is not None and wanted.heading_rad is not None:
+            yield wanted.in_world(building).heading_rad
+        end = None if sketch.current is None else sketch.current.destination.in_world(building)
+        along = None if end is None else math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
+        if along is not None and _begins_with_drive(building, sketch, pose):
+            is_long = abs(wrap_angle(along - pose.heading_rad)) > self._settings.plan.long_turn_rad
+            yield from [along] * is_long  # few landmarks are followed through such a turn: it is done before the look
+        yield pose.heading_rad
+        if along is not None:
+            yield along
+        yield from turn_headings(pose, self._settings)
+
+
+def _begins_with_drive(building: Building, sketch: PlanSketch, pose: Pose2) -> bool:
+    """Whether what comes next is a leg, and not at its end already."""
+    s = sketch.current
+    return s is not None and s.primitive and pose.distance_to(s.destination.in_world(building)) > s.tolerance_m

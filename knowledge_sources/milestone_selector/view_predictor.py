@@ -1,0 +1,76 @@
+"""View predictor (§3.3, §4): what should be seen of a milestone that the robot faces, and the picture of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
+from knowledge_sources.methods.localization import precompute_views
+from knowledge_sources.methods.verification import list_seen_locales, predict_milestone
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import (
+    GOING_ON,
+    HELD,
+    MAX_LOOK_ERROR_RAD,
+    MILESTONE,
+    NOT_LOST,
+    STANDING,
+    find_car_of,
+    find_followed,
+    find_frames,
+    find_heading,
+    find_robot_and_pose,
+    open_discrepancy,
+    unmeasured_doubt,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries import Hypothesis, Milestone, Obstruction, PictureRequest
+from world_models.frames import wrap_angle
+
+
+class Case(NamedTuple):
+    """The milestone that is looked for, the belief, and what is known to stand before the camera: one or none."""
+
+    milestone: Entry[Milestone]
+    belief: Entry[Hypothesis]
+    hidden: tuple[Entry[Obstruction], ...]
+
+
+class ViewPredictor(RobotKnowledgeSource):
+    """Predicts the landmarks of a milestone once the robot faces them, and asks for the picture.
+
+    A doubt that is newer than the milestone does not wait for the turn: the present view is looked at.
+    """
+
+    level, priority = Level.PLAN, Priority.LOOK
+    on = (
+        Watch(Milestone, (Posted,), lambda m: m.status == "turning"),
+        Watch(Discrepancy, (Posted, Revised)),
+        Watch(Hypothesis, (Revised,), lambda h: h.is_held),
+    )
+    needs = (GOING_ON, HELD, STANDING, NOT_LOST, MILESTONE)
+    writes = (Milestone, PictureRequest)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        belief, waiting, doubt = HELD.of(view).entry, MILESTONE.of(view), unmeasured_doubt(view)
+        if waiting.value.status != "turning":
+            return None
+        off_rad = abs(wrap_angle(find_heading(view, belief.value) - waiting.value.look_heading_rad))
+        if off_rad > MAX_LOOK_ERROR_RAD and (doubt is None or waiting.cycle >= doubt.cycle):
+            return None
+        hidden = view.latest(Obstruction)
+        return Case(waiting, belief, () if hidden is None else (hidden,))
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        milestone, belief, hidden = case
+        robot, pose = find_robot_and_pose(view, belief.value)
+        here = replace(milestone.value, look_heading_rad=pose.heading_rad)
+        expected = predict_milestone(robot, pose, here, find_car_of(view, here), self._settings)
+        if not find_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
+            precompute_views(robot, belief.value.locale, pose, self._settings)  # the judge asks: another door?
+        frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale, self._settings))
+        wish = Revise(milestone, expected, (milestone, belief, *hidden, *frames))
+        yield wish
+        yield Post(PictureRequest("milestone"), (wish,))

@@ -1,0 +1,135 @@
+"""Floor watcher (§4, §5): how far the floor is free, by each picture, before the next increment is decided."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from itertools import islice
+from typing import NamedTuple
+
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
+from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD, Seen, see_free_floor
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import (
+    GOING_ON,
+    HELD,
+    PICTURE,
+    SURE,
+    UP_TO_DATE,
+    Belief,
+    find_motion_between,
+    rolling_course,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries import LAST_VIEWS, CameraPicture, FloorAppearance, FloorView, FreeFloor, Hypothesis
+from world_models.frames import Pose2, wrap_angle
+
+FLOOR_STEP_M = 0.04  # on the move the floor is looked at again after so much of the way
+MAX_FLOOR_SIGMA_M = 0.1  # the floor is looked at while the robot's place is known to this
+MAX_FLOOR_SIGMA_RAD = math.radians(1.0)  # the same of its heading
+
+MAX_LIGHT_AGE_S = 20.0  # the light of a picture tells that of the next ones for so long
+
+CORRECTED_BY = ("milestone", "tracks", "relocalization")
+"""What the belief rests on when a picture has corrected it."""
+
+
+class Case(NamedTuple):
+    """A picture, and the belief by which it shows the floor."""
+
+    frame: Entry[CameraPicture]
+    belief: Belief
+
+
+class FloorWatcher(RobotKnowledgeSource):
+    """Looks at the floor in each picture, once the belief was corrected by it.
+
+    It says how far the floor is free in each direction, and what ends it: something of the model, or a thing that the
+    model lacks. What the floor of a locale looks like it learns from where the robot has just driven. Some pictures are
+    kept to compare later ones with: what stands up from the floor moves otherwise than the floor. While the robot's
+    place is in doubt, or not known well, it does not look: it could not tell a wall from a thing. In the dark it sees
+    none of the floor, and no thing.
+    """
+
+    level, priority = Level.ACTION, Priority.SEE
+    on = (
+        Watch(CameraPicture, (Posted,), lambda f: f.purpose not in ("milestone", "probe")),
+        Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in CORRECTED_BY),
+    )
+    needs = (GOING_ON, PICTURE, HELD, UP_TO_DATE, SURE)
+    writes = (FreeFloor, FloorAppearance, FloorView)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """A picture in which the floor was not looked at yet, and a belief that is sharp enough to tell by it."""
+        frame, belief = PICTURE.of(view), HELD.of(view)
+        if belief.value.sigma_m > MAX_FLOOR_SIGMA_M or belief.value.sigma_rad > MAX_FLOOR_SIGMA_RAD:
+            return None
+        if _is_seen(view, frame) or (rolling_course(view) is not None and _is_near_last(view, belief)):
+            return None
+        return Case(frame, belief)
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        frame, belief, robot, pose = case.frame, case.belief.entry, case.belief.seeing, case.belief.pose
+        locale = case.belief.locale
+        floor_m = robot.world.floor_m(locale)
+        known = {entry.value.locale: entry for entry in view.all(FloorAppearance)}
+        kept = [entry for entry in islice(view.newest_first(FloorView), LAST_VIEWS)
+                if entry.value.belief == belief.id and entry.value.floor_m == floor_m]
+        apart_m = FLOOR_VIEW_DISTANCE_M
+        earlier = [entry for entry in kept if _measure_way_m(entry.value, pose) >= apart_m]
+        motions = [find_motion_between(view, entry.value, case.belief) for entry in earlier]
+        wheels = {entry.id: entry for _, told in motions for entry in told}
+        lit = _find_lit(view, frame.value.sim_time_s)
+        seen, learnt = see_free_floor(
+            robot, locale, pose, case.belief.covariance, frame.value.jpeg,
+            [Seen(view[entry.value.frame].value.jpeg, _pose_of(entry.value), motion)
+             for entry, (motion, _) in zip(earlier, motions, strict=True)],
+            {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings,
+            None if lit is None else lit.value.light)
+        reasons = (*earlier, *wheels.values(), *(known[name] for name in (locale,) if name in known),
+                   *(() if lit is None else (lit,)))
+        yield Post(seen, (frame, belief, *reasons))
+        for appearance in learnt:
+            old, because = known.get(appearance.locale), (frame, belief, *earlier)
+            yield Post(appearance, because) if old is None else Revise(old, appearance, (*because, old))
+        if seen.bearings_rad and (not kept or not _is_like(kept[0].value, pose)):
+            yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,
+                                 frame.value.sim_time_s, belief.value.sigma_m, belief.value.sigma_rad,
+                                 belief.value.motion), (frame, belief))
+
+
+def _find_lit(view: View, now_s: float) -> Entry[FreeFloor] | None:
+    """The last picture of which the light is known, if it was taken shortly before."""
+    since_s = now_s - MAX_LIGHT_AGE_S
+    return view.latest(FreeFloor, lambda f: f.light is not None and f.seen_s >= since_s)
+
+
+def _is_near_last(view: View, belief: Belief) -> bool:
+    """Whether the floor was looked at from about here: on the move each picture shows hardly more than the last.
+
+    Only so many looks stay on the board; they must reach back to where what is before the robot now was in sight.
+    """
+    last = view.latest(FreeFloor, lambda f: f.sense == "camera")
+    if last is None:
+        return False
+    eye = belief.pose @ Pose2(belief.robot.mount.forward_m, 0.0, 0.0)
+    return math.hypot(last.value.x_m - eye.x_m, last.value.y_m - eye.y_m) < FLOOR_STEP_M
+
+
+def _is_seen(view: View, frame: Entry[CameraPicture]) -> bool:
+    """Whether the floor was looked at in a picture already."""
+    return any(frame.ref in seen.because for seen in view.newest_first(FreeFloor))
+
+
+def _is_like(kept: FloorView, pose: Pose2) -> bool:
+    """Whether a picture shows hardly more than one that is kept."""
+    turned_rad = abs(wrap_angle(pose.heading_rad - kept.heading_rad))
+    return _measure_way_m(kept, pose) < FLOOR_VIEW_DISTANCE_M and turned_rad < FLOOR_VIEW_TURN_RAD
+
+
+def _pose_of(kept: FloorView) -> Pose2:
+    return Pose2(kept.x_m, kept.y_m, kept.heading_rad)
+
+
+def _measure_way_m(kept: FloorView, pose: Pose2) -> float:
+    return math.hypot(kept.x_m - pose.x_m, kept.y_m - pose.y_m)

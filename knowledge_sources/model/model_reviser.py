@@ -1,0 +1,109 @@
+"""Model reviser (§3.4): what is found or told of the building revises the frames of the locales that it concerns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+from blackboard import Change, Effect, Entry, Level, Posted, Revise, View, Watch
+from knowledge_sources.methods.floor import revise_by_door, revise_by_report, revise_by_thing
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import find_building, find_frames
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.building import LocaleFrame
+from world_models.entries import DoorState, Obstacle, UserReport
+
+
+class Statement(NamedTuple):
+    """What an entry says of locales.
+
+    Attributes:
+        locales: whose frames it concerns.
+        revise: a frame as it is known by it; raises ValueError where the frame has nothing that could be so.
+        is_told: whether somebody told it, who is answered.
+        error: why it concerns none, in words.
+    """
+
+    entry: Entry[Any]
+    locales: tuple[str, ...]
+    revise: Callable[[LocaleFrame], LocaleFrame]
+    is_told: bool = False
+    error: str = ""
+
+
+class Case(NamedTuple):
+    """Frames as they are known now, each with what says so; and answers to what was told, in words."""
+
+    frames: tuple[tuple[Entry[LocaleFrame], LocaleFrame, tuple[Entry[Any], ...]], ...]
+    answers: tuple[tuple[Entry[UserReport], str], ...]
+
+
+class ModelReviser(RobotKnowledgeSource):
+    """Alone revises what is known of locales: by things on the floor, by doors, and by what somebody says.
+
+    Of two that say otherwise the newer counts. All that is new of a locale comes into its frame at once, so that who
+    reads why it was revised finds all of it. A door is in the frames of both its rooms. A frame is revised only where a
+    plan may change by it. What cannot be taken up, because the model has nothing of that name, is answered. It acts at
+    once, before the next increment: the door may be just ahead.
+    """
+
+    level, priority = Level.ACTION, Priority.ENTER
+    on = (Watch(UserReport, (Posted,)), Watch(Obstacle), Watch(DoorState))
+    writes = (LocaleFrame, UserReport)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """The frames that are otherwise by what is new, and all that was told and is not answered yet."""
+        statements = sorted(self._list_statements(view), key=lambda said: said.entry.cycle)
+        new = [said for said in statements if said.is_told or said.entry is trigger.entry]
+        frames, taken, errors = [], set[str](), {s.entry.id: s.error for s in statements if s.error}
+        for frame in find_frames(view, {name for said in new for name in said.locales}):
+            value, reasons = frame.value, list[Entry[Any]]()
+            for said in statements:
+                is_new = said in new or said.entry.cycle >= frame.cycle
+                if not is_new or frame.value.name not in said.locales:
+                    continue
+                try:
+                    revised = said.revise(value)
+                except ValueError as error:
+                    errors[said.entry.id] = str(error)
+                    continue
+                if revised.changes != value.changes:
+                    value = revised
+                    reasons.append(said.entry)
+            if reasons:
+                frames.append((frame, value, tuple(reasons)))
+                taken.update(entry.id for entry in reasons)
+        told = [said.entry for said in statements if said.is_told]
+        answers = tuple((entry, _answer(entry.id in taken, errors.get(entry.id))) for entry in told)
+        return Case(tuple(frames), answers) if frames or answers else None
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        for report, answer in case.answers:
+            yield Revise(report, replace(report.value, answer=answer), (report,))
+        for frame, value, reasons in case.frames:
+            yield Revise(frame, value, (*reasons, frame))
+
+    def _list_statements(self, view: View) -> Iterator[Statement]:
+        """What things on the floor and doors say, and what was told and is not answered."""
+        least_m = self._settings.action.min_footprint_change_m
+        for entry in view.all(Obstacle):
+            revise = partial(revise_by_thing, thing=entry.value, by=entry.author, least_m=least_m)
+            yield Statement(entry, (entry.value.locale,), revise)
+        for door in view.all(DoorState):
+            yield Statement(door, door.value.between, partial(revise_by_door, door=door.value, by=door.author))
+        for told in view.where(UserReport, lambda report: not report.answer):
+            by_report = partial(revise_by_report, report=told.value, by=told.author)
+            try:
+                locales = tuple(find_building(view).find_elements(told.value.what))
+            except ValueError as error:
+                yield Statement(told, (), by_report, is_told=True, error=str(error))
+            else:
+                yield Statement(told, locales, by_report, is_told=True)
+
+
+def _answer(is_taken: bool, error: str | None) -> str:
+    if error is not None:
+        return f"which cannot be: {error}"
+    return "and believes it from now on" if is_taken else "which it knew already"

@@ -1,0 +1,69 @@
+"""Thing mapper (§4: models are incomplete): what is seen on the floor, and is not in the model, is in the way.
+
+It is told of by pictures of the floor or by range sensors; and it is forgotten when its floor is seen free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import shapely
+
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
+from knowledge_sources.methods.floor import Sight, is_telling, may_be_there
+from knowledge_sources.methods.floor.weigh_sight import weigh_sight
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import HELD, SEEN_MARGIN_M, SURE, Belief, current_leg, find_known_free, find_swept_next
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries import CameraPicture, FreeFloor, Obstacle
+
+
+class Case(NamedTuple):
+    """A sight of the floor in which something may be told of a thing, and the belief."""
+
+    scan: Entry[FreeFloor]
+    belief: Belief
+
+
+class ThingMapper(RobotKnowledgeSource):
+    """Concludes from a sight of the floor that something stands on it; or that it is gone.
+
+    What is seen is joined with what is known there already. It is there when it is certain enough, by one sure picture
+    or two unsure ones, or by one where it is next on the way; and gone when most of its footprint is seen to be free
+    floor. Where its feet were not seen, it may reach to the robot's rim.
+    """
+
+    level, priority = Level.ACTION, Priority.REVISE
+    on = (Watch(FreeFloor, (Posted,)),)
+    needs = (HELD, SURE)
+    writes = (Obstacle,)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """A sight with a thing in it that is certain enough, or of floor on which something may be there."""
+        scan: Entry[FreeFloor] = trigger.entry
+        is_thing = any(is_telling(thing, self._settings.action) for thing in scan.value.things)
+        is_told = is_thing or view.latest(Obstacle, may_be_there) is not None
+        return Case(scan, HELD.of(view)) if is_told else None
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        scan, belief = case
+        known, driving = {entry.id: entry for entry in view.all(Obstacle)}, current_leg(view)
+        obstacles = {id: entry.value for id, entry in known.items()}
+        for found in weigh_sight(self._tell_of(view, scan, belief), obstacles, self._settings):
+            entry = None if found.known is None else known[found.known]
+            on_way = (driving[0],) if found.is_next and driving is not None else ()
+            if entry is None:
+                yield Post(found.obstacle, (scan, *on_way))
+            else:
+                yield Revise(entry, found.obstacle, (scan, entry, *on_way))
+
+    def _tell_of(self, view: View, scan: Entry[FreeFloor], belief: Belief) -> Sight:
+        """A sight with what it is weighed by."""
+        is_any_cut, driving, s = any(thing.is_cut for thing in scan.value.things), current_leg(view), self._settings
+        known_free = find_known_free(view, belief.entry, s.action) if is_any_cut else shapely.Polygon()
+        ahead = shapely.Polygon() if driving is None else find_swept_next(belief, driving[0].value, s.action)
+        pictures = (found.id for ref in scan.because
+                    if (found := view.get(ref.id)) is not None and isinstance(found.value, CameraPicture))
+        told_by = next(pictures, scan.id) if scan.value.sense == "camera" else scan.id
+        return Sight(scan.value, told_by, belief.world, belief.robot.radius_m + SEEN_MARGIN_M, known_free, ahead)

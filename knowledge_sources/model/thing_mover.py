@@ -1,0 +1,69 @@
+"""Thing mover (§4): what was seen by a belief that proved a little wrong is moved as the belief is, not forgotten."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch
+from knowledge_sources.methods.floor import doubt_thing, may_be_there, move_thing
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import find_building
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries import Certificate, Hypothesis, Obstacle
+from world_models.frames import Pose2, wrap_angle
+
+MAX_DRIFT_M = 0.5  # a belief that was further off was not worn out on the way: the robot was carried off
+MAX_DRIFT_RAD = 0.35  # the same of its heading
+
+
+class Case(NamedTuple):
+    """The belief by which the robot was found again, what is moved, and the certificate after which it was seen.
+
+    Attributes:
+        correction: the pose that was found, as seen from the one that was believed.
+        sure: the last milestone that was verified, if one was.
+    """
+
+    belief: Entry[Hypothesis]
+    correction: Pose2
+    things: tuple[Entry[Obstacle], ...]
+    sure: tuple[Entry[Any], ...]
+
+
+class ThingMover(RobotKnowledgeSource):
+    """Moves what was seen on the floor since a milestone was last verified, where the robot was found a little beside.
+
+    It was seen from the robot, so it stands where it stood as seen from there, less surely by what the belief was off.
+    Was the robot carried off, what it saw on the way was seen before or after that: it stays where it is, and is
+    believed less. A thing leaves only when its floor is seen free. What was touched stays: a contact was weighed at a
+    milestone.
+    """
+
+    level, priority = Level.ACTION, Priority.REVISE
+    on = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.correction is not None),)
+    writes = (Obstacle,)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """What was seen, and not touched, since a milestone was last verified."""
+        sure = view.latest(Certificate, lambda certificate: certificate.verdict == "verified")
+        seen = tuple(entry for entry in view.where(Obstacle, lambda o: may_be_there(o) and o.touched_s is None)
+                     if sure is None or entry.cycle > sure.cycle)
+        belief: Entry[Hypothesis] = trigger.entry
+        if not seen or belief.value.correction is None:
+            return None
+        return Case(belief, belief.value.correction, seen, () if sure is None else (sure,))
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        belief, by, things, sure = case
+        building = find_building(view)
+        here = belief.value.world_from_robot(building)
+        moved_m, turned_rad = by.distance_to(Pose2(0.0, 0.0, 0.0)), abs(wrap_angle(by.heading_rad))
+        for entry in things:
+            if moved_m > MAX_DRIFT_M or turned_rad > MAX_DRIFT_RAD:
+                told = f"seen before or after the robot was carried off, as {belief.ref} tells"
+                now = doubt_thing(entry.value, told, self._settings.action)
+            else:
+                told = f"moved with the belief, which {belief.ref} corrected"
+                now = move_thing(building, entry.value, here @ by @ here.inverse(), moved_m, told)
+            yield Revise(entry, now, (belief, entry, *sure))

@@ -1,0 +1,78 @@
+"""Touch finder (§4: models are incomplete): what was touched, and is not in the model, is in the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from blackboard import Change, Effect, Entry, Level, Post, Revise, Revised, View, Watch
+from knowledge_sources.methods.floor import TOUCH_MARGIN_M, find_touched, locate_touch, touch_again, touch_first
+from knowledge_sources.methods.motion import find_nearest
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import HELD
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries import Contact, Course, Hypothesis, MotorCommand, Obstacle
+
+MAX_TOUCH_SIGMA_RAD = 0.6  # a contact whose direction is less sure tells of no obstacle
+
+
+class Case(NamedTuple):
+    """What was known of what was touched, if anything was; what is known of it now; and what tells it."""
+
+    known: Entry[Obstacle] | None
+    found: Obstacle
+    because: tuple[Entry[Any], ...]
+
+
+class TouchFinder(RobotKnowledgeSource):
+    """Concludes that something stands where the robot touched.
+
+    It waits until a milestone was verified where the robot touched: as long as its place is in doubt, a contact may be
+    with a wall. The model explains a contact where a wall or a thing is near enough to be touched, by what the belief
+    leaves open. Then nothing is concluded; nor where the contact's direction is not known. How large the thing is a
+    touch does not tell: it is taken to be ``obstacle_width_m`` wide and deep.
+    """
+
+    level, priority = Level.ACTION, Priority.REVISE
+    on = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in ("milestone", "relocalization")),)
+    needs = (HELD,)
+    writes = (Obstacle,)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """The newest contact, where its direction is known well enough and the model does not explain it."""
+        touch, belief, s = _find_new_touch(view), HELD.of(view), self._settings.action
+        if touch is None or touch[0].value.sigma_rad > MAX_TOUCH_SIGMA_RAD:
+            return None
+        contact, turned_rad, turns = touch
+        radius_m, b, because = belief.robot.radius_m, belief.value, (contact, *turns, belief.entry)
+        touched = locate_touch(belief.pose, radius_m, contact.value, turned_rad)
+        sigma_m = math.hypot(b.sigma_m, radius_m * math.hypot(b.sigma_rad, contact.value.sigma_rad))
+        reach_m = TOUCH_MARGIN_M + 3.0 * b.sigma_m
+        obstacles = {entry.id: entry for entry in view.all(Obstacle)}
+        id = find_touched({id: o.value for id, o in obstacles.items()}, touched, reach_m + 3.0 * sigma_m)
+        if id is not None:
+            known = obstacles[id]
+            return Case(known, touch_again(belief.world, touched, known.value, s), (*because, known))
+        if find_nearest(belief.world, b.locale, belief.pose.position, of_model=True)[0] <= radius_m + reach_m:
+            return None
+        return Case(None, touch_first(belief.world, touched, b.locale, sigma_m, 1 + len(obstacles), s), because)
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        known, found, because = case
+        yield Post(found, because) if known is None else Revise(known, found, because)
+
+
+def _find_new_touch(view: View) -> tuple[Entry[Contact], float, tuple[Entry[MotorCommand], ...]] | None:
+    """The newest contact, if no obstacle rests on it yet and the robot stands where it touched: it has only turned; by
+    how much [rad], and by which commands.
+    """
+    contact = view.latest(Contact)
+    if contact is None or any(o.value.touched_s == contact.value.when_s for o in view.all(Obstacle)):
+        return None
+    asked = contact.because[0].id  # of the same cycle as the contact, or the one before
+    since = tuple(command for command in view.since(MotorCommand, contact.cycle) if command.id != asked)
+    has_rolled = any(course.id != asked for course in view.since(Course, contact.cycle))
+    if view.get(asked) is None or has_rolled or any(command.value.move_m != 0.0 for command in since):
+        return None
+    return contact, math.fsum(command.value.turn_rad for command in since), since

@@ -1,0 +1,50 @@
+"""The doors that a picture may show; for several knowledge sources."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from blackboard import Entry, View
+from knowledge_sources.methods.doors import is_in_view
+from knowledge_sources.reads.questions import find_frames, find_robot_in
+from world_models.building import Doorway, FrameChange, LocaleFrame
+from world_models.entries import DoorState, Hypothesis
+from world_models.frame_building import FrameBuilding
+
+MAX_SIGMA_M = 0.1  # largest standard deviation of the robot's place when it judges a door
+MAX_SIGMA_RAD = 0.035  # largest standard deviation of its heading when it does
+
+Frames = tuple[Entry[LocaleFrame], ...]
+
+
+class Watched(NamedTuple):
+    """A doorway in view, and whether it is believed to be shut."""
+
+    doorway: Doorway
+    is_shut: bool
+
+
+def list_doors_in_view(view: View, belief: Hypothesis) -> Iterator[Watched]:
+    """The doorways of the robot's room that a picture may show."""
+    robot = find_robot_in(view, belief.locale)
+    pose = belief.world_from_robot(robot.world)
+    for frame in find_frames(view, (belief.locale,)):
+        doors = [Watched(doorway, is_shut=False) for doorway in frame.value.doorways]
+        doors += [Watched(doorway, is_shut=True) for doorway in frame.value.shut_doorways]
+        yield from (w for w in doors if is_in_view(robot, pose, w.doorway, belief.locale))
+
+
+def find_door_state(view: View, door: str) -> Entry[DoorState] | None:
+    """What is known of a door."""
+    return view.latest(DoorState, lambda state: state.door == door)
+
+
+def with_door_open(view: View, door: str, frames: Frames) -> FrameBuilding:
+    """The building as it would be known if a door were open that is believed to be shut."""
+    return FrameBuilding(view, [entry.value.restored("shut", door) for entry in frames])
+
+
+def with_door_shut(view: View, door: str, frames: Frames) -> FrameBuilding:
+    """The building as it would be known if a door were shut that is believed to be open."""
+    return FrameBuilding(view, [entry.value.changed(FrameChange("shut", door, "")) for entry in frames])

@@ -1,0 +1,414 @@
+"""Floor ahead (§5): how far the way ahead is seen to be free, and where to look for the rest; pure reads."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+
+from blackboard import Entry, View
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor import (
+    SPACING_M,
+    Costs,
+    Lookout,
+    SeenFloor,
+    Sweep,
+    build_free_floor,
+    build_polygon,
+    choose_look,
+    find_floor,
+    measure_blind_end_m,
+    measure_free_m,
+    sample_sweep,
+    take_as_jamb,
+)
+from knowledge_sources.methods.motion import MAX_LOOK_ERROR_RAD, plan_turn
+from knowledge_sources.reads.conditions import Belief
+from knowledge_sources.reads.lost import locate_contact
+from knowledge_sources.reads.questions import active_goal, deepest_sketch, find_robot
+from knowledge_sources.settings import ActionSettings, Settings
+from world_models.building import EXTRA_KIND, Building, Thing
+from world_models.entries import (
+    AROUND_SIGMA_RAD,
+    CameraPicture,
+    Contact,
+    FreeFloor,
+    Goal,
+    Hypothesis,
+    Leg,
+    MotionReport,
+    MotorCommand,
+    Obstacle,
+    PlaceSearch,
+    PlanSketch,
+    RideReport,
+)
+from world_models.frames import Pose2, wrap_angle
+from world_models.robot import RobotModel
+
+SEEN_MARGIN_M = 0.03  # margin round the robot's disc within which the floor must be seen to be free
+PUT_DOWN_FREE_M = 0.75  # round where it was put down the floor is free to this distance: a person sees it
+NEAR_MODEL_M = 0.08  # nearer to a wall or a thing of the model the floor need not be seen
+MIN_INCREMENT_M = 0.2  # shortest move at full speed into floor that is seen to be free; less of it is crept
+MIN_CREEP_M = 0.05  # shortest move into floor that was not seen to be free
+UNSURE_GAP_M = 0.3  # nearer to what is only suspected it creeps: what was seen of it may be a part of it
+TOUCHED_GAP_M = 0.02  # what was touched is not come so near to again
+TOUCHED_AWAY = 0.2  # nearer to it than that a move must lead away from it by this part of the way
+TOUCH_HOLDS_M = 0.5  # after so much of the way a touch that is no obstacle tells no more where not to go
+AWAY_M = 0.15  # length of the move away from what was touched
+AWAY_STEP_RAD = math.radians(15.0)  # of the directions that are tried for it
+MAX_DRIVEN_GAP_M = 0.8  # between two pictures that are no further apart the robot drove straight
+LOOK_AHEAD_M = 1.1  # so much of the way beyond a leg is looked at before it ends: what is too near to be seen then
+LOOK_FROM_M = 3.0  # distance from the end of a leg from which that begins
+LOOK_TURN_RAD_PER_S = math.radians(45.0)  # how fast the robot turns, as far as the time that a look takes is weighed
+LOOK_PICTURE_S = 0.2  # time that a picture with its command takes, weighed likewise
+
+Point = tuple[float, float]
+
+
+class Caution(NamedTuple):
+    """How the next move is limited by what is not seen.
+
+    Attributes:
+        move_m: at most so far [m, true]; 0 where something may stand in what is not seen.
+        creeps: whether that leads into floor that was not seen to be free.
+        is_told: whether it is seen free by more than looks.
+    """
+
+    move_m: float
+    creeps: bool
+    is_told: bool = False
+
+
+class FloorAhead:
+    """What the board tells of the floor along the way of one leg."""
+
+    def __init__(self, view: View, leg: Leg, belief: Entry[Hypothesis], whole: Settings) -> None:
+        settings = whole.action
+        self._settings, self._leg = settings, leg
+        self._robot = find_robot(view)
+        self._here = belief.value.world_from_robot(self._robot.world)
+        self._way: list[Point] = [(self._here.x_m, self._here.y_m), (leg.x1_m, leg.y1_m)]
+        self._beyond, locales = _find_way_beyond(view, self._robot)
+        self._locales = tuple(sorted({belief.value.locale, *locales}))
+        self._floor = find_floor(self._robot.world, self._locales)
+        found = [shapely.Polygon(thing.footprint_world) for name in self._locales
+                 for thing in self._robot.world.things_of(name) if thing.kind == EXTRA_KIND]
+        self._asked = shapely.buffer(shapely.union_all([self._floor, *found]), -NEAR_MODEL_M)
+        self._suspected = _list_what_may_stand(view, self._robot.world)
+        self._touches = _list_touches(view, self._here)
+        self._scans = _find_scans(view, belief, settings)
+        self._discs = list_free_discs(view, self._robot, self._here, self._scans)
+        self._told = dict[str, Entry[Any]]()
+        self._seen = SeenFloor(
+            tuple(entry.value for entry in self._scans), np.array([disc.circle for disc in self._discs]),
+            tuple(_list_taken(thing, whole.plan.overhang_m) for name in self._locales
+                  for thing in self._robot.world.things_of(name) if thing.is_obstacle))
+
+    @property
+    def because(self) -> tuple[Entry[Any], ...]:
+        """What has told something in the answers so far: looks at the floor, and things that may stand on it."""
+        return tuple(sorted(self._told.values(), key=lambda entry: (entry.cycle, entry.id)))
+
+    def limit_move(self, move_m: float) -> Caution:
+        """How far, of a move to the leg's end, the robot may go at once; a move of any other kind is no longer."""
+        free_m = self._measure_to_things_m(move_m, touched=True)
+        if free_m < min(MIN_CREEP_M, move_m):
+            return Caution(0.0, True)
+        caution = limit_move(self._find_unseen(self._sweep(self._way, free_m)), free_m, self._settings)
+        if not caution.creeps:
+            sure_m = self._measure_to_things_m(caution.move_m, UNSURE_GAP_M)
+            if sure_m >= min(caution.move_m, MIN_INCREMENT_M):
+                return caution._replace(move_m=sure_m, is_told=self.is_told(sure_m))
+            caution = Caution(min(caution.move_m, self._settings.max_creep_m), True)
+        return caution._replace(move_m=min(caution.move_m, self._measure_to_things_m(move_m)))
+
+    def keep_to_seen(self, command: MotorCommand) -> tuple[Leg, MotorCommand | None]:
+        """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
+
+        Returns the leg and the command. That is None where something may stand in floor that is not seen, right before
+        the robot.
+        """
+        leg, here, actuator = self._leg, self._here, self._robot.actuator
+        look = self.choose_look()
+        if look is not None:
+            looking = replace(leg, looking_rad=look.heading_rad, looked_at=(
+                *leg.looked_at, (here.x_m, here.y_m, look.heading_rad)))
+            turned = plan_turn(look.heading_rad, here, actuator, MAX_LOOK_ERROR_RAD)
+            if turned is not None:
+                return looking, turned
+        wanted_m = actuator.reach * command.move_m
+        caution = self.limit_move(wanted_m)
+        if caution.creeps and caution.move_m < min(MIN_CREEP_M, wanted_m):
+            return leg, self._lead_away() if self._touches else None
+        move_m = min(command.move_m, actuator.compute_command_m(caution.move_m))
+        s = self._settings
+        slowly = s.creep_speed_m_per_s if caution.creeps else None if caution.is_told else self.wary_m_per_s
+        return leg, MotorCommand(command.turn_rad, move_m, slowly)
+
+    def _lead_away(self) -> MotorCommand | None:
+        """A turn and a short move away from what was touched, as near as may be to the way; None: there is no room.
+
+        So the next motion never repeats the one that ended in a touch, also where the model explains it.
+        """
+        here, (x_m, y_m) = self._here, self._way[1]
+        aim_rad = math.atan2(y_m - here.y_m, x_m - here.x_m)
+        walls = shapely.boundary(self._floor)
+        rim_m = min(self._robot.radius_m, shapely.distance(walls, shapely.Point(here.position)))
+        for turn_rad in sorted(np.arange(-math.pi, math.pi, AWAY_STEP_RAD).tolist(), key=abs):
+            heading_rad = aim_rad + turn_rad
+            there = here.x_m + AWAY_M * math.cos(heading_rad), here.y_m + AWAY_M * math.sin(heading_rad)
+            aside = copy.copy(self)
+            aside._way = [self._way[0], there]
+            if shapely.distance(walls, shapely.Point(there)) >= rim_m and aside.limit_move(AWAY_M).move_m >= AWAY_M:
+                turned_rad = wrap_angle(heading_rad - here.heading_rad)
+                move_m = self._robot.actuator.compute_command_m(AWAY_M)
+                return MotorCommand(turned_rad, move_m, self._settings.creep_speed_m_per_s)
+        return None
+
+    @property
+    def wary_m_per_s(self) -> float:
+        """The highest speed into floor that only looks free."""
+        return min(self._settings.wary_speed_m_per_s, self._robot.actuator.speed_m_per_s)
+
+    def is_told(self, move_m: float) -> bool:
+        """Whether the floor of a move is seen free by more than looks, but for what is next to the model's walls."""
+        asked = self._ask(self._sweep(self._way, move_m))
+        untold = asked.only(~self._seen.ask_told(asked.points))
+        return measure_free_m(untold, move_m) >= move_m - SPACING_M  # the free floor itself ends between two points
+
+    def _measure_to_things_m(self, most_m: float, gap_m: float = 0.0, *, touched: bool = False) -> float:
+        """How far the robot can go towards the leg's end before it comes nearer to what may stand there; 0..most.
+
+        Args:
+            gap_m: of its rim; of what is only suspected, where it is not 0.
+            touched: only what was touched is asked; the robot does not go along that, but away from it.
+        """
+        way, step_m = shapely.LineString(self._way), MIN_CREEP_M
+        along = np.arange(0.0, most_m + step_m, step_m)
+        points = shapely.line_interpolate_point(way, along)
+        free_m = most_m
+        stands = [(entry, polygon) for entry, polygon in self._suspected
+                  if not ((touched and entry.value.touched_s is None) or (gap_m and entry.value.is_there))]
+        for entry, polygon in [*stands, *(self._touches if touched else ())]:
+            gaps = shapely.distance(points, polygon)
+            near_m, away_m = (TOUCHED_GAP_M, TOUCHED_AWAY * step_m) if touched else (gap_m, -1e-9)
+            met = np.flatnonzero((gaps[1:] < self._robot.radius_m + near_m) & (gaps[1:] < gaps[:-1] + away_m))
+            if len(met):
+                free_m = min(free_m, float(along[met[0]]))
+                self._told[entry.id] = entry
+        return free_m
+
+    def measure_free_m(self, most_m: float) -> float:
+        """How far towards the leg's end the floor is seen to be free, and leads not against what was touched."""
+        free_m = self._measure_to_things_m(most_m, touched=True)
+        return measure_free_m(self._find_unseen(self._sweep(self._way, free_m)), free_m)
+
+    def choose_look(self) -> Lookout | None:
+        """A look from here at floor that is needed behind the end of this leg, where it is the best place for that."""
+        s, end = self._settings, (self._leg.x1_m, self._leg.y1_m)
+        to_go_m = math.dist(end, self._here.position)
+        if to_go_m > LOOK_FROM_M or not self._beyond or len(self._leg.looked_at) >= s.max_looks:
+            return None
+        unseen = self._find_unseen(self._sweep([end, *self._beyond], LOOK_AHEAD_M))
+        if len(unseen.points) == 0:
+            return None
+        actuator = self._robot.actuator
+        costs = Costs(LOOK_TURN_RAD_PER_S, LOOK_PICTURE_S, actuator.turn_increment_rad,
+                      1.0 / s.creep_speed_m_per_s - 1.0 / actuator.speed_m_per_s)
+        look = choose_look(self._robot, self._floor, self._here, self._list_poses_ahead(to_go_m), unseen, costs)
+        if look is None or self._was_tried(look.heading_rad):
+            return None
+        return look
+
+    def _was_tried(self, heading_rad: float) -> bool:
+        """Whether the robot has looked there already from about here."""
+        return any(math.dist((x, y), self._here.position) < 0.3 and abs(wrap_angle(heading_rad - there)) < 0.4
+                   for x, y, there in self._leg.looked_at)
+
+    def _list_poses_ahead(self, to_go_m: float) -> list[Pose2]:
+        """Where pictures will be taken on what is left of the leg, and at its end in the direction of the next."""
+        leg, step_m = self._leg, self._robot.actuator.increment_m
+        heading = math.atan2(leg.y1_m - self._here.y_m, leg.x1_m - self._here.x_m)
+        count = max(1, math.ceil(to_go_m / step_m - 0.1))
+        parts = [min(1.0, step_m * k / max(to_go_m, 1e-9)) for k in range(1, count + 1)]
+        poses = [Pose2(self._here.x_m + part * (leg.x1_m - self._here.x_m),
+                       self._here.y_m + part * (leg.y1_m - self._here.y_m), heading) for part in parts]
+        x, y = self._beyond[0]
+        return [*poses, Pose2(leg.x1_m, leg.y1_m, math.atan2(y - leg.y1_m, x - leg.x1_m))]
+
+    def _sweep(self, way: Sequence[Point], most_m: float) -> Sweep:
+        """What the robot sweeps on a way, but for where it begins."""
+        return sample_sweep(way, self._robot.radius_m + SEEN_MARGIN_M, most_m)
+
+    def _ask(self, sweep: Sweep) -> Sweep:
+        """The part of a sweep that is not hard by something that the model has."""
+        return sweep.only(shapely.contains_xy(self._asked, sweep.points[:, 0], sweep.points[:, 1]))
+
+    def _find_unseen(self, sweep: Sweep) -> Sweep:
+        """The part of a sweep that is not seen free, and not hard by something that the model has."""
+        asked = self._ask(sweep)
+        free, scans, discs = self._seen.ask(asked.points)
+        reasons = [self._scans[k] for k in np.flatnonzero(scans)]
+        reasons += [entry for k in np.flatnonzero(discs) for entry in self._discs[k].because]
+        self._told.update((entry.id, entry) for entry in reasons)
+        return asked.only(~free)
+
+
+def _list_taken(thing: Thing, overhang_m: float) -> Floats:
+    """(k, 2) corners of the floor that a thing takes; of what the model lacks the top may be wider than its feet."""
+    if thing.kind != EXTRA_KIND:
+        return thing.footprint_world
+    wide = shapely.buffer(build_polygon(thing.footprint_world), overhang_m, join_style="mitre")
+    return np.asarray(shapely.get_coordinates(wide)[:-1])
+
+
+def _list_what_may_stand(view: View, world: Building) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
+    """What the robot does not creep into: all that what is suspected may take; of what is there what was seen of it,
+    as the sketcher leads through the rest only where nothing else is left. It does creep to what may be a jamb.
+    """
+    found = [(entry, entry.value) for entry in view.where(Obstacle, lambda o: o.status != "gone")]
+    taken = [(entry, o, take_as_jamb(world, o)) for entry, o in found]
+    return [(entry, build_polygon(jamb.core if jamb.core and (o.is_there or jamb is not o) else o.footprint))
+            for entry, o, jamb in taken]
+
+
+def _list_touches(view: View, here: Pose2) -> list[tuple[Entry[Contact], shapely.Point]]:
+    """Where something was touched on the last of the way, and is no obstacle: the model explains it, or may [world]."""
+    known = {obstacle.value.touched_s for obstacle in view.all(Obstacle)}
+    found = []
+    for contact in view.where(Contact, lambda touch: touch.sigma_rad < AROUND_SIGMA_RAD):
+        gone_m = math.fsum(report.value.move_m for report in view.since(MotionReport, contact.cycle)
+                           if report.because != contact.because)
+        if gone_m < TOUCH_HOLDS_M and contact.value.when_s not in known:
+            found.append((contact, shapely.Point(here.apply(locate_contact(view, contact)))))
+    return found
+
+
+def find_swept_next(belief: Belief, leg: Leg, settings: ActionSettings) -> shapely.Geometry:
+    """What the robot will sweep next on its leg [m, world]."""
+    here = shapely.Point(belief.pose.position)
+    way = shapely.LineString([here, (leg.x1_m, leg.y1_m)])
+    return shapely.intersection(way, here.buffer(settings.act_within_m)).buffer(belief.robot.radius_m + SEEN_MARGIN_M)
+
+
+def find_known_free(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> shapely.Geometry:
+    """The floor of the locales here that was seen to be free, or driven over, or told to be free [m, world]."""
+    robot, scans = find_robot(view), _find_scans(view, belief, settings)
+    discs = list_free_discs(view, robot, belief.value.world_from_robot(robot.world), scans)
+    seen = [build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
+            for f in (entry.value for entry in scans)]
+    circles = np.array([disc.circle for disc in discs])
+    return shapely.union_all([*seen, *shapely.buffer(shapely.points(circles[:, :2]), circles[:, 2])])
+
+
+class FreeDisc(NamedTuple):
+    """Floor that is free without being seen.
+
+    Attributes:
+        circle: x, y, radius [m, world].
+        because: what tells where it is, beside the belief.
+    """
+
+    circle: tuple[float, float, float]
+    because: tuple[Entry[FreeFloor], ...] = ()
+
+
+def list_free_discs(
+    view: View, robot: RobotModel, here: Pose2, scans: Sequence[Entry[FreeFloor]]
+) -> list[FreeDisc]:
+    """What is free under the robot, where it has driven from look to look, and where it was put down."""
+    radius_m = robot.radius_m
+    step_m = 0.3 * radius_m  # so near to one another they leave no gap at the sides
+    discs = [FreeDisc((here.x_m, here.y_m, radius_m + SEEN_MARGIN_M))]
+    for pair in pairwise([entry for entry in scans if entry.value.sense == "camera"]):
+        a, b = (entry.value for entry in pair)
+        gap_m = math.dist((a.x_m, a.y_m), (b.x_m, b.y_m))
+        if step_m < gap_m <= MAX_DRIVEN_GAP_M:
+            parts = np.linspace(0.0, 1.0, math.ceil(gap_m / step_m) + 1).tolist()
+            discs += [FreeDisc((a.x_m + part * (b.x_m - a.x_m), a.y_m + part * (b.y_m - a.y_m), radius_m), pair)
+                      for part in parts]
+    goal = active_goal(view)
+    if goal is not None and goal.id == f"{Goal.__name__}-1" and view.latest(RideReport) is None:
+        discs.append(_find_put_down(view, robot, goal.value))
+    return discs
+
+
+def _find_put_down(view: View, robot: RobotModel, goal: Goal) -> FreeDisc:
+    """Round where the robot was put down: by the first picture, if it is still on the board, else by what was said."""
+    first = view.get(f"{FreeFloor.__name__}-1")
+    start = goal.origin.in_world(robot.world)
+    if first is None or not first.value.bearings_rad:
+        return FreeDisc((start.x_m, start.y_m, PUT_DOWN_FREE_M), () if first is None else (first,))
+    eye, ahead = first.value, first.value.bearings_rad[len(first.value.bearings_rad) // 2]
+    before_m = robot.mount.forward_m if eye.sense == "camera" else 0.0  # the robot's axis is that far behind its camera
+    x_m, y_m = eye.x_m - before_m * math.cos(ahead), eye.y_m - before_m * math.sin(ahead)
+    if math.dist((x_m, y_m), start.position) > MAX_DRIVEN_GAP_M:
+        return FreeDisc((start.x_m, start.y_m, PUT_DOWN_FREE_M), (first,))
+    return FreeDisc((x_m, y_m, PUT_DOWN_FREE_M), (first,))
+
+
+def limit_move(unseen: Sweep, move_m: float, settings: ActionSettings) -> Caution:
+    """How far of a move the robot may go, by what of its sweep is not seen; it creeps where the rest is too short."""
+    free_m = measure_free_m(unseen, move_m)
+    if free_m >= min(move_m, MIN_INCREMENT_M):
+        return Caution(free_m, False)
+    return Caution(min(move_m, settings.max_creep_m, measure_blind_end_m(unseen, MIN_INCREMENT_M)), True)
+
+
+def _find_scans(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> tuple[Entry[FreeFloor], ...]:
+    """What the robot saw of the floor that it is on, the oldest first; only since it was last found, as it was seen
+    from elsewhere before.
+    """
+    now_s = _tell_time_s(view)
+    ride, found = view.latest(RideReport), view.latest(PlaceSearch, lambda search: search.status == "found")
+    since_s = max(now_s - settings.max_seen_age_s, -math.inf if ride is None else ride.value.sim_time_s)
+    since = -1 if found is None else found.cycle
+    return tuple(entry for entry in view.since(FreeFloor, since)
+                 if entry.value.seen_s >= since_s and _is_of(entry, belief))
+
+
+def _is_of(scan: Entry[FreeFloor], belief: Entry[Hypothesis]) -> bool:
+    """Whether a scan was placed by this belief, and not by one that was given up."""
+    beliefs = [ref.id for ref in scan.because if ref.id.startswith(f"{Hypothesis.__name__}-")]
+    return not beliefs or belief.id in beliefs
+
+
+def _tell_time_s(view: View) -> float:
+    frame, report = view.latest(CameraPicture), view.latest(MotionReport)
+    return max(0.0 if frame is None else frame.value.sim_time_s, 0.0 if report is None else report.value.sim_time_s)
+
+
+def _find_way_beyond(view: View, robot: RobotModel) -> tuple[list[Point], set[str]]:
+    """The way behind the current leg, as far as the sketches say, and the locales of both."""
+    sketch = deepest_sketch(view)
+    if sketch is None:
+        return [], set()
+    goal_sketches = {entry.value.path: entry.value for entry in view.where(
+        PlanSketch, lambda s: s.is_active and s.goal == sketch.value.goal)}
+    world = robot.world
+    points: list[Point] = []
+    locales: set[str] = set()
+    current = sketch.value.current
+    if current is not None:
+        locales |= {current.origin.locale, current.destination.locale}
+    path = sketch.value.path
+    while path in goal_sketches:
+        level = goal_sketches[path]
+        for subgoal in level.subgoals[level.at + 1:]:
+            if subgoal.is_ride or len(points) >= 3:
+                return points, locales
+            there = subgoal.destination.in_world(world)
+            points.append((there.x_m, there.y_m))
+            locales |= {subgoal.origin.locale, subgoal.destination.locale}
+        if not path:
+            break
+        path = path[:-1]
+    return points, locales

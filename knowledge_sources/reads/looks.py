@@ -1,0 +1,57 @@
+"""What the knowledge sources that look for milestones have in common: when a look may be chosen, and what was tried."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from blackboard import Entry, View
+from knowledge_sources.methods.belief import to_log_odds
+from knowledge_sources.reads.questions import find_building, find_robot_in
+from knowledge_sources.settings import Settings
+from world_models.entries import Certificate, Hypothesis, Milestone, PlanSketch
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
+
+MAX_LOOK_ERROR_RAD = math.radians(3.5)  # the robot faces a milestone when its heading is off by no more than this
+
+
+def find_robot_and_pose(view: View, belief: Hypothesis) -> tuple[RobotModel, Pose2]:
+    """The robot on its floor, and the believed pose in the world."""
+    robot = find_robot_in(view, belief.locale)
+    return robot, belief.world_from_robot(robot.world)
+
+
+def find_heading(view: View, belief: Hypothesis) -> float:
+    """The believed heading [rad, world]."""
+    return belief.world_from_robot(find_building(view)).heading_rad
+
+
+def find_tried(view: View, is_same: Callable[[Entry[Milestone]], bool]) -> tuple[float, ...]:
+    """The headings in which the last milestone, if it is the same one, was not testable."""
+    last = view.latest(Milestone)
+    if last is None or last.value.status != "not testable" or not is_same(last):
+        return ()
+    return (*last.value.tried, last.value.look_heading_rad)
+
+
+def find_car(sketch: PlanSketch, index: int) -> str:
+    """The elevator's car in which a ride before a milestone ends, or "": it looks the same on every floor."""
+    before = sketch.subgoals[index - 1] if index > 0 else None
+    return before.destination.locale if before is not None and before.is_ride else ""
+
+
+def find_car_of(view: View, milestone: Milestone) -> str:
+    """The same for a milestone of any sketch, or of none."""
+    sketch = view.get(milestone.sketch)
+    return "" if sketch is None else find_car(sketch.value, milestone.index)
+
+
+def list_told(view: View, milestone: Milestone, settings: Settings) -> tuple[float, ...]:
+    """The log odds of a wrong place by each of the looks that were tried for a milestone; 0 where one told nothing."""
+    last, certificate = view.latest(Milestone), view.latest(Certificate)
+    if not milestone.tried or last is None or certificate is None or certificate.value.milestone != last.id:
+        return (0.0,) * len(milestone.tried)
+    c, most = certificate.value, settings.plan.max_told
+    tells = c.matched >= settings.verification.min_matched_lines
+    return (*last.value.told, min(max(to_log_odds(c.p_false), -most), most) if tells else 0.0)

@@ -1,0 +1,86 @@
+"""The motion between two pictures: by what is believed of both places, or by the wheels if they tell it better (§3.2).
+
+Two beliefs of which each is off by half a degree tell the motion between them to 0.7 degrees only, as nobody knows how
+much of that they have in common. On a straight way the wheels tell it to 0.2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from blackboard import Entry, View
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor import TYPICAL_M, MotionBetween
+from knowledge_sources.reads.conditions import Belief
+from world_models.actuator import ActuatorModel
+from world_models.entries import BodyFault, Drift, FloorView, MotionReport
+from world_models.frames import Pose2, wrap_angle
+
+MAX_APART_SIGMAS = 3.0
+"""Wheels that say otherwise than what is believed by more than this slipped, or the robot was pushed."""
+
+
+def find_motion_between(
+    view: View, then: FloorView, now: Belief
+) -> tuple[MotionBetween, tuple[Entry[MotionReport] | Entry[Drift], ...]]:
+    """The motion from where a picture was kept to where the robot is believed to be now, and what told of it beside the
+    belief.
+    """
+    believed = _compare_beliefs(then, now)
+    reports = _list_reports(view, then.motion, now.value.motion)
+    drift = view.latest(Drift)
+    if drift is None or not reports or any(_is_broken(view, report) for report in reports):
+        return believed, ()
+    rolled = add_reports(now.robot.actuator, drift.value, [report.value for report in reports])
+    off = believed.moved.position - rolled.moved.position
+    turned = wrap_angle(believed.moved.heading_rad - rolled.moved.heading_rad)
+    is_apart = (abs(turned) > MAX_APART_SIGMAS * math.hypot(believed.sigma_rad, rolled.sigma_rad)
+                or math.hypot(*off) > MAX_APART_SIGMAS * math.hypot(believed.sigma_m, rolled.sigma_m))
+    return believed if is_apart else min(believed, rolled, key=_measure_unsure_m), (drift, *reports)
+
+
+def add_reports(actuator: ActuatorModel, drift: Drift, reports: list[MotionReport]) -> MotionBetween:
+    """The motion that wheels report, the oldest part first; their errors are taken as one and the same."""
+    moved = Pose2(0.0, 0.0, 0.0)
+    for report in reports:
+        moved = moved @ actuator.predict_motion(report.turn_rad, report.move_m, drift.curvature_per_m)
+    bent = math.hypot(drift.sigma_per_m, actuator.bend_sigma_per_m)
+    known = replace(actuator, curvature_sigma_per_m=bent)
+    return MotionBetween(moved, *_spread(known.motion_covariance(
+        math.fsum(abs(report.turn_rad) for report in reports), math.fsum(report.move_m for report in reports))))
+
+
+def _measure_unsure_m(motion: MotionBetween) -> float:
+    """How unsure it leaves where floor is seen that is so far away."""
+    return motion.sigma_m + TYPICAL_M * motion.sigma_rad
+
+
+def _compare_beliefs(then: FloorView, now: Belief) -> MotionBetween:
+    sigma_m, sigma_rad = _spread(now.covariance)
+    moved = Pose2(then.x_m, then.y_m, then.heading_rad).inverse() @ now.pose
+    return MotionBetween(moved, math.hypot(then.sigma_m, sigma_m), math.hypot(then.sigma_rad, sigma_rad))
+
+
+def _spread(covariance: Floats) -> tuple[float, float]:
+    """Standard deviations [m, rad] of a pose with covariance (3, 3)."""
+    return math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0)), math.sqrt(max(float(covariance[2, 2]), 0.0))
+
+
+def _list_reports(view: View, since: str, until: str) -> list[Entry[MotionReport]]:
+    """The reports after one up to another, the oldest first; none where not all of them are on the board any more."""
+    between: list[Entry[MotionReport]] = []
+    for report in view.newest_first(MotionReport):
+        if report.id == since:
+            return between[::-1]
+        if between or report.id == until:
+            between.append(report)
+    return []
+
+
+def _is_broken(view: View, report: Entry[MotionReport]) -> bool:
+    """Whether the motion was broken off: the wheels do not tell all of it."""
+    asked = report.because[0].id
+    return view.latest(BodyFault, lambda fault: fault.request == asked) is not None

@@ -1,0 +1,129 @@
+"""What the knowledge sources of plan sketches have in common: planners round obstacles, and the sketches of a goal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import replace
+
+import shapely
+
+from blackboard import Effect, Entry, Revise, View
+from knowledge_sources.methods.floor import build_polygon, take_as_jamb
+from knowledge_sources.methods.motion import SubgoalPlanner
+from knowledge_sources.reads.questions import find_building, find_robot
+from knowledge_sources.settings import PlanSettings
+from world_models import words
+from world_models.entries import Goal, Hypothesis, Obstacle, Place, PlanSketch, SketchStatus, Subgoal
+from world_models.frames import wrap_angle
+
+GOAL_TOLERANCE_M = 0.010  # tolerance at the goal
+GOAL_HEADING_TOLERANCE_RAD = 0.02  # tolerance of a heading that the goal states
+INEXACT_TOLERANCE_SIGMAS = 2.0
+"""Deviations of the belief that are added to the tolerance of a goal where the model is inexact."""
+
+Way = tuple[Subgoal, ...]
+
+
+def list_planners(view: View, settings: PlanSettings) -> list[SubgoalPlanner]:
+    """Planners in the order in which they are asked: round all that obstacles may take, then what is seen of them, then
+    as if slivers in doorways were the jambs, which may stand a little beside: nothing so narrow blocks a way.
+
+    Where the feet of an obstacle were not seen, the floor round it may be free: the robot drives as if it were, and
+    only into what it then sees to be free.
+    """
+    robot, obstacles = find_robot(view), [entry.value for entry in find_obstacles(view)]
+    ways = [False, *([True] if any(obstacle.core for obstacle in obstacles) else [])]
+    planners = [SubgoalPlanner(robot, settings, obstacles, by_cores=by_cores) for by_cores in ways]
+    as_jambs = [take_as_jamb(robot.world, obstacle) for obstacle in obstacles]
+    return planners if as_jambs == obstacles else [*planners, SubgoalPlanner(robot, settings, as_jambs, by_cores=True)]
+
+
+def find_way(planners: Iterable[SubgoalPlanner], ask: Callable[[SubgoalPlanner], Way | None]) -> Way | None:
+    """The first way that a planner finds."""
+    return next((way for way in map(ask, planners) if way is not None), None)
+
+
+def find_way_to_goal(planners: Iterable[SubgoalPlanner], belief: Hypothesis, goal: Goal) -> Way | None:
+    """From locale to locale, from where the robot believes to be."""
+    here = place_of(belief)
+    return find_way(planners, lambda p: p.plan_between_locales(here, goal.destination, GOAL_TOLERANCE_M))
+
+
+def find_obstacles(view: View, locales: Collection[str] | None = None) -> tuple[Entry[Obstacle], ...]:
+    """What stands in the way in some locales, or in any, and is not in the file."""
+    return view.where(Obstacle, lambda o: o.is_there and (locales is None or o.locale in locales))
+
+
+def name_obstacles(obstacles: Sequence[Entry[Obstacle]]) -> str:
+    return f"; blocked by {' and '.join(entry.value.words() for entry in obstacles)}" if obstacles else ""
+
+
+def list_locales(subgoals: Iterable[Subgoal]) -> set[str]:
+    """The locales through which subgoals lead."""
+    return {place.locale for subgoal in subgoals for place in (subgoal.origin, subgoal.destination)}
+
+
+def place_of(belief: Hypothesis) -> Place:
+    """The believed place, without a heading."""
+    return Place(belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m)
+
+
+def is_just_found(belief: Hypothesis) -> bool:
+    """Whether the robot stands where a search has just found it: there the milestone that a sketch begins with holds.
+
+    The looks of the search are its evidence; the same question put again at the same place would count them twice.
+    """
+    return belief.basis == "relocalization"
+
+
+def supersede(view: View, because: Entry[object], status: SketchStatus = "superseded") -> Iterable[Effect]:
+    """All active sketches end, before another one is drawn."""
+    for old in view.where(PlanSketch, lambda s: s.is_active):
+        yield Revise(old, replace(old.value, status=status), (because,))
+
+
+def find_first_level(view: View) -> Entry[PlanSketch] | None:
+    """The active sketch that leads from locale to locale."""
+    return view.latest(PlanSketch, lambda s: s.is_active and not s.path)
+
+
+def has_missed(view: View, belief: Hypothesis, sketch: PlanSketch, *, is_inexact: bool) -> bool:
+    """Whether the end of the subgoal before a milestone is further than its tolerance.
+
+    A model that is inexact makes it wider. From a lookout the robot has looked when it came there: it may turn since.
+    """
+    if sketch.at == 0:
+        return False
+    subgoal, building = sketch.subgoals[sketch.at - 1], find_building(view)
+    here, there = belief.world_from_robot(building), subgoal.destination.in_world(building)
+    heading = None if _is_of_look(view, sketch) else subgoal.destination.heading_rad
+    error = 0.0 if heading is None else wrap_angle(here.heading_rad - there.heading_rad)
+    wider_m = INEXACT_TOLERANCE_SIGMAS * belief.sigma_m if is_inexact else 0.0
+    is_off = here.distance_to(there) > math.hypot(subgoal.tolerance_m, wider_m)
+    return is_off or abs(error) > GOAL_HEADING_TOLERANCE_RAD
+
+
+def _is_of_look(view: View, sketch: PlanSketch) -> bool:
+    """Whether a sketch leads to a lookout, itself or as a part of one that does."""
+    first = find_first_level(view)
+    return sketch.is_look or (first is not None and first.value.is_look)
+
+
+def tell_missed(
+    view: View, belief: Hypothesis, sketch: PlanSketch
+) -> tuple[str, tuple[Entry[Obstacle], ...]]:
+    """What was tried so often in vain, how far from it the last try ended, and what may stand there; and that itself.
+    """
+    there, then = sketch.subgoals[sketch.at - 1].destination, sketch.current
+    building, robot = find_building(view), find_robot(view)
+    at = there.in_world(building)
+    off_m, rim = belief.world_from_robot(building).distance_to(at), shapely.Point(at.position).buffer(robot.radius_m)
+    is_goal = then is None and not sketch.path and not sketch.is_look
+    what = "the goal" if is_goal else "the way"
+    if then is not None and then.is_ride:
+        what = f"the elevator {then.passage}"
+    taking = view.where(Obstacle, lambda o: o.status != "gone" and build_polygon(o.footprint).intersects(rim))
+    occupied = f"; it is occupied by {' and '.join(o.value.words() for o in taking)}" if taking else ""
+    tries, last = words.count(sketch.adjustments + 1, "try", "tries"), f"the last ended {words.metres(off_m)} from it"
+    return f"{what} at {there} was not come to in {tries}: {last}{occupied}", taking

@@ -1,0 +1,154 @@
+"""Localizer (§2, §4): every place of the floor that agrees with a lost robot's pictures, until one is left."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Retract, Revised, View, Watch
+from knowledge_sources.methods.localization import (
+    LocalizationStatus,
+    Search,
+    StatedPlace,
+    describe,
+    find_far_action,
+    find_odds_used,
+    list_rooms,
+    make_alias_test,
+    prefer_reachable,
+    search,
+    weigh_told,
+)
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import (
+    WHILE_LOST,
+    Lost,
+    count_refuted,
+    find_building,
+    find_building_as_filed,
+    find_camera,
+    find_lost,
+    find_p_there,
+    find_robot,
+    list_contacts,
+    list_views,
+    locate_contact,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries import (
+    CameraState,
+    Certificate,
+    Hypothesis,
+    MotionReport,
+    Obstruction,
+    Panorama,
+    PlaceOdds,
+    PlaceSearch,
+)
+from world_models.frame_building import FrameBuilding
+from world_models.frames import Pose2
+
+MAX_PROBES = 8  # so many looks are taken when lost and no place fits; then the robot says that it does not know
+
+Candidates = tuple[Entry[Hypothesis], ...]
+
+
+class Case(NamedTuple):
+    """The looks of a lost robot, its doubt and belief, the candidates so far, and what stands before its camera."""
+
+    panorama: Entry[Panorama]
+    lost: Lost
+    candidates: Candidates
+    hidden: Entry[Obstruction] | None
+
+
+class Localizer(RobotKnowledgeSource):
+    """Keeps every place of the floor that agrees with the panorama, and says which next look tells most.
+
+    Among places that look alike from here, that is on the way to a view that tells them apart, over floor that is free
+    in all of them. Of such places the one where it was told to be, or was tracked to, is believed if it is likely
+    enough by these odds and by the pictures. Otherwise the robot stays lost and the candidates stay on the board: it
+    never guesses.
+    """
+
+    level = closes = Level.GOAL
+    priority = Priority.RECOVER
+    on = (Watch(Panorama, (Posted, Revised)),)
+    needs = WHILE_LOST
+    writes = (PlaceSearch, Hypothesis, PlaceOdds)
+
+    def bind(self, view: View, trigger: Change) -> Case:
+        candidates = view.where(Hypothesis, lambda h: h.status == "candidate")
+        return Case(trigger.entry, find_lost(view), candidates, view.latest(Obstruction))
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        panorama, (doubt, belief), candidates, hidden = case
+        building, locale, tuning = find_building(view), belief.value.locale, self._settings.localization
+        here = belief.value.world_from_robot(building)
+        refuted = count_refuted(view, doubt)
+        told = StatedPlace(here, belief.value.covariance_world(building), find_p_there(view, refuted, tuning))
+        looked = [glimpse.now_from_then for glimpse in panorama.value.glimpses]
+        looks, obstruction = list_views(view, panorama.value.glimpses), None if hidden is None else hidden.value
+        if obstruction is not None:
+            looks = [replace(g, segments_px=obstruction.without_its_own(g.segments_px)) for g in looks]
+        rooms = list_rooms(building, locale, here, self._settings.goal)
+        followed = _follow(view, candidates, building)
+        contacts = list_contacts(view, doubt)
+        touched = [locate_contact(view, contact) for contact in contacts]
+        cameras, buildings = self._list_cameras(view), self._list_buildings(view)
+        robots = [find_robot(view, camera).in_building(among).with_obstruction(obstruction).on_floor_of(locale)
+                  for camera in cameras for among in buildings]
+        what = Search(looks, rooms, (locale, here), followed, touched, told.p_told)
+        seen, which = search(robots, what, self._settings)
+        is_last = len(looks) >= (self._settings.goal.max_far_probes if seen.candidates else MAX_PROBES)
+        seen = replace(seen, next_action=None) if is_last else seen
+        look_alike = make_alias_test(robots[which], looked, self._settings)
+        result = weigh_told(seen, told, look_alike, len(looks), tuning)
+        verified = view.latest(Certificate, lambda c: c.verdict == "verified")
+        odds = find_odds_used(seen, result, told, was_tracked=verified is not None, refuted=refuted)
+        if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
+            result = prefer_reachable(building, result, locale)
+        far = find_far_action(robots[which], result, looked, rooms, self._settings, touched)
+        if far is not None:
+            result = replace(result, status=LocalizationStatus.PROBE, next_action=far)
+        said = describe(result, is_far=far is not None) if odds is None else odds.sentence()
+        step = result.next_action if result.status is LocalizationStatus.PROBE else None
+        probe = None if step is None else (step.turn_rad, step.move_m)
+        because = (panorama, doubt, belief, *candidates, *contacts, *(() if hidden is None else (hidden,)))
+        found = Post(PlaceSearch(result.status.value, said, probe, which >= len(buildings)), because)
+        yield found
+        yield from (Retract(old, (found,)) for old in candidates)
+        if odds is not None:
+            yield Post(odds, (found, belief))
+        is_found = result.status is LocalizationStatus.FOUND
+        for c in result.candidates[:1] if is_found else result.candidates:
+            yield Post(Hypothesis.of_world(
+                building, c.room, c.world_from_robot, c.covariance, "relocalization", status="candidate",
+                weight=c.weight, motion=belief.value.motion, evidence=str(c.likelihood)), (found, panorama, belief))
+
+    def _list_cameras(self, view: View) -> tuple[CameraState, ...]:
+        """The camera as it was learnt; also as it was told, where few pictures taught otherwise: if the place was not
+        where it was believed, they made the camera fit the wrong place.
+        """
+        camera = find_camera(view)
+        is_sure = camera.told_lens is None or len(camera.counted) > self._settings.localization.max_doubted_pictures
+        return (camera,) if is_sure else (camera, camera.as_told())
+
+    def _list_buildings(self, view: View) -> tuple[FrameBuilding, ...]:
+        """The building as it is known; also without the things that it was found to have besides: if the place was not
+        where it was believed, they may be put where the robot stands or where its view is.
+        """
+        bare = find_building_as_filed(view)
+        return (find_building(view),) if bare is None else (find_building(view), bare)
+
+
+def _follow(view: View, candidates: Candidates, building: FrameBuilding) -> list[tuple[str, Pose2]]:
+    """Room and pose of the candidates of the last search, as the robot has moved since."""
+    out, actuator = [], find_robot(view).actuator
+    for entry in candidates:
+        pose = entry.value.world_from_robot(building)
+        for report in view.since(MotionReport, entry.cycle):
+            pose = pose @ actuator.predict_motion(report.value.turn_rad, report.value.move_m)
+        out.append((entry.value.locale, pose))
+    return out

@@ -1,0 +1,54 @@
+"""Camera calibrator (§3.2): learns the camera's own state from the milestones that are verified."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from blackboard import Change, Effect, Entry, Level, Posted, Revise, View, Watch
+from knowledge_sources.methods.calibration import compute_camera_covariance, learn
+from knowledge_sources.priority import Priority
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.camera import YAW
+from world_models.entries import CameraState, Certificate, PoseFix, Travel, begin_travel
+
+
+class Case(NamedTuple):
+    """A verified milestone whose pose fix says something of the camera, and the camera as it is known."""
+
+    certificate: Entry[Certificate]
+    fix: Entry[PoseFix]
+    camera: Entry[CameraState]
+
+
+class CameraCalibrator(RobotKnowledgeSource):
+    """Takes over what the lines of a verified milestone say of the camera: tilt, roll, height, lens.
+
+    The pose was solved for with the same camera, so it acts before the plan adjuster takes the pose over. After a knock
+    the yaw is open again, and the way by which it was learnt ends.
+    """
+
+    level, priority = Level.PLAN, Priority.ENTER
+    on = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
+    writes = (CameraState, Travel)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        fix, camera = view.get(trigger.entry.value.fix), view.latest(CameraState)
+        if fix is None or not fix.value.camera_step or camera is None:
+            return None
+        return Case(trigger.entry, fix, camera)
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        certificate, fix, camera = case
+        f = fix.value
+        state = learn(camera.value, f.camera_step, np.array(f.camera_covariance), f.world_from_robot,
+                      self._settings.camera_state)
+        learnt = Revise(camera, state, (certificate, fix, camera))
+        yield learnt
+        before = compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW]
+        travel, variance = view.latest(Travel), state.covariance[YAW][YAW]
+        if travel is not None and variance > before:
+            way = begin_travel(f.world_from_robot, f.covariance, state.mount.yaw_rad, variance)
+            yield Revise(travel, way, (learnt,))

@@ -1,0 +1,131 @@
+"""Yaw calibrator (§3.2): learns how far the camera looks aside of where the robot drives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch
+from knowledge_sources.methods.calibration import compute_camera_covariance, to_tuples
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import HELD, STANDING, Belief
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.camera import CAMERA_UNKNOWNS, YAW
+from world_models.entries import CameraState, Drift, Hypothesis, Milestone, Travel, begin_travel, turn_about_camera
+from world_models.frames import wrap_angle
+
+
+class Measured(NamedTuple):
+    """The yaw after a way: by how much it is otherwise than believed, and its variance."""
+
+    step_rad: float
+    variance: float
+
+
+class Case(NamedTuple):
+    """The way that the robot came, the camera, where it is now, and what that tells of the yaw, if anything."""
+
+    travel: Entry[Travel]
+    camera: Entry[CameraState]
+    belief: Belief
+    measured: Measured | None
+
+
+class YawCalibrator(RobotKnowledgeSource):
+    """Learns the camera's yaw on the robot from the direction in which the robot came from one milestone to another.
+
+    No single picture can tell it from the robot's heading. Where the heading is wrong by the yaw, the robot comes to a
+    place beside the one that the wheels and the headings say. With the yaw the believed heading turns, as the camera's
+    own direction is what is known. A way on which something pushed or stopped the robot, or it was lost, tells nothing.
+    """
+
+    level, priority = Level.ACTION, Priority.ENTER
+    on = (
+        Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),
+    )
+    needs = (HELD, STANDING)
+    writes = (CameraState, Hypothesis, Drift, Travel)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        """A way that tells of the yaw more than is known, or that is spent, so that another begins."""
+        travel, camera, milestone = view.latest(Travel), view.latest(CameraState), view.latest(Milestone)
+        if travel is None or camera is None:
+            return None
+        if milestone is not None and milestone.value.displacement_modes:  # an inexact model bends the way
+            return None
+        belief, s = HELD.of(view), self._settings.camera_state
+        measured = self._measure(camera.value, travel.value, belief)
+        known = compute_camera_covariance(camera.value, s)[YAW, YAW]
+        is_told = measured is not None and measured.variance < (1.0 - s.min_learnt) * known
+        return Case(travel, camera, belief, measured) if is_told or self._is_spent(travel.value) else None
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        travel, camera, held, measured = case
+        belief, pose = held.entry, held.pose
+        step_rad, way = 0.0, travel.value
+        if measured is not None:
+            step_rad = measured.step_rad
+            covariance = compute_camera_covariance(camera.value, self._settings.camera_state)
+            covariance[YAW, :] = covariance[:, YAW] = 0.0
+            covariance[YAW, YAW] = max(measured.variance, self._settings.camera_state.floor_rad**2)
+            step = [0.0] * len(CAMERA_UNKNOWNS)
+            step[YAW] = step_rad
+            learnt = replace(camera.value.moved(step), covariance=to_tuples(covariance))
+            yield Revise(camera, learnt, (travel, belief, camera))
+            yield from _turn(view, held, camera.value, -step_rad)
+            way = way.turned(-step_rad, camera.value.mount.forward_m)
+        if self._is_spent(way):
+            here = turn_about_camera(pose, -step_rad, camera.value.mount.forward_m)
+            variance = float(compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW])
+            way = begin_travel(here, held.covariance,
+                               camera.value.mount.yaw_rad + step_rad,
+                               variance if measured is None else measured.variance)
+        yield Revise(travel, way, (travel, belief))
+
+    def _is_spent(self, travel: Travel) -> bool:
+        """Whether a way is too long or too bent to measure more by it, or the robot was pushed or lost on it."""
+        s = self._settings.camera_state
+        return travel.is_broken or travel.gone_m > s.max_travel_m or (
+            travel.gone_m > s.min_travel_m and travel.net_m < s.min_straightness * travel.gone_m)
+
+    def _measure(self, camera: CameraState, travel: Travel, belief: Belief) -> Measured | None:
+        """The yaw by the whole way, from what was known when it began; None where the way tells too little.
+
+        Nor does a way tell anything that ends where no likely yaw leads: something else has moved the robot.
+        """
+        s, pose = self._settings.camera_state, belief.pose
+        if travel.is_broken:
+            return None
+        way = travel.seen(pose.heading_rad)
+        came = pose.position - travel.began.position
+        net_m = way.net_m
+        if net_m < s.min_travel_m or net_m < s.min_straightness * way.gone_m:
+            return None
+        off_rad = wrap_angle(math.atan2(came[1], came[0]) - math.atan2(way.y_m, way.x_m))
+        aside = np.array([-way.y_m, way.x_m]) / net_m
+        ends = np.array(travel.covariance)[:2, :2] + belief.covariance[:2, :2]
+        noise = (float(aside @ ends @ aside) + way.slip_m2) / net_m**2 + travel.covariance[2][2]
+        noise += s.heading_sigma_rad**2 / net_m
+        gain = travel.yaw_variance / (travel.yaw_variance + noise)
+        # The heading is too large by as much as the yaw is too small: the robot came to the right of it.
+        believed = camera.mount.yaw_rad
+        step_rad = believed - off_rad - travel.yaw_rad
+        if step_rad**2 > s.max_yaw_sigmas**2 * (travel.yaw_variance + noise):
+            return None
+        yaw = travel.yaw_rad + gain * step_rad
+        return Measured(yaw - believed, (1.0 - gain) * travel.yaw_variance)
+
+
+def _turn(view: View, belief: Belief, camera: CameraState, turn_rad: float) -> Iterable[Effect]:
+    """Turn the believed heading, and the one that the drift is measured from."""
+    b = belief.value
+    here = turn_about_camera(belief.pose, turn_rad, camera.mount.forward_m)
+    turned = Hypothesis.of_world(belief.world, b.locale, here, belief.covariance, b.basis, motion=b.motion)
+    yield Revise(belief.entry, turned, (belief.entry,))
+    drift = view.latest(Drift)
+    if drift is not None:
+        yield Revise(drift, replace(drift.value, heading_rad=drift.value.heading_rad + turn_rad), (drift,))

@@ -1,0 +1,63 @@
+"""Detour finder (§4: models are incomplete): a leg was halted before floor that is not seen; is there another way?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from blackboard import Change, Effect, Entry, Level, Post, Revised, View, Watch
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import (
+    active_goal,
+    find_belief,
+    find_first_level,
+    find_obstacles,
+    find_way_to_goal,
+    list_planners,
+    name_obstacles,
+    place_of,
+    supersede,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries import Goal, Hypothesis, Impasse, Leg, PlanSketch
+
+
+class Case(NamedTuple):
+    """A halted leg, the first-level sketch of which it is a part, the goal, and the belief."""
+
+    leg: Entry[Leg]
+    drawn: Entry[PlanSketch]
+    goal: Entry[Goal]
+    belief: Entry[Hypothesis]
+
+
+class DetourFinder(RobotKnowledgeSource):
+    """Has the sketch drawn anew when a leg was halted before what may stand in floor that is not seen.
+
+    So it does as often in a row as a subgoal may be repeated, and as long as a way leads to the goal round all that may
+    stand there.
+    """
+
+    level, priority = Level.PLAN, Priority.ADVANCE
+    on = (Watch(Leg, (Revised,), lambda leg: leg.status == "halted"),)
+    writes = (PlanSketch, Impasse)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        sketch, drawn = view.get(trigger.entry.value.sketch), find_first_level(view)
+        goal, belief = active_goal(view), find_belief(view)
+        if sketch is None or drawn is None or goal is None or belief is None or not sketch.value.is_active:
+            return None
+        if not trigger.entry.value.carries_out(sketch.id, sketch.value):
+            return None
+        return Case(trigger.entry, drawn, goal, belief)
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        leg, drawn, goal, belief = case
+        planner = list_planners(view, self._settings.plan)[0]
+        leads_there = find_way_to_goal((planner,), belief.value, goal.value) is not None
+        if leads_there and drawn.value.halts < self._settings.plan.max_adjustments:
+            yield from supersede(view, leg, "halted")
+            return
+        obstacles, here = find_obstacles(view), place_of(belief.value)
+        reason = f"something may stand in floor that is not seen, before {here.words()}{name_obstacles(obstacles)}"
+        yield Post(Impasse("blocked", reason, goal.id, tuple(o.id for o in obstacles)), (leg, belief, *obstacles))

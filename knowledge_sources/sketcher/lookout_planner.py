@@ -1,0 +1,106 @@
+"""Lookout planner (§4: models are incomplete): what leaves no way is looked at again, from elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
+from knowledge_sources.methods.floor import MIN_SIDE_M, build_polygon, list_corners
+from knowledge_sources.methods.motion import SubgoalPlanner
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import (
+    find_belief,
+    find_building,
+    find_frames,
+    find_obstacles,
+    find_robot,
+    find_way_to_goal,
+    list_planners,
+    supersede,
+)
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.entries import DoorState, Goal, Hypothesis, Impasse, Obstacle, PlanSketch, Subgoal
+
+
+class Case(NamedTuple):
+    """An impasse, the goal, the belief, the obstacle or door that may be behind it, and the way to where it is seen."""
+
+    impasse: Entry[Impasse]
+    goal: Entry[Goal]
+    belief: Entry[Hypothesis]
+    about: Entry[Obstacle] | Entry[DoorState]
+    subgoal: Subgoal
+
+
+class LookoutPlanner(RobotKnowledgeSource):
+    """Leads to where a door that may be shut is seen from the front, or an obstacle from elsewhere; so often a goal.
+
+    A leaf is a thing in the way, too: so first the doors of this room. Then the obstacles that leave no way; those
+    without which there is one first, and the nearest of them. What was seen of one, from one place or when it was too
+    near, may be wrong. Where no look is left, the mission monitor ends the mission.
+    """
+
+    level, priority = Level.PLAN, Priority.ADVANCE
+    on = (Watch(Impasse, (Posted,), lambda impasse: impasse.is_open and bool(impasse.behind)),)
+    writes = (PlanSketch, Impasse)
+
+    def bind(self, view: View, trigger: Change) -> Case | None:
+        impasse, belief = trigger.entry, find_belief(view)
+        goal, looked = view.get(impasse.value.goal), _count_looks(view, impasse.value.goal)
+        if goal is None or belief is None or looked >= self._settings.plan.max_lookouts:
+            return None
+        planner = list_planners(view, self._settings.plan)[0]
+        for door in view.where(DoorState, lambda d: d.may_be_shut and belief.value.locale in d.between):
+            subgoal = _plan_door_look(view, planner, belief.value, door.value)
+            if subgoal is not None:
+                return Case(impasse, goal, belief, door, subgoal)
+        for obstacle in self._list_in_order(view, impasse.value, goal.value, belief.value, looked):
+            subgoal = planner.plan_look(belief.value, obstacle.value)
+            if subgoal is not None:
+                return Case(impasse, goal, belief, obstacle, subgoal)
+        return None
+
+    def act(self, view: View, case: Case) -> Iterable[Effect]:
+        impasse, goal, belief, about, subgoal = case
+        yield from supersede(view, impasse)
+        looked = Revise(impasse, replace(impasse.value, is_open=False), (impasse, about, belief))
+        yield looked
+        frames = find_frames(view, {belief.value.locale})
+        yield Post(PlanSketch(goal.id, (), "", (subgoal,), is_look=True), (goal, belief, about, looked, *frames))
+
+    def _list_in_order(
+        self, view: View, impasse: Impasse, goal: Goal, belief: Hypothesis, looked: int
+    ) -> Sequence[Entry[Obstacle]]:
+        """The obstacles in the order in which they are worth a look; a look further each time."""
+        here = shapely.Point(belief.world_from_robot(find_building(view)).position)
+        behind = [o for o in find_obstacles(view) if o.id in impasse.behind]
+        nearest = sorted(behind, key=lambda o: (build_polygon(o.value.footprint).distance(here), o.value.name))
+        alone = [o for o in nearest if self._leads_without(view, goal, belief, o)]
+        first = looked % max(1, len(alone or nearest))
+        ordered = [*alone, *(o for o in nearest if o not in alone)]
+        return (*ordered[first:], *ordered[:first])
+
+    def _leads_without(self, view: View, goal: Goal, belief: Hypothesis, without: Entry[Obstacle]) -> bool:
+        """Whether a way would lead to the goal if one obstacle were next to nothing."""
+        middle = build_polygon(without.value.footprint).centroid
+        least = list_corners(middle.buffer(MIN_SIDE_M))
+        obstacles = [replace(o.value, core=least if o.id == without.id else ()) for o in find_obstacles(view)]
+        planner = SubgoalPlanner(find_robot(view), self._settings.plan, obstacles, by_cores=True)
+        return not planner.explain_unfit(goal.destination) and find_way_to_goal((planner,), belief, goal) is not None
+
+
+def _plan_door_look(view: View, planner: SubgoalPlanner, belief: Hypothesis, door: DoorState) -> Subgoal | None:
+    (frame,) = find_frames(view, {belief.locale})
+    doorway = next((d for d in frame.value.doorways if d.name == door.door), None)
+    seen_from = [np.array([picture.x_m, picture.y_m]) for picture in (*door.views, door.last)]
+    return None if doorway is None else planner.plan_door_look(belief, doorway, seen_from)
+
+
+def _count_looks(view: View, goal: str) -> int:
+    """How often the robot went to look again at what left no way to a goal."""
+    return len(view.where(Impasse, lambda impasse: impasse.goal == goal and not impasse.is_open))
