@@ -30,7 +30,7 @@ DECIDING: Mapping[str, tuple[str, ...]] = {
 }
 """The packages that decide, with the endings of their files; a run names its world's bytes itself."""
 WIRING = "harvey/wiring.py"
-"""The file that lists the knowledge sources."""
+"""The file that finds the knowledge sources."""
 DIGITS = 16
 
 

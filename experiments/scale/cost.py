@@ -50,7 +50,7 @@ PARTS: Mapping[str, str] = {
 """By part: how the names of its functions begin, as file:name. A sample counts for the innermost part whose function is
 being called, and for the modules wherever one is imported. (Compiled code that returns arrays is seen in a function of
 numba's that makes them: that is not loading.)"""
-SOURCE = re.compile(r"knowledge_sources/(?:action|plan|goal)/(\w+)\.py:")
+SOURCE = re.compile(r"knowledge_sources/(?!methods/|reads/)\w+/(\w+)\.py:")
 METHOD = re.compile(r"(?:knowledge_sources/methods|sim/render|world_models/visibility)/(?:.*/)?(\w+)\.py:([\w.]+)$")
 
 
