@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import harvey
-from world_models.building import plan_svg
+from world_models.building.plan_view import plan_svg
 
 WORLD = """
 name = "cottage"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from harvey.hardware.hardware_mission import HardwareMission, load_mission
 from harvey.hardware.own_body import OwnBody, build_robot, drive_body
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import MotionReport, MotorCommand
 from world_models.files.toml.camera_file import camera_text

@@ -7,7 +7,7 @@ import harvey
 from harvey import Change, Effect, Entry, Level, Posted, Revise, View, Watch
 from knowledge_sources.reads import find_building, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.building import CHANGED, FrameChange, LocaleFrame
+from world_models.building.locale_frame import CHANGED, FrameChange, LocaleFrame
 from world_models.entries import MotionReport, PlanSketch
 
 MISSION = """

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     )
     from logs.records import Candidate, DecisionRecord, EntryRecord
     from sim.scenario import load_scenario
-    from world_models.building import World
+    from world_models.building.world import World
     from world_models.camera import Camera, CameraMount
     from world_models.files.world_files import load_world
     from world_models.frames import Pose, Pose2

@@ -19,8 +19,8 @@ from harvey.wiring import build, foreign_sources, knowledge_sources, servoing
 from knowledge_sources.milestone.line_finder import LineFinder
 from knowledge_sources.settings import Settings
 from logs.run_head import RunHead
-from world_models.building import World
-from world_models.entries import KINDS
+from world_models.building.world import World
+from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.settings_reader import parse_value, suggest_keys
 from world_models.frame_store import FrameStore
 from world_models.plugins import GUESTS_GROUP

@@ -44,7 +44,8 @@ from logs.run_head import RunHead
 from logs.timeline import Timeline
 from sim.scenario import FORMAT, Scenario, ScenarioError, load_scenario, with_settings
 from sim.stage import build_stage
-from world_models.building import LocaleFrame, World
+from world_models.building.locale_frame import LocaleFrame
+from world_models.building.world import World
 from world_models.entries import CameraPicture, Hypothesis
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import load_world, read_world

@@ -45,7 +45,7 @@ from knowledge_sources.methods.verification import (
 )
 from knowledge_sources.reads import find_belief, find_robot
 from knowledge_sources.settings import DEFAULT, Settings, VerificationSettings
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import (
     Command,
     Hypothesis,

@@ -14,7 +14,7 @@ from pkgutil import iter_modules
 from blackboard import KnowledgeSource, Level, Registry, Servoing, registry_of
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.entries import KINDS
+from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.mission import Servo
 from world_models.plugins import SOURCES_GROUP, PluginError, load_plugin_classes
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from blackboard import KnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building import FrameRequest
+from world_models.building.locale_frame import FrameRequest
 
 
 class RobotKnowledgeSource(KnowledgeSource):

@@ -17,7 +17,7 @@ from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
 from logs.run_head import SIMULATOR, RunHead
 from logs.timeline import Timeline
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import Hypothesis
 
 Cell = str | int | float | bool | None

@@ -44,8 +44,9 @@ from logs.mjpeg_file import Pictures
 from logs.run_directory import check_version
 from logs.run_errors import BadInput
 from world_models import words
-from world_models.building import FrameReference, FrameRequest, LocaleFrame
-from world_models.entries import KINDS, CameraPicture
+from world_models.building.locale_frame import FrameReference, FrameRequest, LocaleFrame
+from world_models.entries import CameraPicture
+from world_models.entries.entry_kinds import KINDS
 from world_models.files.regular_files import open_regular
 
 if TYPE_CHECKING:  # an explanation starts fast only where no world is imported that it does not need

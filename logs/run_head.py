@@ -16,7 +16,7 @@ from logs.disk import write_whole
 from logs.run_directory import JOURNAL_VERSION, read_json, refuse_version
 from logs.run_errors import BadInput
 from world_models.actuator import ActuatorModel
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import NOT_STATED, Camera, CameraDeviation, CameraMount
 from world_models.entries import Command
 from world_models.files.toml.mission import ROOT, Servo

@@ -14,8 +14,8 @@ from logs.journal_file import JournalFile
 from logs.mjpeg_file import MjpegFile
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
-from world_models.building import World
 from world_models.building.geometry.faces import Face
+from world_models.building.world import World
 from world_models.entries import CameraPicture, Place
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

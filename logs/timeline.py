@@ -24,7 +24,7 @@ from logs.disk import MOST_JOURNAL_BYTES
 from logs.records import Candidate, DecisionRecord, EntryRecord, check_step, decision_at, is_a
 from logs.run_directory import check_version
 from logs.run_errors import BadInput
-from world_models.building import FrameReference, LocaleFrame
+from world_models.building.locale_frame import FrameReference, LocaleFrame
 from world_models.entries import Hypothesis, Outcome, Tracks
 from world_models.files.regular_files import read_regular
 

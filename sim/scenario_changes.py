@@ -15,9 +15,10 @@ from sim.ground_truth.table import ExtraThing, TrueDoor, TrueThing, TrueWall
 from sim.ground_truth.things import MovedThing, belongs_to, build_thing, displace_faces, footprint, move_things
 from sim.ground_truth.true_changes import TrueChange, build_leaf, compare_faces
 from sim.scenario import Scenario
-from world_models.building import Doorway, World
 from world_models.building.geometry.faces import Face
 from world_models.building.geometry.outlines import inside_polygon
+from world_models.building.locales import Doorway
+from world_models.building.world import World
 from world_models.commands import parse_destination
 from world_models.entries import GO_ON, Place
 from world_models.files.toml.settings_reader import suggest_keys

@@ -26,8 +26,9 @@ from sim.scenario_changes import (
     move_scenario_things,
 )
 from sim.truth import Score, Truth, score
-from world_models.building import Link, World
 from world_models.building.geometry.outlines import inside_polygon
+from world_models.building.locales import Link
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.commands import parse_command
 from world_models.entries import Place

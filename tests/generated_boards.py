@@ -34,7 +34,7 @@ from blackboard import (
 )
 from knowledge_sources.model.model_reviser import ModelReviser
 from world_models.actuator import ActuatorModel
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import (
     Goal,

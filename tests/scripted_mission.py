@@ -25,7 +25,7 @@ from blackboard import (
     Watch,
     inference,
 )
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import (
     CameraPicture,

@@ -16,9 +16,9 @@ from knowledge_sources.model.thing_mapper import ThingMapper
 from knowledge_sources.model.thing_mover import ThingMover
 from knowledge_sources.model.touch_finder import TouchFinder
 from sim.scenario import load_scenario
-from world_models.building import FRAME_OF, LocaleFrame, World
+from world_models.building.locale_frame import FRAME_OF, LocaleFrame
+from world_models.building.world import World
 from world_models.entries import (
-    KINDS,
     Certificate,
     Contact,
     FloorThing,
@@ -29,6 +29,7 @@ from world_models.entries import (
     Obstacle,
     diagonal,
 )
+from world_models.entries.entry_kinds import KINDS
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
 

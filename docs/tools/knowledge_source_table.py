@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from blackboard import KnowledgeSource
 from harvey.wiring import KNOWLEDGE_SOURCES, foreign_sources
 from knowledge_sources.priority import Priority
-from world_models.building import FrameRequest
+from world_models.building.locale_frame import FrameRequest
 
 EVERYBODY_WRITES = (FrameRequest,)
 """Left out of the table: each knowledge source of a robot may ask for a locale frame."""

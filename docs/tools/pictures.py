@@ -34,7 +34,8 @@ from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
 from logs.timeline import Timeline
 from world_models import words
-from world_models.building import World, draw_storeys
+from world_models.building.plan_view import draw_storeys
+from world_models.building.world import World
 from world_models.entries import CameraPicture, Certificate, DoorState, FreeFloor, Milestone, Obstacle
 
 OUT = Path(__file__).parents[1] / "pictures"

@@ -29,7 +29,8 @@ from sim.body.collision import Obstacles
 from sim.ground_truth.table import NO_DIFFERENCES
 from sim.stage import Stage, build_stage
 from world_models.actuator import ActuatorModel
-from world_models.building import LocaleFrame, World
+from world_models.building.locale_frame import LocaleFrame
+from world_models.building.world import World
 from world_models.entries import Contact, Hypothesis, MotorCommand, Obstacle, PictureRequest
 from world_models.frames import Pose2
 

@@ -20,7 +20,7 @@ from sim.body.collision import ROBOT_RADIUS_M, Obstacles
 from sim.ground_truth.table import ExtraThing
 from sim.ground_truth.things import SHAPES, build_thing, footprint
 from sim.stage import Stage
-from world_models.building import Doorway
+from world_models.building.locales import Doorway
 from world_models.commands import parse_command
 from world_models.entries import Place
 from world_models.frames import Pose2

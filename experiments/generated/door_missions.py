@@ -20,7 +20,8 @@ from sim.ground_truth.table import TrueDoor
 from sim.ground_truth.true_changes import build_leaf
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage, move_ends
-from world_models.building import Doorway, World
+from world_models.building.locales import Doorway
+from world_models.building.world import World
 
 CASES = ("another way", "no way", "extra door", "stands open", "opens", "shuts", "ajar", "as filed")
 """What is otherwise about the doors: shut, with another way or with none; a door that the model lacks; one that stands

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from experiments.generated.floor_plan import FloorPlan, as_toml
-from world_models.building import World
+from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 

@@ -23,7 +23,7 @@ from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.localization import precompute_views
 from knowledge_sources.milestone_selector import view_predictor
 from sim.scenario import Scenario, load_scenario
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import Milestone, Outcome, PlanSketch
 from world_models.files.world_files import load_world
 

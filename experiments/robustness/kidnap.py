@@ -41,9 +41,10 @@ from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
 from world_models.actuator import ActuatorModel
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries import KINDS, BodyFault, CameraPicture, Hypothesis, Panorama, Place, diagonal
+from world_models.entries import BodyFault, CameraPicture, Hypothesis, Panorama, Place, diagonal
+from world_models.entries.entry_kinds import KINDS
 from world_models.frame_building import FrameBuilding
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2

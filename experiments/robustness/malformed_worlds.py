@@ -30,7 +30,7 @@ from experiments.robustness.malformed_texts import GML, IFC, SMALL
 from harvey.campaign.case_work import Killed
 from harvey.campaign.engine import map_cases
 from harvey.errors import BadInput
-from world_models.building import check_world
+from world_models.building.checks import check_world
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import compile_file, load_world, read_world
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from world_models.building import GROUND, Drawing, DrawnStorey, World, build_drawing, draw_storeys
+from world_models.building.plan_view import GROUND, Drawing, DrawnStorey, build_drawing, draw_storeys
+from world_models.building.world import World
 
 PIXELS_PER_M, MAX_PIXELS = 30.0, 6000.0
 LOOKS: Mapping[str, tuple[str, str]] = {

@@ -14,7 +14,7 @@ from harvey.errors import BadInput, in_one_line
 from world_models.words import count
 
 if TYPE_CHECKING:
-    from world_models.building import World
+    from world_models.building.world import World
 
 SILENT_S = 3.0
 """What takes longer than this shows a bar."""
@@ -146,7 +146,7 @@ def _new(name: str, rooms: str) -> int:
 
 def print_check(world: World, file: str) -> int:
     """Print the faults of a world; the exit code."""
-    from world_models.building import check_world
+    from world_models.building.checks import check_world
     from world_models.files.packed import PackedFrames
 
     if isinstance(world.frames, PackedFrames):
@@ -207,7 +207,7 @@ def _draw(world: World, out: Path) -> None:
 
 
 def _svg(world: World, out: Path) -> None:
-    from world_models.building import plan_svg
+    from world_models.building.plan_view import plan_svg
 
     out.write_text(plan_svg(world), encoding="utf-8")
 

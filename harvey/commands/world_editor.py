@@ -12,7 +12,9 @@ from contextlib import suppress
 from html import escape
 from pathlib import Path
 
-from world_models.building import World, check_world, plan_svg
+from world_models.building.checks import check_world
+from world_models.building.plan_view import plan_svg
+from world_models.building.world import World
 from world_models.files.toml.other_files import compute_digest
 from world_models.files.toml.source import WorldError
 from world_models.files.world_files import load_world

@@ -32,7 +32,7 @@ from logs.records import EntryRecord, read_records
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import Extent, RunRecorder
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import GO_ON, BodyFault, CameraPicture
 from world_models.robot import RobotModel
 

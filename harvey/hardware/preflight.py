@@ -20,7 +20,8 @@ from harvey.hardware.drivers.video_camera import VideoCamera
 from harvey.hardware.hardware_mission import HardwareMission
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
+from world_models.building.world import World
 from world_models.camera import Camera, CameraDeviation, CameraMount
 from world_models.commands import parse_command
 from world_models.entries import Place

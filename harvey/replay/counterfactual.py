@@ -32,7 +32,7 @@ from logs.records import WHAT_IF, DecisionRecord, EntryRecord, Originals, as_lin
 from logs.run_directory import RunDirectory
 from logs.run_head import SIMULATOR, RunHead
 from logs.run_recorder import RunRecorder
-from world_models.building import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import CameraPicture, MotionReport, Outcome, Redirection, RideReport, UserReport
 from world_models.words import count, listed
 

@@ -21,7 +21,9 @@ from harvey.errors import BadInput
 from knowledge_sources.milestone.line_finder import LineFinder
 from knowledge_sources.settings import Settings
 from logs.records import WHAT_IF, DecisionRecord
-from world_models.building import FrameChange, FrameRequest, LocaleFrame, World, element_names
+from world_models.building.changes import element_names
+from world_models.building.locale_frame import FrameChange, FrameRequest, LocaleFrame
+from world_models.building.world import World
 from world_models.entries import CameraPicture, CameraState, Footprint, Segments, Wheels
 from world_models.frame_store import FrameStore
 from world_models.frames import frozen

@@ -18,7 +18,8 @@ from logs.explain.phrases import sentence
 from logs.records import EntryRecord
 from logs.timeline import Timeline
 from world_models import words
-from world_models.building import SCALE, DrawnStorey, World, draw_storeys, drawing_svg
+from world_models.building.plan_view import SCALE, DrawnStorey, draw_storeys, drawing_svg
+from world_models.building.world import World
 from world_models.camera import Camera
 from world_models.entries import CameraPicture, Hypothesis, LineMatch, Milestone, PoseFix, Segments
 

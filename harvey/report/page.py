@@ -22,7 +22,7 @@ from logs.reader import read_true_track
 from logs.run_directory import RunDirectory
 from logs.run_head import SIMULATOR, RunHead
 from logs.timeline import Timeline
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from blackboard import Activation, Decision, Posted
 from logs.explain.turning_points import Collision, Happening, TurningPoint, TurningPointFinder, is_adjusted
-from world_models.building import FrameRequest
+from world_models.building.locale_frame import FrameRequest
 from world_models.entries import (
     CameraLesson,
     CameraPicture,

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from blackboard import Change, Effect, KnowledgeSource, Port, Post, Posted, Revise, Scheduler
-from world_models.building import FrameRequest, World
+from world_models.building.locale_frame import FrameRequest
+from world_models.building.world import World
 from world_models.frame_store import FrameStore
 from world_models.robot import RobotModel
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from sim.body.simulated_body import SimulatedBody
 from sim.truth import Truth
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import Place
 
 

@@ -12,7 +12,7 @@ from logs.explain.turning_points import Collision, Happening
 from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage
 from sim.truth import cross_track_m
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import Certificate, Goal, Hypothesis, Leg, PoseFix, Redirection
 from world_models.frames import Pose2, wrap_angle
 

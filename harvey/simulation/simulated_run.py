@@ -29,8 +29,8 @@ from logs.run_recorder import RunRecorder
 from sim.scenario import Scenario, ScenarioError, scenario_from_tables
 from sim.stage import Stage, build_stage
 from world_models.actuator import ActuatorModel
-from world_models.building import World
 from world_models.building.geometry.faces import Face
+from world_models.building.world import World
 from world_models.files.toml.mission import ROOT
 from world_models.files.world_files import load_world
 from world_models.robot import RobotModel

@@ -25,7 +25,7 @@ from knowledge_sources.reads import (
     list_told,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.building import Building
+from world_models.building.building import Building
 from world_models.entries import Hypothesis, Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 

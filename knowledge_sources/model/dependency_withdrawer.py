@@ -12,7 +12,7 @@ from knowledge_sources.priority import Priority
 from knowledge_sources.reads import active_goal, find_belief, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import Settings
-from world_models.building import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import Milestone, Obstacle, PlanSketch, Track, Tracks
 
 

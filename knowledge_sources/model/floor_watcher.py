@@ -86,11 +86,11 @@ class FloorWatcher(RobotKnowledgeSource):
              for entry, (motion, _) in zip(earlier, motions, strict=True)],
             {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings,
             None if lit is None else lit.value.light)
-        reasons = (*earlier, *wheels.values(), *(known[name] for name in (locale,) if name in known),
+        reasons = (*kept, *wheels.values(), *(known[name] for name in (locale,) if name in known),
                    *(() if lit is None else (lit,)))
         yield Post(seen, (frame, belief, *reasons))
         for appearance in learnt:
-            old, because = known.get(appearance.locale), (frame, belief, *earlier)
+            old, because = known.get(appearance.locale), (frame, belief, *kept)
             yield Post(appearance, because) if old is None else Revise(old, appearance, (*because, old))
         if seen.bearings_rad and (not kept or not _is_like(kept[0].value, pose)):
             yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,

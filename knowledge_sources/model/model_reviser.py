@@ -12,7 +12,7 @@ from knowledge_sources.methods.floor import revise_by_door, revise_by_report, re
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import find_building, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.building import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import DoorState, Obstacle, UserReport
 
 

@@ -31,7 +31,7 @@ from knowledge_sources.reads.questions import (
     rolling_course,
     unmeasured_doubt,
 )
-from world_models.building import Building
+from world_models.building.building import Building
 from world_models.entries import CameraPicture, Hypothesis
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

@@ -8,7 +8,8 @@ from typing import NamedTuple
 from blackboard import Entry, View
 from knowledge_sources.methods.doors import is_in_view
 from knowledge_sources.reads.questions import find_frames, find_robot_in
-from world_models.building import Doorway, FrameChange, LocaleFrame
+from world_models.building.locale_frame import FrameChange, LocaleFrame
+from world_models.building.locales import Doorway
 from world_models.entries import DoorState, Hypothesis
 from world_models.frame_building import FrameBuilding
 

@@ -34,7 +34,8 @@ from knowledge_sources.reads.conditions import Belief
 from knowledge_sources.reads.lost import locate_contact
 from knowledge_sources.reads.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings import ActionSettings, Settings
-from world_models.building import EXTRA_KIND, Building, Thing
+from world_models.building.building import Building
+from world_models.building.locales import EXTRA_KIND, Thing
 from world_models.entries import (
     AROUND_SIGMA_RAD,
     CameraPicture,
@@ -106,7 +107,8 @@ class FloorAhead:
         self._touches = _list_touches(view, self._here)
         self._scans = _find_scans(view, belief, settings)
         self._discs = list_free_discs(view, self._robot, self._here, self._scans)
-        self._told = dict[str, Entry[Any]]()
+        search = _find_last_search(view)  # what was seen before it was found does not count
+        self._told: dict[str, Entry[Any]] = {} if search is None else {search.id: search}
         self._seen = SeenFloor(
             tuple(entry.value for entry in self._scans), np.array([disc.circle for disc in self._discs]),
             tuple(_list_taken(thing, whole.plan.overhang_m) for name in self._locales
@@ -114,7 +116,8 @@ class FloorAhead:
 
     @property
     def because(self) -> tuple[Entry[Any], ...]:
-        """What has told something in the answers so far: looks at the floor, and things that may stand on it."""
+        """What has told something in the answers so far: looks at the floor, what may stand on it, and since when.
+        """
         return tuple(sorted(self._told.values(), key=lambda entry: (entry.cycle, entry.id)))
 
     def limit_move(self, move_m: float) -> Caution:
@@ -368,11 +371,16 @@ def _find_scans(view: View, belief: Entry[Hypothesis], settings: ActionSettings)
     from elsewhere before.
     """
     now_s = _tell_time_s(view)
-    ride, found = view.latest(RideReport), view.latest(PlaceSearch, lambda search: search.status == "found")
+    ride, found = view.latest(RideReport), _find_last_search(view)
     since_s = max(now_s - settings.max_seen_age_s, -math.inf if ride is None else ride.value.sim_time_s)
     since = -1 if found is None else found.cycle
     return tuple(entry for entry in view.since(FreeFloor, since)
                  if entry.value.seen_s >= since_s and _is_of(entry, belief))
+
+
+def _find_last_search(view: View) -> Entry[PlaceSearch] | None:
+    """The search by which the robot was last found."""
+    return view.latest(PlaceSearch, lambda search: search.status == "found")
 
 
 def _is_of(scan: Entry[FreeFloor], belief: Entry[Hypothesis]) -> bool:

@@ -16,7 +16,7 @@ from knowledge_sources.settings import Settings
 from world_models.entries import Anchor, CameraPicture, FreeFloor, Hypothesis, Track, Tracks, covariance_tuple
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
-from world_models.visibility import visible_lines
+from world_models.visibility.lines_and_points import visible_lines
 
 MAX_TEMPLATE_DISTANCE_M = 1.3
 """A template is dropped when the robot is further than this from where it was cut: two increments (Table 1:

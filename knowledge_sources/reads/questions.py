@@ -8,7 +8,7 @@ from typing import Any
 
 from blackboard import OPEN, Blackboard, Discrepancy, Entry, Index, Level, View
 from knowledge_sources.settings import ActionSettings
-from world_models.building import CHANGED, FRAME_OF, LocaleFrame
+from world_models.building.locale_frame import CHANGED, FRAME_OF, LocaleFrame
 from world_models.entries import (
     GO_ON,
     BodyFault,

@@ -7,19 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Retract, Revised, View, Watch
-from knowledge_sources.methods.localization import (
-    LocalizationStatus,
-    Search,
-    StatedPlace,
-    describe,
-    find_far_action,
-    find_odds_used,
-    list_rooms,
-    make_alias_test,
-    prefer_reachable,
-    search,
-    weigh_told,
-)
+from knowledge_sources.methods import localization
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
     WHILE_LOST,
@@ -87,33 +75,34 @@ class Localizer(RobotKnowledgeSource):
         building, locale, tuning = find_building(view), belief.value.locale, self._settings.localization
         here = belief.value.world_from_robot(building)
         refuted = count_refuted(view, doubt)
-        told = StatedPlace(here, belief.value.covariance_world(building), find_p_there(view, refuted, tuning))
+        p_there = find_p_there(view, refuted, tuning)
+        told = localization.StatedPlace(here, belief.value.covariance_world(building), p_there)
         looked = [glimpse.now_from_then for glimpse in panorama.value.glimpses]
         looks, obstruction = list_views(view, panorama.value.glimpses), None if hidden is None else hidden.value
         if obstruction is not None:
             looks = [replace(g, segments_px=obstruction.without_its_own(g.segments_px)) for g in looks]
-        rooms = list_rooms(building, locale, here, self._settings.goal)
+        rooms = localization.list_rooms(building, locale, here, self._settings.goal)
         followed = _follow(view, candidates, building)
         contacts = list_contacts(view, doubt)
         touched = [locate_contact(view, contact) for contact in contacts]
         cameras, buildings = self._list_cameras(view), self._list_buildings(view)
         robots = [find_robot(view, camera).in_building(among).with_obstruction(obstruction).on_floor_of(locale)
                   for camera in cameras for among in buildings]
-        what = Search(looks, rooms, (locale, here), followed, touched, told.p_told)
-        seen, which = search(robots, what, self._settings)
+        what = localization.Search(looks, rooms, (locale, here), followed, touched, told.p_told)
+        seen, which = localization.search(robots, what, self._settings)
         is_last = len(looks) >= (self._settings.goal.max_far_probes if seen.candidates else MAX_PROBES)
         seen = replace(seen, next_action=None) if is_last else seen
-        look_alike = make_alias_test(robots[which], looked, self._settings)
-        result = weigh_told(seen, told, look_alike, len(looks), tuning)
+        look_alike = localization.make_alias_test(robots[which], looked, self._settings)
+        result = localization.weigh_told(seen, told, look_alike, len(looks), tuning)
         verified = view.latest(Certificate, lambda c: c.verdict == "verified")
-        odds = find_odds_used(seen, result, told, was_tracked=verified is not None, refuted=refuted)
-        if result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
-            result = prefer_reachable(building, result, locale)
-        far = find_far_action(robots[which], result, looked, rooms, self._settings, touched)
+        odds = localization.find_odds_used(seen, result, told, was_tracked=verified is not None, refuted=refuted)
+        if result.status is localization.LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
+            result = localization.prefer_reachable(building, result, locale)
+        far = localization.find_far_action(robots[which], result, looked, rooms, self._settings, touched)
         if far is not None:
-            result = replace(result, status=LocalizationStatus.PROBE, next_action=far)
-        said = describe(result, is_far=far is not None) if odds is None else odds.sentence()
-        step = result.next_action if result.status is LocalizationStatus.PROBE else None
+            result = replace(result, status=localization.LocalizationStatus.PROBE, next_action=far)
+        said = localization.describe(result, is_far=far is not None) if odds is None else odds.sentence()
+        step = result.next_action if result.status is localization.LocalizationStatus.PROBE else None
         probe = None if step is None else (step.turn_rad, step.move_m)
         because = (panorama, doubt, belief, *candidates, *contacts, *(() if hidden is None else (hidden,)))
         found = Post(PlaceSearch(result.status.value, said, probe, which >= len(buildings)), because)
@@ -121,7 +110,7 @@ class Localizer(RobotKnowledgeSource):
         yield from (Retract(old, (found,)) for old in candidates)
         if odds is not None:
             yield Post(odds, (found, belief))
-        is_found = result.status is LocalizationStatus.FOUND
+        is_found = result.status is localization.LocalizationStatus.FOUND
         for c in result.candidates[:1] if is_found else result.candidates:
             yield Post(Hypothesis.of_world(
                 building, c.room, c.world_from_robot, c.covariance, "relocalization", status="candidate",

@@ -14,12 +14,12 @@ from logs.records import EntryRecord
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
-from world_models.building import FrameReference
+from world_models.building.locale_frame import FrameReference
 from world_models.entries import LineMatch, Milestone
 from world_models.words import landmark, listed
 
 if TYPE_CHECKING:  # a world is loaded only for an answer that needs it, and so is what loads it
-    from world_models.building import LocaleFrame
+    from world_models.building.locale_frame import LocaleFrame
     from world_models.frame_store import FrameStore
 
 FRAME = "LocaleFrame-"

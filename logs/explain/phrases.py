@@ -18,7 +18,7 @@ from logs.records import WHAT_IF, Candidate, EntryRecord, is_a
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
 from world_models import words
-from world_models.building import FrameRequest
+from world_models.building.locale_frame import FrameRequest
 from world_models.entries import (
     Certificate,
     Command,

@@ -22,7 +22,7 @@ from logs.records import EntryRecord, is_a
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
-from world_models.building import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import (
     CameraPicture,
     Contact,

@@ -24,7 +24,7 @@ from logs.run_directory import RunDirectory, read_head
 from logs.run_errors import BadInput, reading
 from logs.tables import table
 from logs.timeline import Timeline
-from world_models.building import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import (
     CameraState,
     Certificate,

@@ -17,7 +17,7 @@ from logs.records import WHAT_IF, EntryRecord
 from logs.run_errors import UNREADABLE, BadInput
 from logs.timeline import Timeline
 from world_models import words
-from world_models.building import FrameReference, FrameRequest
+from world_models.building.locale_frame import FrameReference, FrameRequest
 from world_models.entries import (
     CameraPicture,
     Certificate,

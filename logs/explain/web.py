@@ -13,7 +13,7 @@ from logs.explain.diff import differing_leaves
 from logs.explain.phrases import describe_decision, sentence, wrap
 from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of
 from logs.timeline import Timeline, ranked
-from world_models.building import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import (
     CameraPicture,
     CameraState,

@@ -29,7 +29,7 @@ from logs.explain.phrases import (
 from logs.records import EntryRecord, is_a
 from logs.run_errors import UNREADABLE, BadInput
 from logs.timeline import Timeline
-from world_models.building import FrameRequest, LocaleFrame
+from world_models.building.locale_frame import FrameRequest, LocaleFrame
 from world_models.entries import (
     BodyFault,
     CameraPicture,

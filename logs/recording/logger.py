@@ -16,8 +16,8 @@ from rerun.encodings import TimeRange
 from blackboard import Change, Decision, Entry, Retracted, decision_line
 from logs.recording.stream import RecordingStream
 from logs.timeline import Mirror
-from world_models.building import World
 from world_models.building.geometry.faces import Face
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import Hypothesis, Place
 from world_models.frames import Pose2

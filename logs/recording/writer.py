@@ -13,8 +13,8 @@ from logs.recording.logger import Difference, Held, Logger, Moment, Subject, blu
 from logs.recording.stream import LIVE_PORT, RecordingStream
 from logs.run_errors import RecordingError
 from logs.timeline import Mirror, find_belief
-from world_models.building import World
 from world_models.building.geometry.faces import Face
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import CameraPicture, MotionReport, Place
 from world_models.frames import Pose2

@@ -9,8 +9,8 @@ from sim.body.collision import Obstacles
 from sim.render.mesh import FaceLike
 from sim.render.renderer import Renderer
 from sim.truth import Truth
-from world_models.building import Link
 from world_models.building.geometry.faces import Face
+from world_models.building.locales import Link
 from world_models.entries import LocalePoses, Place, Ride
 from world_models.frames import Pose2, flattened
 from world_models.units import Bounded, bounded

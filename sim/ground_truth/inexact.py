@@ -16,7 +16,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from world_models.building import Thing, World
+from world_models.building.locales import Thing
+from world_models.building.world import World
 from world_models.files.construction.builder import MAX_WALL_M, build_world, compute_world_poses
 from world_models.files.construction.specs import DoorSpec, LocaleSpec, ThingSpec, WorldSpec
 from world_models.frames import Pose

@@ -13,9 +13,9 @@ from sim.ground_truth.table import Lasting, TrueDoor
 from sim.ground_truth.things import OAK, STEEL
 from sim.render.lights import Lights
 from sim.render.renderer import Renderer
-from world_models.building import Doorway
 from world_models.building.geometry.faces import Face
 from world_models.building.geometry.solids import Box, Range, Solid
+from world_models.building.locales import Doorway
 from world_models.files.construction.doors import LEAF_DEPTH_M
 from world_models.files.construction.rooms import CASING_DEPTH_M
 from world_models.frames import Pose

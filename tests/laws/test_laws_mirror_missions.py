@@ -18,7 +18,7 @@ from generated_boards import HALL, HOUSE, STUDY, WIDTH_M, plain_robot
 from harvey.dry_run import build_dry_run
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import Command, Hypothesis, Leg, Milestone, MotorCommand, Outcome, Place, PlanSketch, diagonal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world

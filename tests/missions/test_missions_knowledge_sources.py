@@ -23,7 +23,7 @@ from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from sim.truth import Truth
 from world_models.actuator import ActuatorModel
-from world_models.building import Building
+from world_models.building.building import Building
 from world_models.camera import Camera, CameraMount
 from world_models.entries import CameraState, MotionReport
 from world_models.robot import RobotModel

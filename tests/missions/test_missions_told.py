@@ -21,7 +21,7 @@ from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
 from two_doors import two_doors
-from world_models.building import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import Course, PlanSketch, UserReport
 
 SEED = 3

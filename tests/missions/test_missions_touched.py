@@ -19,7 +19,8 @@ from knowledge_sources.model.touch_finder import TouchFinder
 from knowledge_sources.settings import Settings
 from sim.scenario import load_scenario, parse_scenario
 from sim.stage import build_stage
-from world_models.building import LocaleFrame, World
+from world_models.building.locale_frame import LocaleFrame
+from world_models.building.world import World
 from world_models.entries import Contact, Hypothesis, MotorCommand, Obstacle, diagonal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_store import FrameStore

@@ -6,7 +6,7 @@ wrongly. ``body``: requests to the robot's body and its answers. ``task``: comma
 certificate, outcome. ``percepts``: tracks, segments, matches, pose fixes. ``user_reports``: what somebody says on the
 way. ``location``: pose hypotheses, and the way since a known place. ``obstacle``: contacts and ranges, what stands in
 the way, what stands before the camera. ``floor``: free floor, and what floors look like. ``door_state``: which doors
-are seen open or shut. ``entry_kinds``: all of them.
+are seen open or shut. ``entry_kinds``: all of them; not part of this face, as frames stand with the building.
 """
 
 from world_models.entries.body import (
@@ -14,7 +14,6 @@ from world_models.entries.body import (
     RideReport, STOP_KEY,
 )
 from world_models.entries.door_state import DoorCondition, DoorPicture, DoorState
-from world_models.entries.entry_kinds import KINDS
 from world_models.entries.floor import (
     FloorAppearance, FloorEnd, FloorThing, FloorView, FreeFloor, LAST_VIEWS, Light, Point,
 )
@@ -34,7 +33,7 @@ from world_models.entries.task import (
 from world_models.entries.user_reports import DOOR_STATES, GO_ON, Redirection, UserReport
 
 __all__ = [
-    "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "KINDS", "LAST_VIEWS", "STOP_KEY", "Anchor", "BodyFault",
+    "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "LAST_VIEWS", "STOP_KEY", "Anchor", "BodyFault",
     "CameraLesson", "CameraPicture", "CameraState", "Certificate", "Command", "Contact", "Corners", "Course",
     "DoorCondition", "DoorPicture", "DoorState", "Drift", "FloorAppearance", "FloorEnd", "FloorThing", "FloorView",
     "Footprint", "FreeFloor", "Glimpse", "Goal", "Hypothesis", "Impasse", "Leg", "Light", "LineMatch", "LocalePoses",

@@ -31,7 +31,7 @@ from harvey_buildings.building_plan import BuildingError, BuildingPlan, ImportRe
 from harvey_buildings.layout import Layout, lay_out
 from harvey_buildings.ros_map_file import PICTURES, explain_bare_picture
 from harvey_buildings.world_text import world_text
-from world_models.building import Watched, pass_on
+from world_models.building.checks import Watched, pass_on
 from world_models.plugins import list_plugins, load_plugins
 
 __all__ = ["BuildingError", "ImportReport", "ImportedBuilding", "Importer", "NavigationGraph", "import_building",

@@ -14,8 +14,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from harvey_buildings.geojson import world_geojson
-from world_models.building import World, find_storeys, plan_svg
 from world_models.building.geometry.scene import Floats
+from world_models.building.plan_view import find_storeys, plan_svg
+from world_models.building.world import World
 from world_models.plugins import list_plugins, load_plugins
 from world_models.words import count
 

@@ -33,7 +33,8 @@ from harvey_buildings.building_plan import (
     slug,
 )
 from harvey_buildings.polygons import MAX_COORDINATE_M, MOST_CROSSINGS, extract_outline, repair
-from world_models.building import Watched, World, pass_on
+from world_models.building.checks import Watched, pass_on
+from world_models.building.world import World
 from world_models.files.construction.specs import DOOR_SIZES_M, ROOM_HEIGHTS_M
 from world_models.files.regular_files import read_regular
 

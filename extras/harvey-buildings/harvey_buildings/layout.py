@@ -41,7 +41,7 @@ from harvey_buildings.polygons import (
     separate_outlines,
     straighten_wall,
 )
-from world_models.building import Watched, pass_on
+from world_models.building.checks import Watched, pass_on
 from world_models.files.construction.specs import DOOR_SIZES_M
 
 STOREY_GAP_M = 10.0

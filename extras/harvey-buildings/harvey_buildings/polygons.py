@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from world_models.building import Watched, pass_on
+from world_models.building.checks import Watched, pass_on
 from world_models.building.geometry.outlines import is_simple
 
 Floats = NDArray[np.float64]

@@ -39,7 +39,7 @@ from harvey_buildings.ros_map_file import (
 )
 from harvey_buildings.ros_map_openings import Gap, Mask, trace
 from harvey_buildings.ros_map_rooms import Labels, clean_floor, part_rooms, rooms_beside
-from world_models.building import Watched, pass_on
+from world_models.building.checks import Watched, pass_on
 
 MARGIN_CELLS = 3
 MIN_TURN_RAD = math.radians(0.3)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from harvey_buildings.building_plan import BuildingError, Floats
-from world_models.building import World
+from world_models.building.world import World
 from world_models.files.regular_files import read_regular
 
 MODES = ("trinary", "scale", "raw")

@@ -12,7 +12,7 @@ import pytest
 from harvey.cli import main
 from harvey_buildings.buildings_commands import EXPORT, IMPORT
 from seams import check_command
-from world_models.building import plan_svg
+from world_models.building.plan_view import plan_svg
 from world_models.files.world_files import WORLDS, load_world
 
 MODULE = """

@@ -16,7 +16,8 @@ from harvey_buildings.building_plan import Space
 from harvey_buildings.ifc_file import find_climbed_spaces
 from harvey_buildings.polygons import Floats, extract_outline, separate_outlines, straighten_wall
 from ifc_house import House, box, flat
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
+from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 

@@ -19,7 +19,8 @@ from harvey.cli import main
 from harvey_buildings import BuildingError, import_building, read_plan
 from harvey_buildings.ros_map import find_wall_turn, make_grid
 from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN, MapFile, read_cells, read_map_yaml
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
+from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 

@@ -16,8 +16,9 @@ from harvey_buildings import import_building
 from harvey_buildings.exporters import ExportError, export_world
 from harvey_buildings.geojson import FRAME
 from harvey_buildings.ros_map_file import FREE, OCCUPIED, read_cells, read_map_yaml
-from world_models.building import World, find_storeys
 from world_models.building.geometry.faces import area_vector
+from world_models.building.plan_view import find_storeys
+from world_models.building.world import World
 from world_models.files.first_world import first_world_text
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from harvey.cli import main
 from harvey_buildings import BuildingError, import_building, read_plan
 from harvey_buildings.exporters import export_world
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
+from world_models.building.world import World
 from world_models.files.first_world import first_world_text
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world

@@ -19,7 +19,8 @@ from harvey_buildings.polygons import (
     separate_outlines,
     square_outline,
 )
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
+from world_models.building.world import World
 from world_models.files.world_files import load_world
 
 DATA = Path(__file__).parents[4] / "shared" / "data" / "buildings"

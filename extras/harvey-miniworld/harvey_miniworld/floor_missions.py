@@ -21,7 +21,7 @@ from harvey.runner.result import MissionResult
 from harvey_miniworld.drawn_floor import picture_aspects
 from harvey_miniworld.miniworld_body import MiniworldBody
 from harvey_miniworld.textured_floor import CHAIR_M, FloorRoom, StandingThing, TexturedFloor, generate_floor
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import Certificate, Hypothesis, Milestone, PoseFix
 from world_models.files.toml.camera_file import camera_text

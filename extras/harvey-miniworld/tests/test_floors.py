@@ -10,7 +10,7 @@ from one_room import CAMERA, MOUNT, needs_egl, plain_floor
 import harvey
 from harvey_miniworld.drawn_floor import DrawnFloor
 from harvey_miniworld.textured_floor import StandingThing, generate_floor
-from world_models.building import check_world
+from world_models.building.checks import check_world
 from world_models.frames import Pose2
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from harvey_ros2.lens_watch import LensWatch
     from harvey_ros2.onlooker import FirstGuess, Onlooker
     from harvey_ros2.run_messages import TimedMessage
-    from world_models.building import World
+    from world_models.building.world import World
     from world_models.frames import Pose2
     from world_models.robot import RobotModel
 

@@ -18,7 +18,7 @@ from harvey_ros2.odometry import OdometryFault, OdometryReader
 from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
 from harvey_ros2.ros2_company import RosCompany, describe_place
 from harvey_ros2.run_messages import TimedMessage
-from world_models.building import World
+from world_models.building.world import World
 from world_models.frames import Pose2, flattened
 from world_models.robot import RobotModel
 

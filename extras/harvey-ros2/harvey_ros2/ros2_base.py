@@ -21,7 +21,7 @@ from harvey_ros2.odometry import Counted, OdometryFault, OdometryReader
 from harvey_ros2.pipe import PipeMessages
 from harvey_ros2.robot_file import SCAN, DriveSettings, RobotFile, ScanMount
 from harvey_ros2.ros2_company import RosCompany
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import Contact, MotionReport, MotorCommand, Odometry, Ranges
 from world_models.frames import wrap_angle
 from world_models.robot import RobotModel

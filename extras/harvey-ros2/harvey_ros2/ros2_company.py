@@ -18,7 +18,7 @@ from harvey_ros2.messages import MessageError
 from harvey_ros2.middleware import Heard
 from harvey_ros2.node import RosNode
 from harvey_ros2.run_messages import KINDS, SENSED, RunMessages, TimedMessage, topic_of
-from world_models.building import World
+from world_models.building.world import World
 from world_models.frames import Pose2, flattened
 from world_models.robot import RobotModel
 from world_models.units import FOOT_M

@@ -19,7 +19,7 @@ from harvey_ros2.localizer_sources import WheelCheck
 from harvey_ros2.messages import MessageTypes, stamp
 from harvey_ros2.middleware import LATCHED, SENSOR, Delivery, Topic, full_name
 from harvey_ros2.robot_file import FrameNames
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import BodyFault, CameraPicture, Certificate, Hypothesis, Milestone, MotionReport, PlanSketch
 from world_models.frames import Pose2

@@ -23,7 +23,7 @@ from harvey.report.data import draw_blank_plans
 from harvey.report.page import embedded, fill_in
 from harvey_serve.live_state import LiveState
 from harvey_serve.run_gate import Gate, Order
-from world_models.building import World
+from world_models.building.world import World
 
 PACKAGE = "harvey_serve"
 PERIOD_S = 0.1

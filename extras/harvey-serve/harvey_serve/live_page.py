@@ -16,7 +16,7 @@ from harvey_serve.app import LOCAL_HOSTS, build_app, refuse_goal
 from harvey_serve.live_state import LiveState
 from harvey_serve.run_gate import Gate, GatedBody, do_nothing
 from harvey_serve.server import bind, serving
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera
 from world_models.commands import parse_destination
 from world_models.entries import GO_ON

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from blackboard import Change, Decision, Discrepancy, Entry, Level, Retracted, highest
 from harvey.report.data import Lenses, placed, shrink
 from world_models import words
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera
 from world_models.entries import CameraPicture, Goal, Hypothesis, LineMatch, Milestone, PlanSketch, PoseFix, Segments
 

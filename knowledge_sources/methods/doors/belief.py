@@ -24,7 +24,7 @@ from knowledge_sources.methods.verification import (
     predict_lines,
 )
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building import Doorway
+from world_models.building.locales import Doorway
 from world_models.entries import DoorCondition, DoorPicture, DoorState, Hypothesis
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel

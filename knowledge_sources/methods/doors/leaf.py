@@ -16,7 +16,8 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats, Image, Mask
 from knowledge_sources.methods.doors.rival_views import ALIKE, Views, fit_views
 from knowledge_sources.methods.verification import RAYS, cast_rays
-from world_models.building import Building, Doorway
+from world_models.building.building import Building
+from world_models.building.locales import Doorway
 from world_models.camera import NEAR_PLANE_M
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel

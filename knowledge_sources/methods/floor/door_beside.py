@@ -14,7 +14,8 @@ import shapely
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.footprints import build_polygon, list_corners, measure_common_directions
-from world_models.building import Building, Doorway
+from world_models.building.building import Building
+from world_models.building.locales import Doorway
 from world_models.entries import Obstacle
 
 JAMB_M = 0.002  # a jamb that stands where the model has it reaches no further into the opening

@@ -18,7 +18,8 @@ from knowledge_sources.methods.floor.footprints import (
 )
 from knowledge_sources.methods.floor.thing_shapes import MIN_COMMON_DIRECTIONS
 from knowledge_sources.settings import ActionSettings
-from world_models.building import EXTRA_KIND, Building, Doorway
+from world_models.building.building import Building
+from world_models.building.locales import EXTRA_KIND, Doorway
 from world_models.entries import Obstacle, ObstacleStatus, Place
 from world_models.frames import Pose2
 

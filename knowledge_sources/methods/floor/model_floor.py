@@ -18,7 +18,7 @@ from knowledge_sources.methods.verification import cast_rays
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
-from world_models.visibility import image_window
+from world_models.visibility.culling import image_window
 
 SIGHT_M = 4.5  # the floor is looked at up to this distance from the camera
 

@@ -17,7 +17,8 @@ import shapely
 from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
-from world_models.building import ROBOT_TOP_M, STEP_M, Building
+from world_models.building.building import Building
+from world_models.building.locales import ROBOT_TOP_M, STEP_M
 from world_models.entries import FloorEnd, FloorThing, FreeFloor, Point, Ranges
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from knowledge_sources.methods.floor.footprints import measure_change_m
-from world_models.building import UNDONE, FrameChange, LocaleFrame
+from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
 from world_models.entries import DOOR_STATES, DoorState, Obstacle, UserReport
 
 MIN_HEIGHT_CHANGE_M = 0.15  # a thing in a frame is revised where its top is so much higher or lower

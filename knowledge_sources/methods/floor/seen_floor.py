@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.arrays import Floats, Mask
-from world_models.building import Building
+from world_models.building.building import Building
 from world_models.entries import FreeFloor
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel

@@ -32,7 +32,7 @@ from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M
 from knowledge_sources.methods.floor.thing_shapes import ThingShape, join_shapes, leave_free
 from knowledge_sources.methods.floor.weigh_touch import TOUCH_MARGIN_M
 from knowledge_sources.settings import ActionSettings, Settings
-from world_models.building import Building
+from world_models.building.building import Building
 from world_models.entries import FloorThing, FreeFloor, Obstacle, ObstacleStatus
 
 MIN_FREE_PART = 0.5  # part of an obstacle's footprint that must be seen free to tell that it is not there any more

@@ -31,7 +31,8 @@ from knowledge_sources.methods.verification import (
     predict_lines,
 )
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building import Building, LineErrors
+from world_models.building.building import Building
+from world_models.building.model_errors import LineErrors
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 

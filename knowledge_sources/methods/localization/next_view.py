@@ -22,7 +22,7 @@ from knowledge_sources.methods.floor import find_floor
 from knowledge_sources.methods.motion import SLACK_M, find_bends, find_free_space, is_clear
 from knowledge_sources.methods.verification import compute_coverage, predict_lines
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building import Building
+from world_models.building.building import Building
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

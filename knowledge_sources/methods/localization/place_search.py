@@ -15,7 +15,7 @@ from knowledge_sources.methods.localization.next_view import SensingAction, choo
 from knowledge_sources.methods.localization.place_odds import StatedPlace
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.settings import GoalSettings, Settings
-from world_models.building import Building
+from world_models.building.building import Building
 from world_models.entries import PlaceOdds
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2

@@ -25,7 +25,7 @@ from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.motion import compute_free_space
 from knowledge_sources.methods.verification import take_distinct
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building import Building
+from world_models.building.building import Building
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2, wrap_angle
 from world_models.robot import RobotModel

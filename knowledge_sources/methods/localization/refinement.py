@@ -35,7 +35,7 @@ from knowledge_sources.methods.verification import (
 from knowledge_sources.settings import DEFAULT, LocalizationSettings, Settings
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
-from world_models.visibility import visible_lines
+from world_models.visibility.lines_and_points import visible_lines
 
 TURN_STEP_RAD = math.radians(1.5)  # step of the search for an uncertain turn
 

@@ -28,7 +28,7 @@ import math
 from dataclasses import replace
 
 from world_models.actuator import ActuatorModel
-from world_models.building import Building
+from world_models.building.building import Building
 from world_models.entries import Leg, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 

@@ -16,7 +16,8 @@ import shapely
 from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats
-from world_models.building import EXTRA_KIND, Building
+from world_models.building.building import Building
+from world_models.building.locales import EXTRA_KIND
 
 Footprint = tuple[tuple[float, float], ...]
 

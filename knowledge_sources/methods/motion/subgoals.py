@@ -27,7 +27,8 @@ from knowledge_sources.methods.motion.routes import (
     list_obstacles,
 )
 from knowledge_sources.settings import PlanSettings
-from world_models.building import Doorway, Link, Passage, Route
+from world_models.building.locales import Doorway, Link, Passage
+from world_models.building.passages import Route
 from world_models.entries import Hypothesis, Obstacle, Place, Subgoal
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

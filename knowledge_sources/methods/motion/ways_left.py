@@ -6,7 +6,7 @@ import shapely
 
 from knowledge_sources.methods.floor import build_polygon, measure_approach_m
 from knowledge_sources.settings import PlanSettings
-from world_models.building import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import Obstacle, PlanSketch
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

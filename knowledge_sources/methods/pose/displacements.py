@@ -27,7 +27,7 @@ from knowledge_sources.methods.pose.planar import (
     compute_scatter,
 )
 from knowledge_sources.settings import DEFAULT, PoseSettings
-from world_models.building import LineErrors
+from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2, wrap_angle
 

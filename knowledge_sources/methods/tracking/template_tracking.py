@@ -26,7 +26,7 @@ from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.entries import Anchor, Track
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
-from world_models.visibility import visible_points
+from world_models.visibility.lines_and_points import visible_points
 
 MIN_LANDMARK_CONTRAST = 0.08  # least contrast of a model point that may be followed
 MIN_CORNER_PER_PX = 3.0  # least corner strength of a landmark's patch (Shi-Tomasi)

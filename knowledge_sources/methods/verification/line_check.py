@@ -21,11 +21,12 @@ from scipy.special import betainc, betaln
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose import compute_camera_poses, compute_point_jacobian, fit_displacements, to_pose2
 from knowledge_sources.settings import DEFAULT, PoseSettings, VerificationSettings
-from world_models.building import Building, LineErrors, find_line_errors
+from world_models.building.building import Building
+from world_models.building.model_errors import LineErrors, find_line_errors
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
-from world_models.visibility import VisibleLines, visible_lines
+from world_models.visibility.lines_and_points import VisibleLines, visible_lines
 
 MIN_LINE_CONTRAST = 0.05  # smallest contrast of a model line that is predicted, 0..1
 MAX_LINE_DISTANCE_M = 15.0  # largest distance of a model line that is predicted

@@ -10,13 +10,13 @@ import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints
-from world_models.building import Building
+from world_models.building.building import Building
 from world_models.building.geometry.faces import Finish, area_vector, expected_brightness
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
-from world_models.visibility import Window, find_visible_locales, image_window
+from world_models.visibility.culling import Window, find_visible_locales, image_window
 
 COLOR_GRID_SIZE = 32  # samples along each side of the picture in which faces are predicted
 BORDER_MARGIN_PX = 12.0  # distance that color samples keep from the border of the picture

@@ -17,11 +17,11 @@ from knowledge_sources.methods.verification.line_check import (
 )
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.building import pack_errors
+from world_models.building.model_errors import pack_errors
 from world_models.entries import Milestone
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
-from world_models.visibility import VisibleLines
+from world_models.visibility.lines_and_points import VisibleLines
 
 MAX_COUNTED_LENGTH_PX = 120.0  # a line longer than this is no clearer than one of this length
 MAX_COUNTED_CONTRAST = 0.3  # a line of more contrast than this is no clearer than one of this contrast

@@ -15,7 +15,7 @@ from logs.recording.palette import DONE, LEVELS, REJECTED
 from logs.recording.paths import RECORDS, TABLE
 from logs.recording.stream import TROUBLE, Mixed, RecordingStream
 from world_models import words
-from world_models.building import FrameRequest, LocaleFrame, has_answer
+from world_models.building.locale_frame import FrameRequest, LocaleFrame, has_answer
 from world_models.entries import Drift, Hypothesis, Leg, Milestone
 
 TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "halted")

@@ -13,7 +13,7 @@ from blackboard import Decision, Post, Quiescence
 from harvey.dry_run import build_dry_run
 from towers import tower
 from world_models.actuator import ActuatorModel
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import Command, Hypothesis, Outcome, PlanSketch, Ride, Subgoal, diagonal
 from world_models.files.toml.source import Source

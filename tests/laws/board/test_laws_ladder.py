@@ -47,9 +47,8 @@ from knowledge_sources.reads import (
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario, with_settings
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import (
-    KINDS,
     CameraPicture,
     Certificate,
     Course,
@@ -64,6 +63,7 @@ from world_models.entries import (
     PoseFix,
     diagonal,
 )
+from world_models.entries.entry_kinds import KINDS
 from world_models.files.world_files import load_world
 from world_models.robot import RobotModel
 

@@ -25,7 +25,7 @@ from sim.stage import Stage, build_stage
 from world_models.camera import move_camera
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
-from world_models.visibility import visible_lines
+from world_models.visibility.lines_and_points import visible_lines
 
 KNOWN, TILT = np.zeros((7, 7)), np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 few = settings(max_examples=30, deadline=None)

@@ -26,7 +26,7 @@ from knowledge_sources.reads.floor_ahead import (
     list_free_discs,
 )
 from knowledge_sources.settings import DEFAULT
-from world_models.building import EXTRA_KIND
+from world_models.building.locales import EXTRA_KIND
 from world_models.entries import FreeFloor, Place, PlaceSearch, Subgoal
 from world_models.entries.floor import FloorSense
 from world_models.files.toml.source import Source

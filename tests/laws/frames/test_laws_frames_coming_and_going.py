@@ -43,8 +43,10 @@ from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from strategies import Note
 from without_frames import list_decided
-from world_models.building import LocaleFrame, World
-from world_models.entries import KINDS, Hypothesis, UserReport, diagonal
+from world_models.building.locale_frame import LocaleFrame
+from world_models.building.world import World
+from world_models.entries import Hypothesis, UserReport, diagonal
+from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frame_store import FrameStore

@@ -17,7 +17,7 @@ from harvey.wiring import KNOWLEDGE_SOURCES, build, foreign_sources
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT
 from sim.scenario import load_scenario
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import UserReport
 from world_models.frame_store import FrameStore
 

@@ -14,7 +14,8 @@ from harvey.runner.replay import open_originals, replay
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
 from rebuilt_board import rebuild, recorded_act
-from world_models.building import FrameChange, LocaleFrame, element_names
+from world_models.building.changes import element_names
+from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.frame_building import FrameBuilding
 
 

@@ -18,7 +18,7 @@ from harvey.simulation.simulated_run import SimulatedRun, build_head
 from logs.run_recorder import RunRecorder
 from sim.stage import Stage
 from two_doors import two_doors
-from world_models.building import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import Milestone, Outcome, PlanSketch, Tracks, UserReport
 
 DOORS = ("north-door", "south-door")

@@ -19,12 +19,12 @@ from knowledge_sources.reads import find_building_as_filed
 from knowledge_sources.reads.floor_ahead import PUT_DOWN_FREE_M, list_free_discs
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, X_M, Y_M, Hall, carton
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import Contact, FloorThing, FreeFloor, Goal, Hypothesis, MotorCommand, Obstacle, Place
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
-from world_models.visibility import visible_lines
+from world_models.visibility.lines_and_points import visible_lines
 
 SCREEN = tuple((X_M + x, Y_M + y) for x, y in ((3.9, 0.6), (4.3, 0.6), (4.3, 1.8), (3.9, 1.8)))
 

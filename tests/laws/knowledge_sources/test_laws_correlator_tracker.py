@@ -291,10 +291,12 @@ def test_landmarks_are_taken_anew_where_fewer_are_left_than_serve(
 
     monkeypatch.setattr(correlator_tracker, "find_near_frames", lambda *_: {"near"})
     monkeypatch.setattr(correlator_tracker, "with_anchors", lambda *_: "as they are")
+    monkeypatch.setattr(correlator_tracker, "find_camera", lambda _: None)
+    monkeypatch.setattr(correlator_tracker, "compute_camera_covariance", lambda *_: None)
     monkeypatch.setattr(correlator_tracker, "take_new", lambda *_: "anew")
     old = SimpleNamespace(value=SimpleNamespace(anchors=(), taken=taken))
     case: Any = SimpleNamespace(frame=SimpleNamespace(id="CameraPicture-9"), old=old,
-                                belief=SimpleNamespace(seeing=SimpleNamespace(world=None)))
+                                belief=SimpleNamespace(seeing=SimpleNamespace(world=None), view=None))
     belief: Any = SimpleNamespace(world_from_robot=lambda _: None)
     useless = [follow(False, 0, "near"), follow(True, most, "near"), follow(True, 0, "far")]
     followed = [*useless, *[follow(True, most - 1, "near")] * (least + more)]

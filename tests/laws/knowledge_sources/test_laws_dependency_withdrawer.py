@@ -16,7 +16,7 @@ from generated_boards import HALL, STUDY, Bench, made, plain_robot, reasons, to_
 from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M
 from knowledge_sources.model.dependency_withdrawer import DependencyWithdrawer
 from knowledge_sources.settings import DEFAULT
-from world_models.building import FrameChange, LocaleFrame
+from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.entries import Milestone, Obstacle, Place, PlanSketch, Subgoal, Track, Tracks
 from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2

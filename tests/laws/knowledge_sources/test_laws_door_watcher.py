@@ -22,7 +22,7 @@ from sim.ground_truth.table import TrueDoor
 from sim.ground_truth.true_changes import build_leaf
 from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from things_in_hall import HALL, Hall
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import CameraPicture, DoorState, Hypothesis, Milestone, Outcome, diagonal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2

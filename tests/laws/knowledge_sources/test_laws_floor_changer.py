@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from generated_boards import Bench, covariances, effect_on, made, plain_robot, reasons
 from knowledge_sources.action.floor_changer import ELEVATOR_SIGMA_M, ELEVATOR_SIGMA_RAD, FloorChanger
 from towers import tower
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import Anchor, Hypothesis, Place, PlanSketch, Ride, RideReport, SketchStatus, Subgoal, Tracks
 from world_models.entries.location import Covariance
 from world_models.files.toml.source import Source

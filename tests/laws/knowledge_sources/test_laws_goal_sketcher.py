@@ -15,7 +15,7 @@ from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.reads import find_frames
 from knowledge_sources.reads.sketches import GOAL_TOLERANCE_M
 from knowledge_sources.sketcher.goal_sketcher import GoalSketcher
-from world_models.building import LocaleFrame
+from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import (
     DoorPicture,
     DoorState,

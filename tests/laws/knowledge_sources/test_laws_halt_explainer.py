@@ -16,7 +16,7 @@ from knowledge_sources.model.halt_explainer import HaltExplainer
 from knowledge_sources.reads import SEEN_MARGIN_M
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import Leg, Obstacle, ObstacleStatus
 from world_models.entries.task import LegStatus
 from world_models.files.world_files import WORLDS, load_world

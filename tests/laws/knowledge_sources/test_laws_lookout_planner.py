@@ -24,7 +24,7 @@ from generated_boards import (
 from knowledge_sources.methods.motion.subgoals import DOOR_LOOK_APART_M, MIN_DOOR_LOOK_SINE
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.sketcher.lookout_planner import LookoutPlanner
-from world_models.building import FRAME_OF
+from world_models.building.locale_frame import FRAME_OF
 from world_models.entries import DoorCondition, DoorPicture, DoorState, Impasse, Obstacle, Place, PlanSketch
 from world_models.frames import Pose2
 

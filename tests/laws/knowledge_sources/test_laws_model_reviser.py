@@ -15,7 +15,8 @@ from blackboard import Post, Posted, Retracted, Revise, Revised
 from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall
-from world_models.building import FRAME_OF, FrameChange, LocaleFrame, World
+from world_models.building.locale_frame import FRAME_OF, FrameChange, LocaleFrame
+from world_models.building.world import World
 from world_models.entries import DoorPicture, DoorState, Obstacle, UserReport
 from world_models.files.world_files import WORLDS, load_world
 

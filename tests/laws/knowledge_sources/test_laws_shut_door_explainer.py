@@ -24,7 +24,7 @@ from sim.ground_truth.true_changes import build_leaf
 from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
-from world_models.building import Doorway
+from world_models.building.locales import Doorway
 from world_models.entries import CameraPicture, DoorState, Milestone, Segments, diagonal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, flattened

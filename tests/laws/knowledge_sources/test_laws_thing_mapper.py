@@ -23,7 +23,7 @@ from knowledge_sources.methods.floor.weigh_sight import (
 from knowledge_sources.model.thing_mapper import ThingMapper
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall, carton
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import (
     CameraPicture,
     FreeFloor,

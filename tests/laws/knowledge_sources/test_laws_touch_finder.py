@@ -16,7 +16,7 @@ from blackboard import Post, Posted, Revise, Revised
 from knowledge_sources.model.touch_finder import MAX_TOUCH_SIGMA_RAD, TouchFinder
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall
-from world_models.building import World
+from world_models.building.world import World
 from world_models.entries import Contact, Hypothesis, MotorCommand, Obstacle, diagonal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2

@@ -11,7 +11,7 @@ from world_models.building.geometry.outlines import inside_polygon
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
-from world_models.visibility import image_window
+from world_models.visibility.culling import image_window
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0))
 MOUNT = CameraMount(1.2, 0.05)

@@ -25,7 +25,7 @@ from world_models.entries.obstacle import MOST_HIDDEN
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
-from world_models.visibility import visible_points
+from world_models.visibility.lines_and_points import visible_points
 
 Floats = NDArray[np.float64]
 WORLD = load_world(WORLDS / "research_center.toml", details=[])

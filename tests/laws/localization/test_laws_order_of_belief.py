@@ -16,7 +16,7 @@ from knowledge_sources.methods.localization.pose_candidates import MIN_SIEVED, V
 from knowledge_sources.methods.verification import predict_lines
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.building import Building
+from world_models.building.building import Building
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel

@@ -32,7 +32,7 @@ from knowledge_sources.methods.pose import (
 )
 from knowledge_sources.methods.pose.estimate import compute_mean_square, compute_spread
 from knowledge_sources.settings import DEFAULT
-from world_models.building import LineErrors
+from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 

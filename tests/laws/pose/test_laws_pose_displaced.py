@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 
 from knowledge_sources.methods.pose import fit_displacements
 from knowledge_sources.settings import DEFAULT
-from world_models.building import LineErrors
+from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 

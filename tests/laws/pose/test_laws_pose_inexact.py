@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from knowledge_sources.methods.pose import build_line_set, fit_displacements, planar_from_lines
 from knowledge_sources.methods.pose.displacements import compute_displaced_jacobian, compute_sigmas_px
 from knowledge_sources.settings import DEFAULT
-from world_models.building import LineErrors
-from world_models.building.model_errors import exact
+from world_models.building.model_errors import LineErrors, exact
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
 

@@ -16,7 +16,8 @@ from logs.recording.paths import FRAME_LIST
 from logs.recording.stream import RecordingStream
 from logs.timeline import Mirror
 from scripted_mission import CAMERA, MOUNT, house
-from world_models.building import FrameChange, LocaleFrame, World
+from world_models.building.locale_frame import FrameChange, LocaleFrame
+from world_models.building.world import World
 from world_models.frame_store import FrameStore
 
 ROOMS = ("kitchen", "parlour")

@@ -17,9 +17,9 @@ from harvey.errors import BadInput
 from logs.records import EntryRecord, Originals, effect_of, value_of
 from scripted_mission import HOUSE
 from world_models.actuator import ActuatorModel
-from world_models.building import FrameChange, FrameRequest, LocaleFrame
-from world_models.building.locale_frame import FrameAnswer
-from world_models.entries import KINDS, CameraPicture, Command, Footprint, MotionReport, Outcome, RideReport, Wheels
+from world_models.building.locale_frame import FrameAnswer, FrameChange, FrameRequest, LocaleFrame
+from world_models.entries import CameraPicture, Command, Footprint, MotionReport, Outcome, RideReport, Wheels
+from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frame_store import FrameStore

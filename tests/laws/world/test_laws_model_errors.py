@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from experiments.generated.floors import generated_floor
-from world_models.building import World, find_line_errors, pack_errors
-from world_models.building.model_errors import find_sigma_m, unpack_errors
+from world_models.building.model_errors import find_line_errors, find_sigma_m, pack_errors, unpack_errors
+from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 

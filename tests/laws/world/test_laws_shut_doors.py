@@ -12,16 +12,17 @@ from numpy.typing import NDArray
 from experiments.generated.scenes import generate_house
 from knowledge_sources.methods.verification import predict_face_colors
 from world_models.actuator import ActuatorModel
-from world_models.building import Doorway, World
 from world_models.building.changes import build_shut_faces, shut_door
 from world_models.building.geometry.outlines import inside_polygon
+from world_models.building.locales import Doorway
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
-from world_models.visibility import VisibleLines, visible_lines, visible_points
 from world_models.visibility.culling import CONTACT_M
+from world_models.visibility.lines_and_points import VisibleLines, visible_lines, visible_points
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0))
 MOUNT = CameraMount(1.2, 0.05)

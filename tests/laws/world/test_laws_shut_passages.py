@@ -9,9 +9,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from world_models.building import Doorway, Link, LocaleFrame, Route
-from world_models.building.locales import Locale
-from world_models.building.passages import find_route
+from world_models.building.locale_frame import LocaleFrame
+from world_models.building.locales import Doorway, Link, Locale
+from world_models.building.passages import Route, find_route
 from world_models.building.world import build_frames
 from world_models.frames import Pose
 

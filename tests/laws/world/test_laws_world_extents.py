@@ -7,9 +7,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from world_models.building import World
 from world_models.building.locales import Locale
-from world_models.building.world import build_frames
+from world_models.building.world import World, build_frames
 from world_models.files.packed import compile_world
 from world_models.files.world_files import WORLDS, compile_file, load_world
 from world_models.frames import Pose

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from world_models.building import Doorway, World
 from world_models.building.geometry.outlines import distance_to_border
+from world_models.building.locales import Doorway
+from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world
 

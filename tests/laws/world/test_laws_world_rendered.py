@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from experiments.generated.scenes import generate_house
 from sim.render.mesh import Pinhole, build_mesh, project_mesh
 from sim.render.rasterizer import find_visible_patches, sample_offsets
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
 from world_models.building.geometry.outlines import inside_polygon
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world

@@ -12,7 +12,7 @@ from blackboard import Decision, Post, Quiescence
 from experiments.generated.scenes import generate_house
 from harvey.dry_run import build_dry_run
 from world_models.actuator import ActuatorModel
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import Command, Outcome, PlanSketch, Subgoal, diagonal
 from world_models.files.toml.source import Source

@@ -12,9 +12,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.building.passages import find_route
+from world_models.building.world import World
 from world_models.files.packed import FORMAT, PackedFrames, compile_world
 from world_models.files.toml.source import Source, WorldError
 from world_models.files.world_files import WORLDS, compile_file, load_world, read_world

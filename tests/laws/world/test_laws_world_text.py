@@ -6,7 +6,8 @@ import tomllib
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
+from world_models.building.world import World
 from world_models.files.toml.source import Source, WorldError, find_line_numbers
 from world_models.files.world_files import WORLDS, read_world
 

@@ -166,7 +166,7 @@ def test_two_processes_do_not_write_one_run(
     run = cut(whole, tmp_path / "run", 9)
     open_elsewhere = disk.Appended(run.journal, "journal", keep=run.journal.stat().st_size)
     assert main(["resume", str(run.path)]) == 2
-    assert "another process is writing it" in capsys.readouterr().err
+    assert "another process is writing" in capsys.readouterr().err
     open_elsewhere.close()
 
 

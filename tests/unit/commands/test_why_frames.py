@@ -15,7 +15,7 @@ from logs.explain.web import MODEL, Trace, kind_of
 from logs.explain.why import story
 from logs.records import Candidate, DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
-from world_models.building import FrameChange, FrameReference, FrameRequest
+from world_models.building.locale_frame import FrameChange, FrameReference, FrameRequest
 from world_models.entries import Footprint, Milestone, UserReport
 
 SHUT = FrameChange("shut", "library-door", "user")

@@ -13,7 +13,7 @@ from harvey.errors import BadInput
 from logs.explain.questions_in_words import QUESTIONS, answers, is_question
 from logs.records import DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
-from world_models.building import FrameChange, FrameReference
+from world_models.building.locale_frame import FrameChange, FrameReference
 from world_models.entries import (
     CameraPicture,
     DoorPicture,

@@ -14,7 +14,7 @@ from docs.tools.fill import MARKED
 from harvey.cli import parser
 from sim.scenario import load_scenario, parse_scenario
 from world_models import plugins
-from world_models.building import check_world
+from world_models.building.checks import check_world
 from world_models.files.toml.mission import Telling
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world

@@ -18,7 +18,7 @@ from harvey.wiring import SUBJECTS, knowledge_sources, load_kinds
 from knowledge_sources.priority import Priority
 from sim.scenario import load_scenario
 from sim.stage import build_stage
-from world_models.building import FrameRequest, LocaleFrame
+from world_models.building.locale_frame import FrameRequest, LocaleFrame
 from world_models.entries import Outcome
 
 FOLDER = Path(__file__).parents[3] / "knowledge_sources"

@@ -27,7 +27,8 @@ from logs.recording.writer import RecordingWriter
 from scripted_mission import CAMERA, MOUNT
 from two_doors import WORLD
 from world_models.actuator import ActuatorModel
-from world_models.building import FRAME_OF, FrameChange, FrameRequest, LocaleFrame, World
+from world_models.building.locale_frame import FRAME_OF, FrameChange, FrameRequest, LocaleFrame
+from world_models.building.world import World
 from world_models.entries import CameraState, Footprint, Wheels
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world

@@ -22,7 +22,7 @@ from knowledge_sources.methods.pose import (
     r_and_t_ml,
 )
 from knowledge_sources.settings import MatchingSettings, PoseSettings
-from world_models.building import LineErrors
+from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
 

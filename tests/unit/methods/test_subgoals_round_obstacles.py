@@ -14,7 +14,7 @@ from knowledge_sources.methods.motion.routes import list_obstacles
 from knowledge_sources.settings import DEFAULT
 from two_doors import two_doors
 from world_models.actuator import ActuatorModel
-from world_models.building import World
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import Hypothesis, Obstacle, Place, Subgoal
 from world_models.frames import Pose2

@@ -11,7 +11,7 @@ import pytest
 from experiments.generated.floors import generated_floor
 from sim.render.renderer import Renderer
 from sim.scenario import CameraSettings
-from world_models.building import check_world
+from world_models.building.checks import check_world
 from world_models.files.world_files import load_world
 from world_models.frames import Pose2
 

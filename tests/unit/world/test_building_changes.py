@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from logs.recording.loggers.surroundings.model_building import _meshes
-from world_models.building import World, element_names
-from world_models.building.changes import build_shut_faces, remove_element, remove_thing, shut_door
+from world_models.building.changes import build_shut_faces, element_names, remove_element, remove_thing, shut_door
 from world_models.building.geometry.faces import UNKNOWN, area_vector, expected_brightness
-from world_models.building.world import build_frames
+from world_models.building.world import World, build_frames
 from world_models.files.world_files import WORLDS, load_world
 
 WORLD = load_world(WORLDS / "research_center.toml", details=[])

@@ -12,7 +12,7 @@ from harvey.cli import main
 from harvey.dry_run import dry_run
 from harvey.simulation.simulated_run import build_robot_model
 from sim.scenario import load_scenario
-from world_models.building import check_world
+from world_models.building.checks import check_world
 from world_models.files.first_world import first_world_text
 from world_models.files.toml.source import Source
 from world_models.files.world_files import load_world, read_world

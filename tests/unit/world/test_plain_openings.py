@@ -6,8 +6,8 @@ import pytest
 import harvey
 from harvey.errors import BadInput
 from sim.render.mesh import DRAWN_GREY, build_mesh
-from world_models.building import World
 from world_models.building.geometry.scene import build_scene
+from world_models.building.world import World
 
 WORLD = """
 name = "two"

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from harvey.commands.plan_picture import draw_plan
-from world_models.building import World, build_drawing, check_world, plan_svg
+from world_models.building.checks import check_world
+from world_models.building.plan_view import build_drawing, plan_svg
+from world_models.building.world import World
 from world_models.commands import find_room, parse_command
 from world_models.entries import Place
 from world_models.files.world_files import WORLDS, load_world

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from world_models.building import World, check_world
-from world_models.building.world import build_frames
+from world_models.building.checks import check_world
+from world_models.building.world import World, build_frames
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world
 

@@ -13,7 +13,8 @@ import pytest
 
 from harvey.cli import main
 from harvey.commands.world_editor import BuildingViewer, WorldEditor
-from world_models.building import World, plan_svg
+from world_models.building.plan_view import plan_svg
+from world_models.building.world import World
 from world_models.files.first_world import first_world_text
 from world_models.files.world_files import load_world
 

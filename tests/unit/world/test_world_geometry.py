@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from world_models.building import World
 from world_models.building.geometry.faces import Finish, area_vector
 from world_models.building.geometry.outlines import convex_pieces, subtract_intervals
 from world_models.building.geometry.solids import Box, Solid, Surface
+from world_models.building.world import World
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose
 

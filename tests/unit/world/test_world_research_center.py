@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from world_models.building import World, build_drawing, plan_svg
 from world_models.building.geometry.outlines import distance_to_border, inside_polygon
-from world_models.building.plan_view import LEGEND
+from world_models.building.plan_view import LEGEND, build_drawing, plan_svg
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
-from world_models.visibility import visible_lines, visible_points
+from world_models.visibility.lines_and_points import visible_lines, visible_points
 
 FT = 0.3048
 ROBOT_M = 0.35

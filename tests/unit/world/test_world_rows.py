@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
+from world_models.building.world import World
 from world_models.files.toml.other_files import compute_digest
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WorldError, load_world, read_world

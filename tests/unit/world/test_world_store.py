@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
+from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, WorldError, load_world, read_world
 

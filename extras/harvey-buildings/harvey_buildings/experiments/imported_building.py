@@ -20,8 +20,9 @@ from experiments.shared_data import DUPLEX, data_path, describe_absence
 from experiments.trials import campaign_folder, run_trials
 from harvey.campaign.campaign import Task, run_task
 from harvey_buildings import import_building
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
 from world_models.building.geometry.outlines import distance_to_border
+from world_models.building.world import World
 from world_models.commands import find_open_point
 from world_models.files.world_files import load_world
 

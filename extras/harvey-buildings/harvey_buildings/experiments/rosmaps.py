@@ -30,7 +30,8 @@ from harvey_buildings.experiments.rosmaps_scores import (
     draw_rooms,
     read_truth,
 )
-from world_models.building import World, check_world
+from world_models.building.checks import check_world
+from world_models.building.world import World
 from world_models.files.world_files import load_world
 
 if TYPE_CHECKING:

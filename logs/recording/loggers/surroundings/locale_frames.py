@@ -16,7 +16,7 @@ from logs.recording.palette import KNOWN, REVISED
 from logs.recording.paths import FRAME_LIST, FRAMES
 from logs.recording.stream import RecordingStream, viewable
 from world_models import words
-from world_models.building import FrameRequest, LocaleFrame
+from world_models.building.locale_frame import FrameRequest, LocaleFrame
 from world_models.entries import CameraState, Footprint, Wheels
 
 ROBOT_KINDS = (CameraState, Wheels, Footprint)

@@ -16,9 +16,10 @@ from logs.recording.logger import BACKGROUND, Logger, Moment, Panel
 from logs.recording.palette import DOOR, NAME, REJECTED, TRUE, Colour
 from logs.recording.paths import BELIEVED_TRAIL, BUILDING, DOORWAYS, NAMES, TRUE_ADDED, TRUE_GONE, TRUE_TRAIL, WORLD
 from logs.recording.stream import RecordingStream, viewable
-from world_models.building import Doorway, World
 from world_models.building.geometry.faces import LAMP, Face, Region, area_vector
 from world_models.building.geometry.scene import stack_regions
+from world_models.building.locales import Doorway
+from world_models.building.world import World
 
 Strip = NDArray[np.float32]
 """(n, 3) points one after the other [m, world]."""
