@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.entries.obstacle import Obstruction
 from world_models.frames import Pose, frozen
+from world_models.obstruction import Obstruction
 
 NEAR_PLANE_M = 0.05
 """Near plane: points at a smaller depth are not projected."""

@@ -8,9 +8,9 @@ from typing import Any
 from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
 from world_models.camera import NOT_STATED, Camera, CameraDeviation, CameraMount
-from world_models.entries.obstacle import Obstruction
 from world_models.entries.robot_state import CameraState, Footprint, Wheels
 from world_models.frames import Pose, Pose2
+from world_models.obstruction import Obstruction
 
 _NO_LENS = Camera(1.0, 1.0, 0.0, 0.0, 1, 1)
 """Default of ``lens``: take the camera that the model is made with."""

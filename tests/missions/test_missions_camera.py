@@ -60,4 +60,6 @@ def test_a_knock_in_mid_mission_is_noticed_and_survived() -> None:
     assert after.tilt_rad - before.tilt_rad == pytest.approx(knock.tilt_rad, abs=math.radians(0.05))
     assert after.roll_rad - before.roll_rad == pytest.approx(knock.roll_rad, abs=math.radians(0.05))
     sigma_rad = math.sqrt(states[-1].covariance[YAW][YAW])
-    assert abs(after.yaw_rad - before.yaw_rad - knock.yaw_rad) < 3.0 * sigma_rad < math.radians(1.5)
+    # The way that tells the yaw is measured by beliefs that count each picture once, so it is told less surely.
+    assert abs(after.yaw_rad - before.yaw_rad - knock.yaw_rad) < min(3.0 * sigma_rad, math.radians(1.5))
+    assert sigma_rad < math.radians(1.5)

@@ -22,7 +22,7 @@ from world_models.entries.location import (
     diagonal, turn_about_camera,
 )
 from world_models.entries.obstacle import (
-    AROUND_SIGMA_RAD, Contact, Corners, Obstacle, ObstacleStatus, Obstruction, Ranges, Sense,
+    AROUND_SIGMA_RAD, Contact, Corners, Obstacle, ObstacleStatus, Ranges, Sense,
 )
 from world_models.entries.percepts import Anchor, Glimpse, LineMatch, Panorama, PoseFix, Segments, Track, Tracks
 from world_models.entries.robot_state import CameraLesson, CameraState, Drift, Footprint, Wheels, find_camera_lessons
@@ -30,6 +30,7 @@ from world_models.entries.task import (
     Certificate, Command, Goal, Impasse, Leg, Milestone, MilestoneVerdict, Outcome, PlanSketch, Resumed, SketchStatus,
     Subgoal,
 )
+from world_models.obstruction import Obstruction
 from world_models.entries.user_reports import DOOR_STATES, GO_ON, Redirection, UserReport
 
 __all__ = [

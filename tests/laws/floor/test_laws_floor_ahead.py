@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 from blackboard import Entry
 from generated_boards import HALL, HOUSE, STUDY, Bench, house, plain_robot, to_world
 from ideal_floor_watcher import scan_floor
-from knowledge_sources import floor_ahead
 from knowledge_sources.methods.floor import Lookout, find_floor
-from knowledge_sources.reads import SEEN_MARGIN_M, FloorAhead, find_robot
+from knowledge_sources.reads import SEEN_MARGIN_M, FloorAhead, find_robot, floor_ahead
 from knowledge_sources.reads.floor_ahead import (
     LOOK_FROM_M,
     MAX_DRIVEN_GAP_M,

@@ -21,9 +21,9 @@ from knowledge_sources.methods.verification import predict_face_colors, predict_
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries import Obstruction
-from world_models.entries.obstacle import MOST_HIDDEN
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
+from world_models.obstruction import MOST_HIDDEN
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_points
 

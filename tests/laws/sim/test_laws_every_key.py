@@ -70,7 +70,7 @@ def test_every_key_moves_the_field_that_it_names_in_its_unit(table: str, kind: t
         name, factor = find_field(kind, key)
         before = getattr(plain, name)
         if isinstance(before, str):
-            tries: list[Any] = ["b", "on", "off"]
+            tries: list[Any] = ["b", "on", "off", "asked"]
         elif isinstance(before, bool):
             tries = [not before]
         elif isinstance(before, int):
