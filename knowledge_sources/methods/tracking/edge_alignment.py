@@ -38,6 +38,7 @@ MAX_EDGE_RESIDUAL_PX = 1.2  # largest distance of an edge from its model line af
 PRIOR_SIGMA_M = 0.02  # standard deviation added to the believed place, as templates err together (experiment table1)
 PRIOR_SIGMA_RAD = 0.01
 """Standard deviation added to the believed heading, as templates err together (experiment table1)."""
+INFLATION = np.diag([PRIOR_SIGMA_M**2, PRIOR_SIGMA_M**2, PRIOR_SIGMA_RAD**2])
 EDGE_ITERATIONS = 4  # steps of the reweighted least-squares fit
 MIN_EDGE_LINE_SHARE = 0.5  # least share of the lines with an edge near them that must agree with the fit
 
@@ -81,7 +82,20 @@ def align_to_edges(
             return None
         pose, doubt = found.world_from_robot, found.covariance
     slopes = compute_pose_slopes(lines_world, robot.camera, robot.mount, pose)
-    return found and replace(found, covariance=doubt + slopes @ camera_covariance @ slopes.T)
+    return found and _weigh_with_camera(found, world_from_robot, covariance, slopes @ camera_covariance @ slopes.T)
+
+
+def _weigh_with_camera(found: EdgeAlignment, prior: Pose2, covariance: Floats, of_camera: Floats) -> EdgeAlignment:
+    """What the edges tell is as unsure as the camera makes the pose, ``of_camera`` (3, 3); the belief is not.
+
+    So the alignment comes between the belief and what the edges alone tell, and is never less sure than the belief.
+    """
+    of_belief = np.linalg.inv(covariance + INFLATION)
+    all_told = np.linalg.inv(found.covariance)
+    less = np.linalg.inv(np.eye(3) + (all_told - of_belief) @ of_camera)
+    weighed = np.linalg.inv(of_belief + less @ (all_told - of_belief))
+    step = weighed @ less @ all_told @ found.world_from_robot.minus(prior)
+    return replace(found, world_from_robot=to_pose2(prior.vector + step), covariance=0.5 * (weighed + weighed.T))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,8 +185,7 @@ def _solve(
 ) -> EdgeAlignment | None:
     """Least squares with a hard cut-off, from one step with Huber weights; the belief is one more measurement."""
     sigma_px, cutoff_px = EDGE_SIGMA_PX, MAX_EDGE_RESIDUAL_PX
-    inflation = np.diag([PRIOR_SIGMA_M**2, PRIOR_SIGMA_M**2, PRIOR_SIGMA_RAD**2])
-    information = np.linalg.inv(covariance + inflation)
+    information = np.linalg.inv(covariance + INFLATION)
     away = at.minus(prior)
     per_line = np.bincount(edges.line, minlength=int(edges.line.max(initial=0)) + 1)[edges.line]
     weight = np.minimum(1.0, EDGES_PER_LINE / np.maximum(per_line, 1)) / sigma_px**2
