@@ -17,7 +17,7 @@ from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.motion import compute_free_space
 from knowledge_sources.methods.tracking import align_to_edges
-from knowledge_sources.methods.tracking.edge_alignment import EdgeAlignment, _intersect_lines
+from knowledge_sources.methods.tracking.edge_alignment import INFLATION, EdgeAlignment, _intersect_lines
 from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
@@ -117,7 +117,7 @@ def test_a_nearly_right_belief_is_corrected_to_a_millimetre_or_so() -> None:
 
 
 def test_what_is_not_known_of_the_camera_is_not_known_of_the_pose() -> None:
-    """With another tilt it would be elsewhere, by as much as the covariance grows."""
+    """With another tilt it would be elsewhere, and the covariance grows by about as much, never beyond the belief's."""
     rng = np.random.default_rng(3)
     true = draw_pose(rng)
     image, sure = render(true, rng), 0.003**2 * np.eye(3)
@@ -125,8 +125,8 @@ def test_what_is_not_known_of_the_camera_is_not_known_of_the_pose() -> None:
     other = align(true, sure, image, of=replace(robot(), mount=move_camera(robot().camera, robot().mount, TILT)[1]))
     assert here is not None and unsure is not None and other is not None
     off, grown = difference(other.world_from_robot, here.world_from_robot), unsure.covariance - here.covariance
-    assert unsure.world_from_robot == here.world_from_robot
-    assert 0.5 < math.sqrt(np.trace(grown[:2, :2])) / math.hypot(*off[:2]) < 2.0
+    assert 0.3 < math.sqrt(np.trace(grown[:2, :2])) / math.hypot(*off[:2]) < 2.0
+    assert np.all(np.linalg.eigvalsh(sure + INFLATION - unsure.covariance) > 0.0)
 
 
 @few
