@@ -1,21 +1,22 @@
 """What a knowledge source may ask of the board: conditions that it needs, and questions with one answer.
 
 Read ``conditions`` (needs, and what they bind) and ``questions`` first; the others answer for one subject each:
-``belief``, ``sketches``, ``looks``, ``landmarks``, ``doors``, ``lost``, ``floor_ahead``, ``motion_between``.
+``place_believed``, ``sketches``, ``looks``, ``followed_landmarks``, ``doors_in_view``, ``lost``, ``floor_ahead``,
+``motion_between``.
 """
 
-from knowledge_sources.reads.belief import (
+from knowledge_sources.reads.place_believed import (
     PLACED_BY, count_refuted, find_p_not_alias, find_p_there, find_search_here, has_only_turned,
 )
 from knowledge_sources.reads.conditions import (
     Belief, GOAL, GOING_ON, HELD, LOST, MEASURED, MILESTONE, NOT_GIVEN_UP, NOT_LOST, NO_DOUBT_ABOVE, NO_MILESTONE,
     PICTURE, SKETCH, SOUND, STANDING, SURE, UP_TO_DATE,
 )
-from knowledge_sources.reads.doors import (
+from knowledge_sources.reads.doors_in_view import (
     MAX_SIGMA_M, MAX_SIGMA_RAD, Watched, find_door_state, list_doors_in_view, with_door_open, with_door_shut,
 )
 from knowledge_sources.reads.floor_ahead import FloorAhead, SEEN_MARGIN_M, find_known_free, find_swept_next
-from knowledge_sources.reads.landmarks import (
+from knowledge_sources.reads.followed_landmarks import (
     Following, Renewed, find_missing_floors, find_near_frames, post_or_revise, rectify, take_new, tell_worst,
     with_anchors,
 )

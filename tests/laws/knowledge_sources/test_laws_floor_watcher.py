@@ -155,7 +155,7 @@ def test_it_compares_with_the_pictures_kept_from_far_enough_by_this_belief_on_th
         for e in far]
     (seen,) = [e for e in effects if isinstance(e.value, FreeFloor)]
     assert isinstance(seen, Post) and seen.value == floor()
-    assert reasons(seen) == {room.frame.id, room.belief.id, *(e.id for e in far)}
+    assert reasons(seen) == {room.frame.id, room.belief.id, *(e.id for e in kept)}
     is_kept = not kept or abs(float(room.bench.view[kept[-1].value.frame].value.jpeg)) > FLOOR_VIEW_DISTANCE_M
     here = to_world(HERE)
     assert made(effects, FloorView) == [FloorView(

@@ -103,7 +103,7 @@ def test_what_it_has_felt_is_part_of_the_search_and_of_the_reasons(direction: fl
         return LocalizationResult(LocalizationStatus.PROBE, (), SensingAction(1.0, 0.0, 0.0)), len([*robots]) - 1
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("knowledge_sources.relocalizer.localizer.search", note)
+        patch.setattr("knowledge_sources.methods.localization.search", note)
         effects: Any = bench.ask(SOURCE, look_round(bench, (0.0,)))
     ((felt,),) = [what.touched for what in asked]
     assert felt == pytest.approx(ROBOT.radius_m * np.array([math.cos(direction), math.sin(direction)]))
@@ -131,8 +131,8 @@ def search_says(bench: Bench, panorama: Entry[Panorama], result: LocalizationRes
         return result, which
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("knowledge_sources.relocalizer.localizer.search", answer)
-        patch.setattr("knowledge_sources.relocalizer.localizer.find_far_action", lambda *_: None)
+        patch.setattr("knowledge_sources.methods.localization.search", answer)
+        patch.setattr("knowledge_sources.methods.localization.find_far_action", lambda *_: None)
         return bench.ask(SOURCE, panorama), asked
 
 
@@ -197,7 +197,7 @@ def test_what_is_looked_for_is_all_that_it_knows_of_where_it_may_be(is_hidden: b
     seen = bench.put(Segments("CameraPicture-1", "", np.concatenate([own, other]), np.full(4, 0.4), 40.0, 120.0))
     asked: list[Search] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("knowledge_sources.relocalizer.localizer.search", lambda robots, what, _: asked.append(what) or (
+        patch.setattr("knowledge_sources.methods.localization.search", lambda robots, what, _: asked.append(what) or (
             LocalizationResult(PROBE, (), ACTION), len([*robots]) - 1))
         bench.ask(SOURCE, bench.put(Panorama((Glimpse(seen.id, Pose2(0.0, 0.0, 0.1), diagonal(0.0, 0.0)),))))
     (what,) = asked

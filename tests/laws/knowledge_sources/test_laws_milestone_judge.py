@@ -37,7 +37,8 @@ from knowledge_sources.milestone.milestone_judge import (
     Case,
     MilestoneJudge,
 )
-from knowledge_sources.reads import HELD, find_belief, find_camera, find_followed, find_p_not_alias
+from knowledge_sources.reads import find_belief, find_camera, find_followed, find_p_not_alias
+from knowledge_sources.reads.questions import HELD
 from knowledge_sources.settings import DEFAULT, Settings
 from rebuilt_board import copy_of
 from sim.scenario import parse_scenario

@@ -91,8 +91,8 @@ def test_files_that_name_others_are_read_so_often_at_most(tmp_path: Path, capsys
 
 
 @pytest.mark.parametrize("spoil", [
-    "update frame set packed = (select about from meta) where number = 1",
-    "alter table word rename to words; create view word as select 'a' as word, 1 as number, 'a' as name",
+    "update frame set packed = (select about from meta) where name = (select name from frame)",
+    "alter table frame rename to frames; create view frame as select 'a' as name, 1 as packed",
     "update meta set sha256 = replace(sha256, substr(sha256, 1, 1), 'x')"])
 def test_a_compiled_world_with_other_contents_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], spoil: str
