@@ -78,13 +78,18 @@ def has_counted(camera: CameraState, pose: Pose2, settings: CameraStateSettings)
         for x, y, heading in camera.counted)
 
 
+USUAL_SIGMAS = 3.37
+"""Of three unknowns 99 % lie within; the root of their chi square."""
+
+
 def widen(found: CameraEstimate, believed: Pose2, covariance: Floats) -> Floats:
     """(7, 7) of a camera that was found with a pose, no surer than how far that is from a belief and its covariance.
 
     Along a corridor a longer focal length looks like a place further on, and pairs that are wrong alike make both.
+    Only what lies beyond ``USUAL_SIGMAS`` of the belief is taken for that.
     """
     sigmas = math.sqrt(compute_chi2(found.world_from_robot, believed, covariance + found.pose_covariance))
-    strange = max(0.0, 1.0 - 1.0 / max(sigmas, 1e-9)) * found.world_from_robot.minus(believed)
+    strange = max(0.0, 1.0 - USUAL_SIGMAS / max(sigmas, 1e-9)) * found.world_from_robot.minus(believed)
     moved = found.covariance @ found.pose_slopes.T @ np.linalg.solve(found.pose_covariance, strange)
     return np.asarray(found.covariance + np.outer(moved, moved))
 
