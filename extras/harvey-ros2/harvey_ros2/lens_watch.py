@@ -6,6 +6,7 @@ grow with the cube of the distance from the centre, as no pose and no mounting m
 
 from __future__ import annotations
 
+import math
 import statistics
 from dataclasses import dataclass, field
 
@@ -58,7 +59,7 @@ class LensWatch:
         if len(self.offs) < MIN_PICTURES:
             return ""
         off = statistics.median(value for value, _ in self.offs)
-        spread = 1.48 * statistics.median(abs(value - off) for value, _ in self.offs)
+        spread = 1.25 * 1.48 * statistics.median(abs(value - off) for value, _ in self.offs) / math.sqrt(len(self.offs))
         sigma = max(statistics.median(sigma for _, sigma in self.offs), spread)
         if abs(off) <= MOST_DEVIATIONS * sigma:
             return ""

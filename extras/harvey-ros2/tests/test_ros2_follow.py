@@ -150,14 +150,15 @@ def test_pictures_that_are_older_than_their_stamps_say_are_in_the_covariance_and
     assert check_poses(told, truth, truth[0][0] + lag_s) >= 30
     knows, said = onlooker.judge()
     assert knows == (lag_s < 0.2)
-    assert knows or f"its pictures are {lag_s:.2f} s older than their stamps say, by its odometry" in said, said
+    named = f"its pictures are {lag_s:.2f} s older than their stamps say, by its odometry"
+    assert knows or said == "lost" or named in said, said
 
 
 def test_who_was_only_told_where_it_is_knows_nothing_and_odometry_that_ends_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def noise(time_s: float, jpeg: bytes) -> tuple[float, bytes]:
-        pixels = np.random.default_rng(round(100 * time_s)).integers(0, 255, (480, 640), np.uint8)
+        pixels = np.random.default_rng(round(100 * time_s)).integers(0, 255, (512, 512), np.uint8)
         return time_s, cv2.imencode(".jpg", pixels)[1].tobytes()
 
     drive_bag(tmp_path / "bag", [(2.5, 1.22)], seen=noise)
