@@ -165,7 +165,7 @@ def test_who_was_only_told_where_it_is_knows_nothing_and_odometry_that_ends_is_t
     arguments = ["follow", str(tmp_path / "bag"), "--world", "research_center", "--reach", str(REACH), "--start", START]
     assert main([*arguments, "--out", str(tmp_path / "run")]) == 1
     said = capsys.readouterr().out
-    assert re.match(r"the recording ends; (lost|was told where it is; 0 of \d+ pictures said so): ", said), said
+    assert re.search(r"the recording ends; (lost|was told where it is; 0 of \d+ pictures said so): ", said), said
     drive_bag(tmp_path / "ahead", [(2.5, 1.22)], seen=lambda time_s, jpeg: (time_s + 3.0 * (time_s > 1003.0), jpeg))
     arguments[1] = str(tmp_path / "ahead")
     assert main([*arguments, "--out", str(tmp_path / "other")]) == 1
