@@ -139,6 +139,8 @@ class OdometryReader:
         most = MOST_JUMP_M + MOST_SPEED_M_PER_S * later_s, MOST_JUMP_RAD + MOST_SPEED_RAD_PER_S * later_s
         if away_m > most[0] or turned > most[1]:
             raise OdometryFault(f"its odometry jumped by {away_m:.2f} m and {math.degrees(turned):.0f} degrees")
+        if passed_s > self._late_s:  # it was silent, and the link lost: its clock may have stood still with it
+            self._delay = LeastDelay()
         self._delay.take(found.came_s, found.odometry.time_s)
         if self.is_late:
             self.passed_over["late"] += 1
