@@ -191,7 +191,9 @@ class RosNode:
         return take
 
     def _take_picture(self, heard: Heard) -> None:
-        picture, self._picture_came_s = self._picture, heard.came_s
+        last_s, picture, self._picture_came_s = self._picture_came_s, self._picture, heard.came_s
+        if last_s is not None and heard.came_s - last_s > self.robot.drive.pictures_s:
+            self._picture_delay = LeastDelay()  # they stopped: their clock may have stood still with its process
         if not self.robot.sim_time and len(heard.cdr) >= 12:  # the stamp is what a message begins with
             sec, nanosec = struct.unpack_from("<iI" if heard.cdr[1] & 1 else ">iI", heard.cdr, 4)
             self._picture_delay.take(heard.came_s, sec + 1e-9 * nanosec)

@@ -158,9 +158,13 @@ def test_pictures_age_from_when_somebody_looks_and_by_their_stamps_and_an_order_
     assert node.picture_age_s() == pytest.approx(1.6)
     show(7.0)
     assert node.picture_age_s() == 0.0
-    now_s[0] += 2.0
-    show(7.2)
+    for k in range(3):  # each later than the one before
+        now_s[0] += 0.8
+        show(7.2 + 0.2 * k)
     assert node.picture_age_s() == pytest.approx(1.8, abs=0.01)
+    now_s[0] += 2.0
+    show(9.0)
+    assert node.picture_age_s() == 0.0  # they stopped, and their clock may have
     zero, fast = (TYPES.build("geometry_msgs/msg/Twist", linear={"x": speed}) for speed in (0.0, 0.2))
     node.send("cmd_vel", zero)
     assert [node.is_ours("cmd_vel", Heard(TYPES.encode(said), sender, now_s[0])) for said, sender in (
