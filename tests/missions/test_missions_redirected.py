@@ -105,7 +105,7 @@ def test_what_if_it_had_been_otherwise_hears_the_page_again(tmp_path: Path, caps
     assert main(["replay", str(tmp_path / "run")]) == 0
     assert "all the same, byte for byte" in capsys.readouterr().out
     answer = what_if(RunDirectory(tmp_path / "run"), ["plan_adjuster"], ())
-    assert answer.result is not None and answer.result.outcome == "reached" and answer.result.error_m < 0.1
+    assert answer.result is not None and answer.result.outcome == "reached" and answer.result.error_m < 0.15
     out = RunDirectory(tmp_path / "other")
     what_if(RunDirectory(tmp_path / "run"), ["parlour/picture-1"], (), out=out)
     told = [(entry.author, entry.fields["text"]) for record in read_records(out.journal) for entry in record.observed
