@@ -10,16 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch
-from knowledge_sources.methods.belief import BelievedPlace, bound_p_rivals, compute_p_rivals
 from knowledge_sources.methods.calibration import add_yaw, compute_camera_covariance, is_camera_known
-from knowledge_sources.methods.localization import DISTINCT, list_aliases
 from knowledge_sources.methods.verification import (
     Before,
     PictureEvidence,
     Verdict,
     Weighed,
     certify,
-    compute_coverage_elsewhere,
     is_last_look,
     judge_place,
     tell_odds,
@@ -30,19 +27,23 @@ from knowledge_sources.reads import (
     find_belief,
     find_camera,
     find_followed,
-    find_p_not_alias,
+    find_rival,
     find_robot_in,
     find_search_here,
     has_only_turned,
     open_discrepancy,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import CameraPicture, Certificate, Hypothesis, LineMatch, Milestone, PoseFix, Segments, Travel
-
-MIN_ALIAS_PART = 0.8  # another place at which this part of the agreement is seen is not ruled out
-MAX_P_FALSE_UNMISTAKABLE = 2e-4  # up to this probability of a wrong place, it is not compared with others
-MAX_P_FALSE_CLEAR = 2e-3
-"""Up to this one, only with places at which the room repeats itself; beyond, with the whole room."""
+from world_models.entries import (
+    CameraPicture,
+    Certificate,
+    Hypothesis,
+    LineMatch,
+    Milestone,
+    PoseFix,
+    Segments,
+    Travel,
+)
 
 
 class Case(NamedTuple):
@@ -54,13 +55,6 @@ class Case(NamedTuple):
     frame: Entry[CameraPicture]
     milestone: Entry[Milestone]
     belief: Entry[Hypothesis]
-
-
-class Rival(NamedTuple):
-    """Where else a picture may have been taken, in words, and how likely that is."""
-
-    said: str
-    p: float
 
 
 class MilestoneJudge(RobotKnowledgeSource):
@@ -122,28 +116,9 @@ class MilestoneJudge(RobotKnowledgeSource):
 
     def _hold_against_others(self, view: View, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:
         """What would be verified is not testable where the picture may have been taken elsewhere."""
-        rival = self._find_rival(view, case, weighed) if verdict.kind == "verified" else None
+        rival = find_rival(view, case.fix, case.belief, weighed, self._settings) if verdict.kind == "verified" else None
         if rival is None or rival.p <= self._settings.plan.max_p_rival:
             return verdict
         odds = rival.p, self._settings.plan.max_p_rival
         reason = f"{verdict.reason}; but {rival.said}: {tell_odds(*odds)}"
         return Verdict("not testable", reason, *odds, p_rival=rival.p)
-
-    def _find_rival(self, view: View, case: Case, weighed: Weighed) -> Rival | None:
-        """Where else the picture is most likely taken, by the belief and by the picture; None where nowhere."""
-        least, room, s = MIN_ALIAS_PART * weighed.lines.coverage, case.belief.value.locale, self._settings
-        for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
-            there = other.value.world_from_robot(weighed.robot.world)
-            if compute_coverage_elsewhere(weighed, there, s) >= least:
-                return Rival(f"as much agrees at {other.id}", 0.5)
-        if weighed.p_false <= MAX_P_FALSE_UNMISTAKABLE or not weighed.is_weak:
-            return None
-        p_there, most = find_p_not_alias(view, s.localization), s.localization.max_alike_log_ratio
-        believed = BelievedPlace(weighed.before, weighed.covariance + case.fix.value.covariance, p_there)
-        if bound_p_rivals(believed, weighed.pose, DISTINCT, most) <= s.plan.max_p_rival:
-            return None
-        rivals = list_aliases(weighed.robot, weighed.segments.segments_px, room, weighed.pose,
-                              search=weighed.p_false > MAX_P_FALSE_CLEAR, settings=s)
-        p = compute_p_rivals(believed, weighed.pose, [
-            (alias.world_from_robot, min(max(-alias.margin, -most), most)) for alias in rivals])
-        return Rival(f"it may be another door of {room}, or its other side", p)

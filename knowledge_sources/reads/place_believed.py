@@ -6,17 +6,35 @@ One number for all that ask: the judge of milestones, the search of a lost robot
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from blackboard import Discrepancy, Entry, Level, View
-from knowledge_sources.methods.localization import compute_prior
-from knowledge_sources.reads.questions import open_discrepancy
-from knowledge_sources.settings import LocalizationSettings
-from world_models.entries import Hypothesis, MotionReport, PlaceOdds, PlaceSearch, Travel, TwinOdds
+from knowledge_sources.methods.belief import BelievedPlace, bound_p_rivals, compute_p_rivals
+from knowledge_sources.methods.localization import DISTINCT, compare_places, compute_prior, list_aliases
+from knowledge_sources.methods.verification import Weighed, compute_coverage_elsewhere
+from knowledge_sources.reads.questions import find_building, find_camera, find_robot_in, open_discrepancy
+from knowledge_sources.settings import LocalizationSettings, Settings
+from world_models.entries import (
+    Hypothesis,
+    MotionReport,
+    PlaceOdds,
+    PlaceSearch,
+    PoseFix,
+    Ride,
+    RideReport,
+    Travel,
+    TwinOdds,
+)
+from world_models.frames import Pose2
 
 PLACED_BY = ("command", "relocalization")
 """Bases of a belief that no motion has followed yet."""
 MAX_STANDING_M = 0.1
 """Up to such a way the robot has only turned: what wheels do in turns is far less."""
+MIN_ALIAS_PART = 0.8  # another place at which this part of the agreement is seen is not ruled out
+MAX_P_FALSE_UNMISTAKABLE = 2e-4  # up to this probability of a wrong place, it is not compared with others
+MAX_P_FALSE_CLEAR = 2e-3
+"""Up to this one, only with places at which the room repeats itself; beyond, with the whole room."""
 
 
 def find_p_there(view: View, refuted: int, settings: LocalizationSettings) -> float:
@@ -78,3 +96,58 @@ def has_only_turned(view: View, belief: Hypothesis) -> bool:
     way = view.latest(Travel)
     return belief.basis in PLACED_BY or (
         way is not None and not way.value.is_broken and way.value.gone_m <= MAX_STANDING_M)
+
+
+class Rival(NamedTuple):
+    """Where else a picture may have been taken, in words, and how likely that is."""
+
+    said: str
+    p: float
+
+
+def find_rival(
+    view: View, fix: Entry[PoseFix], belief: Entry[Hypothesis], weighed: Weighed, settings: Settings
+) -> Rival | None:
+    """Where else a picture that agrees with the believed place is most likely taken; None where nowhere."""
+    least, room, s = MIN_ALIAS_PART * weighed.lines.coverage, belief.value.locale, settings
+    for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
+        there = other.value.world_from_robot(weighed.robot.world)
+        if compute_coverage_elsewhere(weighed, there, s) >= least:
+            return Rival(f"as much agrees at {other.id}", 0.5)
+    if weighed.p_false <= MAX_P_FALSE_UNMISTAKABLE:
+        return None
+    storey = _find_storey(view, fix, weighed, s)
+    if (storey is not None and storey.p > s.plan.max_p_rival) or not weighed.is_weak:
+        return storey
+    p_there, most = find_p_not_alias(view, s.localization), s.localization.max_alike_log_ratio
+    believed = BelievedPlace(weighed.before, weighed.covariance + fix.value.covariance, p_there)
+    if bound_p_rivals(believed, weighed.pose, DISTINCT, most) <= s.plan.max_p_rival:
+        return None
+    rivals = list_aliases(weighed.robot, weighed.segments.segments_px, room, weighed.pose,
+                          search=weighed.p_false > MAX_P_FALSE_CLEAR, settings=s)
+    p = compute_p_rivals(believed, weighed.pose, [
+        (alias.world_from_robot, min(max(-alias.margin, -most), most)) for alias in rivals])
+    return Rival(f"it may be another door of {room}, or its other side", p)
+
+
+def _find_storey(view: View, fix: Entry[PoseFix], weighed: Weighed, settings: Settings) -> Rival | None:
+    """The storey, of those where the last ride may have ended, that is likeliest but for the believed one.
+
+    What was reported of the ride speaks for the believed one, as what is told of any place where the robot stands.
+    """
+    ride = view.latest(Ride)
+    if ride is None or view.latest(RideReport) is None:
+        return None
+    building, here, most = find_building(view), ride.value.destination, settings.localization.max_alike_log_ratio
+    stops = {link.other(here): [Pose2(*link.stop_of(name)) for name in (here, link.other(here))]
+             for link in building.links_of(here) if link.name == ride.value.passage}
+    building.require(list(stops))
+    step, odds = fix.value.camera_step, dict[str, float]()
+    for other, (stop, there) in stops.items():
+        robot = find_robot_in(view, other, find_camera(view).moved(step) if step else None)
+        margin = compare_places((weighed.robot, weighed.pose), (robot, there @ (stop.inverse() @ weighed.pose)),
+                                weighed.segments.segments_px, settings)
+        odds[other] = settings.plan.p_wrong_standing / len(stops) * math.exp(min(-margin, most))
+    likeliest = max(odds, key=odds.__getitem__, default=None)
+    return None if likeliest is None else Rival(
+        f"the doors may have opened at {likeliest}", odds[likeliest] / (1.0 + math.fsum(odds.values())))

@@ -20,7 +20,9 @@ Could a known pose be another one that looks the same?
 * :mod:`aliasing`: where the floor plan repeats itself; the pose of the room that is hardest to tell from a known one.
 """
 
-from knowledge_sources.methods.localization.aliasing import find_repetitions, list_aliases, precompute_views
+from knowledge_sources.methods.localization.aliasing import (
+    compare_places, find_repetitions, list_aliases, precompute_views,
+)
 from knowledge_sources.methods.localization.camera_matching import match_with_camera, rate_match
 from knowledge_sources.methods.localization.global_localization import LocalizationStatus, make_alias_test
 from knowledge_sources.methods.localization.next_view import MIN_NEW_VIEW_RAD, MOVE_M
@@ -34,8 +36,8 @@ from knowledge_sources.methods.localization.views import CameraView, propagate_p
 
 __all__ = [
     "DISTINCT", "MIN_NEW_VIEW_RAD", "MOVE_M", "CameraView", "LocalizationStatus", "Search", "StatedPlace",
-    "are_distinct", "compute_pose_likelihood", "compute_prior", "compute_twin_odds", "describe", "find_far_action",
-    "find_odds_used", "find_repetitions", "get_visibility_map", "list_aliases", "list_rooms", "make_alias_test",
-    "match_with_camera", "precompute_views", "prefer_reachable", "propagate_pose", "rate_match", "search",
-    "update_obstruction", "weigh_told",
+    "are_distinct", "compare_places", "compute_pose_likelihood", "compute_prior", "compute_twin_odds", "describe",
+    "find_far_action", "find_odds_used", "find_repetitions", "get_visibility_map", "list_aliases", "list_rooms",
+    "make_alias_test", "match_with_camera", "precompute_views", "prefer_reachable", "propagate_pose", "rate_match",
+    "search", "update_obstruction", "weigh_told",
 ]

@@ -97,6 +97,14 @@ def list_aliases(
     return [Alias(other, compute_margin(own, view)) for other, view in zip(others, there, strict=True)]
 
 
+def compare_places(
+    one: tuple[RobotModel, Pose2], other: tuple[RobotModel, Pose2], segments_px: Floats, settings: Settings = DEFAULT
+) -> float:
+    """By how many lines segments (k, 2, 2) support one robot and pose more than another, as on another storey."""
+    views = (predict_views_on_grid(robot, (pose,), settings, segments_px)[0] for robot, pose in (one, other))
+    return compute_margin(*(score_view(lines_px, segments_px, settings) for lines_px in views))
+
+
 def find_repeated_poses(robot: RobotModel, room: str, pose: Pose2) -> list[Pose2]:
     """Find the other poses within a room at which its plan repeats itself."""
     outline = robot.world.outline(room)

@@ -30,14 +30,9 @@ from knowledge_sources.methods.localization.aliasing import Alias
 from knowledge_sources.methods.verification import POSE_CONFIDENCE, Verdict, Weighed, is_last_look, judge_place
 from knowledge_sources.methods.verification.pose_confidence import compute_motion_tolerance_px
 from knowledge_sources.methods.verification.weigh import MAX_P_UNMISTAKABLE, _find_tolerance_px, _median_shift
-from knowledge_sources.milestone import milestone_judge
-from knowledge_sources.milestone.milestone_judge import (
-    MAX_P_FALSE_CLEAR,
-    MAX_P_FALSE_UNMISTAKABLE,
-    Case,
-    MilestoneJudge,
-)
-from knowledge_sources.reads import find_belief, find_camera, find_followed, find_p_not_alias
+from knowledge_sources.milestone.milestone_judge import Case, MilestoneJudge
+from knowledge_sources.reads import find_belief, find_camera, find_followed, find_p_not_alias, place_believed
+from knowledge_sources.reads.place_believed import MAX_P_FALSE_CLEAR, MAX_P_FALSE_UNMISTAKABLE
 from knowledge_sources.reads.questions import HELD
 from knowledge_sources.settings import DEFAULT, Settings
 from rebuilt_board import copy_of
@@ -474,7 +469,7 @@ def test_a_place_that_repeats_itself_is_held_against_it_by_bayes_rule(
     weighed = replace(judge.weigh(view, case), p_false=1e-3, is_weak=True)
     near = Pose2(weighed.pose.x_m + 0.05, weighed.pose.y_m, weighed.pose.heading_rad)
     other = near if is_near else Pose2(weighed.pose.x_m + 3.0, weighed.pose.y_m, weighed.pose.heading_rad)
-    monkeypatch.setattr(milestone_judge, "list_aliases", lambda *_, **__: [Alias(other, margin)])
+    monkeypatch.setattr(place_believed, "list_aliases", lambda *_, **__: [Alias(other, margin)])
     verdict = judge._hold_against_others(view, case, weighed, Verdict("verified", "so", 1e-3, PLAN.max_p_rival))
     spread = weighed.covariance + case.fix.value.covariance + 1e-9 * np.eye(3)
     (own, away) = (float(d @ np.linalg.solve(spread, d)) for d in (
@@ -500,7 +495,7 @@ def test_how_far_it_is_held_against_the_rest_of_the_room(
     judge, view = MilestoneJudge(), one.board.view
     case = case_on(view, one.trigger)
     weighed = replace(judge.weigh(view, case), p_false=p_false, is_weak=is_weak)
-    monkeypatch.setattr(milestone_judge, "list_aliases", lambda *_, search, **__: searched.append(search) or [])
+    monkeypatch.setattr(place_believed, "list_aliases", lambda *_, search, **__: searched.append(search) or [])
     assert judge._hold_against_others(view, case, weighed, Verdict("verified", "so", p_false, 1.0)).kind == "verified"
     assert searched == ([] if asked is None else [asked])
 
