@@ -28,7 +28,7 @@ from knowledge_sources.methods.floor.found_things import (
     place,
     tell_status,
 )
-from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M
+from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M, MAX_P_SEEN_ONCE
 from knowledge_sources.methods.floor.thing_shapes import ThingShape, join_shapes, leave_free
 from knowledge_sources.methods.floor.weigh_touch import TOUCH_MARGIN_M
 from knowledge_sources.settings import ActionSettings, Settings
@@ -37,7 +37,8 @@ from world_models.entries import FloorThing, FreeFloor, Obstacle, ObstacleStatus
 
 MIN_FREE_PART = 0.5  # part of an obstacle's footprint that must be seen free to tell that it is not there any more
 MAX_SHARED_PART = 0.25  # where a thing that is seen takes more of the footprint, the rest seen free tells nothing of it
-FREE_FLOOR_ODDS = 0.03  # odds of an obstacle that is there while all of its footprint is seen free
+FREE_FLOOR_ODDS = (1.0 - MAX_P_SEEN_ONCE) / MAX_P_SEEN_ONCE
+"""Odds of an obstacle that is there while all of its footprint is seen free: a picture unsays what a picture said."""
 LOOKS_FREE_ODDS = 0.2  # the same where the floor there looks free, and nothing else tells
 ALIKE_FREE_ODDS = 0.3  # the same of one that looks like the floor
 MIN_WAY_M = FLOOR_VIEW_DISTANCE_M / 2.0  # what is seen, or missed, from nearer by is no further evidence
