@@ -1,7 +1,7 @@
 """The simulated body behind a serial line: the mission reaches it through a driver and an emulated base only.
 
-The bytes go through a pseudo-terminal as they go through a cable; pictures come from the simulator's camera. The truth
-stays with the simulated body.
+The bytes go through memory as they go through a cable; pictures come from the simulator's camera. The truth stays with
+the simulated body.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ def open_body(body: SimulatedBody, kind: str) -> Iterator[Body]:
     from harvey.hardware.bases import base_kinds
     from harvey.hardware.hardware_body import HardwareBody
     from sim.emulators.emulator_registry import emulator_kinds
-    from sim.emulators.line import FaultyLine, PseudoTerminalLink
+    from sim.emulators.line import EmulatedLine, FaultyLine
 
     emulator = emulator_kinds()[kind]
     clock = (lambda: body.truth.time_s) if emulator.keeps_time else None
-    base = base_kinds()[kind].connect_to_emulator(PseudoTerminalLink(FaultyLine(emulator.on_body(body), body), clock))
+    base = base_kinds()[kind].connect_to_emulator(EmulatedLine(FaultyLine(emulator.on_body(body), body), clock))
     try:
         yield HardwareBody(base, FaultyBody(body), clock=lambda: body.truth.time_s, pause=body.wait,
                            carried=body.ride, ranges=body.has_ranges)

@@ -104,6 +104,11 @@ class SimulatedGround:
         return self._body.truth.time_s
 
     @property
+    def pose(self) -> Pose2:
+        """Of the robot, in the building."""
+        return self._body.truth.world_from_robot
+
+    @property
     def touching_rad(self) -> float | None:
         return self._body.touching_rad
 
