@@ -21,10 +21,10 @@ from experiments.robustness.serial_line import Findings, Killed, Noise, NoisyLin
 from harvey.hardware.bases import base_kinds
 from harvey.hardware.drivers.base_driver import Base, BaseFault
 from harvey.runner.result import MissionResult
+from harvey.simulation.serial_body import emulator_kinds
 from harvey.simulation.simulated_run import run_mission
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.emulator import IdealGround
-from sim.emulators.emulator_registry import emulator_kinds
 from sim.emulators.line import EmulatedLine
 from sim.faults.fault_registry import find_fault_class
 from sim.stage import Stage

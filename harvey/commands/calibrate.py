@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
-import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,6 @@ from harvey.errors import BadInput
 
 if TYPE_CHECKING:
     from harvey.hardware.calibration import Boards, Grey, Mounted
-    from harvey.hardware.drivers.video_camera import VideoCamera
     from knowledge_sources.methods.calibration import Calibration, Pattern
 
 PATTERN = re.compile(r"(\d{1,3})x(\d{1,3})", re.ASCII)
@@ -88,7 +87,7 @@ def _run(args: Namespace) -> int:
     calibration = calibrate_camera(boards, pattern, with_k3=args.k3)
     found, mount = None, None
     if board is not None:
-        place = _live_place(args) if place is None else place
+        place = _take_place(args) if place is None else place
         found, mount = find_mounting(calibration, place, pattern, board)
     lines = report(calibration, boards, found, board)
     text = camera_text(calibration.camera, mount, _notes(calibration, args), find_deviation(calibration, found, board))
@@ -123,37 +122,22 @@ def _find_boards(args: Namespace, pattern: Pattern) -> Boards:
     if args.camera is None:
         pictures = ((str(path), grey_of(path)) for path in picture_files(args.images))
         return find_boards(pictures, pattern, _print_status)
-    with _open_camera(args.camera) as camera:
-        _print_status("show the board from all sides: near and far, tilted, and in every corner of the picture")
-        return find_boards(live_pictures(camera), pattern, _print_status, wanted=args.count)
+    _print_status("show the board from all sides: near and far, tilted, and in every corner of the picture")
+    with closing(live_pictures(args.camera)) as taken:
+        return find_boards(taken, pattern, _print_status, wanted=args.count)
 
 
-def _live_place(args: Namespace) -> Grey:
-    """A picture that is taken when the user says so."""
-    from harvey.hardware.drivers.capture import CameraFault
-    from knowledge_sources.methods.features import read_picture
+def _take_place(args: Namespace) -> Grey:
+    """The picture of the mounting, taken when the user says so."""
+    from harvey.hardware.calibration import live_pictures
 
     where = "flat on the floor" if args.mount_board == "floor" else "upright on the floor"
     try:
         input(f"put the board {where} in front of the robot, square to it, then press Enter ")
     except EOFError:
         raise BadInput("--mount-image: expected Enter, or a picture, got the end of the input") from None
-    with _open_camera(args.camera) as camera:
-        try:
-            return read_picture(camera.look("mount").jpeg).grey
-        except CameraFault as fault:
-            raise BadInput(f"--camera {args.camera}: {fault.kind}: {fault.detail}") from None
-
-
-def _open_camera(source: str) -> VideoCamera:
-    from harvey.hardware.drivers.capture import CameraFault
-    from harvey.hardware.drivers.video_camera import VideoCamera
-
-    began_s = time.monotonic()
-    try:
-        return VideoCamera(source, None, clock=lambda: time.monotonic() - began_s, late_s=5.0)
-    except CameraFault as fault:
-        raise BadInput(f"--camera {source}: {fault.kind}: {fault.detail}") from None
+    with closing(live_pictures(args.camera)) as taken:
+        return next(taken)[1]
 
 
 def _notes(calibration: Calibration, args: Namespace) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from harvey.errors import BadInput
 if TYPE_CHECKING:
     from sim.body.simulated_body import SimulatedBody
     from sim.emulators.camera_server import CameraServer
-    from sim.emulators.emulator import IdealGround, SimulatedGround
+    from sim.emulators.emulator import IdealGround
     from sim.scenario import CameraSettings
 
 MAX_PORT = 65535
@@ -59,8 +59,8 @@ def _factor(text: str) -> float:
 
 def _run(args: Namespace) -> int:
     from harvey.hardware.bases import say_what_to_install
-    from sim.emulators.emulator import IdealGround, Served, SimulatedGround
-    from sim.emulators.emulator_registry import emulator_kinds
+    from harvey.simulation.serial_body import emulator_kinds
+    from sim.emulators.emulator import IdealGround, Served
     from sim.emulators.line import FaultyLine, PseudoTerminal
 
     kind = emulator_kinds().get(args.kind)
@@ -74,8 +74,8 @@ def _run(args: Namespace) -> int:
     if kind.serve is None and args.at is not None:
         raise BadInput(f"--at: expected none with {args.kind}, which is on a serial port")
     body, sight = (None, None) if args.scenario is None else _body(args.scenario, args.seed, args.calibration)
-    ground = IdealGround() if body is None else SimulatedGround(body)
-    trace = _Trace(args.kind == "denning" or kind.serve is not None, ground, body) if args.trace else None
+    ground = IdealGround() if body is None else body
+    trace = _Trace(args.kind == "denning" or kind.serve is not None, ground) if args.trace else None
     until = trace.tell_place if trace else lambda: False
     if kind.serve is not None:
         kind.serve(Served(ground, body, args.at or "", args.speed, until, trace=trace,
@@ -132,8 +132,8 @@ def _body(name: str, seed: int, calibration: str | None) -> tuple[SimulatedBody,
 class _Trace:
     """Prints the traffic: lines of text as they are, bytes in hexadecimal; and now and then where the robot is."""
 
-    def __init__(self, is_text: bool, ground: IdealGround | SimulatedGround, body: SimulatedBody | None) -> None:
-        self._text, self._ground, self._body = is_text, ground, body
+    def __init__(self, is_text: bool, ground: IdealGround | SimulatedBody) -> None:
+        self._text, self._ground = is_text, ground
         self._told_s, self._place = 0.0, ""
 
     def __call__(self, direction: str, data: bytes) -> None:
@@ -150,12 +150,14 @@ class _Trace:
         return False
 
     def _describe_place(self) -> str:
-        there = self._ground.pose
-        if self._body is None:
-            return f"{there.x_m:.3f} {there.y_m:.3f} m"
-        truth = self._body.truth
+        from sim.emulators.emulator import IdealGround
+
+        if isinstance(there := self._ground, IdealGround):
+            return f"{there.pose.x_m:.3f} {there.pose.y_m:.3f} m"
+        truth = there.truth
         hits = f", {truth.collisions} collisions" if truth.collisions else ""
-        return f"{there.x_m:.3f} {there.y_m:.3f} m in {truth.locale or 'no room'}{hits}"
+        at = truth.world_from_robot
+        return f"{at.x_m:.3f} {at.y_m:.3f} m in {truth.locale or 'no room'}{hits}"
 
 
 EMULATE = CliCommand(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import time
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import count as count_up
 from pathlib import Path
@@ -135,18 +136,20 @@ def find_boards(
             break
     if shown is None or size is None:
         why = f"; {useless[0][0]}: {useless[0][1]}" if useless else ""
-        raise BadInput(f"expected a board of {pattern.columns} x {pattern.rows} inner corners, as --board writes it, in "
-                       f"at least one of {count(len(useless), 'picture')}, got none{why}")
+        raise BadInput(f"expected a board of {pattern.columns} x {pattern.rows} inner corners, as --board writes it, "
+                       f"in at least one of {count(len(useless), 'picture')}, got none{why}")
     return Boards(tuple(views), shown, size, tuple(useless))
 
 
-def live_pictures(camera: VideoCamera) -> Iterator[tuple[str, Grey]]:
-    """Pictures without end. Raises BadInput."""
-    for number in count_up(1):
-        try:
-            yield f"picture {number}", read_picture(camera.look("calibrate").jpeg).grey
-        except CameraFault as fault:
-            raise BadInput(f"camera: {fault.kind}: {fault.detail}") from None
+def live_pictures(source: str) -> Generator[tuple[str, Grey], None, None]:
+    """Pictures without end of a camera: number of a device, video file or URL. Raises BadInput."""
+    began_s = time.monotonic()
+    try:
+        with VideoCamera(source, None, clock=lambda: time.monotonic() - began_s, late_s=5.0) as camera:
+            for number in count_up(1):
+                yield f"picture {number}", read_picture(camera.look("calibrate").jpeg).grey
+    except CameraFault as fault:
+        raise BadInput(f"--camera {source}: {fault.kind}: {fault.detail}") from None
 
 
 def calibrate_camera(boards: Boards, pattern: Pattern, *, with_k3: bool) -> Calibration:

@@ -359,4 +359,4 @@ def _is_speed(speed_m_per_s: float | None) -> bool:
 
 
 KIND = EmulatorKind("denning", lambda ground: DenningEmulator(ConstantSpeedMotion(ground)),
-                    lambda body: DenningEmulator(InstantMotion(body)), keeps_time=False)
+                    lambda body: DenningEmulator(InstantMotion(body)))

@@ -8,6 +8,7 @@ import pytest
 
 from experiments.generated.scenes import box_room
 from harvey.hardware.bases import base_kinds
+from harvey.simulation.serial_body import emulator_kinds
 from harvey_bases import p2os_emulator
 from harvey_bases.create2 import Create2Base, Watchdog
 from harvey_bases.create2_emulator import PASSIVE, Create2Emulator
@@ -16,7 +17,6 @@ from harvey_bases.p2os_emulator import P2osEmulator
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
 from sim.emulators.emulator import IdealGround
-from sim.emulators.emulator_registry import emulator_kinds
 from sim.emulators.line import EmulatedLine
 from tests.serial_bench import (
     NEAR_M,
@@ -144,8 +144,8 @@ def simulated() -> SimulatedBody:
 @pytest.mark.parametrize("kind", KINDS)
 def test_over_a_simulated_body_wheels_err_walls_stop_and_the_clock_is_the_bodys(kind: str) -> None:
     body = simulated()
-    end = emulator_kinds()[kind].on_body(body)
-    base = base_kinds()[kind].connect_to_emulator(EmulatedLine(end, lambda: body.truth.time_s))
+    end = emulator_kinds()[kind].on_ground(body)
+    base = base_kinds()[kind].connect_to_emulator(EmulatedLine(end, lambda: body.time_s))
     report = base.execute(MotorCommand(0.3, 2.0))
     gone_m = body.truth.path_m
     assert report.move_m == pytest.approx(2.0, abs=NEAR_M)

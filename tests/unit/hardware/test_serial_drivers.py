@@ -19,6 +19,7 @@ from tests.serial_bench import (
     ON_LINE_IN_MEMORY,
     Bench,
     check_the_bases_own_watchdog_stops_it_when_the_host_dies,
+    check_what_is_reported_is_what_was_done,
     over_emulated_line,
     over_line_in_memory,
 )
@@ -39,6 +40,12 @@ def test_over_a_line_that_breaks(check: Callable[[Bench], None]) -> None:
 @pytest.mark.parametrize("check", OF_SENSES)
 def test_touch_and_ranges(check: Callable[[str], None]) -> None:
     check("denning")
+
+
+@pytest.mark.parametrize("how", ["doubled", "stale before", "stale after", "late"])
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_reported_is_what_was_done(how: str, seed: int) -> None:
+    check_what_is_reported_is_what_was_done("denning", how, seed)
 
 
 def test_its_line_runs_as_its_document_says() -> None:
