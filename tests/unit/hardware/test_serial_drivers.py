@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 
-from harvey.hardware.drivers.base_driver import BaseFault, SerialLink
+from harvey.hardware.drivers.base_driver import SerialLink
 from harvey.hardware.drivers.denning import BAUD, DenningBase
 from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator, InstantMotion
 from sim.emulators.emulator import IdealGround
@@ -118,9 +117,3 @@ def test_a_terminal_that_nobody_reads_does_not_hold_the_base_up() -> None:
     for _ in range(40):
         terminal.exchange()
     terminal.close()
-
-
-@pytest.mark.parametrize("kind", ["", "dead"])
-def test_a_fault_has_one_of_the_known_kinds(kind: Any) -> None:
-    with pytest.raises(ValueError, match="kind of fault"):
-        BaseFault(kind, "what happened")
