@@ -15,7 +15,7 @@ COMPILE := CUSTOM_COMPILE_COMMAND='make lock' $(LOCK)/bin/pip-compile --quiet --
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
 
 # Compiled once, as pip does with a package: a third of a second a command where Python is told to write no bytecode.
-# Of the packages only what a mission imports is compiled before it, by harvey.compiling: it takes a third of the time.
+# Of the packages only what a mission imports is compiled before it, by docs/tools/compiling.py: it takes a third of the time.
 ROOMS := blackboard world_models knowledge_sources sim logs harvey
 
 # One thread: faster for matrices as small as ours, and the order of additions never varies.
@@ -83,7 +83,7 @@ $(VENV)/.ready-to-run: requirements.lock pyproject.toml $(VENV)/.ready-to-instal
 	@$(PIP) install --no-deps --no-build-isolation -e .
 	@$(BIN)/python -m compileall -q $(ROOMS)
 	@echo "== Compiling what it computes with, on all processors"
-	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m harvey.compiling
+	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m docs.tools.compiling
 	@touch $@
 
 $(VENV)/.ready-to-test: requirements-dev.lock $(VENV)/.ready-to-run

@@ -11,7 +11,6 @@ from pathlib import Path
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.camera_server import CameraServer
 from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator
-from sim.emulators.emulator import SimulatedGround
 from sim.emulators.line import FaultyLine, PseudoTerminal
 from sim.faults.fault import Fault
 from sim.scenario import Scenario, load_scenario
@@ -52,7 +51,7 @@ def emulated(folder: Path, *faults: Fault) -> Iterator[Emulated]:
     stage = build_stage(replace(scenario(), faults=faults))
     body, over = stage.body(0), threading.Event()
     body.picture()  # compiled before anybody waits for it
-    base = DenningEmulator(ConstantSpeedMotion(SimulatedGround(body)), watchdog_s=2.0)
+    base = DenningEmulator(ConstantSpeedMotion(body), watchdog_s=2.0)
     terminal = PseudoTerminal(FaultyLine(base, body))
     server = threading.Thread(target=terminal.serve, kwargs={"until": over.is_set, "speed": 1.5})
     (folder / "camera.toml").write_text(camera_text(stage.scenario.camera.camera, stage.scenario.camera.mount))

@@ -21,11 +21,11 @@ from experiments.robustness.serial_line import Findings, Killed, Noise, NoisyLin
 from harvey.hardware.bases import base_kinds
 from harvey.hardware.drivers.base_driver import Base, BaseFault
 from harvey.runner.result import MissionResult
+from harvey.simulation.serial_body import emulator_kinds
 from harvey.simulation.simulated_run import run_mission
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.emulator import IdealGround
-from sim.emulators.emulator_registry import emulator_kinds
-from sim.emulators.line import PseudoTerminalLink
+from sim.emulators.line import EmulatedLine
 from sim.faults.fault_registry import find_fault_class
 from sim.stage import Stage
 from world_models.entries import AROUND_SIGMA_RAD, BodyFault, MotorCommand, Recovery
@@ -61,14 +61,14 @@ def over_line_in_memory(kind: str, floor: IdealGround, noise: float = 0.0, seed:
 
 
 @contextmanager
-def over_terminal(kind: str) -> Iterator[Bench]:
-    """Over a pseudo-terminal; a base that counts its wheels' turns begins shortly before its counters wrap."""
+def over_emulated_line(kind: str) -> Iterator[Bench]:
+    """Over a mission's line; a base that counts its wheels' turns begins shortly before its counters wrap."""
     floor = IdealGround()
     end: Any = emulator_kinds()[kind].on_ground(floor)
     if hasattr(end, "first_count"):
         end.first_count = 65_500
         end.power_cycle()
-    line = PseudoTerminalLink(end)
+    line = EmulatedLine(end)
     bench = Bench(kind, floor, end, line, base_kinds()[kind].connect_to_emulator(line))
     try:
         yield bench
@@ -129,7 +129,7 @@ def check_a_command_that_is_no_motion_is_the_callers_mistake(bench: Bench) -> No
             bench.base.execute(MotorCommand(turn, move))
 
 
-ON_TERMINAL: tuple[Callable[[Bench], None], ...] = (
+ON_EMULATED_LINE: tuple[Callable[[Bench], None], ...] = (
     *(partial(check_a_turn_and_a_move_come_out_as_asked_and_as_reported, turn=turn)
       for turn in (0.3, -0.3, 2.8, -2.8, 4.5)),
     check_odometry_follows_a_way_with_corners_and_counters_that_wrap,

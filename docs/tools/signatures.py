@@ -1,4 +1,4 @@
-"""Writes harvey/signatures.json: what Figure 17's mission has compiled. ``python -m docs.tools.signatures``."""
+"""Writes signatures.json: what Figure 17's mission has compiled. ``python -m docs.tools.signatures``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 import tempfile
 
 import harvey
-from harvey.compiling import FILE, list_compiled
+from docs.tools.compiling import FILE, list_compiled
 
 ROOMS = ("world_models.", "knowledge_sources.", "sim.")
 

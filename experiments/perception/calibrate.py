@@ -1,4 +1,4 @@
-"""Calibration from rendered chessboards: are the reported standard deviations true?
+"""Calibration from rendered boards: are the reported standard deviations true?
 
 Boards are rendered through a distorting lens by the simulator, whose projection shares no code with the one fitted,
 with blur, noise and JPEG. Over many calibrations the errors, in units of their reported standard deviations, must be
@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from experiments.generated.scenes import chessboard_picture, chessboard_renderer, chessboard_view
+from experiments.generated.scenes import board_picture, board_renderer, board_view
 from experiments.report import Cell, Report
-from knowledge_sources.methods.calibration import PARAMETERS, BoardView, Calibration, Pattern, calibrate, find_corners
+from knowledge_sources.methods.calibration import PARAMETERS, BoardView, Calibration, Pattern, calibrate, find_board
 from knowledge_sources.methods.features import read_picture
 from sim.render.optics import Optics
 from sim.render.renderer import Renderer
 from sim.render.sensor import SensorParameters
 from world_models.camera import Camera
 
-PATTERN = Pattern(9, 6, 0.025)
+PATTERN = Pattern(7, 5, 0.025)
 CAMERA = Camera(402.0, 405.0, 250.3, 259.1, 512, 512, (-0.2, 0.05, 0.001, -0.0005))
 VIEWS, SEEDS, QUICK_SEEDS = 20, 20, 3
 NORMAL = tuple(math.erf(k / math.sqrt(2.0)) for k in (1, 2, 3))
@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 def run(quick: bool, seed: int) -> Report:
     """Calibrate from ``VIEWS`` views each, with seeds ``seed``, ``seed + 1``, ..."""
     seeds = range(seed, seed + (QUICK_SEEDS if quick else SEEDS))
-    renderer, optics = chessboard_renderer(PATTERN.columns, PATTERN.rows, PATTERN.square_m), Optics.of(CAMERA)
+    renderer, optics = board_renderer(PATTERN), Optics.of(CAMERA)
     shown = tqdm(seeds, file=sys.stderr, disable=not sys.stderr.isatty())
     calibrations = [_calibrate(renderer, optics, s) for s in shown]
     truth = np.array([CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy, *CAMERA.distortion])[: len(calibrations[0].values)]
@@ -45,9 +45,9 @@ def run(quick: bool, seed: int) -> Report:
     rows = [_row(*cells) for cells in zip(PARAMETERS, truth, errors.T, sigmas.T, relative.T, strict=False)]
     rows += [(f"within {k} sigma", f"{100 * n:.1f} %", f"{100 * s:.1f} %", None, None)
              for k, n, s in zip((1, 2, 3), NORMAL, shares, strict=True)]
-    noise = float(np.mean([c.sigma_px for c in calibrations]))
+    noise = float(np.mean([c.rms_px for c in calibrations]) / math.sqrt(2.0))
     return Report(
-        "Calibration from rendered chessboards", COLUMNS, tuple(rows),
+        "Calibration from rendered boards", COLUMNS, tuple(rows),
         notes=(
             f"{len(seeds)} calibrations, seeds {seeds[0]} to {seeds[-1]}, from {VIEWS} views each of "
             f"{PATTERN.columns} x {PATTERN.rows} inner corners, {CAMERA.width} x {CAMERA.height} px; "
@@ -71,11 +71,11 @@ def _calibrate(renderer: Renderer, optics: Optics, seed: int) -> Calibration:
     rng = np.random.default_rng(seed)
     views: list[BoardView] = []
     while len(views) < VIEWS:
-        pose = chessboard_view(CAMERA, PATTERN.columns, PATTERN.rows, PATTERN.square_m, rng)
-        picture = read_picture(chessboard_picture(renderer, optics, pose, SensorParameters(), rng)).grey
-        corners = find_corners(picture, PATTERN)
-        if not isinstance(corners, str):
-            views.append(BoardView(f"view {len(views)}", corners))
+        pose = board_view(CAMERA, PATTERN, rng)
+        picture = read_picture(board_picture(renderer, optics, pose, SensorParameters(), rng)).grey
+        view = find_board(f"view {len(views)}", picture, PATTERN)
+        if isinstance(view, BoardView):
+            views.append(view)
     return calibrate(views, PATTERN, (CAMERA.width, CAMERA.height))
 
 

@@ -16,8 +16,8 @@ from harvey.errors import BadInput
 from harvey.hardware.bases import base_kinds, say_what_to_install
 from harvey.hardware.drivers.base_driver import Base, BaseFault
 from harvey.hardware.drivers.denning import DenningBase
+from harvey.simulation.serial_body import emulator_kinds
 from sim.emulators.emulator import IdealGround
-from sim.emulators.emulator_registry import emulator_kinds
 from world_models.entries import MotionReport, MotorCommand
 
 

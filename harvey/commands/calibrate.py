@@ -1,12 +1,11 @@
-"""``harvey calibrate``: a camera's intrinsics, lens distortion and mounting, from pictures of a chessboard."""
+"""``harvey calibrate``: a camera's intrinsics, lens distortion and mounting, from pictures of a ChArUco board."""
 
 from __future__ import annotations
 
 import re
 import sys
-import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +13,7 @@ from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
 
 if TYPE_CHECKING:
-    from harvey.hardware.calibration import Grey, Mounted
-    from harvey.hardware.drivers.video_camera import VideoCamera
+    from harvey.hardware.calibration import Boards, Grey, Mounted
     from knowledge_sources.methods.calibration import Calibration, Pattern
 
 PATTERN = re.compile(r"(\d{1,3})x(\d{1,3})", re.ASCII)
@@ -24,7 +22,7 @@ PATTERN = re.compile(r"(\d{1,3})x(\d{1,3})", re.ASCII)
 def _pattern(text: str) -> tuple[int, int]:
     match = PATTERN.fullmatch(text)
     if match is None:
-        raise ArgumentTypeError(f"expected inner corners as 9x6, got {text!r}")
+        raise ArgumentTypeError(f"expected inner corners as 7x5, got {text!r}")
     return int(match[1]), int(match[2])
 
 
@@ -40,10 +38,11 @@ def _millimetres(text: str) -> float:
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("images", metavar="IMAGE", nargs="*", help="pictures of the board: files, folders, 'left*.jpg'")
+    parser.add_argument("--board", metavar="FILE", help="only write the board that is to be printed, as .pdf or .png")
     parser.add_argument("--camera", metavar="SOURCE", help="take them live: number of a device, video file or URL")
     parser.add_argument("--count", metavar="N", type=whole, default=20, help="live: how many views to take (20)")
-    parser.add_argument("--pattern", metavar="CxR", type=_pattern, default=(9, 6),
-                        help="inner corners in a row and in a column of the board (9x6)")
+    parser.add_argument("--pattern", metavar="CxR", type=_pattern, default=(7, 5),
+                        help="inner corners in a row and in a column of the board (7x5)")
     parser.add_argument("--square-mm", metavar="MM", type=_millimetres, default=0.025, dest="square_m",
                         help="side of a square (25)")
     parser.add_argument("--k3", action="store_true", help="find a third radial term too (very wide lenses)")
@@ -64,27 +63,31 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     from harvey.hardware.calibration import (
         calibrate_camera,
-        find_boards,
         find_deviation,
         find_mounting,
         grey_of,
         report,
+        save_board,
     )
     from knowledge_sources.methods.calibration import Pattern, draw_calibration
     from world_models.files.toml.camera_file import camera_text
 
-    board = _check_options(args)
     try:
         columns, rows = args.pattern
         pattern = Pattern(columns, rows, args.square_m)
     except ValueError as error:
         raise BadInput(f"--pattern, --square-mm: {error}") from None
+    if args.board is not None:
+        save_board(Path(args.board), pattern)
+        _print_status(f"written: {args.board}; print it in its true size, and measure a square")
+        return 0
+    board = _check_options(args)
     place = None if args.mount_image is None else grey_of(Path(args.mount_image))
-    boards = find_boards(_pictures(args, pattern), pattern, _print_status)
+    boards = _find_boards(args, pattern)
     calibration = calibrate_camera(boards, pattern, with_k3=args.k3)
     found, mount = None, None
     if board is not None:
-        place = _live_place(args) if place is None else place
+        place = _take_place(args) if place is None else place
         found, mount = find_mounting(calibration, place, pattern, board)
     lines = report(calibration, boards, found, board)
     text = camera_text(calibration.camera, mount, _notes(calibration, args), find_deviation(calibration, found, board))
@@ -113,43 +116,28 @@ def _check_options(args: Namespace) -> Mounted | None:
     return Mounted(args.lowest_m, args.board_ahead_m, args.forward_m)
 
 
-def _pictures(args: Namespace, pattern: Pattern) -> Iterator[tuple[str, Grey]]:
-    from harvey.hardware.calibration import grey_of, live_pictures, picture_files
+def _find_boards(args: Namespace, pattern: Pattern) -> Boards:
+    from harvey.hardware.calibration import find_boards, grey_of, live_pictures, picture_files
 
     if args.camera is None:
-        yield from ((str(path), grey_of(path)) for path in picture_files(args.images))
-        return
-    with _open_camera(args.camera) as camera:
-        _print_status("show the board from all sides: near and far, tilted, and in every corner of the picture")
-        yield from live_pictures(camera, pattern, args.count, _print_status)
+        pictures = ((str(path), grey_of(path)) for path in picture_files(args.images))
+        return find_boards(pictures, pattern, _print_status)
+    _print_status("show the board from all sides: near and far, tilted, and in every corner of the picture")
+    with closing(live_pictures(args.camera)) as taken:
+        return find_boards(taken, pattern, _print_status, wanted=args.count)
 
 
-def _live_place(args: Namespace) -> Grey:
-    """A picture that is taken when the user says so."""
-    from harvey.hardware.drivers.capture import CameraFault
-    from knowledge_sources.methods.features import read_picture
+def _take_place(args: Namespace) -> Grey:
+    """The picture of the mounting, taken when the user says so."""
+    from harvey.hardware.calibration import live_pictures
 
     where = "flat on the floor" if args.mount_board == "floor" else "upright on the floor"
     try:
         input(f"put the board {where} in front of the robot, square to it, then press Enter ")
     except EOFError:
         raise BadInput("--mount-image: expected Enter, or a picture, got the end of the input") from None
-    with _open_camera(args.camera) as camera:
-        try:
-            return read_picture(camera.look("mount").jpeg).grey
-        except CameraFault as fault:
-            raise BadInput(f"--camera {args.camera}: {fault.kind}: {fault.detail}") from None
-
-
-def _open_camera(source: str) -> VideoCamera:
-    from harvey.hardware.drivers.capture import CameraFault
-    from harvey.hardware.drivers.video_camera import VideoCamera
-
-    began_s = time.monotonic()
-    try:
-        return VideoCamera(source, None, clock=lambda: time.monotonic() - began_s, late_s=5.0)
-    except CameraFault as fault:
-        raise BadInput(f"--camera {source}: {fault.kind}: {fault.detail}") from None
+    with closing(live_pictures(args.camera)) as taken:
+        return next(taken)[1]
 
 
 def _notes(calibration: Calibration, args: Namespace) -> tuple[str, ...]:
@@ -182,15 +170,17 @@ def _print_status(line: str) -> None:
 CALIBRATE = CliCommand(
     "calibrate", "measure a camera: lens, distortion, mounting",
     (
-        ("harvey calibrate photos/ --pattern 9x6 --square-mm 25", "from photographs of a board"),
+        ("harvey calibrate --board board.pdf", "the board, to be printed"),
+        ("harvey calibrate photos/ --square-mm 24.8", "from photographs of it, with a square as it was measured"),
         ("harvey calibrate --camera 0 --count 25 --out eye.toml", "live, from a USB camera"),
         ("harvey calibrate photos/ --mount-board floor --mount-image floor.jpg --board-ahead-mm 900", "and mounting"),
         ("harvey calibrate --camera 0 --mount-board standing --lowest-mm 62 --forward-mm 80", "with an upright board"),
     ),
     _arguments, _run,
     """
-Print a chessboard, glue it to something flat, and measure a square. Take 15 to 25 pictures: near and far, tilted up to
-45 degrees to all sides, and into every corner of the picture. Do not touch focus or zoom afterwards.
+Print the board (--board), glue it to something flat, and measure a square. Take 15 to 25 pictures: near and far, tilted
+up to 45 degrees to all sides, and into every corner of the picture, also with a part of the board only. Do not touch
+focus or zoom afterwards.
 
 Mounting: --mount-board floor: lay the board flat on the floor, where the camera sees all of it, its rows square to the
 robot. Height, tilt and roll follow from the board alone. A camera that looks straight ahead sees the floor at a flat

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,8 +15,8 @@ from harvey.errors import BadInput
 if TYPE_CHECKING:
     from sim.body.simulated_body import SimulatedBody
     from sim.emulators.camera_server import CameraServer
-    from sim.emulators.emulator import EmulatorKind, Ground
-    from sim.scenario import Scenario
+    from sim.emulators.emulator import IdealGround
+    from sim.scenario import CameraSettings
 
 MAX_PORT = 65535
 TELL_S = 1.0
@@ -58,31 +58,37 @@ def _factor(text: str) -> float:
 
 
 def _run(args: Namespace) -> int:
-    from sim.emulators.emulator import Served
+    from harvey.hardware.bases import say_what_to_install
+    from harvey.simulation.serial_body import emulator_kinds
+    from sim.emulators.emulator import IdealGround, Served
     from sim.emulators.line import FaultyLine, PseudoTerminal
 
+    kind = emulator_kinds().get(args.kind)
+    if kind is None:
+        raise BadInput(f"expected a kind of base, one of {', '.join(emulator_kinds())}, got {args.kind!r}"
+                       f"{say_what_to_install(args.kind)}")
     if args.scenario is None and not (args.camera_port is None and args.calibration is None):
         raise BadInput("--camera-port and --calibration: expected a --scenario to look at, got none")
-    kind = _kind(args.kind)
-    ground, where, body, scenario = _ground(args)
-    trace = _Trace(args.kind == "denning" or kind.serve is not None, where) if args.trace else None
-    if kind.serve is not None:
-        if args.camera_port is not None:
-            raise BadInput(f"--camera-port: expected none with {args.kind}, which brings its camera along")
-        sight = None if scenario is None else scenario.camera
-        kind.serve(Served(
-            ground, body, args.at or "", args.speed, trace.tell_place if trace else lambda: False, trace=trace,
-            camera=None if sight is None else sight.camera, mount=None if sight is None else sight.mount))
-        return 0
-    if args.at is not None:
+    if kind.serve is not None and args.camera_port is not None:
+        raise BadInput(f"--camera-port: expected none with {args.kind}, which brings its camera along")
+    if kind.serve is None and args.at is not None:
         raise BadInput(f"--at: expected none with {args.kind}, which is on a serial port")
+    body, sight = (None, None) if args.scenario is None else _body(args.scenario, args.seed, args.calibration)
+    ground = IdealGround() if body is None else body
+    trace = _Trace(args.kind == "denning" or kind.serve is not None, ground) if args.trace else None
+    until = trace.tell_place if trace else lambda: False
+    if kind.serve is not None:
+        kind.serve(Served(ground, body, args.at or "", args.speed, until, trace=trace,
+                          camera=None if sight is None else sight.camera,
+                          mount=None if sight is None else sight.mount))
+        return 0
     emulator = kind.on_ground(ground) if body is None else FaultyLine(kind.on_ground(ground), body)
     with _camera(args.camera_port, body) as camera, closing(PseudoTerminal(emulator, trace)) as terminal:
         print(f"an emulated {args.kind} base is at {terminal.name}; Ctrl-C ends it", flush=True)
         if camera is not None:
             print(f"its camera is at {camera.url}", flush=True)
         try:
-            terminal.serve(args.speed, until=trace.tell_place if trace else lambda: False)
+            terminal.serve(args.speed, until=until)
         except KeyboardInterrupt:
             print("the base is gone", file=sys.stderr)
     return 0
@@ -105,30 +111,8 @@ def _camera(port: int | None, body: SimulatedBody | None) -> Iterator[CameraServ
         yield camera
 
 
-def _kind(name: str) -> EmulatorKind:
-    from harvey.hardware.bases import say_what_to_install
-    from sim.emulators.emulator_registry import emulator_kinds
-
-    kinds = emulator_kinds()
-    if name not in kinds:
-        raise BadInput(f"expected a kind of base, one of {', '.join(kinds)}, got {name!r}{say_what_to_install(name)}")
-    return kinds[name]
-
-
-def _ground(
-    args: Namespace
-) -> tuple[Ground, Callable[[], tuple[float, str]], SimulatedBody | None, Scenario | None]:
-    """What it rolls on, what tells its time and true place, the simulated body and its scenario, if there are any."""
-    from sim.emulators.emulator import IdealGround, SimulatedGround
-
-    if args.scenario is None:
-        floor = IdealGround()
-        return floor, lambda: (floor.time_s, f"{floor.pose.x_m:.3f} {floor.pose.y_m:.3f} m"), None, None
-    body, scenario = _body(args.scenario, args.seed, args.calibration)
-    return SimulatedGround(body), lambda: (body.truth.time_s, _place(body)), body, scenario
-
-
-def _body(name: str, seed: int, calibration: str | None) -> tuple[SimulatedBody, Scenario]:
+def _body(name: str, seed: int, calibration: str | None) -> tuple[SimulatedBody, CameraSettings]:
+    """The simulated body where a scenario begins, and its camera; writes what a calibration would find of it."""
     from sim.scenario import ScenarioError, load_scenario
     from sim.stage import build_stage
     from world_models.files.toml.camera_file import camera_text
@@ -142,34 +126,38 @@ def _body(name: str, seed: int, calibration: str | None) -> tuple[SimulatedBody,
     if calibration is not None:
         text = camera_text(scenario.camera.camera, scenario.camera.mount, (f"the simulated camera of {name}",))
         Path(calibration).write_text(text, encoding="utf-8")
-    return body, scenario
-
-
-def _place(body: SimulatedBody) -> str:
-    there = body.truth.world_from_robot
-    hits = f", {body.truth.collisions} collisions" if body.truth.collisions else ""
-    return f"{there.x_m:.3f} {there.y_m:.3f} m in {body.truth.locale or 'no room'}{hits}"
+    return body, scenario.camera
 
 
 class _Trace:
     """Prints the traffic: lines of text as they are, bytes in hexadecimal; and now and then where the robot is."""
 
-    def __init__(self, is_text: bool, where: Callable[[], tuple[float, str]]) -> None:
-        self._text, self._where = is_text, where
+    def __init__(self, is_text: bool, ground: IdealGround | SimulatedBody) -> None:
+        self._text, self._ground = is_text, ground
         self._told_s, self._place = 0.0, ""
 
     def __call__(self, direction: str, data: bytes) -> None:
         lines = data.decode("ascii", "backslashreplace").splitlines() if self._text else [data.hex(" ")]
         for line in lines:
-            print(f"{self._where()[0]:9.3f} {direction} {line}", flush=True)
+            print(f"{self._ground.time_s:9.3f} {direction} {line}", flush=True)
 
     def tell_place(self) -> bool:
         """Where it is, if that has changed; never the end."""
-        now_s, place = self._where()
-        if now_s - self._told_s >= TELL_S and place != self._place:
+        now_s = self._ground.time_s
+        if now_s - self._told_s >= TELL_S and (place := self._describe_place()) != self._place:
             self._told_s, self._place = now_s, place
             print(f"{now_s:9.3f} = {place}", flush=True)
         return False
+
+    def _describe_place(self) -> str:
+        from sim.emulators.emulator import IdealGround
+
+        if isinstance(there := self._ground, IdealGround):
+            return f"{there.pose.x_m:.3f} {there.pose.y_m:.3f} m"
+        truth = there.truth
+        hits = f", {truth.collisions} collisions" if truth.collisions else ""
+        at = truth.world_from_robot
+        return f"{at.x_m:.3f} {at.y_m:.3f} m in {truth.locale or 'no room'}{hits}"
 
 
 EMULATE = CliCommand(

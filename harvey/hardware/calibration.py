@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import count as count_up
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from harvey.errors import BadInput
 from harvey.hardware.drivers.capture import CameraFault
@@ -21,7 +24,7 @@ from knowledge_sources.methods.calibration import (
     Pattern,
     calibrate,
     estimate_mounting,
-    find_corners,
+    find_board,
 )
 from knowledge_sources.methods.features import read_picture
 from world_models.camera import CameraDeviation, CameraMount
@@ -32,10 +35,12 @@ NEW_PX = 0.08
 """A live view is new when its corners have moved so far on the average, as part of the picture's width."""
 SAME_PX = 0.02
 """Two pictures show the same view where the corners have moved less on the average, as part of the picture's width."""
-MAX_SPREAD_PX = 0.01
-"""A camera is of no use that says no better, as part of the picture's width, where a direction is seen in it."""
+MAX_DEVIATION_PX = 0.01
+"""A camera is of no use whose focal length or principal point is not known to this part of the picture's width."""
 ROLLED = math.radians(1.0)
 UNITS = (("fx", "px"), ("fy", "px"), ("cx", "px"), ("cy", "px"))
+PRINTED_TIMES = 10
+"""Of the least size at which a board can be drawn: sharp on any printer."""
 Grey = NDArray[np.uint8]
 
 
@@ -60,6 +65,18 @@ class Mounted:
     camera_ahead_m: float | None = None
 
 
+def save_board(path: Path, pattern: Pattern) -> None:
+    """The board to be printed, in its true size, with a margin. Raises BadInput."""
+    image = pattern.draw(PRINTED_TIMES)
+    square_px = image.shape[1] // (pattern.columns + 1)
+    per_inch = square_px * 0.0254 / pattern.square_m
+    page = Image.fromarray(np.pad(image, square_px // 2, constant_values=255))
+    try:
+        page.save(path, dpi=(per_inch, per_inch), resolution=per_inch)
+    except (OSError, ValueError) as error:
+        raise BadInput(f"--board {path}: expected a .pdf or .png file to write to, got: {error}") from None
+
+
 def picture_files(names: Sequence[str]) -> tuple[Path, ...]:
     """The pictures that a user names: files, folders and patterns. Raises BadInput where there are none."""
     files: list[Path] = []
@@ -71,7 +88,7 @@ def picture_files(names: Sequence[str]) -> tuple[Path, ...]:
         if not path.exists() and any(c in name for c in "*?["):
             found = sorted(path.parent.glob(path.name), key=by_numbers)
         if not found or not all(p.is_file() for p in found):
-            raise BadInput(f"expected pictures of a chessboard, a folder or a pattern of them, got {name!r}")
+            raise BadInput(f"expected pictures of a board, a folder or a pattern of them, got {name!r}")
         files += found
     return tuple(dict.fromkeys(files))
 
@@ -84,70 +101,68 @@ def grey_of(path: Path) -> Grey:
         raise BadInput(f"{path}: {getattr(error, 'strerror', None) or error}") from None
 
 
-def find_boards(pictures: Iterator[tuple[str, Grey]], pattern: Pattern, tell: Callable[[str], None]) -> Boards:
-    """Look for the board in pictures. Raises BadInput where there is none in any."""
+def find_boards(
+    pictures: Iterable[tuple[str, Grey]], pattern: Pattern, tell: Callable[[str], None], *, wanted: int | None = None
+) -> Boards:
+    """Look for the board in pictures; views that are alike count once. Raises BadInput where it is in none.
+
+    Args:
+        wanted: of pictures without end: so many views, each clearly from another side; what is of no use is not kept.
+    """
     views: list[BoardView] = []
     useless: list[tuple[str, str]] = []
     shown: Grey | None = None
     size: tuple[int, int] | None = None
+    apart, told = SAME_PX if wanted is None else NEW_PX, ""
     for name, grey in pictures:
         here = grey.shape[1], grey.shape[0]
         size = size or here
-        corners = find_corners(grey, pattern) if here == size else f"its size is {here}, that of the others {size}"
-        if not isinstance(corners, str):
-            again = next((view.name for view in views if _moved_px(corners, view.corners_px) < SAME_PX * here[0]), None)
-            corners = corners if again is None else f"the same view as {again}, which counts once"
-        tell(f"{name}: {corners if isinstance(corners, str) else 'board found'}")
-        if isinstance(corners, str):
-            useless.append((name, corners))
-        else:
-            views.append(BoardView(name, corners))
+        found = find_board(name, grey, pattern) if here == size else f"its size is {here}, that of the others {size}"
+        if isinstance(found, BoardView):
+            near = (view.name for view in views if found.measure_moved_px(view) < apart * here[0])
+            if again := next(near, ""):
+                found = f"the same view as {again}, which counts once"
+        if isinstance(found, BoardView):
+            views.append(found)
             shown = grey if shown is None else shown
+            tell(f"{name}: board found")
+        elif wanted is None:
+            useless.append((name, found))
+            tell(f"{name}: {found}")
+        elif found != told:
+            told = found
+            tell(f"{len(views)} of {wanted} views; {name}: {found}")
+        if len(views) == wanted:
+            break
     if shown is None or size is None:
         why = f"; {useless[0][0]}: {useless[0][1]}" if useless else ""
-        raise BadInput(f"expected a board of {pattern.columns} x {pattern.rows} inner corners in at least one of "
-                       f"{count(len(useless), 'picture')}, got none{why}")
+        raise BadInput(f"expected a board of {pattern.columns} x {pattern.rows} inner corners, as --board writes it, "
+                       f"in at least one of {count(len(useless), 'picture')}, got none{why}")
     return Boards(tuple(views), shown, size, tuple(useless))
 
 
-def _moved_px(corners: NDArray[np.float64], old: NDArray[np.float64]) -> float:
-    """How far corners (n, 2) are from others on the average [px]; a board may be found from either end."""
-    return min(float(np.mean(np.linalg.norm(way - old, axis=1))) for way in (corners, corners[::-1]))
-
-
-def live_pictures(
-    camera: VideoCamera, pattern: Pattern, wanted: int, tell: Callable[[str], None]
-) -> Iterator[tuple[str, Grey]]:
-    """Pictures with the board in them, each from another side, until there are enough. Raises BadInput."""
-    kept: list[NDArray[np.float64]] = []
-    told = ""
-    while len(kept) < wanted:
-        try:
-            grey = read_picture(camera.look("calibrate").jpeg).grey
-        except CameraFault as fault:
-            raise BadInput(f"camera: {fault.kind}: {fault.detail} ({len(kept)} of {wanted} views taken)") from None
-        found = find_corners(grey, pattern)
-        if isinstance(found, str):
-            told, before = found, told
-            if told != before:
-                tell(f"waiting: {found}")
-        elif all(_moved_px(found, old) > NEW_PX * grey.shape[1] for old in kept):
-            kept.append(found)
-            told = ""
-            yield f"view {len(kept)} of {wanted}", grey
+def live_pictures(source: str) -> Generator[tuple[str, Grey], None, None]:
+    """Pictures without end of a camera: number of a device, video file or URL. Raises BadInput."""
+    began_s = time.monotonic()
+    try:
+        with VideoCamera(source, None, clock=lambda: time.monotonic() - began_s, late_s=5.0) as camera:
+            for number in count_up(1):
+                yield f"picture {number}", read_picture(camera.look("calibrate").jpeg).grey
+    except CameraFault as fault:
+        raise BadInput(f"--camera {source}: {fault.kind}: {fault.detail}") from None
 
 
 def calibrate_camera(boards: Boards, pattern: Pattern, *, with_k3: bool) -> Calibration:
-    """Raises BadInput where the views do not do."""
+    """Raises BadInput where the views do not do, by what the calibration itself says."""
     try:
         found = calibrate(boards.views, pattern, boards.size, with_k3=with_k3)
-        limit_px = MAX_SPREAD_PX * found.camera.width
-        if found.spread_px <= limit_px:
+        worst, limit_px = int(np.argmax(found.deviations[:4])), MAX_DEVIATION_PX * found.camera.width
+        if found.deviations[worst] <= limit_px:
             return found
         raise ValueError(
-            f"expected views that tell to {limit_px:.2g} px where a direction is seen, got {found.spread_px:.2g} px "
-            f"(fx {found.camera.fx:.0f} +- {found.deviations[0]:.2g} px): take the board from more sides, tilted up to "
-            "45 degrees, near and far, into every corner of the picture")
+            f"expected views that tell focal length and principal point to {limit_px:.2g} px, got {PARAMETERS[worst]} "
+            f"{found.values[worst]:.0f} +- {found.deviations[worst]:.2g} px: take the board from more sides, tilted up "
+            "to 45 degrees, near and far, into every corner of the picture")
     except ValueError as error:
         told = "".join(f"; {name}: {why}" for name, why in boards.useless[:1])
         raise BadInput(f"calibration: {error}{told}") from None
@@ -157,15 +172,14 @@ def find_mounting(
     calibration: Calibration, grey: Grey, pattern: Pattern, board: Mounted
 ) -> tuple[Mounting, CameraMount]:
     """The mounting by one picture. Raises BadInput."""
-    corners = find_corners(grey, pattern)
-    camera = calibration.camera
-    if isinstance(corners, str):
-        raise BadInput(f"the picture of the mounting: {corners}")
-    if grey.shape != (camera.height, camera.width):
-        raise BadInput(f"the picture of the mounting: expected {camera.width} x {camera.height} px, as the others, got "
-                       f"{grey.shape[1]} x {grey.shape[0]}")
+    camera, view = calibration.camera, find_board("mount", grey, pattern)
     try:
-        found = estimate_mounting(calibration, corners, pattern, standing_at_m=board.standing_at_m)
+        if isinstance(view, str):
+            raise ValueError(view)
+        if grey.shape != (camera.height, camera.width):
+            raise ValueError(f"expected {camera.width} x {camera.height} px, as the others, got "
+                             f"{grey.shape[1]} x {grey.shape[0]}")
+        found = estimate_mounting(calibration, view, pattern, standing_at_m=board.standing_at_m)
     except ValueError as error:
         raise BadInput(f"the picture of the mounting: {error}") from None
     forward = board.camera_ahead_m or 0.0

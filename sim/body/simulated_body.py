@@ -111,6 +111,11 @@ class SimulatedBody:
         return self._truth
 
     @property
+    def time_s(self) -> float:
+        """Its time [s]."""
+        return self._truth.time_s
+
+    @property
     def track(self) -> tuple[Truth, ...]:
         """Every true state so far, one at least every two centimetres of the way. Not for knowledge sources."""
         return tuple(self._track)

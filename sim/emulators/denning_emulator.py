@@ -8,11 +8,12 @@ from __future__ import annotations
 import binascii
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import replace
+from typing import NamedTuple
 
 from sim.body.collision import ROBOT_RADIUS_M
 from sim.body.senses import Bumper, RangeRing
+from sim.body.simulated_body import SimulatedBody
 from sim.emulators.emulator import EmulatorKind, Ground
 from world_models.entries import Contact, MotionReport, MotorCommand, Ranges
 from world_models.frames import Pose2
@@ -21,14 +22,7 @@ RING = RangeRing(sensors=24)
 """Of the platform: sonars that face outward at equal angles."""
 
 
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """What the encoders report of one command: how far it has come [rad, m], its duration and the time [s]."""
-
-    turn_rad: float = 0.0
-    move_m: float = 0.0
-    duration_s: float = 0.0
-    time_s: float = 0.0
+STANDS = MotionReport(0.0, 0.0, 0.0, 0.0)
 
 
 class BaseMotors(ABC):
@@ -37,59 +31,39 @@ class BaseMotors(ABC):
     Attributes:
         turn_rate, speed: of every motion [rad/s, m/s].
         ended: "" while it moves, else "ok", "stalled" or "halted".
-        claim: of the last command; contact: what it touched.
+        claim: what the encoders report of the last command; contact: what it touched.
     """
 
     turn_rate, speed = math.radians(45.0), 0.4
-
-    def __init__(self, time_s: float = 0.0) -> None:
-        self.ended, self.claim = "ok", Claim(time_s=time_s)
-        self.contact: Contact | None = None
+    ended, claim = "ok", STANDS
+    contact: Contact | None = None
 
     @abstractmethod
-    def begin(self, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> None:
+    def begin(self, command: MotorCommand) -> None:
         """Begin a command: TURN, then MOVE."""
 
-    @abstractmethod
-    def advance(self, duration_s: float) -> None:
+    def advance(self, _duration_s: float) -> None:
         """Let time pass."""
+        return
 
-    @abstractmethod
     def halt(self) -> None:
         """Break the command off."""
+        return
 
     @abstractmethod
     def ranges(self) -> Ranges | None:
         """What its sonars measure now."""
 
 
-class CommandExecutor(Protocol):
-    """Something that executes a whole command in one call."""
-
-    def execute(self, command: MotorCommand, /) -> MotionReport: ...
-
-    def take_contact(self) -> Contact | None: ...
-
-    def ranges(self) -> Ranges | None: ...
-
-
 class InstantMotion(BaseMotors):
-    """Executes a command at once, in the time of the body: no state in between is visible."""
+    """A simulated body's: a command is over at once, in the time of the body."""
 
-    def __init__(self, body: CommandExecutor) -> None:
-        super().__init__()
+    def __init__(self, body: SimulatedBody) -> None:
         self._body = body
 
-    def begin(self, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> None:
-        report = self._body.execute(MotorCommand(turn_rad, move_m, speed_m_per_s))
+    def begin(self, command: MotorCommand) -> None:
+        self.claim = self._body.execute(command)
         self.contact = self._body.take_contact()
-        self.claim = Claim(report.turn_rad, report.move_m, report.duration_s, report.sim_time_s)
-
-    def advance(self, duration_s: float) -> None:
-        """Nothing to do: the body's time passes only in commands."""
-
-    def halt(self) -> None:
-        """Nothing to do: it stands between commands."""
 
     def ranges(self) -> Ranges | None:
         return self._body.ranges()
@@ -104,15 +78,14 @@ class ConstantSpeedMotion(BaseMotors):
     max_held_s = 0.5
 
     def __init__(self, ground: Ground) -> None:
-        super().__init__(ground.time_s)
         self._ground = ground
-        self._turn = self._move = self._held_s = 0.0
-        self._speed, self._began_s = self.speed, ground.time_s
+        self._command, self._held_s = MotorCommand(0.0, 0.0), 0.0
+        self.claim = replace(STANDS, sim_time_s=ground.time_s)
+        self._began_s = ground.time_s
 
-    def begin(self, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> None:
-        self._turn, self._move, self._began_s = turn_rad, move_m, self._ground.time_s
-        self._speed = self.speed if speed_m_per_s is None else min(self.speed, speed_m_per_s)
-        self.claim = Claim(time_s=self._began_s)
+    def begin(self, command: MotorCommand) -> None:
+        self._command, self._began_s = command, self._ground.time_s
+        self.claim = replace(STANDS, sim_time_s=self._began_s)
         self.ended, self._held_s, self.contact = "", 0.0, None
 
     def advance(self, duration_s: float) -> None:
@@ -134,45 +107,36 @@ class ConstantSpeedMotion(BaseMotors):
 
     def _step(self, max_s: float) -> float:
         """Roll for at most this time, or to the end of the turn or move; returns the time that it took [s]."""
-        turning = self.claim.turn_rad != self._turn
-        to_go = self._turn - self.claim.turn_rad if turning else self._move - self.claim.move_m
+        command, claim = self._command, self.claim
+        turning = claim.turn_rad != command.turn_rad
+        to_go = command.turn_rad - claim.turn_rad if turning else command.move_m - claim.move_m
         if to_go == 0.0:
             self.ended = "ok"
             return 0.0
-        rate = self.turn_rate if turning else self._speed
+        rate = self.turn_rate if turning else min(self.speed, command.speed_m_per_s or math.inf)
         step_s = min(max_s, abs(to_go) / rate)
         step = to_go if step_s < max_s or abs(to_go) <= rate * max_s else math.copysign(rate * step_s, to_go)
-        rolled = self._ground.roll(step if turning else 0.0, 0.0 if turning else step, step_s)
-        self._held_s = self._held_s + step_s if rolled == (0.0, 0.0) else 0.0
+        turned, moved = self._ground.roll(step if turning else 0.0, 0.0 if turning else step, step_s)
+        is_held, now_s = turned == moved == 0.0, self._ground.time_s
+        self._held_s = self._held_s + step_s if is_held else 0.0
         if self._held_s > self.max_held_s:
             self.ended = "stalled"
-            touching_rad, now_s = self._ground.touching_rad, self._ground.time_s
+            touching_rad = self._ground.touching_rad
             self.contact = (Contact.of_stall(now_s, turning=turning) if touching_rad is None
-                             else Bumper().feel(touching_rad, now_s))
-        self._add(*rolled, finished=step == to_go and rolled != (0.0, 0.0), turning=turning)
+                            else Bumper().feel(touching_rad, now_s))
+        turn, move = claim.turn_rad + turned, claim.move_m + moved
+        if step == to_go and not is_held:  # what is finished claims exactly what was commanded
+            turn, move = (command.turn_rad, move) if turning else (turn, command.move_m)
+        self.claim = MotionReport(turn, move, now_s - self._began_s, now_s)
         return max(step_s, 1e-9)
-
-    def _add(self, turn_rad: float, move_m: float, *, finished: bool, turning: bool) -> None:
-        """Add a step to the claim; a finished turn or move claims exactly what was commanded."""
-        turn, move = self.claim.turn_rad + turn_rad, self.claim.move_m + move_m
-        if finished:
-            turn, move = (self._turn, move) if turning else (turn, self._move)
-        now_s = self._ground.time_s
-        self.claim = Claim(turn, move, now_s - self._began_s, now_s)
 
 
 WATCHDOG_S = 0.5
 MAX_TURN_RAD, MAX_MOVE_M = 2.0 * math.pi, 20.0
 
 
-@dataclass(frozen=True, slots=True)
-class Executed:
-    """A command that was executed.
-
-    Attributes:
-        token, seq: its session and number.
-        turn_rad, move_m: as the base understood it.
-    """
+class Executed(NamedTuple):
+    """A command that was begun: its session, its number, and what the base understood [rad, m]."""
 
     token: str
     seq: int
@@ -187,10 +151,12 @@ class DenningEmulator:
         executed: every command that was begun, in order.
         rejected: number of lines that were not understood.
         stops: how often the watchdog stopped it.
+        standing_within_s: longest time from the last line that it understood until it stands [s].
     """
 
-    def __init__(self, motion: BaseMotors, *, boot: int = 1, watchdog_s: float = WATCHDOG_S) -> None:
-        self._motion, self._boot, self._watchdog_s = motion, boot, watchdog_s
+    def __init__(self, motion: BaseMotors, *, watchdog_s: float = WATCHDOG_S) -> None:
+        self._motion, self.standing_within_s = motion, watchdog_s
+        self._boot = 1
         self.executed: list[Executed] = []
         self.rejected = self.stops = 0
         self._time_s = 0.0
@@ -201,7 +167,7 @@ class DenningEmulator:
         self._token = self._nonce = ""
         self._waiting: tuple[str, str] | None = None
         self._sessions = self._seq = 0
-        self._status, self._claim = "ok", Claim()
+        self._status, self._claim = "ok", STANDS
         self._pose = Pose2(0.0, 0.0, 0.0)
         self._heard_s = self._time_s
 
@@ -215,11 +181,6 @@ class DenningEmulator:
     def moving(self) -> bool:
         """Whether the motors run."""
         return self._status == "run"
-
-    @property
-    def standing_within_s(self) -> float:
-        """Longest time from the last line that it understood until it stands [s]."""
-        return self._watchdog_s
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the line."""
@@ -240,11 +201,10 @@ class DenningEmulator:
 
     def advance(self, duration_s: float) -> None:
         """Let time pass; a watchdog that is due within it acts at its exact time."""
-        left_s = duration_s
-        if self.moving and self._heard_s + self._watchdog_s < self._time_s + duration_s:
-            before_s = max(0.0, self._heard_s + self._watchdog_s - self._time_s)
-            self._roll(before_s)
-            left_s -= before_s
+        left_s, due_s = duration_s, self._heard_s + self.standing_within_s - self._time_s
+        if self.moving and due_s < duration_s:
+            self._roll(max(0.0, due_s))
+            left_s -= max(0.0, due_s)
             if self.moving:
                 self.stops += 1
                 self._end("watchdog")
@@ -294,10 +254,8 @@ class DenningEmulator:
             return
         self._heard_s = self._time_s
         match verb, words:
-            case "GO", [turn, move]:
-                self._go(seq, float(turn), float(move))
-            case "GO", [turn, move, speed]:
-                self._go(seq, float(turn), float(move), float(speed))
+            case "GO", [turn, move, *speed] if len(speed) < 2:
+                self._go(seq, float(turn), float(move), *map(float, speed))
             case "STOP", []:
                 self._stop(seq)
             case "BEAT", [question]:
@@ -319,14 +277,14 @@ class DenningEmulator:
             self._sessions += 1
             token = f"{binascii.crc32(f'{self._boot} {self._sessions} {nonce}'.encode()):08X}"
             self._waiting = (token, nonce)
-        limits = (self._watchdog_s, self._motion.turn_rate, self._motion.speed)
+        limits = (self.standing_within_s, self._motion.turn_rate, self._motion.speed)
         self._send(token, 0, "HI", nonce, *(repr(value) for value in limits))
 
     def _begin_session(self, token: str, nonce: str) -> None:
         if self.moving:
             self._end("stopped")
         self._token, self._nonce, self._waiting = token, nonce, None
-        self._seq, self._status, self._claim = 0, "ok", Claim(time_s=self._motion.claim.time_s)
+        self._seq, self._status, self._claim = 0, "ok", replace(STANDS, sim_time_s=self._motion.claim.sim_time_s)
 
     def _go(self, seq: int, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> None:
         if seq == self._seq:
@@ -340,7 +298,7 @@ class DenningEmulator:
         else:
             self._seq, self._status = seq, "run"
             self.executed.append(Executed(self._token, seq, turn_rad, move_m))
-            self._motion.begin(turn_rad, move_m, speed_m_per_s)
+            self._motion.begin(MotorCommand(turn_rad, move_m, speed_m_per_s))
             self._follow()
             self._send_status()
 
@@ -349,7 +307,7 @@ class DenningEmulator:
         if self.moving:
             self._end("stopped")
         if seq == self._seq + 1:
-            self._seq, self._status, self._claim = seq, "stopped", Claim(time_s=self._claim.time_s)
+            self._seq, self._status, self._claim = seq, "stopped", replace(STANDS, sim_time_s=self._claim.sim_time_s)
         if seq == self._seq:
             self._send_status()
         else:
@@ -358,7 +316,7 @@ class DenningEmulator:
     def _send_status(self) -> None:
         self._follow()
         claim = self._claim
-        numbers = [repr(v) for v in (claim.turn_rad, claim.move_m, claim.duration_s, claim.time_s)]
+        numbers = [repr(v) for v in (claim.turn_rad, claim.move_m, claim.duration_s, claim.sim_time_s)]
         if self.moving:
             self._send(self._token, self._seq, "RUN", *numbers)
         else:
@@ -369,7 +327,7 @@ class DenningEmulator:
         pose = self._pose
         if self.moving:
             pose = pose @ Pose2(0.0, 0.0, self._claim.turn_rad) @ Pose2(self._claim.move_m, 0.0, 0.0)
-        where = (pose.x_m, pose.y_m, pose.heading_rad, self._motion.claim.time_s)
+        where = (pose.x_m, pose.y_m, pose.heading_rad, self._motion.claim.sim_time_s)
         self._send(self._token, seq, "HERE", question, *(repr(v) for v in where))
 
     def _send_contact(self, seq: int) -> None:
@@ -401,4 +359,4 @@ def _is_speed(speed_m_per_s: float | None) -> bool:
 
 
 KIND = EmulatorKind("denning", lambda ground: DenningEmulator(ConstantSpeedMotion(ground)),
-                    lambda body: DenningEmulator(InstantMotion(body)), keeps_time=False)
+                    lambda body: DenningEmulator(InstantMotion(body)))

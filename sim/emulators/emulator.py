@@ -34,7 +34,7 @@ class Emulator(Protocol):
 
 
 class Ground(Protocol):
-    """What wheels roll on, with the clock of the base."""
+    """What wheels roll on, with the clock of the base: :class:`IdealGround`, or a simulated body in its building."""
 
     @property
     def time_s(self) -> float:
@@ -59,7 +59,7 @@ class IdealGround:
     """An endless plane on which wheels do exactly what they are commanded.
 
     Attributes:
-        pose: of the robot, from where it began.
+        pose: of the robot, from where it began; time_s: of the base [s].
         turned_rad, moved_m: sums of all turns and moves, signed.
         rolled_s: time of its last motion [s].
         held: whether something holds the wheels; touching_rad: in which direction something is touched.
@@ -67,7 +67,7 @@ class IdealGround:
     """
 
     def __init__(self) -> None:
-        self._time_s = 0.0
+        self.time_s = 0.0
         self.pose = Pose2(0.0, 0.0, 0.0)
         self.turned_rad = self.moved_m = 0.0
         self.rolled_s = -math.inf
@@ -75,43 +75,18 @@ class IdealGround:
         self.touching_rad: float | None = None
         self.wall_m: float | None = None
 
-    @property
-    def time_s(self) -> float:
-        return self._time_s
-
     def echo(self, sensor: Pose2) -> float | None:
         return None if self.wall_m is None else self.wall_m - math.hypot(sensor.x_m, sensor.y_m)
 
     def roll(self, turn_rad: float, move_m: float, duration_s: float) -> tuple[float, float]:
-        self._time_s += duration_s
+        self.time_s += duration_s
         if self.held or turn_rad == move_m == 0.0:
             return 0.0, 0.0
         self.pose = self.pose @ Pose2(move_m, 0.0, turn_rad)
         self.turned_rad += turn_rad
         self.moved_m += move_m
-        self.rolled_s = self._time_s
+        self.rolled_s = self.time_s
         return turn_rad, move_m
-
-
-class SimulatedGround:
-    """The floor of a simulated building; the wheels have the errors of the simulated body."""
-
-    def __init__(self, body: SimulatedBody) -> None:
-        self._body = body
-
-    @property
-    def time_s(self) -> float:
-        return self._body.truth.time_s
-
-    @property
-    def touching_rad(self) -> float | None:
-        return self._body.touching_rad
-
-    def echo(self, sensor: Pose2) -> float | None:
-        return self._body.echo(sensor)
-
-    def roll(self, turn_rad: float, move_m: float, duration_s: float) -> tuple[float, float]:
-        return self._body.roll(turn_rad, move_m, duration_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,14 +117,13 @@ class EmulatorKind:
 
     Attributes:
         name: of its protocol, as its driver's ``BaseKind`` has it.
-        on_ground: one whose wheels roll on a ground in real time, for ``harvey emulate``.
-        on_body: one under which a simulated body moves, for missions over ``--body serial:NAME``.
-        keeps_time: whether its driver waits by the base's time; else a motion is over at once.
+        on_ground: one whose wheels roll on a ground, in the time that passes for it.
+        on_body: one whose motions are over at once, in the time of a simulated body, for missions over
+            ``--body serial:NAME``; None where its driver waits by the base's time.
         serve: serves one that is on no serial line, in real time, for ``harvey emulate``; None where it is on one.
     """
 
     name: str
     on_ground: Callable[[Ground], Emulator]
-    on_body: Callable[[SimulatedBody], Emulator]
-    keeps_time: bool = True
+    on_body: Callable[[SimulatedBody], Emulator] | None = None
     serve: Callable[[Served], None] | None = None

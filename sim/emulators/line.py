@@ -8,8 +8,7 @@ import time
 import tty
 import zlib
 from collections.abc import Callable
-
-import serial
+from contextlib import suppress
 
 from sim.body.simulated_body import SimulatedBody
 from sim.emulators.emulator import Emulator
@@ -27,7 +26,6 @@ class PseudoTerminal:
 
     Attributes:
         name: of the device to open, as /dev/pts/7.
-        received, sent: number of bytes so far, from the host and to it.
     """
 
     def __init__(self, emulator: Emulator, trace: Trace | None = None) -> None:
@@ -37,7 +35,6 @@ class PseudoTerminal:
         tty.setraw(self._theirs)
         os.set_blocking(self._ours, False)
         self.name = os.ttyname(self._theirs)
-        self.received = self.sent = 0
 
     def serve(self, speed: float = 1.0, tick_s: float = 0.01, until: Callable[[], bool] = lambda: False) -> None:
         """Serve in real time, or ``speed`` times as fast, until ``until()`` is true or interrupted."""
@@ -49,38 +46,23 @@ class PseudoTerminal:
             then = now
             self.exchange()
 
-    def exchange(self, expected: int = 0) -> None:
-        """Pass the host's bytes to the base, waiting for ``expected`` in all; send what the base answers."""
-        while True:
-            data = self._read(wait=self.received < expected)
-            if not data:
-                break
-            self.received += len(data)
-            self._report("<", data)
-            self._emulator.receive(data)
-        self._write(self._emulator.take())
+    def exchange(self) -> None:
+        """Pass the host's bytes to the base, and its answers back; what does not fit into the buffer is lost, as on a
+        wire.
+        """
+        with suppress(BlockingIOError):
+            while data := os.read(self._ours, 4096):
+                self._report("<", data)
+                self._emulator.receive(data)
+        if answer := self._emulator.take():
+            self._report(">", answer)
+            with suppress(BlockingIOError):
+                os.write(self._ours, answer)
 
     def close(self) -> None:
         """Close both ends."""
         for end in (self._ours, self._theirs):
             os.close(end)
-
-    def _read(self, wait: bool) -> bytes:
-        if wait:
-            select.select([self._ours], [], [], 1.0)
-        try:
-            return os.read(self._ours, 4096)
-        except BlockingIOError:
-            return b""
-
-    def _write(self, data: bytes) -> None:
-        """Bytes that do not fit into the buffer are lost, as on a wire."""
-        if data:
-            self._report(">", data)
-            try:
-                self.sent += os.write(self._ours, data)
-            except BlockingIOError:
-                return
 
     def _report(self, direction: str, data: bytes) -> None:
         if self._trace is not None:
@@ -94,41 +76,30 @@ TICK_S = 0.015
 """Largest step of an emulated base's time [s]."""
 
 
-class PseudoTerminalLink:
-    """A line to an emulated base without real time: the base's time passes only while the host waits for bytes.
+class EmulatedLine:
+    """A line in memory to an emulated base, without real time: the base's time passes only while the host waits.
 
-    The bytes go through a pseudo-terminal that pyserial opens; both ends are held here. No byte is ever late, so a
-    mission over this line is deterministic and takes no longer than its decisions.
-
-    Attributes:
-        name: of the pseudo-terminal, as /dev/pts/7.
+    No byte is ever late, so a mission over this line is deterministic and takes no longer than its decisions.
     """
 
     def __init__(self, emulator: Emulator, clock: Callable[[], float] | None = None) -> None:
         """``clock``: the time [s] where the emulator itself advances it; None: the sum of the waits here."""
-        self._emulator, self._terminal = emulator, PseudoTerminal(emulator)
-        self.name = self._terminal.name
-        self._port = serial.serial_for_url(self.name)
-        self._port.timeout = 2.0
+        self._emulator, self._answers = emulator, b""
         self._time_s = 0.0
         self._clock = clock
-        self._written = self._read = 0
-        self._is_open = True
 
     def write(self, data: bytes) -> None:
-        self._port.write(data)
-        self._written += len(data)
-        self._terminal.exchange(self._written)
+        self._emulator.receive(data)
+        self._answers += self._emulator.take()
 
     def read(self, timeout_s: float) -> bytes:
         ends_s = self._time_s + max(timeout_s, MIN_STEP_S)
-        while self._terminal.sent == self._read and self._time_s < ends_s:
+        while not self._answers and self._time_s < ends_s:
             step_s = max(MIN_STEP_S, min(TICK_S, ends_s - self._time_s))
             self._time_s += step_s
             self._emulator.advance(step_s)
-            self._terminal.exchange(self._written)
-        data: bytes = self._port.read(self._terminal.sent - self._read) if self._terminal.sent > self._read else b""
-        self._read += len(data)
+            self._answers = self._emulator.take()
+        data, self._answers = self._answers, b""
         return data
 
     def now(self) -> float:
@@ -138,11 +109,7 @@ class PseudoTerminalLink:
         """Nothing to do: it is always open."""
 
     def close(self) -> None:
-        """Close both ends."""
-        if self._is_open:
-            self._is_open = False
-            self._port.close()
-            self._terminal.close()
+        """Nothing to do."""
 
 
 class FaultyLine:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.emulators.emulator import EmulatorKind, Ground, SimulatedGround
+from sim.emulators.emulator import EmulatorKind, Ground
 
 TURN_RAD_PER_S, SPEED_M_PER_S = 0.6, 0.4
 
@@ -54,4 +54,4 @@ class CountingEmulator:
         self._is_answer_due = True
 
 
-KIND = EmulatorKind("counting", CountingEmulator, lambda body: CountingEmulator(SimulatedGround(body)))
+KIND = EmulatorKind("counting", CountingEmulator)

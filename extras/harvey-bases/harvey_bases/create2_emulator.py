@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from sim.emulators.emulator import EmulatorKind, Ground, SimulatedGround
+from sim.emulators.emulator import EmulatorKind, Ground
 from world_models.frames import Pose2
 
 STREAM_S = 0.015
@@ -208,4 +208,4 @@ def _limit(speed: int) -> int:
     return max(-MAX_SPEED_MM_PER_S, min(MAX_SPEED_MM_PER_S, speed))
 
 
-KIND = EmulatorKind("create2", Create2Emulator, lambda body: Create2Emulator(SimulatedGround(body)))
+KIND = EmulatorKind("create2", Create2Emulator)

@@ -7,7 +7,7 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from sim.emulators.emulator import EmulatorKind, Ground, SimulatedGround
+from sim.emulators.emulator import EmulatorKind, Ground
 from world_models.frames import Pose2
 
 STRING = 0x2B
@@ -352,4 +352,4 @@ class P2osEmulator:
             self._out += build_encoder_counts(*((value + (1 << 31)) % (1 << 32) - (1 << 31) for value in wrap))
 
 
-KIND = EmulatorKind("p2os", P2osEmulator, lambda body: P2osEmulator(SimulatedGround(body)))
+KIND = EmulatorKind("p2os", P2osEmulator)

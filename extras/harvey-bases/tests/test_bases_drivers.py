@@ -8,6 +8,7 @@ import pytest
 
 from experiments.generated.scenes import box_room
 from harvey.hardware.bases import base_kinds
+from harvey.simulation.serial_body import emulator_kinds
 from harvey_bases import p2os_emulator
 from harvey_bases.create2 import Create2Base, Watchdog
 from harvey_bases.create2_emulator import PASSIVE, Create2Emulator
@@ -16,19 +17,18 @@ from harvey_bases.p2os_emulator import P2osEmulator
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
 from sim.emulators.emulator import IdealGround
-from sim.emulators.emulator_registry import emulator_kinds
-from sim.emulators.line import PseudoTerminalLink
+from sim.emulators.line import EmulatedLine
 from tests.serial_bench import (
     NEAR_M,
     OF_SENSES,
+    ON_EMULATED_LINE,
     ON_LINE_IN_MEMORY,
-    ON_TERMINAL,
     Bench,
     check_the_bases_own_watchdog_stops_it_when_the_host_dies,
     check_what_is_reported_is_what_was_done,
     faulted,
+    over_emulated_line,
     over_line_in_memory,
-    over_terminal,
 )
 from world_models.camera import Camera, CameraMount
 from world_models.entries import MotorCommand
@@ -38,9 +38,9 @@ KINDS = ("p2os", "create2")
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("check", ON_TERMINAL)
-def test_over_a_pseudo_terminal(check: Callable[[Bench], None], kind: str) -> None:
-    with over_terminal(kind) as bench:
+@pytest.mark.parametrize("check", ON_EMULATED_LINE)
+def test_over_a_line_of_missions(check: Callable[[Bench], None], kind: str) -> None:
+    with over_emulated_line(kind) as bench:
         check(bench)
 
 
@@ -92,7 +92,7 @@ def test_a_pioneer_takes_its_motion_up_after_the_watchdog_unless_it_is_told_to_s
 def test_a_create_that_is_lifted_is_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
     floor = IdealGround()
     end = Create2Emulator(floor)
-    line = PseudoTerminalLink(end)
+    line = EmulatedLine(end)
     base = Create2Base(line)
     base.heartbeat()
     real = floor.roll
@@ -111,7 +111,7 @@ def test_a_create_that_is_lifted_is_a_refusal(monkeypatch: pytest.MonkeyPatch) -
 
 def test_a_pioneer_of_an_unknown_kind_is_refused_until_its_units_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(p2os_emulator, "NAMES", b"Somebody\0Pioneer\0p9zz\0")
-    line = PseudoTerminalLink(P2osEmulator(IdealGround()))
+    line = EmulatedLine(P2osEmulator(IdealGround()))
     fault = faulted(lambda: P2osBase(line).move(0.1))
     assert fault.kind == "refused" and "p9zz" in fault.detail and "mm_per_unit" in fault.detail
     assert P2osBase(line, mm_per_unit=1.0).move(0.1).move_m == pytest.approx(0.1, abs=NEAR_M)
@@ -144,8 +144,8 @@ def simulated() -> SimulatedBody:
 @pytest.mark.parametrize("kind", KINDS)
 def test_over_a_simulated_body_wheels_err_walls_stop_and_the_clock_is_the_bodys(kind: str) -> None:
     body = simulated()
-    end = emulator_kinds()[kind].on_body(body)
-    base = base_kinds()[kind].connect_to_emulator(PseudoTerminalLink(end, lambda: body.truth.time_s))
+    end = emulator_kinds()[kind].on_ground(body)
+    base = base_kinds()[kind].connect_to_emulator(EmulatedLine(end, lambda: body.time_s))
     report = base.execute(MotorCommand(0.3, 2.0))
     gone_m = body.truth.path_m
     assert report.move_m == pytest.approx(2.0, abs=NEAR_M)

@@ -13,8 +13,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from sim.body.simulated_body import SimulatedBody
-from sim.emulators.emulator import EmulatorKind, Ground, SimulatedGround
+from sim.emulators.emulator import EmulatorKind, Ground
 from world_models.camera import Camera, CameraMount
 
 WATCHDOG_S = 0.5
@@ -233,10 +232,6 @@ class PipedRobot:
         return self.robot.moving
 
 
-def _on_body(body: SimulatedBody) -> PipedRobot:
-    return PipedRobot(RobotEmulator(SimulatedGround(body)))
-
-
 def _serve(*given: object) -> None:
     from harvey_ros2.robot_server import serve  # it needs Zenoh
 
@@ -244,4 +239,4 @@ def _serve(*given: object) -> None:
     run(*given)
 
 
-KIND = EmulatorKind("ros2", lambda ground: PipedRobot(RobotEmulator(ground)), _on_body, serve=_serve)
+KIND = EmulatorKind("ros2", lambda ground: PipedRobot(RobotEmulator(ground)), serve=_serve)

@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import Any
 
 from blackboard import Sink
-from harvey.hardware.drivers.base_driver import Base, BaseFault, BaseKind, BytePipe, LineDriver
+from harvey.hardware.drivers.base_driver import Base, BaseFault, BaseKind, BytePipe
 from harvey.runner.teller import Tell
 from harvey_ros2.laser_scan import read_scan
 from harvey_ros2.messages import MessageError, stamp
@@ -48,7 +48,7 @@ OTHERS_S = 1.0
 """Who else drove so lately may still [s]."""
 
 
-class Ros2Base(LineDriver):
+class Ros2Base(Base):
     """A base over ROS 2."""
 
     def __init__(self, messages: RobotMessages, settings: DriveSettings, scanner: ScanMount | None = None) -> None:

@@ -19,7 +19,6 @@ from harvey_ros2.messages import message_types
 from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
 from harvey_ros2.robot_emulator import RobotEmulator, write_camera_info, write_mount, write_picture
 from harvey_ros2.run_messages import RunMessages, TimedMessage
-from sim.emulators.emulator import SimulatedGround
 from sim.faults.fault import Fault
 from sim.scenario import load_scenario
 from sim.stage import build_stage
@@ -50,7 +49,7 @@ def drive_bag(
     """
     stage = build_stage(replace(load_scenario(scenario), faults=faults))
     body, camera = stage.body(seed), stage.scenario.camera
-    robot = RobotEmulator(SimulatedGround(body), epoch_s=1000.0)
+    robot = RobotEmulator(body, epoch_s=1000.0)
     truth: Truth = []
     kinds = {"odom": "nav_msgs/msg/Odometry", "camera/image_raw/compressed": "sensor_msgs/msg/CompressedImage",
              "camera/camera_info": "sensor_msgs/msg/CameraInfo", "tf_static": "tf2_msgs/msg/TFMessage"}

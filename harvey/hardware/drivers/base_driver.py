@@ -1,7 +1,4 @@
-"""What the mission asks of a base, how a base fails, the line to it, and what the drivers of bases share.
-
-The simulator's body is one implementation of :class:`Base`, by its shape alone; drivers are the others.
-"""
+"""What the mission asks of a base, how a base fails, the line to it, and what the drivers of bases share."""
 
 from __future__ import annotations
 
@@ -12,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Literal, Protocol, get_args
+from typing import Literal, Protocol
 
 import serial
 
@@ -44,59 +41,11 @@ class BaseFault(Exception):
     def __init__(
         self, kind: FaultKind, detail: str, *, done: MotionReport | None = None, stopped: bool = False
     ) -> None:
-        if kind not in get_args(FaultKind):
-            raise ValueError(f"expected a kind of fault, one of {get_args(FaultKind)}, got {kind!r}")
         super().__init__(f"the base is {kind}: {detail}" if kind != "watchdog" else f"the base's watchdog: {detail}")
         self.kind: FaultKind = kind
         self.detail = detail
         self.done = done
         self.stopped = stopped
-
-
-class Base(Protocol):
-    """A base that turns on the spot and moves ahead.
-
-    Calls that move return when the robot stands again, and answer within a bound that follows from the command: the
-    time of the motion and a few watchdog times. Only :meth:`stop` may be called while another call is under way, from
-    another thread. After a fault the next call tries the line again; there is nothing to reset.
-    """
-
-    def turn(self, turn_rad: float) -> MotionReport:
-        """Turn on the spot, counter-clockwise; reports what the wheels claim. Raises BaseFault."""
-        ...
-
-    def move(self, move_m: float) -> MotionReport:
-        """Move straight ahead (>= 0 m); reports what the wheels claim. Raises BaseFault."""
-        ...
-
-    def execute(self, command: MotorCommand, /) -> MotionReport:
-        """TURN, then MOVE. Raises BaseFault, with what had been done so far."""
-        ...
-
-    def take_contact(self) -> Contact | None:
-        """What it felt to touch since the last call: pressed bumpers, or wheels that were held. Asks the base nothing.
-        """
-        ...
-
-    def ranges(self) -> Ranges | None:
-        """What its range sensors measure now; None where it has none. Raises BaseFault."""
-        ...
-
-    def stop(self) -> None:
-        """Stand still, at once. May be called from any thread. Raises BaseFault where the base did not confirm it."""
-        ...
-
-    def odometry(self) -> Odometry:
-        """Where the wheels count that the robot is. Raises BaseFault."""
-        ...
-
-    def heartbeat(self) -> None:
-        """Keep the base's watchdog quiet, and find out whether the base answers. Raises BaseFault."""
-        ...
-
-    def close(self) -> None:
-        """Stop, and let the line go. Never raises; a second call does nothing."""
-        ...
 
 
 class Line(Protocol):
@@ -171,34 +120,13 @@ class SerialLink:
             raise OSError(f"{self._url}: expected a serial port or a URL that pyserial knows, got: {error}") from None
 
 
-@dataclass(frozen=True, slots=True)
-class BaseKind:
-    """A kind of base, as ``harvey drive`` names it before the colon: ``denning:/dev/ttyUSB0``.
+class Base(ABC):
+    """A base over any line, that turns on the spot and moves ahead.
 
-    Attributes:
-        name: of the kind.
-        baud: of its line.
-        connect: its driver over a line.
-        watchdog: what stops it when it hears nothing any more, in words.
-        connect_emulated: its driver over a line to an emulated base, where that must be otherwise: no real time passes
-            there, and two runs must send the same bytes.
-        open_at: its driver by what stands behind the colon, where that is no serial port; raises OSError and BadInput.
+    Calls that move return when the robot stands again, and answer within a bound that follows from the command: the
+    time of the motion and a few watchdog times. There is one call at a time; only :meth:`stop` comes through to one
+    that is under way, from another thread. After a fault the next call tries the line again; there is nothing to reset.
     """
-
-    name: str
-    baud: int
-    connect: Callable[[BytePipe], Base]
-    watchdog: str
-    connect_emulated: Callable[[BytePipe], Base] | None = None
-    open_at: Callable[[str], Base] | None = None
-
-    def connect_to_emulator(self, link: BytePipe) -> Base:
-        """The driver over a line to an emulated base."""
-        return (self.connect_emulated or self.connect)(link)
-
-
-class LineDriver(ABC):
-    """A base over any line: one call at a time, a stop that comes through, and a line that is tried again."""
 
     def __init__(self, line: Line) -> None:
         self._line = line
@@ -209,15 +137,15 @@ class LineDriver(ABC):
         self._contact: Contact | None = None
 
     def turn(self, turn_rad: float) -> MotionReport:
-        """Turn on the spot. Raises BaseFault."""
+        """Turn on the spot, counter-clockwise; reports what the wheels claim. Raises BaseFault."""
         return self.execute(MotorCommand(turn_rad, 0.0))
 
     def move(self, move_m: float) -> MotionReport:
-        """Move ahead. Raises BaseFault."""
+        """Move straight ahead (>= 0 m); reports what the wheels claim. Raises BaseFault."""
         return self.execute(MotorCommand(0.0, move_m))
 
     def execute(self, command: MotorCommand, /) -> MotionReport:
-        """TURN, then MOVE. Raises BaseFault, and ValueError where the command is no finite motion."""
+        """TURN, then MOVE. Raises BaseFault with what had been done so far; ValueError where it is no finite motion."""
         if not (math.isfinite(command.turn_rad) and math.isfinite(command.move_m)):
             raise ValueError(f"expected a turn and a move that are finite, got {command}")
         with self._call():
@@ -225,12 +153,12 @@ class LineDriver(ABC):
             return self._carried_out(command)
 
     def take_contact(self) -> Contact | None:
-        """What it felt to touch since the last call."""
+        """What it felt to touch since the last call: pressed bumpers, or wheels that were held."""
         contact, self._contact = self._contact, None
         return contact
 
     def ranges(self) -> Ranges | None:
-        """What its range sensors measure. Raises BaseFault."""
+        """What its range sensors measure now; None where it has none. Raises BaseFault."""
         with self._call():
             self._so_far = None
             return self._read_ranges()
@@ -256,7 +184,7 @@ class LineDriver(ABC):
         self.odometry()
 
     def close(self) -> None:
-        """Stop, and let the line go."""
+        """Stop, and let the line go. Never raises; a second call does nothing."""
         if self._closed:
             return
         with suppress(BaseFault):  # there is nobody left to tell; what stops it now is the base's watchdog
@@ -303,9 +231,35 @@ class LineDriver(ABC):
                 raise self._fault("disconnected", str(error) or "the line is gone") from None
 
 
-class Driver(LineDriver):
+class Driver(Base):
     """A base over a pipe of bytes."""
 
     def __init__(self, link: BytePipe) -> None:
         super().__init__(link)
         self._link = link
+
+
+@dataclass(frozen=True, slots=True)
+class BaseKind:
+    """A kind of base, as ``harvey drive`` names it before the colon: ``denning:/dev/ttyUSB0``.
+
+    Attributes:
+        name: of the kind.
+        baud: of its line.
+        connect: its driver over a line.
+        watchdog: what stops it when it hears nothing any more, in words.
+        connect_emulated: its driver over a line to an emulated base, where that must be otherwise: no real time passes
+            there, and two runs must send the same bytes.
+        open_at: its driver by what stands behind the colon, where that is no serial port; raises OSError and BadInput.
+    """
+
+    name: str
+    baud: int
+    connect: Callable[[BytePipe], Base]
+    watchdog: str
+    connect_emulated: Callable[[BytePipe], Base] | None = None
+    open_at: Callable[[str], Base] | None = None
+
+    def connect_to_emulator(self, link: BytePipe) -> Base:
+        """The driver over a line to an emulated base."""
+        return (self.connect_emulated or self.connect)(link)

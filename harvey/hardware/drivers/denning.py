@@ -25,8 +25,6 @@ LONGEST = 200
 """Bytes of a line; more without an end is noise."""
 
 _LINE = re.compile(rb"#([0-9A-F]{8} (?:0|[1-9][0-9]{0,8}) [A-Z]+(?: [ -)+-~]+)?)\*([0-9A-F]{8})", re.ASCII)
-_WHOLE = re.compile(r"[0-9]{1,6}", re.ASCII)
-_NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +45,11 @@ class Packet:
 
     def numbers(self, first: int, count: int) -> tuple[float, ...] | None:
         """``count`` finite numbers from the word ``first`` on, the last of the frame; None where they are not there."""
-        words = self.words[first:]
-        if len(words) != count or not all(_NUMBER.fullmatch(word) for word in words):
+        try:
+            values = tuple(map(float, self.words[first:]))
+        except ValueError:
             return None
-        values = tuple(float(word) for word in words)
-        return values if all(math.isfinite(value) for value in values) else None
+        return values if len(values) == count and all(map(math.isfinite, values)) else None
 
 
 def encode(frame: Packet) -> bytes:
@@ -109,7 +107,7 @@ def parse_ranges(words: Sequence[str], when_s: float) -> Ranges | None:
 
     Words: sigma [mm], half of the beam [mrad], furthest echo [mm], then the distance of each sensor [mm] or ``-``.
     """
-    if len(words) < 4 or not all(_WHOLE.fullmatch(word) or (word == "-" and at > 2) for at, word in enumerate(words)):
+    if len(words) < 4 or not all(word.isdecimal() or (word == "-" and at > 2) for at, word in enumerate(words)):
         return None
     sigma_m, half_beam_rad, max_range_m = (int(word) / 1000.0 for word in words[:3])
     distances = tuple(None if word == "-" else int(word) / 1000.0 for word in words[3:])

@@ -6,12 +6,12 @@ from knowledge_sources.methods.calibration.camera_state import (
     learn, loosen, to_tuples, widen,
 )
 from knowledge_sources.methods.calibration.intrinsics import (
-    BoardView, Calibration, PARAMETERS, Pattern, calibrate, find_corners,
+    BoardView, Calibration, PARAMETERS, Pattern, calibrate, find_board,
 )
 from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
 
 __all__ = [
     "PARAMETERS", "RIGID_DISTANCE_M", "BoardView", "Calibration", "Mounting", "Pattern", "add_yaw", "calibrate",
     "compute_camera_covariance", "compute_knocked_covariance", "draw_calibration", "estimate_mounting",
-    "find_corners", "has_counted", "is_camera_known", "learn", "loosen", "to_tuples", "widen",
+    "find_board", "has_counted", "is_camera_known", "learn", "loosen", "to_tuples", "widen",
 ]

@@ -1,109 +1,104 @@
-"""Camera calibration from views of a chessboard: corners, intrinsics, distortion, and their covariance.
+"""Camera calibration from views of a ChArUco board, as OpenCV does it: corners, intrinsics, distortion, deviations.
 
-Corners are found to a few hundredths of a pixel; where a picture cannot be used it is said why. Source: Z. Zhang, A
-flexible new technique for camera calibration, PAMI 22(11), 2000, as OpenCV implements it. The covariance is computed
-here, as OpenCV gives standard deviations only.
+A ChArUco board is a chessboard with a marker in each white square. So every inner corner has a number, and a view of a
+part of the board is of use. Source: Z. Zhang, A flexible new technique for camera calibration, PAMI 22(11), 2000.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from knowledge_sources.methods.arrays import Floats, Floats32
+from knowledge_sources.methods.arrays import Floats, Image
 from world_models.camera import Camera
-from world_models.frames import frozen
 
-MIN_SQUARE_PX = 5.0  # least side of a chessboard's square in a picture that is used
-MAX_EDGE_RISE_PX = 5.0  # largest width of the rise from black to white before a picture counts as blurred
-CORNER_WINDOW_SHARE = 0.4
-"""Half-width of the window of corner refinement as a share of the distance to the next corner (rendered boards: 0.048
-px RMS with 3 px, 0.035 px with 8 px)."""
-MAX_CORNER_WINDOW_PX = 11  # largest half-width of that window
-CORNER_ITERATIONS = 60  # iteration limit of corner refinement
-CORNER_TOLERANCE_PX = 1e-4  # step at which corner refinement ends
+MARKERS = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_250)
+MARKER_SHARE = 2.0 / 3.0  # side of a marker, as a share of the square that it stands in
+SQUARE_PX = 18  # so wide a square is drawn without a remainder: a marker of 6 x 6 cells of 2 px, and 3 px around it
+MAX_SQUARES = 500  # every second holds a marker of its own
+MAGNIFIED = 2  # times, where markers are not read
+MIN_CORNERS = 8  # fewest corners of a view that is used
+MIN_VIEWS = 4  # least number of views of the board (Zhang 2000)
+MAX_VIEW_RMS_RATIO = 3.0  # largest RMS error of a view over that of the median view before it is left out
+STEPS = cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-10  # of the calibration
 
-_UNKNOWN_PX = 1000.0
-"""OpenCV's sharpness from here on means that it could not measure it, as for squares seen at a flat angle."""
+PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+"""Names of the parameters, in OpenCV's order."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """A chessboard: how many inner corners in a row and in a column, and the side of a square [m]."""
+    """A board: how many inner corners in a row and in a column, and the side of a square [m].
+
+    Its frame: origin at the outer corner of the first square, x along a row, y down, z away from who sees it.
+    """
 
     columns: int
     rows: int
     square_m: float
 
     def __post_init__(self) -> None:
-        if min(self.columns, self.rows) < 3 or not 0.0 < self.square_m < 10.0:
-            raise ValueError("expected at least 3 x 3 inner corners and squares of more than 0 and less than 10 m, got "
-                             f"{self.columns} x {self.rows} and {self.square_m} m")
+        squares = (self.columns + 1) * (self.rows + 1)
+        if min(self.columns, self.rows) < 3 or squares > MAX_SQUARES or not 0.0 < self.square_m < 10.0:
+            raise ValueError(
+                f"expected at least 3 x 3 inner corners, at most {MAX_SQUARES} squares, and squares of more than 0 and "
+                f"less than 10 m, got {self.columns} x {self.rows} and {self.square_m} m")
+
+    @property
+    def board(self) -> cv2.aruco.CharucoBoard:
+        """OpenCV's board."""
+        squares = self.columns + 1, self.rows + 1
+        return cv2.aruco.CharucoBoard(squares, self.square_m, MARKER_SHARE * self.square_m, MARKERS)
 
     @property
     def points(self) -> Floats:
-        """(columns rows, 3) inner corners, row by row, in the board's plane z = 0 [m]."""
-        y, x = np.divmod(np.arange(self.columns * self.rows), self.columns)
-        return np.stack([x, y, np.zeros_like(x)], axis=1) * self.square_m
+        """(columns rows, 3) inner corners by their numbers, row by row, in the plane z = 0 [m]."""
+        return np.asarray(self.board.getChessboardCorners(), float).reshape(-1, 3)
 
-
-def find_corners(image: Any, pattern: Pattern) -> Floats | str:
-    """Find the inner corners of a board in a grey picture (h, w) uint8.
-
-    Returns:
-        (columns rows, 2) corners, row by row [px]; or the reason why the picture cannot be used.
-    """
-    grey = np.ascontiguousarray(image, np.uint8)
-    size = (pattern.columns, pattern.rows)
-    if min(grey.shape) < min(size) * MIN_SQUARE_PX:
-        return f"the picture is only {grey.shape[1]} x {grey.shape[0]} px"
-    found, corners = cv2.findChessboardCorners(grey, size)
-    if not found:
-        found, corners = cv2.findChessboardCornersSB(grey, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
-    if not found:
-        return f"no board of {pattern.columns} x {pattern.rows} inner corners in it"
-    rough = np.asarray(corners, np.float32).reshape(-1, 2)
-    spacing = _measure_spacing_px(rough, pattern)
-    if spacing < MIN_SQUARE_PX:
-        return f"the board's squares are only {spacing:.1f} px wide"
-    rise = float(np.ravel(cv2.estimateChessboardSharpness(grey, size, rough)[0])[0])
-    if MAX_EDGE_RISE_PX < rise < _UNKNOWN_PX:
-        return f"blurred: edges take {rise:.1f} px from black to white"
-    half = min(max(2, int(CORNER_WINDOW_SHARE * spacing)), MAX_CORNER_WINDOW_PX)
-    criteria = cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, CORNER_ITERATIONS, CORNER_TOLERANCE_PX
-    fine = cv2.cornerSubPix(grey, rough.reshape(-1, 1, 2).copy(), (half, half), (-1, -1), criteria).reshape(-1, 2)
-    moved = float(np.max(np.linalg.norm(fine - rough, axis=1)))
-    return f"a corner is not clear to {moved:.1f} px" if moved > half else np.asarray(fine, np.float64)
-
-
-def _measure_spacing_px(corners: Floats32, pattern: Pattern) -> float:
-    """The least distance between neighbouring corners [px]."""
-    grid = corners.reshape(pattern.rows, pattern.columns, 2)
-    steps = [np.linalg.norm(np.diff(grid, axis=axis), axis=-1).min() for axis in (0, 1)]
-    return float(min(steps))
-
-
-MIN_VIEWS = 4  # least number of views of the board (Zhang 2000)
-MAX_VIEW_RMS_RATIO = 3.0  # largest RMS error of a view over that of the median view before it is left out
-CALIBRATION_ITERATIONS = 100  # iteration limit of the calibration
-CALIBRATION_TOLERANCE = 1e-10  # relative step at which the calibration ends
-
-GRID = 9  # places along each side of the picture at which it is said how sure the camera is
-
-PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-"""Names of the parameters, in OpenCV's order."""
+    def draw(self, times: int = 1) -> Image:
+        """The board, black on white, each square ``times`` times 18 px wide, without a margin."""
+        side = times * SQUARE_PX
+        size = (self.columns + 1) * side, (self.rows + 1) * side
+        return np.asarray(self.board.generateImage(size, marginSize=0), np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
 class BoardView:
-    """One view of a board: name of the picture, and inner corners (n, 2) [px]."""
+    """One view of a board: name of the picture, inner corners (n, 2) [px], and their numbers (n,)."""
 
     name: str
     corners_px: Floats
+    numbers: NDArray[np.int64]
+
+    def measure_moved_px(self, other: BoardView) -> float:
+        """How far the corners are on the average from those of another view; infinite where none is seen in both."""
+        _, here, there = np.intersect1d(self.numbers, other.numbers, return_indices=True)
+        apart = np.linalg.norm(self.corners_px[here] - other.corners_px[there], axis=1)
+        return float(np.mean(apart)) if len(apart) else float("inf")
+
+
+def find_board(name: str, image: Image, pattern: Pattern) -> BoardView | str:
+    """Find a board in a grey picture (h, w) uint8; or the reason why the picture cannot be used.
+
+    Where markers are too small to be read the picture is magnified, and more of them are looked for where those that
+    were read say that they must be; corners are less exact then.
+    """
+    seen = 0
+    for times in (1, MAGNIFIED):
+        ways = cv2.aruco.CharucoParameters()
+        ways.tryRefineMarkers = times > 1
+        magnified = cv2.resize(image, None, fx=times, fy=times, interpolation=cv2.INTER_CUBIC)
+        corners, numbers, _, _ = cv2.aruco.CharucoDetector(pattern.board, ways).detectBoard(magnified)
+        seen = 0 if numbers is None else len(numbers)
+        if seen >= MIN_CORNERS and not pattern.board.checkCharucoCornersCollinear(numbers):
+            corners_px = (np.asarray(corners, float).reshape(-1, 2) + 0.5) / times - 0.5
+            return BoardView(name, corners_px, np.ravel(numbers).astype(np.int64))
+    part = f"only {seen} corners of a" if seen else "no"
+    return f"{part} board of {pattern.columns} x {pattern.rows} inner corners in it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,50 +107,24 @@ class Calibration:
 
     Attributes:
         camera: intrinsics and distortion.
-        covariance: (p, p) of the first p of :data:`PARAMETERS`.
-        views: those that were used.
-        residuals_px: for each view, (n, 2) found minus projected [px].
+        deviations: (p,) standard deviations of the first p of :data:`PARAMETERS`.
+        views: those that were used; view_rms_px: for each the RMS distance between found and projected corners.
+        rms_px: the RMS distance over all corners.
         rejected: name of a view -> why it was left out.
-        sigma_px: standard deviation of a corner's coordinate, from the residuals.
     """
 
     camera: Camera
-    covariance: Floats
+    deviations: Floats
     views: tuple[BoardView, ...]
-    residuals_px: tuple[Floats, ...]
+    view_rms_px: Floats
+    rms_px: float
     rejected: Mapping[str, str]
-    sigma_px: float
 
     @property
     def values(self) -> Floats:
         """(p,) the parameters, in the order of :data:`PARAMETERS`."""
         c = self.camera
-        return np.array([c.fx, c.fy, c.cx, c.cy, *c.distortion])[: len(self.covariance)]
-
-    @property
-    def deviations(self) -> Floats:
-        """(p,) standard deviations of the parameters."""
-        return np.sqrt(np.diag(self.covariance))
-
-    @property
-    def spread_px(self) -> float:
-        """Standard deviation of where a direction is seen [px], by the covariance; the median over the picture."""
-        c, p = self.camera, len(self.covariance)
-        u, v = np.meshgrid(np.linspace(0, c.width - 1, GRID), np.linspace(0, c.height - 1, GRID))
-        rays = np.stack([(u - c.cx) / c.fx, (v - c.cy) / c.fy, np.ones_like(u)], axis=-1).reshape(-1, 3)
-        inner = np.asarray(cv2.projectPoints(rays, np.zeros(3), np.zeros(3), c.matrix, c.distortion)[1])[:, 6 : 6 + p]
-        variances = np.einsum("ij,jk,ik->i", inner, self.covariance, inner).reshape(-1, 2).sum(axis=1)
-        return float(np.sqrt(np.median(variances)))
-
-    @property
-    def view_rms_px(self) -> Floats:
-        """For each view the RMS distance between found and projected corners."""
-        return np.array([_compute_rms(r) for r in self.residuals_px])
-
-    @property
-    def rms_px(self) -> float:
-        """The RMS distance over all corners."""
-        return _compute_rms(np.concatenate(self.residuals_px))
+        return np.array([c.fx, c.fy, c.cx, c.cy, *c.distortion])[: len(self.deviations)]
 
 
 def calibrate(
@@ -171,78 +140,28 @@ def calibrate(
         ValueError: too few views, or no camera explains them.
     """
     used, rejected = list(views), dict[str, str]()
-    while True:
-        if len(used) < MIN_VIEWS:
-            raise ValueError(
-                f"expected at least {MIN_VIEWS} views of the board that can be used, got {len(used)}")
-        fit = _fit_camera(used, pattern, size, with_k3)
-        rms = np.array([_compute_rms(r) for r in fit.residuals])
-        worst, usual = int(np.argmax(rms)), float(np.median(rms))
-        if rms[worst] <= MAX_VIEW_RMS_RATIO * usual:
-            return _to_calibration(fit, used, rejected, size)
-        why = f"its corners are off by {rms[worst]:.2f} px, {usual:.2f} px are usual here"
+    while len(used) >= MIN_VIEWS:
+        found = _fit_camera(used, pattern, size, with_k3, rejected)
+        worst, usual = int(np.argmax(found.view_rms_px)), float(np.median(found.view_rms_px))
+        if found.view_rms_px[worst] <= MAX_VIEW_RMS_RATIO * usual:
+            return found
+        why = f"its corners are off by {found.view_rms_px[worst]:.2f} px, {usual:.2f} px are usual here"
         rejected[used.pop(worst).name] = why
+    raise ValueError(f"expected at least {MIN_VIEWS} views of the board that can be used, got {len(used)}")
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Camera matrix (3, 3), distortion (5,), and for each view the residuals (n, 2) [px] and their derivative
-    (2 n, 6 + p) by the view's pose and by the intrinsics.
-    """
-
-    matrix: Floats
-    distortion: Floats
-    residuals: tuple[Floats, ...]
-    jacobians: tuple[Floats, ...]
-
-
-def _fit_camera(views: Sequence[BoardView], pattern: Pattern, size: tuple[int, int], with_k3: bool) -> _Fit:
-    points = pattern.points.astype(np.float32)
-    flags = 0 if with_k3 else cv2.CALIB_FIX_K3
+def _fit_camera(
+    views: Sequence[BoardView], pattern: Pattern, size: tuple[int, int], with_k3: bool, rejected: Mapping[str, str]
+) -> Calibration:
+    points = [pattern.points[view.numbers].astype(np.float32) for view in views]
     corners = [view.corners_px.astype(np.float32) for view in views]
-    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, CALIBRATION_ITERATIONS,
-                CALIBRATION_TOLERANCE)
     try:
-        _, matrix, distortion, turns, places = cv2.calibrateCamera(
-            [points] * len(views), corners, size, np.eye(3), np.zeros(5), flags=flags, criteria=criteria
-        )
+        rms, matrix, terms, _, _, deviations, _, view_rms = cv2.calibrateCameraExtended(
+            points, corners, size, np.eye(3), np.zeros(5), flags=0 if with_k3 else cv2.CALIB_FIX_K3, criteria=STEPS)
     except cv2.error as error:
         raise ValueError(f"expected views that a camera explains, got: {error.err}") from None
-    k = np.asarray(distortion, float).ravel()[:5]
-    if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(k))):
+    m, k, sigmas = (np.asarray(found, float) for found in (matrix, np.ravel(terms)[:5], np.ravel(deviations)))
+    if not (np.all(np.isfinite(m)) and np.all(np.isfinite(k))):
         raise ValueError("expected views that a camera explains, got none that fits")
-    poses = [(np.asarray(t, float), np.asarray(p, float)) for t, p in zip(turns, places, strict=True)]
-    seen = [project_board(pattern, turn, place, np.asarray(matrix, float), k) for turn, place in poses]
-    residuals = tuple(view.corners_px - px for view, (px, _) in zip(views, seen, strict=True))
-    return _Fit(np.asarray(matrix, float), k, residuals, tuple(j[:, : 15 if with_k3 else 14] for _, j in seen))
-
-
-def project_board(pattern: Pattern, turn: Floats, place: Floats, matrix: Floats, k: Floats) -> tuple[Floats, Floats]:
-    """Project the corners (n, 2) [px], with the derivative (2 n, 15) by rotation vector, place, :data:`PARAMETERS`."""
-    px, jacobian = cv2.projectPoints(pattern.points, turn, place, matrix, k)
-    return np.asarray(px, float).reshape(-1, 2), np.asarray(jacobian, float)[:, :15]
-
-
-def _to_calibration(
-    fit: _Fit, used: Sequence[BoardView], rejected: Mapping[str, str], size: tuple[int, int]
-) -> Calibration:
-    m = fit.matrix
-    camera = Camera(float(m[0, 0]), float(m[1, 1]), float(m[0, 2]), float(m[1, 2]), *size, tuple(fit.distortion))
-    free = 2 * len(np.concatenate(fit.residuals)) - 6 * len(used) - (fit.jacobians[0].shape[1] - 6)
-    variance = float(np.sum(np.concatenate(fit.residuals) ** 2)) / free
-    covariance = variance * np.linalg.inv(_compute_information(fit.jacobians))
-    return Calibration(camera, frozen(covariance), tuple(used), fit.residuals, rejected, variance**0.5)
-
-
-def _compute_information(jacobians: Sequence[Floats]) -> Floats:
-    """Information matrix (p, p) of the intrinsics with each view's pose marginalized (Schur complement)."""
-    parts = []
-    for jacobian in jacobians:
-        pose, inner = jacobian[:, :6], jacobian[:, 6:]
-        explained = pose @ np.linalg.lstsq(pose, inner, rcond=None)[0]
-        parts.append(inner.T @ (inner - explained))
-    return np.asarray(np.sum(parts, axis=0))
-
-
-def _compute_rms(residuals: Floats) -> float:
-    return float(np.sqrt(np.mean(np.sum(residuals**2, axis=1))))
+    camera = Camera(float(m[0, 0]), float(m[1, 1]), float(m[0, 2]), float(m[1, 2]), *size, tuple(map(float, k)))
+    return Calibration(camera, sigmas[: 9 if with_k3 else 8], tuple(views), np.ravel(view_rms), float(rms), rejected)

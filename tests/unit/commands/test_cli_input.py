@@ -110,7 +110,7 @@ def test_a_scenario_that_is_not_there_is_named_before_anything_begins(capsys: py
 def test_a_picture_of_one_pixel_shows_no_board(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     cv2.imwrite(str(tmp_path / "dot.png"), np.zeros((1, 1), np.uint8))
     code, err = said(capsys, ["calibrate", str(tmp_path / "dot.png"), "--out", str(tmp_path / "camera.toml")])
-    assert code == 2 and "the picture is only 1 x 1 px" in err and "Traceback" not in err
+    assert code == 2 and "no board of 7 x 5 inner corners" in err and "Traceback" not in err
 
 
 def test_a_port_in_use_is_named_before_a_base_is_there(capsys: pytest.CaptureFixture[str]) -> None:

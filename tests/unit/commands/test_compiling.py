@@ -14,7 +14,7 @@ import pytest
 from numba import njit, typeof
 from numba.core.dispatcher import Dispatcher
 
-from harvey.compiling import FILE, build_type, describe_type
+from docs.tools.compiling import FILE, build_type, describe_type
 from sim.render.pieces import Pieces
 
 ROOT = Path(__file__).parents[3]
@@ -57,7 +57,7 @@ def test_each_function_that_is_listed_is_there(module: str) -> None:
 @pytest.mark.slow
 def test_a_mission_has_nothing_left_to_compile(tmp_path: Path) -> None:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    subprocess.run([sys.executable, "-m", "harvey.compiling"], cwd=ROOT, env=environment, check=True)
+    subprocess.run([sys.executable, "-m", "docs.tools.compiling"], cwd=ROOT, env=environment, check=True)
     script = COUNT.format(out=tmp_path / "run")
     told = subprocess.run([sys.executable, "-c", script], cwd=ROOT, env=environment, check=True, capture_output=True,
                           text=True)

@@ -19,10 +19,9 @@ from harvey.hardware.bases import open_base
 from harvey.hardware.hardware_mission import load_mission
 from harvey.hardware.preflight import Preflight
 from harvey.hardware.stopping import stop_key
-from harvey.simulation.serial_body import body_kind
+from harvey.simulation.serial_body import body_kind, emulator_kinds
 from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator
 from sim.emulators.emulator import IdealGround
-from sim.emulators.emulator_registry import emulator_kinds
 from sim.emulators.line import PseudoTerminal
 from world_models import plugins
 from world_models.camera import Camera, CameraMount

@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import pytest
 
 from harvey.hardware.drivers.base_driver import BaseFault
 from harvey.hardware.drivers.denning import DenningBase
+from tests.serial_bench import COMMANDS
 from world_models.entries import AROUND_SIGMA_RAD, MotorCommand
 from world_models.entries.obstacle import AHEAD_SIGMA_RAD
 
-TOKEN, NONCE = "0000002A", "12345678"
+TOKEN, OTHER, NONCE = "0000002A", "0000002B", "12345678"
+
+
+def say(body: str) -> bytes:
+    """A frame by the protocol's document: the CRC-32 of what stands between # and *."""
+    return f"#{body}*{zlib.crc32(body.encode()):08X}\n".encode()
 
 
 class HandMade:
-    """A base that answers what the test says; a clock of whole milliseconds."""
+    """A base that answers what the test says, after what the test says too; a clock of whole milliseconds."""
 
-    def __init__(self, answer: Callable[[str, str, list[str]], str | None] = lambda verb, seq, words: None) -> None:
-        self.answer = answer
+    def __init__(
+        self, answer: Callable[[str, str, list[str]], str | None] = lambda verb, seq, words: None,
+        before: Callable[[str, int, str, list[str]], Sequence[str]] = lambda token, seq, verb, words: (),
+    ) -> None:
+        self.answer, self.before = answer, before
         self.said: list[tuple[float, str, int, list[str]]] = []
         self.time_ms, self._out = 0, b""
 
@@ -31,11 +40,11 @@ class HandMade:
         for line in data.decode().splitlines():
             token, seq, verb, *words = line[1:-9].split(" ")
             self.said.append((self.now(), verb, int(seq), words))
+            self._out += b"".join(map(say, self.before(token, int(seq), verb, words)))
             said = self.answer(verb, seq, words)
             said = self._usual(verb, words) if said is None else said
             if said:
-                body = f"{TOKEN if verb == 'HELLO' else token} {seq} {said}"
-                self._out += f"#{body}*{zlib.crc32(body.encode()):08X}\n".encode()
+                self._out += say(f"{TOKEN if verb == 'HELLO' else token} {seq} {said}")
 
     def _usual(self, verb: str, words: list[str]) -> str:
         return {"HELLO": f"HI {' '.join(words)} 0.5 1.25 0.25", "GO": f"DONE ok {' '.join(words[:2])} 1.5 2.5",
@@ -190,3 +199,42 @@ def test_ranges_answer_their_own_question() -> None:
     base.answer = lambda verb, seq, words: f"ECHOES {int(words[0]) - 1} 20 218 3000 1000" if verb == "RANGES" else None
     began_s = base.now()
     assert driver.ranges() is None and base.now() - began_s == pytest.approx(1.05, abs=0.16)
+
+
+WRONG: dict[str, tuple[str, str]] = {
+    "DONE of the command before": ("GO", "{token} {before} DONE ok 0.9 0.9 9.0 9.0"),
+    "DONE of a command to come": ("GO", "{token} {after} DONE ok 0.9 0.9 9.0 9.0"),
+    "DONE of another session": ("GO", "{other} {seq} DONE ok 0.9 0.9 9.0 9.0"),
+    "RUN of the command before": ("GO", "{token} {before} RUN 0.9 0.9 9.0 9.0"),
+    "refusal of the command before": ("GO", "{token} {before} NO range"),
+    "refusal of another session": ("GO", "{other} {seq} NO session"),
+    "stall of the command before": ("GO", "{token} {before} DONE stalled 0.0 0.0 9.0 9.0"),
+    "HERE of the question before": ("BEAT", "{token} {seq} HERE {asked_before} 9.0 9.0 9.0 9.0"),
+    "HERE of another session": ("BEAT", "{other} {seq} HERE {asked} 9.0 9.0 9.0 9.0"),
+    "HERE of the command before": ("BEAT", "{token} {before} HERE {asked} 9.0 9.0 9.0 9.0"),
+    "HI to another greeting": ("HELLO", "{other} 0 HI 99999999 0.5 9.0 9.0"),
+}
+"""Answers of right checksum to something else: to which verb, and what is said before the right one."""
+
+
+@pytest.mark.parametrize("wrong", list(WRONG))
+def test_an_answer_to_something_else_is_none(wrong: str) -> None:
+    """A line may keep a frame and deliver it after newer ones. Answers carry session, command and question."""
+
+    def before(token: str, seq: int, verb: str, words: list[str]) -> Sequence[str]:
+        when, said = WRONG[wrong]
+        if verb != when:
+            return ()
+        asked = words[0] if verb == "BEAT" else "0"
+        return [said.format(token=token, other=OTHER, seq=seq, before=max(0, seq - 1), after=seq + 1, asked=asked,
+                            asked_before=int(asked) - 1)] if seq or "{before}" not in said else ()
+
+    base = HandMade(before=before)
+    driver = DenningBase(base, nonce=NONCE)
+    for command in COMMANDS:
+        report = driver.execute(command)
+        assert (report.turn_rad, report.move_m) == (command.turn_rad, command.move_m)
+        assert (report.duration_s, report.sim_time_s) == (1.5, 2.5)
+        there = driver.odometry()
+        assert (there.x_m, there.y_m, there.heading_rad, there.time_s) == (1.0, 2.0, 3.0, 4.0)
+    assert len(base.times("HELLO")) == 1 and len(base.times("GO")) == len(COMMANDS)

@@ -4,30 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 
-from harvey.hardware.drivers.base_driver import BaseFault, SerialLink
+from harvey.hardware.drivers.base_driver import SerialLink
 from harvey.hardware.drivers.denning import BAUD, DenningBase
 from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator, InstantMotion
 from sim.emulators.emulator import IdealGround
-from sim.emulators.line import PseudoTerminal, PseudoTerminalLink
+from sim.emulators.line import EmulatedLine, PseudoTerminal
 from tests.serial_bench import (
     OF_SENSES,
+    ON_EMULATED_LINE,
     ON_LINE_IN_MEMORY,
-    ON_TERMINAL,
     Bench,
     check_the_bases_own_watchdog_stops_it_when_the_host_dies,
+    check_what_is_reported_is_what_was_done,
+    over_emulated_line,
     over_line_in_memory,
-    over_terminal,
 )
 from world_models.entries import MotionReport, MotorCommand
 
 
-@pytest.mark.parametrize("check", ON_TERMINAL)
-def test_over_a_pseudo_terminal(check: Callable[[Bench], None]) -> None:
-    with over_terminal("denning") as bench:
+@pytest.mark.parametrize("check", ON_EMULATED_LINE)
+def test_over_a_line_of_missions(check: Callable[[Bench], None]) -> None:
+    with over_emulated_line("denning") as bench:
         check(bench)
 
 
@@ -41,6 +41,12 @@ def test_touch_and_ranges(check: Callable[[str], None]) -> None:
     check("denning")
 
 
+@pytest.mark.parametrize("how", ["doubled", "stale before", "stale after", "late"])
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_reported_is_what_was_done(how: str, seed: int) -> None:
+    check_what_is_reported_is_what_was_done("denning", how, seed)
+
+
 def test_its_line_runs_as_its_document_says() -> None:
     assert BAUD == 38400
 
@@ -48,7 +54,7 @@ def test_its_line_runs_as_its_document_says() -> None:
 def test_a_repeated_denning_command_moves_once(monkeypatch: pytest.MonkeyPatch) -> None:
     floor = IdealGround()
     end = DenningEmulator(ConstantSpeedMotion(floor))
-    link = PseudoTerminalLink(end)
+    link = EmulatedLine(end)
     said: list[bytes] = []
     real = link.write
 
@@ -78,7 +84,7 @@ def test_over_a_body_that_acts_at_once_the_denning_reports_are_the_bodys_own() -
         def ranges(self) -> None:
             return None
 
-    base = DenningBase(PseudoTerminalLink(DenningEmulator(InstantMotion(Body()))))
+    base = DenningBase(EmulatedLine(DenningEmulator(InstantMotion(Body()))))
     command = MotorCommand(-0.1, math.pi)
     assert base.execute(command) == Body().execute(command)
     base.close()
@@ -101,29 +107,13 @@ def test_a_serial_link_opens_reads_writes_and_says_what_is_wrong() -> None:
 
 def test_a_terminal_that_nobody_reads_does_not_hold_the_base_up() -> None:
     class Talker:
-        moving = False
-        told = 0
-
         def receive(self, data: bytes) -> None:
             raise AssertionError(data)
 
-        def advance(self, duration_s: float) -> None:
-            self.told += round(5000 * duration_s)
-
         def take(self) -> bytes:
-            out, self.told = bytes(self.told), 0
-            return out
+            return bytes(5000)
 
-    end = Talker()
-    terminal = PseudoTerminal(end)
+    terminal = PseudoTerminal(Talker())
     for _ in range(40):
-        end.advance(1.0)
         terminal.exchange()
-    assert 0 < terminal.sent < 40 * 5000
     terminal.close()
-
-
-@pytest.mark.parametrize("kind", ["", "dead"])
-def test_a_fault_has_one_of_the_known_kinds(kind: Any) -> None:
-    with pytest.raises(ValueError, match="kind of fault"):
-        BaseFault(kind, "what happened")

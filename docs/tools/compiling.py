@@ -1,4 +1,4 @@
-"""What a mission has compiled, compiled beforehand, on all processors: ``python -m harvey.compiling``.
+"""What a mission has compiled, compiled beforehand, on all processors: ``python -m docs.tools.compiling``.
 
 numba compiles a function when it is first called, one after the other, while the robot waits. Which functions a mission
 calls, and with which types, stands in ``signatures.json`` (``python -m docs.tools.signatures`` writes it). What is
