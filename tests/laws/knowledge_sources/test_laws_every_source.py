@@ -44,6 +44,7 @@ from sim.stage import Stage
 from world_models.entries import (
     BodyFault,
     CameraPicture,
+    CameraState,
     Goal,
     Hypothesis,
     Milestone,
@@ -52,6 +53,7 @@ from world_models.entries import (
     Place,
     PlanSketch,
     Subgoal,
+    Travel,
 )
 
 pytestmark = pytest.mark.slow
@@ -187,6 +189,10 @@ def close(kind: type[Any], **fields: Any) -> Callable[[Blackboard], list[Effect]
     return lambda board: [Revise(entry, replace(entry.value, **fields)) for entry in board.view.all(kind)]
 
 
+def withdraw(kind: type[Any]) -> Callable[[Blackboard], list[Effect]]:
+    return lambda board: [Retract(entry) for entry in board.view.all(kind)]
+
+
 def post(value: Any) -> Callable[[Blackboard], list[Effect]]:
     return lambda board: [Post(value)]
 
@@ -198,7 +204,7 @@ BROKEN: Mapping[str, Callable[[Blackboard], list[Effect]]] = {
     "not given up": post(Outcome("stopped", "by a law")),
     "not over": post(Outcome("stopped", "by a law")),
     "a belief": close(Hypothesis, status="candidate"),
-    "a picture": lambda board: [Retract(entry) for entry in board.view.all(CameraPicture)],
+    "a picture": withdraw(CameraPicture),
     "belief up to date": post(MotorCommand(0.1, 0.0)),
     "standing": post(MotorCommand(0.1, 0.0)),
     "no doubt": post(DOUBT),
@@ -212,6 +218,11 @@ BROKEN: Mapping[str, Callable[[Blackboard], list[Effect]]] = {
     "no milestone awaited": post(Milestone("", 0, "by a law", 0.0)),
     "a goal": close(Goal, status="abandoned"),
     "a sketch": close(PlanSketch, status="done"),
+    "not ended": post(Outcome("stopped", "by a law")),
+    "an unmeasured doubt": close(Discrepancy, status="corrected"),
+    "a doubt at the plan level": close(Discrepancy, status="corrected"),
+    "a camera": withdraw(CameraState),
+    "a way since a known place": withdraw(Travel),
 }
 """What makes a condition false on a board on which it holds."""
 
