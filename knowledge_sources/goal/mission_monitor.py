@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Quiescence, Revised, View, Watch
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_camera, open_discrepancy, open_impasse, open_milestone
+from knowledge_sources.reads import NOT_ENDED, find_camera, open_discrepancy, open_impasse, open_milestone
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Goal, Hypothesis, Impasse, Obstruction, Outcome, Place, TwinOdds
 
@@ -36,11 +36,10 @@ class MissionMonitor(RobotKnowledgeSource):
         Watch(Impasse, (Posted,), lambda impasse: impasse.is_open),
         Watch(Quiescence, (Posted,)),
     )
+    needs = (NOT_ENDED,)
     writes = (Outcome,)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        if view.latest(Outcome) is not None:
-            return None
+    def bind(self, view: View, trigger: Change) -> Case:
         reached, impasse = view.latest(Goal, lambda goal: goal.status == "reached"), open_impasse(view)
         if reached is not None:
             why = f"every milestone on the way to {reached.value.destination} was verified"

@@ -31,8 +31,8 @@ from knowledge_sources.reads.questions import (
     rolling_course,
     unmeasured_doubt,
 )
-from world_models.building.building import Building
 from world_models.entries import CameraPicture, CameraState, Hypothesis, Outcome, Travel
+from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
@@ -68,7 +68,7 @@ class Belief:
         return find_robot_in(self.view, self.locale)
 
     @cached_property
-    def world(self) -> Building:
+    def world(self) -> FrameBuilding:
         """The building as far as its frames are on the board."""
         return find_building(self.view)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,25 +19,12 @@ from world_models.entries import (
     AROUND_SIGMA_RAD,
     Contact,
     Glimpse,
-    Hypothesis,
     MotionReport,
     Panorama,
     PlanSketch,
     Segments,
 )
 from world_models.frames import Pose2
-
-
-class Lost(NamedTuple):
-    """The doubt at the goal level, and what was believed last."""
-
-    doubt: Entry[Discrepancy]
-    belief: Entry[Hypothesis]
-
-
-def find_lost(view: View) -> Lost:
-    """What a lost robot rests on."""
-    return Lost(LOST.of(view), HELD.of(view).entry)
 
 
 def find_panorama(view: View, doubt: Entry[Discrepancy]) -> Entry[Panorama] | None:
