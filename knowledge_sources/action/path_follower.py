@@ -43,11 +43,10 @@ MAX_ROLLING_ERROR_RAD = math.radians(12.0)  # the path follower stops when its a
 
 
 class Case(NamedTuple):
-    """The course that is driven, None where the robot stands; the leg, if one is under way; where the robot is."""
+    """The course that is driven, None where the robot stands; the leg, if one is under way."""
 
     course: Entry[Course] | None
     leg: Entry[Leg] | None
-    belief: Belief
     must_stop: bool
 
 
@@ -79,13 +78,13 @@ class PathFollower(RobotKnowledgeSource):
                 return None
             goes_on = leg is not None and not _is_hindered(view) and self._is_on_line(
                 view, leg.value, belief, MAX_ROLLING_ERROR_RAD)
-            return Case(course, leg, belief, not goes_on)
+            return Case(course, leg, not goes_on)
         if leg is None or leg.value.looking_rad is not None or not belief.robot.continuous:
             return None
         if _is_hindered(view) or not is_standing(view):
             return None
         is_ready = self._is_on_line(view, leg.value, belief, MAX_ROLLING_START_ERROR_RAD)
-        return Case(None, leg, belief, False) if is_ready else None
+        return Case(None, leg, False) if is_ready else None
 
     def rate(self, case: Case) -> float:
         if case.must_stop:
@@ -93,7 +92,7 @@ class PathFollower(RobotKnowledgeSource):
         return Priority.STEER if case.course is None else Priority.MOVE
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        course, leg, held, must_stop = case
+        (course, leg, must_stop), held = case, HELD.of(view)
         if course is not None and must_stop:
             reasons = () if leg is None else self._look_ahead(view, leg.value, held)[2]
             yield Revise(course, replace(course.value, speed_m_per_s=0.0),

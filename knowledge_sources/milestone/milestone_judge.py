@@ -24,7 +24,7 @@ from knowledge_sources.methods.verification import (
 )
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
-    find_belief,
+    HELD,
     find_camera,
     find_followed,
     find_rival,
@@ -69,17 +69,18 @@ class MilestoneJudge(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.SEE
     on = (Watch(PoseFix, (Posted,)),)
+    needs = (HELD,)
     writes = (Certificate, Milestone, Discrepancy)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
-        belief, match = find_belief(view), view.get(trigger.entry.value.match)
-        if match is None or belief is None:
+        match = view.get(trigger.entry.value.match)
+        if match is None:
             return None
         milestone, segments = view.get(match.value.milestone), view.get(match.value.segments)
         frame = None if segments is None else view.get(segments.value.frame)
         if milestone is None or milestone.value.status != "expected" or segments is None or frame is None:
             return None
-        return Case(trigger.entry, match, segments, frame, milestone, belief)
+        return Case(trigger.entry, match, segments, frame, milestone, HELD.of(view).entry)
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         milestone = case.milestone

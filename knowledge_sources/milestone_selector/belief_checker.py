@@ -39,11 +39,11 @@ class BeliefChecker(RobotKnowledgeSource):
 
     def act(self, view: View, case: Change) -> Iterable[Effect]:
         doubt, belief = DOUBTED.of(view), HELD.of(view)
-        tried, pose = find_tried(view, lambda m: m.cycle >= doubt.cycle), belief.pose
+        robot, pose, tried = belief.seeing, belief.pose, find_tried(view, lambda m: m.cycle >= doubt.cycle)
         heading = pose.heading_rad
         if tried:
             headings = find_untried(turn_headings(pose, self._settings), tried) or [heading]
-            heading = choose_heading(belief.seeing, pose, headings, CHECK_TOLERANCE_M, settings=self._settings)
+            heading = choose_heading(robot, pose, headings, CHECK_TOLERANCE_M, settings=self._settings)
         what = f"the place where it believes to be, because {doubt.value.what}"
         check = Milestone("", -1, what, heading, tried=tried)
         yield Post(replace(check, told=list_told(view, check, self._settings)), (doubt, belief.entry))

@@ -63,14 +63,14 @@ class AliasMonitor(RobotKnowledgeSource):
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         (certificate, fix, looked, known), belief = case, HELD.of(view)
-        here = fix.value.world_from_robot
+        robot, here = belief.seeing, fix.value.world_from_robot
         s = self._settings.localization
         if known is None:
             p_prior = compute_prior(count_refuted(view), s)
-            twins = self._find_twins(belief, here)
+            twins = self._find_twins(belief, robot, here)
         else:
             p_prior, twins = known.value.p_prior, known.value.twins
-        weighed = self._weigh(belief.seeing, looked.value, here, twins)
+        weighed = self._weigh(robot, looked.value, here, twins)
         odds = compute_twin_odds([twin.log_ratio for twin in weighed], p_prior)
         kept = tuple(twin for twin, p in zip(weighed, odds[1:], strict=True) if p >= s.min_p_twin)
         counted = (*(() if known is None else known.value.counted), certificate.id)
@@ -88,7 +88,7 @@ class AliasMonitor(RobotKnowledgeSource):
         turn = abs(wrap_angle(pose.heading_rad - known.last.heading_rad))
         return pose.distance_to(known.last) >= 0.5 * MOVE_M or turn >= MIN_NEW_VIEW_RAD
 
-    def _find_twins(self, belief: Belief, here: Pose2) -> tuple[Twin, ...]:
+    def _find_twins(self, belief: Belief, robot: RobotModel, here: Pose2) -> tuple[Twin, ...]:
         """The places of the floor that look like the believed one by walls and doors."""
         building = belief.world
         container, level_m = building.locale(belief.locale).parent or belief.locale, building.floor_m(belief.locale)
@@ -99,7 +99,7 @@ class AliasMonitor(RobotKnowledgeSource):
         nearest = [belief.locale, *(room for room in rooms if room != belief.locale)][:self._settings.goal.max_rooms]
         back = here.inverse()
         found = dict[Pose2, str]()
-        for room, there in find_repetitions(belief.seeing.world, belief.locale, here, nearest):
+        for room, there in find_repetitions(robot.world, belief.locale, here, nearest):
             if all(are_distinct(there, other) for other in (here, *found)):
                 found[there] = room
         return tuple(Twin(room, there @ back, 0.0) for there, room in found.items())

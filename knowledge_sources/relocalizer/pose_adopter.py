@@ -33,9 +33,9 @@ class PoseAdopter(RobotKnowledgeSource):
 
     def act(self, view: View, case: Found) -> Iterable[Effect]:
         (search, place), belief, camera = case, HELD.of(view), CAMERA.of(view)
-        now = place.value.world_from_robot(belief.world)
+        before, now = belief.pose, place.value.world_from_robot(belief.world)
         held = replace(place.value, status="held", weight=1.0, motion=belief.value.motion,
-                       correction=belief.pose.inverse() @ now)
+                       correction=before.inverse() @ now)
         yield Revise(belief.entry, held, (search, place, LOST.of(view), belief.entry))
         yield Retract(place, (search,))
         yield from (Retract(odds, (search,)) for odds in view.all(TwinOdds))
