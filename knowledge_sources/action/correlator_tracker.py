@@ -13,7 +13,7 @@ from statistics import median
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Level, Post, Posted, Revise, View, Watch
+from blackboard import Change, Discrepancy, Effect, Level, Posted, Revise, View, Watch, open_or_measure
 from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.features import Template
@@ -129,7 +129,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         found = Discrepancy(Level.ACTION, what, magnitude_px, bounds, "px")
         last = open_discrepancy(view, Level.ACTION)
         if last is None or not last.value.exceeds:  # one beyond its bound is the discrepancy raiser's
-            yield Post(found, because) if last is None else Revise(last, found, because)
+            yield open_or_measure(view, found, because)
 
 
 def _learn_drift(view: View, before: Belief, belief: Hypothesis, correction: Revise) -> Iterable[Effect]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch, correct
 from knowledge_sources.methods.motion import (
     ROLLING_STOP_MARGIN_M,
     choose_speed,
@@ -29,7 +29,6 @@ from knowledge_sources.reads import (
     is_standing,
     is_up_to_date,
     open_discrepancies,
-    open_discrepancy,
     open_milestone,
     rolling_course,
 )
@@ -107,8 +106,7 @@ class PathFollower(RobotKnowledgeSource):
         (robot, here, belief), drift = (held.robot, held.pose, held.entry), view.latest(Drift)
         along, _ = measure_progress(leg.value, here)
         point = find_aim_point(leg.value, along, ROLLING_LOOKAHEAD_M)
-        discrepancy = open_discrepancy(view, Level.ACTION)
-        corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
+        corrected = correct(view, Level.ACTION, (belief,))
         yield from corrected
         seen = update_leg(leg.value, here, point)
         step = Revise(leg, replace(seen, increments=seen.increments + (course is None)), (leg, belief, *corrected))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from blackboard import Change, Discrepancy, Effect, Level, Post, Revise, Revised, View, Watch, rule
+from blackboard import Change, Discrepancy, Effect, Level, Post, Revise, Revised, View, Watch, correct, rule
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import LOST, active_goal, find_building, open_discrepancy
+from knowledge_sources.reads import LOST, active_goal, find_building
 from world_models.building.locale_frame import FrameRequest
 from world_models.entries import Goal, Hypothesis, Place
 
@@ -22,9 +22,7 @@ def goal_renewer(view: View, trigger: Change) -> Iterable[Effect]:
     """
     found, goal, building = trigger.entry, active_goal(view), find_building(view)
     for level in (Level.GOAL, Level.ACTION, Level.PLAN):
-        doubt = open_discrepancy(view, level)
-        if doubt is not None:
-            yield Revise(doubt, doubt.value.corrected(), (found,))
+        yield from correct(view, level, (found,))
     here = found.value.world_from_robot(building)
     origin = Place.of_world(building, found.value.locale, here.x_m, here.y_m)
     if goal is not None:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch, open_or_measure
 from knowledge_sources.methods.calibration import add_yaw, compute_camera_covariance, is_camera_known
 from knowledge_sources.methods.verification import (
     Before,
@@ -98,8 +98,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         magnitude = weighed.shift_px if is_measured else math.inf
         what = f"{milestone.value.what.partition(', because')[0]} is {verdict.kind}"
         found = Discrepancy(Level.PLAN, what, magnitude, (0.0, most_px), "px")
-        last = open_discrepancy(view, Level.PLAN)
-        yield Post(found, (certificate,)) if last is None else Revise(last, found, (certificate,))
+        yield open_or_measure(view, found, (certificate,))
 
     def weigh(self, view: View, case: Case) -> Weighed:
         """What the picture says, with the camera as it was solved for, and with what was believed before."""

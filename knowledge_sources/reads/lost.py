@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from blackboard import Condition, Discrepancy, Entry, View
+from blackboard import Condition, Discrepancy, Entry, Level, Post, View
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.features import picture
 from knowledge_sources.methods.localization import CameraView
@@ -25,6 +25,11 @@ from world_models.entries import (
     Segments,
 )
 from world_models.frames import Pose2
+
+
+def declare_lost(what: str, because: tuple[object, ...]) -> Post:
+    """The robot may be elsewhere: the goal level measures that anew, by a look round."""
+    return Post(Discrepancy(Level.GOAL, what, None, (0.0, 0.0), "px"), because)
 
 
 def find_panorama(view: View, doubt: Entry[Discrepancy]) -> Entry[Panorama] | None:

@@ -22,7 +22,7 @@ from knowledge_sources.methods.localization import (
     make_alias_test,
 )
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import GOING_ON, HELD, NOT_LOST, Belief, count_refuted
+from knowledge_sources.reads import GOING_ON, HELD, NOT_LOST, Belief, count_refuted, declare_lost
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Certificate, PoseFix, Segments, Twin, TwinOdds
 from world_models.frames import Pose2, wrap_angle
@@ -79,8 +79,7 @@ class AliasMonitor(RobotKnowledgeSource):
         change = Post(found, because) if known is None else Revise(known, found, (*because, known))
         yield change
         if odds[0] < s.min_p_tracked:
-            yield Post(Discrepancy(Level.GOAL, f"it may be elsewhere: {found.sentence()}", None, (0.0, 0.0), "px"),
-                       (change,))
+            yield declare_lost(f"it may be elsewhere: {found.sentence()}", (change,))
 
     def _is_new(self, known: TwinOdds, fix: PoseFix) -> bool:
         """Whether a picture shows something else than the last that was counted."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Revise, Revised, View, Watch
 from knowledge_sources.methods.verification import is_last_look
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, find_building, find_search_here, has_missed, tell_missed
+from knowledge_sources.reads import HELD, declare_lost, find_building, find_search_here, has_missed, tell_missed
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Goal, Hypothesis, Impasse, Milestone, Place, PlaceSearch, PlanSketch
 
@@ -65,7 +65,7 @@ class MilestonePasser(RobotKnowledgeSource):
             return
         (in_vain, taking), is_first = tell_missed(view, belief.value, s), len(view.all(Goal)) == 1
         if is_first:
-            yield Post(Discrepancy(Level.GOAL, in_vain, None, (0.0, 0.0), "px"), (milestone, goal, *taking))
+            yield declare_lost(in_vain, (milestone, goal, *taking))
         else:
             yield Post(Impasse("blocked", in_vain, goal.id), (milestone, sketch, *taking))
 

@@ -34,7 +34,7 @@ from knowledge_sources.reads import HELD, LOST, OPEN_FAULT, find_camera
 from knowledge_sources.relocalizer.alias_monitor import AliasMonitor
 from knowledge_sources.relocalizer.localizer import Localizer
 from knowledge_sources.relocalizer.panorama_builder import PanoramaBuilder
-from knowledge_sources.relocalizer.pose_adopter import PoseAdopter
+from knowledge_sources.relocalizer.pose_adopter import pose_adopter
 from knowledge_sources.robot.camera_calibrator import CameraCalibrator
 from knowledge_sources.robot.travel_breaker import travel_breaker
 from knowledge_sources.robot.yaw_calibrator import YawCalibrator
@@ -51,7 +51,7 @@ from world_models.plugins import GUESTS_GROUP, list_plugins
 from world_models.robot import RobotModel
 
 SEATED = (interpreter, LineFinder, Matcher, MedRAndT, MilestoneJudge, CameraCalibrator, AliasMonitor, plan_adjuster,
-          YawCalibrator, travel_breaker, PanoramaBuilder, Localizer, PoseAdopter)
+          YawCalibrator, travel_breaker, PanoramaBuilder, Localizer, pose_adopter)
 """The sources of a mission that are wanted here too."""
 GUESTS = ("claim_reckoner", "view_expecter", "loss_declarer", "place_confirmer")
 AUTHOR = "onlooker"
