@@ -33,7 +33,7 @@ from blackboard.effect import type_of
 from harvey.replay.why_not_again import tell_of_trigger
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import resume_mission
-from harvey.wiring import KNOWLEDGE_SOURCES
+from harvey.wiring import KNOWLEDGE_SOURCES, build
 from hidden_reasons import HidingView, describe, find_named, list_unnamed
 from knowledge_sources.settings import DEFAULT
 from logs.records import read_records, ref_of
@@ -101,7 +101,7 @@ def list_acts(name: str, run: RunDirectory, left: Counter[str]) -> Iterator[Act]
         chosen = decision.chosen
         if chosen is None or decision.cycle not in asked or left[chosen.source] <= 0:
             continue
-        source, entry = SOURCES[chosen.source](DEFAULT), rebuilt.entries[ref_of(chosen.trigger)]
+        source, entry = build(SOURCES[chosen.source], DEFAULT), rebuilt.entries[ref_of(chosen.trigger)]
         trigger, board = CHANGES[chosen.kind](entry), copy_of(rebuilt.board)
         earlier = rebuilt.entries.get(Ref(entry.id, entry.revision - 1))
         try:
