@@ -20,13 +20,13 @@ from blackboard.knowledge_source import KnowledgeSource
 from blackboard.level import Level, highest
 from blackboard.rule import rule
 from blackboard.scheduler import Port, RAISED, Scheduler, registry_of
-from blackboard.servoing import Discrepancy, OPEN, Servoing, last_escalated
+from blackboard.servoing import Discrepancy, OPEN, Servoing, correct, last_escalated, open_or_measure
 
 __all__ = [
     "NOT_FINITE", "OPEN", "RAISED", "Activation", "Blackboard", "Change", "Condition", "Decision", "Decoders",
     "Discrepancy", "Effect", "Entry", "History", "Index", "KnowledgeSource", "Level", "MisfitError",
     "MissingEntryError", "Port", "Post", "Posted", "Quiescence", "Ref", "Registry", "Retract", "Retracted", "Revise",
-    "Revised", "Role", "Scheduler", "Servoing", "Sink", "StaleError", "View", "Watch", "always", "brief",
+    "Revised", "Role", "Scheduler", "Servoing", "Sink", "StaleError", "View", "Watch", "always", "brief", "correct",
     "decision_line", "decision_record", "decode", "fields_of", "highest", "inference", "is_request", "kind_of",
-    "kinds_in", "last_escalated", "observation", "plain", "registry_of", "request", "rule", "to_say",
+    "kinds_in", "last_escalated", "observation", "open_or_measure", "plain", "registry_of", "request", "rule", "to_say",
 ]

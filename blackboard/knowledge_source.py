@@ -55,7 +55,7 @@ class KnowledgeSource(ABC):
         return self._called
 
     def find_case(self, view: View, trigger: Change) -> Any | None:
-        """What :meth:`bind` finds where its ``needs`` are met: asked on the trigger, for the choice and for the act."""
+        """What :meth:`bind` finds where its ``needs`` are met: asked on the trigger and for the choice."""
         return None if self.find_unmet(view) else self.bind(view, trigger)
 
     def find_unmet(self, view: View) -> Condition[Any] | None:

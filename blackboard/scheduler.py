@@ -1,8 +1,9 @@
 """Scheduler: one cycle takes the changes, asks knowledge sources for ratings, executes one act and journals it.
 
 Order of a cycle: changes of the last cycle -> obviate what they made stale -> activate the watchers -> choose (pure),
-asking the best whether it still holds, and obviating it if not -> act -> apply -> journal -> ports. The journal has the
-decision before any port sees it, so that nothing reaches the motors that is not written down.
+asking the best whether it still holds, and obviating it if not -> act -> apply -> journal -> ports. A source is asked
+once a cycle: the act gets the case that was found on the trigger or for the choice. The journal has the decision before
+any port sees it, so that nothing reaches the motors that is not written down.
 
 An act that lacks something asks for it (:class:`~blackboard.effect.MissingEntryError`): that request is all that the
 cycle does, and the activation goes back to where it was, to be chosen again when a port has answered.
@@ -89,6 +90,7 @@ class Scheduler:
         self._traced = frozenset(kind for kind in self.kinds.values() if kind_of(kind).traced)
         self._retention = Retention(self.kinds.marks() if retention is None else retention)
         self._numbers = 0
+        self._cases: dict[int, tuple[TracedView, Any]] = {}  # of this cycle, by activation; the view notes what is read
         self._unseen: tuple[Change, ...] = ()
         self._observed: tuple[Change, ...] = ()
         self._is_waiting = False
@@ -106,11 +108,14 @@ class Scheduler:
         if not seen and not len(agenda):
             return None
         self._unseen = self._observed = ()
+        self._cases.clear()
         self.cycle += 1
         obviated: list[Obviated] = []
         activated: list[Activation] = []
         fault = self._hear_bids(seen, activated, obviated)
         left = self._retention.sweep(seen, self.board, agenda, hold=self._is_waiting)
+        if left:  # the board is not as it was when they were found
+            self._cases.clear()
         self._is_waiting = False
         focus = self._servoing.focus(self.view)
         chosen, runner_up, fault = (None, None, fault) if fault else self._two_best(focus, obviated)
@@ -159,13 +164,13 @@ class Scheduler:
         return tuple((source, () if always in wheres else tuple(wheres)) for source, wheres in found if wheres)
 
     def _hear_bids_on(self, change: Change, watchers: Watchers, activated: list[Activation]) -> None:
-        view, value = self.view, change.entry.value
+        value = change.entry.value
         if not self._stands(change):
             return
         for source, wheres in watchers:
             if wheres and not any(where(value) for where in wheres):
                 continue
-            rating = _rate(source, view, change)
+            rating = self._rate(self._numbers + 1, source, change)
             if rating is None:
                 continue
             if not 0.0 <= rating <= 1.0:
@@ -174,6 +179,17 @@ class Scheduler:
             activation = new_tuple(Activation, (self._numbers, source, change, rating, self.cycle))
             activated.append(activation)
             self._agenda.add(activation)
+
+    def _rate(self, number: int, source: KnowledgeSource, trigger: Change) -> float | None:
+        """How urgent a source finds a trigger now; None: it could not act. The case is kept for the act."""
+        view = TracedView(self.board, self._traced)
+        try:
+            case = source.find_case(view, trigger)
+            rating = None if case is None else float(source.rate(case))  # a member of an enum is written as its name
+        except MissingEntryError:
+            return MISSING_RATING
+        self._cases[number] = view, case
+        return rating
 
     def _stands(self, trigger: Change) -> bool:
         """A trigger stands while its entry is the current revision; a retraction stands for good."""
@@ -199,9 +215,8 @@ class Scheduler:
 
     def _best(self, groups: Groups, obviated: list[Obviated]) -> Activation | None:
         """The best that is pending and still holds; what is better and does not is obviated."""
-        view = self.view
         while (best := self._agenda.best(groups)) is not None:
-            _number, source, trigger, _rating, cycle = best
+            number, source, trigger, _rating, cycle = best
             if cycle == self.cycle:  # it was asked in this cycle, and the board is as it was then
                 return best
             reason = "raised when it was asked"
@@ -209,7 +224,7 @@ class Scheduler:
                 if not self._stands(trigger):
                     reason = self._staleness(trigger)
                 else:
-                    reason = "could not answer any more" if _rate(source, view, trigger) is None else ""
+                    reason = "could not answer any more" if self._rate(number, source, trigger) is None else ""
             finally:
                 if reason:
                     self._agenda.take(best)
@@ -220,10 +235,11 @@ class Scheduler:
 
     def _execute(self, chosen: Activation) -> tuple[tuple[Change, ...], str, tuple[Ref, ...]]:
         """The changes of an act, why it was refused, and which revisions of traced kinds it read."""
-        source, view = chosen.source, TracedView(self.board, self._traced)
+        source = chosen.source
+        view, case = self._cases.get(chosen.number) or (TracedView(self.board, self._traced), None)
         try:
             try:
-                case = source.find_case(view, chosen.trigger)
+                case = source.find_case(view, chosen.trigger) if case is None else case
                 effects = () if case is None else tuple(source.act(view, case))
                 if not all(effect.because for effect in effects):
                     effects = self._reasoned(chosen, effects)
@@ -291,14 +307,6 @@ def registry_of(
     """
     of_sources = ((*(watch.value_type for watch in s.on), *s.writes) for s in sources)
     return Registry((Discrepancy, Quiescence, *kinds, *chain.from_iterable(of_sources)))
-
-
-def _rate(source: KnowledgeSource, view: View, trigger: Change) -> float | None:
-    try:
-        case = source.find_case(view, trigger)
-        return None if case is None else float(source.rate(case))  # a member of an enum is written as its name
-    except MissingEntryError:
-        return MISSING_RATING
 
 
 def _by_number(ref: Ref) -> tuple[str, int, int]:

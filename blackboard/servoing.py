@@ -19,6 +19,7 @@ from itertools import groupby
 from typing import Any, Literal
 
 from blackboard.board import View
+from blackboard.effect import Post, Revise
 from blackboard.entry import Entry
 from blackboard.entry_store import Index
 from blackboard.kinds import inference
@@ -103,6 +104,18 @@ class Discrepancy:
         head = "" if self.is_open else f"{self.status}: "
         bound = "" if self.bound == math.inf else f", where up to {self.bound:.2f} {self.unit} may be corrected"
         return f"{head}{self.what}: {size}; discrepancy at the {self.level} level{bound}; {self.status}"
+
+
+def open_or_measure(view: View, found: Discrepancy, because: tuple[Any, ...]) -> Post | Revise:
+    """Opens a discrepancy at its level; where one is open there, that is measured anew."""
+    last = view.newest(OPEN, found.level)
+    return Post(found, because) if last is None else Revise(last, found, because)
+
+
+def correct(view: View, level: Level, because: tuple[Any, ...]) -> tuple[Revise, ...]:
+    """Says that what is open at a level is corrected; nothing where nothing is."""
+    found = view.newest(OPEN, level)
+    return () if found is None else (Revise(found, found.value.corrected(), because),)
 
 
 def last_escalated(view: View, level: Level) -> Entry[Discrepancy] | None:

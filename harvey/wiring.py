@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
+from types import ModuleType
 
 from blackboard import KnowledgeSource, Level, Registry, Servoing, registry_of
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -22,16 +23,22 @@ SUBJECTS = ("sketcher", "milestone_selector", "action", "milestone", "relocalize
 """The folders of knowledge sources, in the order in which a mission meets them."""
 
 
-def _find_sources() -> Iterator[type[RobotKnowledgeSource]]:
+def _find_sources() -> Iterator[type[KnowledgeSource]]:
     for subject in SUBJECTS:
         package = import_module(f"knowledge_sources.{subject}")
         for file in sorted(found.name for found in iter_modules(package.__path__)):
             module = import_module(f"{package.__name__}.{file}")
-            own = (kind for kind in vars(module).values() if getattr(kind, "__module__", "") == module.__name__)
-            yield from (kind for kind in own if isinstance(kind, type) and issubclass(kind, RobotKnowledgeSource))
+            yield from sources_of(module)
 
 
-KNOWLEDGE_SOURCES: tuple[type[RobotKnowledgeSource], ...] = tuple(_find_sources())
+def sources_of(module: ModuleType) -> list[type[KnowledgeSource]]:
+    """The knowledge sources that a module defines, as classes or as rules."""
+    own = (type(found) if isinstance(found, KnowledgeSource) else found for found in vars(module).values())
+    return [kind for kind in own if isinstance(kind, type) and issubclass(kind, KnowledgeSource)
+            and kind.__module__ == module.__name__]
+
+
+KNOWLEDGE_SOURCES: tuple[type[KnowledgeSource], ...] = tuple(_find_sources())
 """Every knowledge source. The order does not matter: control comes from triggers, ratings and levels."""
 
 

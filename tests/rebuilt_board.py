@@ -25,7 +25,7 @@ from blackboard.board import TracedView
 from blackboard.journal import change_record
 from harvey.agent import build_agent
 from harvey.runner.replay import open_originals
-from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds
+from harvey.wiring import KNOWLEDGE_SOURCES, build, load_kinds
 from knowledge_sources.settings import DEFAULT
 from logs.records import (
     DecisionRecord,
@@ -96,7 +96,7 @@ class RebuiltBoard:
         assert chosen is not None
         view, trigger = TracedView(self.board, TRACED), CHANGES[chosen.kind](self.entries[ref_of(chosen.trigger)])
         try:
-            effects = answer(SOURCES[chosen.source](DEFAULT), view, trigger) or ()
+            effects = answer(build(SOURCES[chosen.source], DEFAULT), view, trigger) or ()
         except MissingEntryError as missing:
             effects = (Post(missing.request, (trigger.entry,)),)
         changes = _apply_aside(self.board, effects, chosen.source, decision.cycle)

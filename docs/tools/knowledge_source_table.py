@@ -29,7 +29,7 @@ def rows(sources: Iterable[type[KnowledgeSource]]) -> list[str]:
 
 def _row(source: type[KnowledgeSource]) -> str:
     watches = ", ".join(dict.fromkeys(watch.value_type.__name__ for watch in source.on))
-    needs = ", ".join(need.name for need in source.needs)
+    needs = ", ".join(need.name for need in source.needs) or "nothing but what it watches"
     writes = ", ".join(kind.__name__ for kind in source.writes if kind not in EVERYBODY_WRITES)
     closes = "" if source.closes is None else ", closes"
     name = source.__module__.rpartition(".")[2]

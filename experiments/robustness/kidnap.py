@@ -26,14 +26,14 @@ from harvey.runner.ports import BodyPort
 from harvey.runner.run import run_to_outcome
 from harvey.runner.world_port import build_scheduler
 from knowledge_sources.action.dead_reckoner import DeadReckoner
-from knowledge_sources.goal.goal_renewer import GoalRenewer
-from knowledge_sources.goal.mission_monitor import MissionMonitor
+from knowledge_sources.goal.goal_renewer import goal_renewer
+from knowledge_sources.goal.mission_monitor import mission_monitor
 from knowledge_sources.methods.localization import get_visibility_map
 from knowledge_sources.methods.motion import compute_free_space
 from knowledge_sources.milestone.line_finder import LineFinder
 from knowledge_sources.relocalizer.localizer import Localizer
 from knowledge_sources.relocalizer.panorama_builder import PanoramaBuilder
-from knowledge_sources.relocalizer.pose_adopter import PoseAdopter
+from knowledge_sources.relocalizer.pose_adopter import pose_adopter
 from knowledge_sources.relocalizer.probe_photographer import ProbePhotographer
 from knowledge_sources.relocalizer.prober import Prober
 from knowledge_sources.settings import DEFAULT
@@ -175,8 +175,8 @@ class _TimedBody(FaultyBody):
 
 def _build_lost_agent(scene: Scene, body: FaultyBody, belief: Place) -> Scheduler:
     """Build a scheduler whose goal level is in doubt."""
-    finders = (ProbePhotographer, PanoramaBuilder, Localizer, Prober, PoseAdopter, GoalRenewer)
-    sources = [source(DEFAULT) for source in (LineFinder, DeadReckoner, *finders, MissionMonitor)]
+    finders = (LineFinder, DeadReckoner, ProbePhotographer, PanoramaBuilder, Localizer, Prober)
+    sources = [*(source(DEFAULT) for source in finders), pose_adopter, goal_renewer, mission_monitor]
     scheduler = build_scheduler(sources, scene.floor.world, scene.robot, ports=(BodyPort(body),), servoing=Servoing(),
                                 kinds=KINDS)
     held = Hypothesis(belief.locale, Pose2(belief.x_m, belief.y_m, belief.heading_rad or 0.0), diagonal(0.05, 0.02),

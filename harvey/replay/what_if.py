@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from blackboard import Effect, Entry, Post, Revise, Scheduler, View
+from blackboard import Change, Effect, Entry, Post, Revise, Scheduler, View
 from harvey.agent_settings import build_believed
 from harvey.errors import BadInput
 from knowledge_sources.milestone.line_finder import LineFinder
@@ -141,8 +141,8 @@ class SegmentHider(LineFinder):
     def name(self) -> str:
         return "line_finder"
 
-    def act(self, view: View, case: Entry[CameraPicture]) -> Iterable[Effect]:
-        hidden = [segment for frame, segment in self._segments if case.id == f"CameraPicture-{frame}"]
+    def act(self, view: View, case: Change) -> Iterable[Effect]:
+        hidden = [segment for frame, segment in self._segments if case.entry.id == f"CameraPicture-{frame}"]
         for effect in super().act(view, case):
             if isinstance(effect, Post) and isinstance(effect.value, Segments) and hidden:
                 yield Post(_hide(effect.value, hidden), effect.because)

@@ -13,7 +13,7 @@ from statistics import median
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Level, Post, Posted, Revise, View, Watch
+from blackboard import Change, Discrepancy, Effect, Level, Posted, Revise, View, Watch, open_or_measure
 from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.features import Template
@@ -105,8 +105,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
     def _correct(self, held: Belief, seen: list[Track], anchors: tuple[Anchor, ...]) -> tuple[Hypothesis, int]:
         """The belief after the landmarks were found, and how many of them agree with it."""
         pose, covariance, agreeing = correct_pose(held.robot, seen, anchors, held.pose, held.covariance, self._settings)
-        motion = held.value.motion
-        return Hypothesis.of_world(held.world, held.locale, pose, covariance, "tracks", motion=motion), agreeing
+        return held.moved_to(pose, covariance, "tracks"), agreeing
 
     def _renew(self, case: Following, image: Image, followed: list[TrackUpdate], belief: Hypothesis) -> Renewed:
         """Keep the landmarks that still serve, and take new ones where too few are left."""
@@ -118,7 +117,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         if len(kept) >= max(MIN_LANDMARKS, min(ENOUGH_LANDMARKS, MIN_REMAINING_PART * taken)):
             return Renewed(with_anchors(robot, frame.id, kept, anchors, belief, taken, self._settings), belief)
         camera = compute_camera_covariance(find_camera(case.belief.view), self._settings.camera_state)
-        return take_new(robot, frame.id, image, kept, anchors, belief, camera, self._settings)
+        return take_new(case.belief, frame.id, image, kept, anchors, belief, camera, self._settings)
 
     def _post_discrepancy(
         self, view: View, what: str, magnitude_px: float, belief: Belief, tracks: list[Track],
@@ -130,7 +129,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         found = Discrepancy(Level.ACTION, what, magnitude_px, bounds, "px")
         last = open_discrepancy(view, Level.ACTION)
         if last is None or not last.value.exceeds:  # one beyond its bound is the discrepancy raiser's
-            yield Post(found, because) if last is None else Revise(last, found, because)
+            yield open_or_measure(view, found, because)
 
 
 def _learn_drift(view: View, before: Belief, belief: Hypothesis, correction: Revise) -> Iterable[Effect]:

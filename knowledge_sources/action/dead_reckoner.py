@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, PLACED_BY, Belief, find_camera, find_contact
+from knowledge_sources.reads import HELD, PLACED_BY, find_camera, find_contact
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.camera import YAW
@@ -32,13 +31,6 @@ from world_models.frames import Pose2
 MIN_CLAIMED_PART = 0.7  # if the wheels claim less than this part of a move, something stopped the robot
 
 
-class Case(NamedTuple):
-    """A report of the odometry, and the belief before it."""
-
-    report: Entry[MotionReport]
-    belief: Belief
-
-
 class DeadReckoner(RobotKnowledgeSource):
     """Moves the belief by the odometry's report, corrected for drift, and asks for a picture to check it.
 
@@ -51,13 +43,12 @@ class DeadReckoner(RobotKnowledgeSource):
     needs = (HELD,)
     writes = (Hypothesis, Drift, Travel, PictureRequest, Discrepancy)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
+    def bind(self, view: View, trigger: Change) -> Entry[MotionReport] | None:
         """A report that the belief does not include yet."""
-        belief = HELD.of(view)
-        return None if belief.value.motion == trigger.entry.id else Case(trigger.entry, belief)
+        return None if HELD.of(view).value.motion == trigger.entry.id else trigger.entry
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        told, held = case
+    def act(self, view: View, case: Entry[MotionReport]) -> Iterable[Effect]:
+        told, held = case, HELD.of(view)
         belief, report = held.entry, told.value
         robot, before = held.robot, held.pose
         world, actuator = robot.world, robot.actuator
@@ -77,7 +68,7 @@ class DeadReckoner(RobotKnowledgeSource):
         if request is not None and fault is not None:
             missing = _compute_missing_motion(request.value, report, actuator)
             covariance = covariance + _compute_partial_covariance(pose, *missing)
-        moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=told.id)
+        moved = held.moved_to(pose, covariance, "odometry", locale=str(locale), motion=told.id)
         step = Revise(belief, moved, (told, belief) if fault is None else (told, belief, fault))
         yield step
         rolled = drift.after_motion(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)

@@ -97,9 +97,8 @@ class FaultHandler(RobotKnowledgeSource):
             reason = f"{times} motions in a row were broken off, the last one by: {fault.value.what}"
             yield Post(Impasse("failed", reason), (closed,))
             return
-        bound_px = self._settings.plan.max_deviation_px
         what = f"{motion.id} was broken off: {fault.value.what}"
-        yield Post(Discrepancy(Level.PLAN, what, None, (bound_px, bound_px), "px"), (closed, recovery))
+        yield _doubt_place(what, self._settings.plan.max_deviation_px, (closed, recovery))
 
     def _give_up(self, request: Entry[Any] | None, fault: BodyFault, tried: Recovery) -> Impasse:
         """How the mission ends: without an elevator there is no way; else the body has failed."""
@@ -116,9 +115,14 @@ def _wait_for_word(view: View, stop: Entry[Any], wait: Entry[Recovery] | None, b
     if isinstance(stop.value, Redirection):
         if open_discrepancy(view, Level.GOAL) is not None:
             return Post(PictureRequest("probe"), (stop,))
-        return Post(Discrepancy(Level.PLAN, "it was told to go on", None, (bound_px, bound_px), "px"), (stop,))
+        return _doubt_place("it was told to go on", bound_px, (stop,))
     return Post(Recovery(stop.id, "", stop.value.when_s, WORD_WAIT_S), (stop,)) if wait is None else Revise(
         wait, replace(wait.value, status="asked"), (stop, wait))
+
+
+def _doubt_place(what: str, bound_px: float, because: tuple[Any, ...]) -> Post:
+    """A doubt that a milestone is to measure."""
+    return Post(Discrepancy(Level.PLAN, what, None, (bound_px, bound_px), "px"), because)
 
 
 def _were_all_broken_off(view: View, times: int) -> bool:

@@ -40,15 +40,15 @@ class LandmarkChooser(RobotKnowledgeSource):
 
     def act(self, view: View, case: Following) -> Iterable[Effect]:
         frame, held, old = case
-        belief, robot = held.entry, held.seeing
+        belief = held.entry
         camera = None if rests_on(view, belief, frame.id) else compute_camera_covariance(
             find_camera(view), self._settings.camera_state)
-        fresh = take_new(robot, frame.id, rectify(held.robot, frame), (), (), belief.value, camera, self._settings)
+        fresh = take_new(held, frame.id, rectify(held.robot, frame), (), (), belief.value, camera, self._settings)
         tracks = post_or_revise(old, fresh.tracks, (frame, belief))
         yield tracks
         drift = view.latest(Drift)
         if drift is not None:
-            heading = fresh.hypothesis.world_from_robot(robot.world).heading_rad
+            heading = fresh.hypothesis.world_from_robot(held.world).heading_rad
             yield Revise(drift, drift.value.restart(heading), (tracks,))
         if fresh.hypothesis is not belief.value:
             yield Revise(belief, fresh.hypothesis, (frame, belief, tracks))

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch, correct
 from knowledge_sources.methods.motion import (
     MAX_HEADING_ERROR_RAD,
     MAX_LOOK_ERROR_RAD,
@@ -121,8 +121,7 @@ class Motor(RobotKnowledgeSource):
                 if command is None:
                     yield Revise(leg, replace(seen, status="halted"), (leg, belief, *told))
                     return
-        discrepancy = open_discrepancy(view, Level.ACTION)
-        corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
+        corrected = correct(view, Level.ACTION, (belief,))
         yield from corrected
         if command is None:
             yield Revise(leg, replace(seen, status="arrived"), (leg, belief, *corrected))

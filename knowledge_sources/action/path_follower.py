@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch, correct
 from knowledge_sources.methods.motion import (
     ROLLING_STOP_MARGIN_M,
     choose_speed,
@@ -29,7 +29,6 @@ from knowledge_sources.reads import (
     is_standing,
     is_up_to_date,
     open_discrepancies,
-    open_discrepancy,
     open_milestone,
     rolling_course,
 )
@@ -41,13 +40,22 @@ MIN_ROLLING_LEG_M = 0.3  # shortest rest of a leg, beyond the stopping distance,
 MAX_ROLLING_START_ERROR_RAD = math.radians(3.0)  # the path follower starts when it faces its aim to within this
 MAX_ROLLING_ERROR_RAD = math.radians(12.0)  # the path follower stops when its aim is further to the side than this
 
+MIN_FREE_M = 2.0 * ROLLING_STOP_MARGIN_M  # with less floor seen to be free ahead it stops, or does not start
+
+
+class Ahead(NamedTuple):
+    """How far ahead the floor is seen to be free, as far as that matters; the highest speed; what tells that."""
+
+    free_m: float
+    most_m_per_s: float
+    because: tuple[Entry[Any], ...]
+
 
 class Case(NamedTuple):
-    """The course that is driven, None where the robot stands; the leg, if one is under way; where the robot is."""
+    """The course that is driven, None where the robot stands; the leg, if one is under way, and the way ahead on it."""
 
     course: Entry[Course] | None
-    leg: Entry[Leg] | None
-    belief: Belief
+    leg: tuple[Entry[Leg], Ahead] | None
     must_stop: bool
 
 
@@ -73,19 +81,22 @@ class PathFollower(RobotKnowledgeSource):
     def bind(self, view: View, trigger: Change) -> Case | None:
         """A course to stop or to correct; or a leg that is long enough, where the robot stands and faces along it."""
         belief, course, driving = HELD.of(view), rolling_course(view), current_leg(view)
-        leg = None if driving is None else driving[0]
         if course is not None:
             if not is_up_to_date(view):
                 return None
-            goes_on = leg is not None and not _is_hindered(view) and self._is_on_line(
-                view, leg.value, belief, MAX_ROLLING_ERROR_RAD)
-            return Case(course, leg, belief, not goes_on)
-        if leg is None or leg.value.looking_rad is not None or not belief.robot.continuous:
+            if driving is None:
+                return Case(course, None, True)
+            leg, ahead = driving[0], self._look_ahead(view, driving[0].value, belief)
+            goes_on = not _is_hindered(view) and _is_on_line(leg.value, belief, MAX_ROLLING_ERROR_RAD)
+            return Case(course, (leg, ahead), not goes_on or ahead.free_m <= MIN_FREE_M)
+        if driving is None or driving[0].value.looking_rad is not None or not belief.robot.continuous:
             return None
-        if _is_hindered(view) or not is_standing(view):
+        leg = driving[0]
+        is_free_to_go = is_standing(view) and not _is_hindered(view)
+        if not is_free_to_go or not _is_on_line(leg.value, belief, MAX_ROLLING_START_ERROR_RAD):
             return None
-        is_ready = self._is_on_line(view, leg.value, belief, MAX_ROLLING_START_ERROR_RAD)
-        return Case(None, leg, belief, False) if is_ready else None
+        ahead = self._look_ahead(view, leg.value, belief)
+        return Case(None, (leg, ahead), False) if ahead.free_m > MIN_FREE_M else None
 
     def rate(self, case: Case) -> float:
         if case.must_stop:
@@ -93,50 +104,45 @@ class PathFollower(RobotKnowledgeSource):
         return Priority.STEER if case.course is None else Priority.MOVE
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        course, leg, held, must_stop = case
+        (course, leg, must_stop), held = case, HELD.of(view)
         if course is not None and must_stop:
-            reasons = () if leg is None else self._look_ahead(view, leg.value, held)[2]
-            yield Revise(course, replace(course.value, speed_m_per_s=0.0),
-                         (course, held.entry, *open_discrepancies(view), *reasons))
+            because = (course, held.entry, *open_discrepancies(view), *(() if leg is None else leg[1].because))
+            yield Revise(course, replace(course.value, speed_m_per_s=0.0), because)
         elif leg is not None:
-            yield from self._steer(view, course, leg, held)
+            yield from self._steer(view, course, *leg, held)
 
     def _steer(
-        self, view: View, course: Entry[Course] | None, leg: Entry[Leg], held: Belief
+        self, view: View, course: Entry[Course] | None, leg: Entry[Leg], ahead: Ahead, held: Belief
     ) -> Iterable[Effect]:
         """Steer an arc to the point of the line ahead, less the curvature that the wheels add."""
-        (robot, here, belief), drift = (held.robot, held.pose, held.entry), view.latest(Drift)
-        along, _ = measure_progress(leg.value, here)
-        point = find_aim_point(leg.value, along, ROLLING_LOOKAHEAD_M)
-        discrepancy = open_discrepancy(view, Level.ACTION)
-        corrected = () if discrepancy is None else (Revise(discrepancy, discrepancy.value.corrected(), (belief,)),)
+        (wheels, here, belief), drift = (held.robot.actuator, held.pose, held.entry), view.latest(Drift)
+        point = find_aim_point(leg.value, measure_progress(leg.value, here)[0], ROLLING_LOOKAHEAD_M)
+        corrected = correct(view, Level.ACTION, (belief,))
         yield from corrected
         seen = update_leg(leg.value, here, point)
         step = Revise(leg, replace(seen, increments=seen.increments + (course is None)), (leg, belief, *corrected))
         yield step
-        free_m, most_m_per_s, reasons = self._look_ahead(view, leg.value, held)
-        speed = choose_speed(free_m, most_m_per_s, robot.actuator, self._settings.action.creep_speed_m_per_s)
+        speed = choose_speed(ahead.free_m, ahead.most_m_per_s, wheels, self._settings.action.creep_speed_m_per_s)
         new = Course(leg.id, speed, steer_to(point, here, 0.0 if drift is None else drift.value.curvature_per_m))
-        because = (step, belief, *(() if drift is None else (drift,)), *reasons)
+        because = (step, belief, *(() if drift is None else (drift,)), *ahead.because)
         yield Post(new, because) if course is None else Revise(course, new, (course, *because))
 
-    def _look_ahead(self, view: View, leg: Leg, belief: Belief) -> tuple[float, float, tuple[Entry[Any], ...]]:
-        """How far ahead the floor is seen to be free, as far as that matters; the highest speed; what tells that."""
+    def _look_ahead(self, view: View, leg: Leg, belief: Belief) -> Ahead:
         wheels = belief.robot.actuator
         full, most_m = wheels.speed_m_per_s, wheels.stopping_distance_m() + MIN_ROLLING_LEG_M
         if not self._settings.action.keeps_to_seen_floor:
-            return most_m, full, ()
+            return Ahead(most_m, full, ())
         floor = FloorAhead(view, leg, belief.entry, self._settings)
         free_m = floor.measure_free_m(most_m)
-        return free_m, full if floor.is_told(free_m) else floor.wary_m_per_s, floor.because
+        return Ahead(free_m, full if floor.is_told(free_m) else floor.wary_m_per_s, floor.because)
 
-    def _is_on_line(self, view: View, leg: Leg, belief: Belief, most_rad: float) -> bool:
-        """Whether the robot can roll along a leg, and stop before its end: it faces its aim, and the floor is free."""
-        along, _ = measure_progress(leg, belief.pose)
-        if along <= belief.robot.actuator.stopping_distance_m() + MIN_ROLLING_LEG_M:
-            return False
-        aside_rad = compute_bearing(find_aim_point(leg, along, ROLLING_LOOKAHEAD_M), belief.pose)
-        return abs(aside_rad) <= most_rad and self._look_ahead(view, leg, belief)[0] > 2.0 * ROLLING_STOP_MARGIN_M
+
+def _is_on_line(leg: Leg, belief: Belief, most_rad: float) -> bool:
+    """Whether the robot can roll along a leg, and stop before its end: it faces its aim."""
+    along, _ = measure_progress(leg, belief.pose)
+    if along <= belief.robot.actuator.stopping_distance_m() + MIN_ROLLING_LEG_M:
+        return False
+    return abs(compute_bearing(find_aim_point(leg, along, ROLLING_LOOKAHEAD_M), belief.pose)) <= most_rad
 
 
 def _is_hindered(view: View) -> bool:

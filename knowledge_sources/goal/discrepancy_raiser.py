@@ -29,16 +29,14 @@ class DiscrepancyRaiser(RobotKnowledgeSource):
     on = (Watch(Discrepancy, where=lambda d: d.exceeds),)
     writes = (Discrepancy, Impasse)
 
-    def bind(self, view: View, trigger: Change) -> Entry[Discrepancy]:
-        return trigger.entry
-
-    def act(self, view: View, case: Entry[Discrepancy]) -> Iterable[Effect]:
-        closed, raised = case.value.escalated()
+    def act(self, view: View, case: Change) -> Iterable[Effect]:
+        found = case.entry
+        closed, raised = found.value.escalated()
         sketch = deepest_sketch(view) if raised.level is Level.PLAN else None
         tried, last = _describe_attempt(sketch), last_escalated(view, closed.level)
         times = 1 + (last.value.times if last is not None and last.value.tried == tried else 0)
         counted = tuple(entry for entry in (sketch, last) if entry is not None)
-        close = Revise(case, replace(closed, tried=tried, times=times), (*case.because, *counted))
+        close = Revise(found, replace(closed, tried=tried, times=times), (*found.because, *counted))
         yield close
         yield Post(raised, (close,))
         s = self._settings.plan

@@ -4,31 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import NamedTuple
 
-from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch, rule
 from knowledge_sources.priority import Priority
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Goal, PlanSketch
 
 
-class Case(NamedTuple):
-    """A sketch that is done, and the goal to which it led."""
+def find_goal(view: View, trigger: Change) -> tuple[Entry[PlanSketch], Entry[Goal]] | None:
+    """The sketch that is done, and the goal to which it led."""
+    goal = view.get(trigger.entry.value.goal)
+    return (trigger.entry, goal) if goal is not None and goal.value.is_active else None
 
-    done: Entry[PlanSketch]
-    goal: Entry[Goal]
 
-
-class GoalCloser(RobotKnowledgeSource):
+@rule(on=Watch(PlanSketch, (Revised,), lambda s: s.status == "done" and not s.path and not s.is_look), writes=Goal,
+      bind=find_goal, level=Level.GOAL, priority=Priority.ENTER)
+def goal_closer(_view: View, case: tuple[Entry[PlanSketch], Entry[Goal]]) -> Iterable[Effect]:
     """Says that a goal is reached when the sketch that leads to it from locale to locale is done."""
-
-    level, priority = Level.GOAL, Priority.ENTER
-    on = (Watch(PlanSketch, (Revised,), lambda s: s.status == "done" and not s.path and not s.is_look),)
-    writes = (Goal,)
-
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        goal = view.get(trigger.entry.value.goal)
-        return Case(trigger.entry, goal) if goal is not None and goal.value.is_active else None
-
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        yield Revise(case.goal, replace(case.goal.value, status="reached"), (case.done,))
+    done, goal = case
+    yield Revise(goal, replace(goal.value, status="reached"), (done,))

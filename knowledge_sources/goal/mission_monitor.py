@@ -6,10 +6,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from blackboard import Change, Effect, Entry, Level, Post, Posted, Quiescence, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Quiescence, Revised, View, Watch, rule
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_camera, open_discrepancy, open_impasse, open_milestone
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.reads import NOT_ENDED, find_camera, open_discrepancy, open_impasse, open_milestone
 from world_models.entries import Goal, Hypothesis, Impasse, Obstruction, Outcome, Place, TwinOdds
 
 SURE_PLACE = 0.999
@@ -23,42 +22,35 @@ class Case(NamedTuple):
     because: tuple[Entry[Any], ...]
 
 
-class MissionMonitor(RobotKnowledgeSource):
+def find_end(view: View, trigger: Change) -> Case:
+    """The goal that is reached, else what leaves no way on, else what is left to do."""
+    reached, impasse = view.latest(Goal, lambda goal: goal.status == "reached"), open_impasse(view)
+    if reached is not None:
+        why = f"every milestone on the way to {reached.value.destination} was verified"
+        twins = view.latest(TwinOdds, lambda odds: bool(odds.twins) and odds.probability < SURE_PLACE)
+        if twins is None:
+            return Case(Outcome("reached", why), (reached,))
+        return Case(Outcome("reached", f"{why}, but {twins.value.sentence()}"), (reached, twins))
+    if impasse is not None:
+        return Case(Outcome(impasse.value.kind, impasse.value.reason), (impasse,))
+    return _find_what_is_left(view, trigger.entry)
+
+
+@rule(on=(Watch(Goal, (Revised,), lambda goal: goal.status == "reached"),
+          Watch(Impasse, (Posted,), lambda impasse: impasse.is_open), Watch(Quiescence, (Posted,))),
+      writes=Outcome, needs=(NOT_ENDED,), bind=find_end, level=Level.GOAL, priority=Priority.ENTER)
+def mission_monitor(view: View, case: Case) -> Iterable[Effect]:
     """Declares how the mission ends: the goal is reached, somebody sees no way on, or nothing is left to do.
 
     Where it is not reached, what hides a part of each picture is said too; where it is, how likely the robot is at
     another place that looks the same.
     """
-
-    level, priority = Level.GOAL, Priority.ENTER
-    on = (
-        Watch(Goal, (Revised,), lambda goal: goal.status == "reached"),
-        Watch(Impasse, (Posted,), lambda impasse: impasse.is_open),
-        Watch(Quiescence, (Posted,)),
-    )
-    writes = (Outcome,)
-
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        if view.latest(Outcome) is not None:
-            return None
-        reached, impasse = view.latest(Goal, lambda goal: goal.status == "reached"), open_impasse(view)
-        if reached is not None:
-            why = f"every milestone on the way to {reached.value.destination} was verified"
-            twins = view.latest(TwinOdds, lambda odds: bool(odds.twins) and odds.probability < SURE_PLACE)
-            if twins is None:
-                return Case(Outcome("reached", why), (reached,))
-            return Case(Outcome("reached", f"{why}, but {twins.value.sentence()}"), (reached, twins))
-        if impasse is not None:
-            return Case(Outcome(impasse.value.kind, impasse.value.reason), (impasse,))
-        return _find_what_is_left(view, trigger.entry)
-
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        (outcome, because), hidden = case, view.latest(Obstruction)
-        if outcome.kind != "reached" and hidden is not None:
-            camera = find_camera(view).pinhole
-            said = f"{outcome.reason}; {hidden.value.words(camera.width, camera.height)}"
-            outcome, because = replace(outcome, reason=said), (*because, hidden)
-        yield Post(outcome, because)
+    (outcome, because), hidden = case, view.latest(Obstruction)
+    if outcome.kind != "reached" and hidden is not None:
+        camera = find_camera(view).pinhole
+        said = f"{outcome.reason}; {hidden.value.words(camera.width, camera.height)}"
+        outcome, because = replace(outcome, reason=said), (*because, hidden)
+    yield Post(outcome, because)
 
 
 def _find_what_is_left(view: View, still: Entry[Quiescence]) -> Case:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
+from blackboard import Change, Effect, Level, Post, Posted, View, Watch
 from knowledge_sources.methods.features import compute_mean_and_deviation, find_lines, read_picture
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import find_robot, open_milestone
@@ -25,11 +25,8 @@ class LineFinder(RobotKnowledgeSource):
     on = (Watch(CameraPicture, (Posted,), lambda f: f.purpose in ("milestone", "probe")),)
     writes = (Segments,)
 
-    def bind(self, view: View, trigger: Change) -> Entry[CameraPicture]:
-        return trigger.entry
-
-    def act(self, view: View, case: Entry[CameraPicture]) -> Iterable[Effect]:
-        frame, robot = case, find_robot(view)
+    def act(self, view: View, case: Change) -> Iterable[Effect]:
+        frame, robot = case.entry, find_robot(view)
         image = read_picture(frame.value.jpeg).rectified(robot.lens, robot.camera)
         found = find_lines(image, min_length_px=MIN_SEGMENT_LENGTH_PX,
                            settings=self._settings.features)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,23 +21,17 @@ from knowledge_sources.methods.localization import match_with_camera, rate_match
 from knowledge_sources.methods.matching import Match, PoseMatch, match_lines, match_on_floor
 from knowledge_sources.methods.verification import find_distinct
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_belief, find_camera, find_robot
+from knowledge_sources.reads import HELD, Belief, find_camera
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Hypothesis, LineMatch, Milestone, Segments
+from world_models.entries import LineMatch, Milestone, Segments
 from world_models.frames import frozen
-from world_models.robot import RobotModel
 
 MAX_RIGID_SIGMA_PX = 6.0  # up to this uncertainty lines are matched in the image (§6.1); beyond it, on the floor
 
 Floats = NDArray[np.float64]
 
 
-class Case(NamedTuple):
-    """The segments of a picture, the milestone that waits for it, and the belief from which it was predicted."""
-
-    segments: Entry[Segments]
-    milestone: Entry[Milestone]
-    belief: Entry[Hypothesis]
+Expected = tuple[Entry[Segments], Entry[Milestone]]
 
 
 class Matcher(RobotKnowledgeSource):
@@ -51,16 +44,16 @@ class Matcher(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.SEE
     on = (Watch(Segments, (Posted,), lambda s: s.milestone != ""),)
+    needs = (HELD,)
     writes = (LineMatch,)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        milestone, belief = view.get(trigger.entry.value.milestone), find_belief(view)
-        if milestone is None or milestone.value.status != "expected" or belief is None:
-            return None
-        return Case(trigger.entry, milestone, belief)
+    def bind(self, view: View, trigger: Change) -> Expected | None:
+        """The segments of a picture, and the milestone that waits for it."""
+        milestone = view.get(trigger.entry.value.milestone)
+        return None if milestone is None or milestone.value.status != "expected" else (trigger.entry, milestone)
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        segments, milestone, belief = case
+    def act(self, view: View, case: Expected) -> Iterable[Effect]:
+        (segments, milestone), belief = case, HELD.of(view)
         m, data_px = milestone.value, segments.value.segments_px
         lines_world = np.array(m.expected, float).reshape(-1, 2, 3)
         expected_px = np.array(m.expected_px, float).reshape(-1, 2, 2)
@@ -68,9 +61,9 @@ class Matcher(RobotKnowledgeSource):
         if not len(asked):
             none = np.zeros((0, 2), np.int64)
             yield Post(LineMatch(milestone.id, segments.id, none, frozen(lines_world[:0]), frozen(data_px[:0]), 0.0,
-                                 frozen(np.zeros(len(lines_world)))), (segments, milestone, belief))
+                                 frozen(np.zeros(len(lines_world)))), (segments, milestone, belief.entry))
             return
-        found, is_open = self._match(view, expected_px[asked], lines_world[asked], data_px, belief.value)
+        found, is_open = self._match(view, expected_px[asked], lines_world[asked], data_px, belief)
         pairs, coverage = np.asarray(found.pairs, np.int64).reshape(-1, 2).copy(), np.zeros(len(lines_world))
         pairs[:, 0], coverage[asked] = asked[pairs[:, 0]], found.coverage
         yield Post(
@@ -78,20 +71,20 @@ class Matcher(RobotKnowledgeSource):
                 milestone.id, segments.id, pairs, frozen(lines_world[pairs[:, 0]]), frozen(data_px[pairs[:, 1]]),
                 float(found.e_match), frozen(coverage), is_open,
             ),
-            (segments, milestone, belief),
+            (segments, milestone, belief.entry),
         )
 
     def _match(
-        self, view: View, expected_px: Floats, lines_world: Floats, data_px: Floats, belief: Hypothesis
+        self, view: View, expected_px: Floats, lines_world: Floats, data_px: Floats, belief: Belief
     ) -> tuple[Match | PoseMatch, bool]:
         """The match, and whether it takes the camera for knocked: much more agrees with the picture then."""
-        robot, camera, s = find_robot(view).on_floor_of(belief.locale), find_camera(view), self._settings.camera_state
+        robot, camera, s = belief.robot, find_camera(view), self._settings.camera_state
         known = compute_camera_covariance(camera, s)
-        prior = belief.world_from_robot(robot.world), belief.covariance_world(robot.world)
+        prior = belief.pose, belief.covariance
         given = lines_world, data_px, robot.camera, robot.mount
         if not is_camera_known(robot, known, self._settings):
             return match_with_camera(*given, *prior, known, self._settings).match, False
-        found = rate_match(self._match_with_known_camera(robot, expected_px, lines_world, data_px, belief), *given,
+        found = rate_match(self._match_with_known_camera(expected_px, lines_world, data_px, belief), *given,
                            prior[0], loosen(prior[1]), known, self._settings)
         if found.sharp_part >= s.min_sharp_part and found.prior_chi2 <= s.max_chi2:
             return found.match, False
@@ -101,11 +94,12 @@ class Matcher(RobotKnowledgeSource):
         return (knocked if is_knocked else found).match, is_knocked
 
     def _match_with_known_camera(
-        self, robot: RobotModel, expected_px: Floats, lines_world: Floats, data_px: Floats, belief: Hypothesis
+        self, expected_px: Floats, lines_world: Floats, data_px: Floats, belief: Belief
     ) -> Match | PoseMatch:
-        sigma_px = robot.camera.fx * math.hypot(belief.sigma_rad, belief.sigma_m / RIGID_DISTANCE_M)
+        robot, b = belief.robot, belief.value
+        sigma_px = robot.camera.fx * math.hypot(b.sigma_rad, b.sigma_m / RIGID_DISTANCE_M)
         if sigma_px <= MAX_RIGID_SIGMA_PX:
             return match_lines(expected_px, data_px, self._settings.matching)
         return match_on_floor(
             lines_world, data_px, robot.camera, robot.mount.camera_from_robot,
-            belief.world_from_robot(robot.world), belief.covariance_world(robot.world), self._settings.matching)
+            belief.pose, belief.covariance, self._settings.matching)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,19 +20,13 @@ from knowledge_sources.methods.calibration import (
 )
 from knowledge_sources.methods.pose import CameraEstimate, PlanarEstimate, estimate_camera_and_pose, planar_from_lines
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_belief, find_camera, find_robot
+from knowledge_sources.reads import HELD, find_camera, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Hypothesis, LineMatch, Milestone, PoseFix
+from world_models.entries import LineMatch, Milestone, PoseFix
 from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
 
-
-class Case(NamedTuple):
-    """The lines that were matched, the milestone that expected them, and the belief near which the pose is sought."""
-
-    match: Entry[LineMatch]
-    milestone: Entry[Milestone]
-    belief: Entry[Hypothesis]
+Matched = tuple[Entry[LineMatch], Entry[Milestone]]
 
 
 class MedRAndT(RobotKnowledgeSource):
@@ -47,19 +40,19 @@ class MedRAndT(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.SEE
     on = (Watch(LineMatch, (Posted,)),)
+    needs = (HELD,)
     writes = (PoseFix,)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        milestone, belief = view.get(trigger.entry.value.milestone), find_belief(view)
-        return None if milestone is None or belief is None else Case(trigger.entry, milestone, belief)
+    def bind(self, view: View, trigger: Change) -> Matched | None:
+        """The lines that were matched, and the milestone that expected them."""
+        milestone = view.get(trigger.entry.value.milestone)
+        return None if milestone is None else (trigger.entry, milestone)
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        match, milestone, belief = case
-        m = milestone.value
-        own, locale = self._settings.camera_state, belief.value.locale
-        robot, camera = find_robot(view).on_floor_of(locale), find_camera(view)
-        here = belief.value.world_from_robot(robot.world)
-        prior, known = loosen(belief.value.covariance_world(robot.world)), compute_camera_covariance(camera, own)
+    def act(self, view: View, case: Matched) -> Iterable[Effect]:
+        (match, milestone), belief = case, HELD.of(view)
+        m, own, camera = milestone.value, self._settings.camera_state, find_camera(view)
+        robot, here = belief.robot, belief.pose
+        prior, known = loosen(belief.covariance), compute_camera_covariance(camera, own)
         if match.value.is_camera_open:
             opened = compute_knocked_covariance(camera, own)
             prior, known = add_yaw(prior, opened, known), opened
@@ -67,10 +60,10 @@ class MedRAndT(RobotKnowledgeSource):
         moves = learnt is not None and (
             match.value.is_camera_open or not has_counted(camera, learnt.world_from_robot, own))
         if learnt is not None and moves:
-            robot = find_robot(view, camera.moved(tuple(learnt.step.tolist()))).on_floor_of(locale)
+            robot = find_robot(view, camera.moved(tuple(learnt.step.tolist()))).on_floor_of(belief.locale)
         found = self._solve(robot, match.value, here, prior, m)
         covariance = found.covariance
-        learnt = learnt and replace(learnt, covariance=widen(learnt, here, belief.value.covariance_world(robot.world)))
+        learnt = learnt and replace(learnt, covariance=widen(learnt, here, belief.covariance))
         if learnt is not None:
             spread = learnt.covariance if moves else known
             covariance = covariance + learnt.pose_slopes @ spread @ learnt.pose_slopes.T
@@ -82,7 +75,7 @@ class MedRAndT(RobotKnowledgeSource):
                 () if learnt is None or not moves else to_tuples(learnt.covariance),
                 0.0 if learnt is None or not moves else learnt.prior_chi2,
             ),
-            (match, milestone, belief),
+            (match, milestone, belief.entry),
         )
 
     def _learn(

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch, open_or_measure
 from knowledge_sources.methods.calibration import add_yaw, compute_camera_covariance, is_camera_known
 from knowledge_sources.methods.verification import (
     Before,
@@ -24,7 +24,7 @@ from knowledge_sources.methods.verification import (
 )
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
-    find_belief,
+    HELD,
     find_camera,
     find_followed,
     find_rival,
@@ -69,17 +69,18 @@ class MilestoneJudge(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.SEE
     on = (Watch(PoseFix, (Posted,)),)
+    needs = (HELD,)
     writes = (Certificate, Milestone, Discrepancy)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
-        belief, match = find_belief(view), view.get(trigger.entry.value.match)
-        if match is None or belief is None:
+        match = view.get(trigger.entry.value.match)
+        if match is None:
             return None
         milestone, segments = view.get(match.value.milestone), view.get(match.value.segments)
         frame = None if segments is None else view.get(segments.value.frame)
         if milestone is None or milestone.value.status != "expected" or segments is None or frame is None:
             return None
-        return Case(trigger.entry, match, segments, frame, milestone, belief)
+        return Case(trigger.entry, match, segments, frame, milestone, HELD.of(view).entry)
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         milestone = case.milestone
@@ -97,8 +98,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         magnitude = weighed.shift_px if is_measured else math.inf
         what = f"{milestone.value.what.partition(', because')[0]} is {verdict.kind}"
         found = Discrepancy(Level.PLAN, what, magnitude, (0.0, most_px), "px")
-        last = open_discrepancy(view, Level.PLAN)
-        yield Post(found, (certificate,)) if last is None else Revise(last, found, (certificate,))
+        yield open_or_measure(view, found, (certificate,))
 
     def weigh(self, view: View, case: Case) -> Weighed:
         """What the picture says, with the camera as it was solved for, and with what was believed before."""

@@ -3,44 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Posted, Revise, View, Watch
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Posted, Revise, View, Watch, rule
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_belief, find_building, open_discrepancy
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.reads import HELD, PLAN_DOUBT
+from world_models.building.locale_frame import FrameRequest
 from world_models.entries import Certificate, Hypothesis, PoseFix
 
 
-class Case(NamedTuple):
-    """A verified milestone with its pose, the belief, and the discrepancy within the plan level's bound."""
-
-    certificate: Entry[Certificate]
-    fix: Entry[PoseFix]
-    belief: Entry[Hypothesis]
-    found: Entry[Discrepancy]
+def find_fix(view: View, trigger: Change) -> tuple[Entry[Certificate], Entry[PoseFix]] | None:
+    """A verified milestone with its pose, where the discrepancy is within the plan level's bound."""
+    fix = view.get(trigger.entry.value.fix)
+    return None if PLAN_DOUBT.of(view).value.exceeds or fix is None else (trigger.entry, fix)
 
 
-class PlanAdjuster(RobotKnowledgeSource):
+@rule(on=Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),
+      writes=(Hypothesis, Discrepancy, FrameRequest), needs=(HELD, PLAN_DOUBT), bind=find_fix,
+      level=Level.PLAN, closes=Level.PLAN, priority=Priority.CORRECT)
+def plan_adjuster(view: View, case: tuple[Entry[Certificate], Entry[PoseFix]]) -> Iterable[Effect]:
     """Replaces the belief by the pose of a verified milestone, within the plan level's bound."""
-
-    level = closes = Level.PLAN
-    priority = Priority.CORRECT
-    on = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
-    writes = (Hypothesis, Discrepancy)
-
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        found, belief, fix = open_discrepancy(view, Level.PLAN), find_belief(view), view.get(trigger.entry.value.fix)
-        if found is None or found.value.exceeds or belief is None or fix is None:
-            return None
-        return Case(trigger.entry, fix, belief, found)
-
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        certificate, fix, belief, found = case
-        here = Hypothesis.of_world(
-            find_building(view), belief.value.locale, fix.value.world_from_robot, fix.value.covariance, "milestone",
-            motion=belief.value.motion,
-        )
-        correction = Revise(belief, here, (certificate, fix, belief))
-        yield correction
-        yield Revise(found, found.value.corrected(), (correction,))
+    (certificate, fix), belief, found = case, HELD.of(view), PLAN_DOUBT.of(view)
+    here = belief.moved_to(fix.value.world_from_robot, fix.value.covariance, "milestone")
+    correction = Revise(belief.entry, here, (certificate, fix, belief.entry))
+    yield correction
+    yield Revise(found, found.value.corrected(), (correction,))

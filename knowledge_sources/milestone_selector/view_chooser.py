@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import NamedTuple
 
 from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revised, View, Watch
 from knowledge_sources.methods.verification import CHECK_TOLERANCE_M, choose_heading, find_untried, turn_headings
@@ -20,7 +19,6 @@ from knowledge_sources.reads import (
     SKETCH,
     STANDING,
     find_car,
-    find_robot_and_pose,
     find_tried,
     list_told,
 )
@@ -28,14 +26,6 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.building import Building
 from world_models.entries import Hypothesis, Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
-
-
-class Case(NamedTuple):
-    """The sketch whose milestone is due, the belief, and the headings in which it was looked for in vain."""
-
-    sketch: Entry[PlanSketch]
-    belief: Entry[Hypothesis]
-    tried: tuple[float, ...]
 
 
 class ViewChooser(RobotKnowledgeSource):
@@ -56,23 +46,22 @@ class ViewChooser(RobotKnowledgeSource):
     needs = (GOING_ON, HELD, STANDING, NOT_LOST, MEASURED, NO_MILESTONE, SKETCH)
     writes = (Milestone,)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
+    def bind(self, view: View, trigger: Change) -> Entry[PlanSketch] | None:
+        """The sketch whose milestone is due."""
         sketch = SKETCH.of(view)
-        if sketch.value.verified:
-            return None
-        at = sketch.id, sketch.value.at
-        return Case(sketch, HELD.of(view).entry, find_tried(view, lambda m: (m.value.sketch, m.value.index) == at))
+        return None if sketch.value.verified else sketch
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        sketch, belief, tried = case
-        s, (robot, pose) = sketch.value, find_robot_and_pose(view, belief.value)
+    def act(self, view: View, case: Entry[PlanSketch]) -> Iterable[Effect]:
+        sketch, s, belief = case, case.value, HELD.of(view)
+        robot, pose = belief.seeing, belief.pose
+        tried = find_tried(view, lambda m: (m.value.sketch, m.value.index) == (sketch.id, s.at))
         headings = find_untried(self.list_headings(robot.world, s, pose), tried)
         tolerance_m = s.subgoals[s.at - 1].tolerance_m if s.at else CHECK_TOLERANCE_M
         heading = choose_heading(robot, pose, headings, tolerance_m, find_car(s, s.at), self._settings)
         is_ahead = abs(wrap_angle(pose.heading_rad - heading)) <= MAX_LOOK_ERROR_RAD
         chosen = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}",
                            pose.heading_rad if is_ahead else heading, tried=tried)
-        yield Post(replace(chosen, told=list_told(view, chosen, self._settings)), (sketch, belief))
+        yield Post(replace(chosen, told=list_told(view, chosen, self._settings)), (sketch, belief.entry))
 
     def list_headings(self, building: Building, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
         """The headings that come into question [rad, world], the first good one is taken."""

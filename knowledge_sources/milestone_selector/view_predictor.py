@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import NamedTuple
 
 from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.methods.localization import precompute_views
@@ -20,22 +19,12 @@ from knowledge_sources.reads import (
     find_car_of,
     find_followed,
     find_frames,
-    find_heading,
-    find_robot_and_pose,
     open_discrepancy,
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Hypothesis, Milestone, Obstruction, PictureRequest
 from world_models.frames import wrap_angle
-
-
-class Case(NamedTuple):
-    """The milestone that is looked for, the belief, and what is known to stand before the camera: one or none."""
-
-    milestone: Entry[Milestone]
-    belief: Entry[Hypothesis]
-    hidden: tuple[Entry[Obstruction], ...]
 
 
 class ViewPredictor(RobotKnowledgeSource):
@@ -53,24 +42,24 @@ class ViewPredictor(RobotKnowledgeSource):
     needs = (GOING_ON, HELD, STANDING, NOT_LOST, MILESTONE)
     writes = (Milestone, PictureRequest)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        belief, waiting, doubt = HELD.of(view).entry, MILESTONE.of(view), unmeasured_doubt(view)
+    def bind(self, view: View, trigger: Change) -> Entry[Milestone] | None:
+        """The milestone that is looked for, where the robot faces it."""
+        waiting, doubt = MILESTONE.of(view), unmeasured_doubt(view)
         if waiting.value.status != "turning":
             return None
-        off_rad = abs(wrap_angle(find_heading(view, belief.value) - waiting.value.look_heading_rad))
+        off_rad = abs(wrap_angle(HELD.of(view).pose.heading_rad - waiting.value.look_heading_rad))
         if off_rad > MAX_LOOK_ERROR_RAD and (doubt is None or waiting.cycle >= doubt.cycle):
             return None
-        hidden = view.latest(Obstruction)
-        return Case(waiting, belief, () if hidden is None else (hidden,))
+        return waiting
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        milestone, belief, hidden = case
-        robot, pose = find_robot_and_pose(view, belief.value)
+    def act(self, view: View, case: Entry[Milestone]) -> Iterable[Effect]:
+        milestone, belief, hidden = case, HELD.of(view), view.all(Obstruction)[-1:]
+        robot, pose = belief.seeing, belief.pose
         here = replace(milestone.value, look_heading_rad=pose.heading_rad)
         expected = predict_milestone(robot, pose, here, find_car_of(view, here), self._settings)
         if not find_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
-            precompute_views(robot, belief.value.locale, pose, self._settings)  # the judge asks: another door?
-        frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale, self._settings))
-        wish = Revise(milestone, expected, (milestone, belief, *hidden, *frames))
+            precompute_views(robot, belief.locale, pose, self._settings)  # the judge asks: another door?
+        frames = find_frames(view, list_seen_locales(robot, pose, belief.locale, self._settings))
+        wish = Revise(milestone, expected, (milestone, belief.entry, *hidden, *frames))
         yield wish
         yield Post(PictureRequest("milestone"), (wish,))

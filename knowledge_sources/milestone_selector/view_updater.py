@@ -1,24 +1,15 @@
-"""View updater (§4: models are incomplete): what stands before the camera is not expected to be seen through."""
+"""View updater (§4: models are incomplete): what stands before the camera hides what is behind it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Posted, Revise, Revised, View, Watch
 from knowledge_sources.methods.verification import list_seen_locales, predict_milestone
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, MILESTONE, find_car_of, find_frames, find_robot_and_pose
+from knowledge_sources.reads import HELD, MILESTONE, find_car_of, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Hypothesis, Milestone, Obstruction
-
-
-class Case(NamedTuple):
-    """What was found to stand before the camera, the milestone whose picture is taken and not judged, the belief."""
-
-    hidden: Entry[Obstruction]
-    milestone: Entry[Milestone]
-    belief: Entry[Hypothesis]
+from world_models.entries import Milestone, Obstruction
 
 
 class ViewUpdater(RobotKnowledgeSource):
@@ -29,13 +20,13 @@ class ViewUpdater(RobotKnowledgeSource):
     needs = (HELD, MILESTONE)
     writes = (Milestone,)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        waiting = MILESTONE.of(view)
-        return Case(trigger.entry, waiting, HELD.of(view).entry) if waiting.value.status == "expected" else None
+    def bind(self, view: View, trigger: Change) -> Entry[Obstruction] | None:
+        """What was found, where the picture of the milestone is taken and not judged."""
+        return trigger.entry if MILESTONE.of(view).value.status == "expected" else None
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        hidden, milestone, belief = case
-        robot, pose = find_robot_and_pose(view, belief.value)
+    def act(self, view: View, case: Entry[Obstruction]) -> Iterable[Effect]:
+        hidden, milestone, belief = case, MILESTONE.of(view), HELD.of(view)
+        robot, pose = belief.seeing, belief.pose
         seen = predict_milestone(robot, pose, milestone.value, find_car_of(view, milestone.value), self._settings)
-        frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale, self._settings))
-        yield Revise(milestone, seen, (hidden, milestone, belief, *frames))
+        frames = find_frames(view, list_seen_locales(robot, pose, belief.locale, self._settings))
+        yield Revise(milestone, seen, (hidden, milestone, belief.entry, *frames))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch
 from knowledge_sources.methods.motion import leads_through, meets
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import active_goal, find_belief, find_robot
+from knowledge_sources.reads import HELD, active_goal, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import Settings
 from world_models.building.locale_frame import LocaleFrame
@@ -102,14 +102,13 @@ def _find_misled(view: View, frame: Entry[LocaleFrame], settings: Settings) -> t
     """The active sketches, all of them, where one leads through what has changed."""
     if active_goal(view) is None:
         return ()
-    active, belief = view.where(PlanSketch, lambda sketch: sketch.is_active), find_belief(view)
+    active, belief = view.where(PlanSketch, lambda sketch: sketch.is_active), HELD.find(view)
     found = [view.get(ref.id) for ref in frame.because if ref.id != frame.id]
     changed = [entry.value for entry in found if entry is not None and isinstance(entry.value, Obstacle)]
     is_misled = False
     if belief is not None and changed:
         robot = find_robot(view)
-        here = belief.value.world_from_robot(robot.world)
-        is_misled = any(meets(sketch.value, obstacle, here, robot, settings.plan)
+        is_misled = any(meets(sketch.value, obstacle, belief.pose, robot, settings.plan)
                         for sketch in active for obstacle in changed)
     if len(changed) < len(found) or not changed:  # something else is otherwise too: a door, or what the file has
         is_misled = is_misled or any(leads_through(sketch.value, frame.value) for sketch in active)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.methods.arrays import Image
@@ -29,14 +28,6 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import CameraPicture, DoorPicture, DoorState, Milestone
 
 
-class Case(NamedTuple):
-    """Doors in view, and the belief by which the newest picture shows them."""
-
-    doors: tuple[Watched, ...]
-    belief: Belief
-    frame: Entry[CameraPicture]
-
-
 class DoorWatcher(RobotKnowledgeSource):
     """Looks whether the doors in view are open or shut.
 
@@ -54,20 +45,20 @@ class DoorWatcher(RobotKnowledgeSource):
     needs = (GOING_ON, HELD, PICTURE, UP_TO_DATE, SURE)
     writes = (DoorState,)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        """Doors that the newest picture may show, and a belief that is sharp enough to look at them."""
-        belief, frame = HELD.of(view), PICTURE.of(view)
+    def bind(self, view: View, trigger: Change) -> tuple[Watched, ...] | None:
+        """Doors that the newest picture may show, where the belief is sharp enough to look at them."""
+        belief = HELD.of(view)
         if belief.value.sigma_m > MAX_SIGMA_M or belief.value.sigma_rad > MAX_SIGMA_RAD:
             return None
-        doors = tuple(list_doors_in_view(view, belief.value))
-        return Case(doors, belief, frame) if doors else None
+        return tuple(list_doors_in_view(view, belief.value)) or None
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        picture = read_picture(case.frame.value.jpeg)
+    def act(self, view: View, case: tuple[Watched, ...]) -> Iterable[Effect]:
+        held, frame = HELD.of(view), PICTURE.of(view)
+        picture = read_picture(frame.value.jpeg)
         if is_dark(*compute_mean_and_deviation(picture.grey), self._settings.goal):
             return
-        for watched in case.doors:
-            yield from self._watch(view, watched, case.belief, case.frame, picture.half)
+        for watched in case:
+            yield from self._watch(view, watched, held, frame, picture.half)
 
     def _watch(
         self, view: View, watched: Watched, held: Belief, frame: Entry[CameraPicture], image: Image

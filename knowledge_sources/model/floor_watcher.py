@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from itertools import islice
-from typing import NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD, Seen, see_free_floor
@@ -34,13 +33,6 @@ CORRECTED_BY = ("milestone", "tracks", "relocalization")
 """What the belief rests on when a picture has corrected it."""
 
 
-class Case(NamedTuple):
-    """A picture, and the belief by which it shows the floor."""
-
-    frame: Entry[CameraPicture]
-    belief: Belief
-
-
 class FloorWatcher(RobotKnowledgeSource):
     """Looks at the floor in each picture, once the belief was corrected by it.
 
@@ -59,29 +51,29 @@ class FloorWatcher(RobotKnowledgeSource):
     needs = (GOING_ON, PICTURE, HELD, UP_TO_DATE, SURE)
     writes = (FreeFloor, FloorAppearance, FloorView)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        """A picture in which the floor was not looked at yet, and a belief that is sharp enough to tell by it."""
+    def bind(self, view: View, trigger: Change) -> Entry[CameraPicture] | None:
+        """A picture in which the floor was not looked at yet, where the belief is sharp enough to tell by it."""
         frame, belief = PICTURE.of(view), HELD.of(view)
         if belief.value.sigma_m > MAX_FLOOR_SIGMA_M or belief.value.sigma_rad > MAX_FLOOR_SIGMA_RAD:
             return None
         if _is_seen(view, frame) or (rolling_course(view) is not None and _is_near_last(view, belief)):
             return None
-        return Case(frame, belief)
+        return frame
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        frame, belief, robot, pose = case.frame, case.belief.entry, case.belief.seeing, case.belief.pose
-        locale = case.belief.locale
+    def act(self, view: View, case: Entry[CameraPicture]) -> Iterable[Effect]:
+        frame, held = case, HELD.of(view)
+        belief, locale, robot, pose = held.entry, held.locale, held.seeing, held.pose
         floor_m = robot.world.floor_m(locale)
         known = {entry.value.locale: entry for entry in view.all(FloorAppearance)}
         kept = [entry for entry in islice(view.newest_first(FloorView), LAST_VIEWS)
                 if entry.value.belief == belief.id and entry.value.floor_m == floor_m]
         apart_m = FLOOR_VIEW_DISTANCE_M
         earlier = [entry for entry in kept if _measure_way_m(entry.value, pose) >= apart_m]
-        motions = [find_motion_between(view, entry.value, case.belief) for entry in earlier]
+        motions = [find_motion_between(view, entry.value, held) for entry in earlier]
         wheels = {entry.id: entry for _, told in motions for entry in told}
         lit = _find_lit(view, frame.value.sim_time_s)
         seen, learnt = see_free_floor(
-            robot, locale, pose, case.belief.covariance, frame.value.jpeg,
+            robot, locale, pose, held.covariance, frame.value.jpeg,
             [Seen(view[entry.value.frame].value.jpeg, _pose_of(entry.value), motion)
              for entry, (motion, _) in zip(earlier, motions, strict=True)],
             {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings,

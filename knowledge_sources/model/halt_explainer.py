@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch
 from knowledge_sources.methods.floor import build_polygon
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, find_swept_next
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Hypothesis, Leg, Obstacle
+from world_models.entries import Leg, Obstacle
 
-
-class Case(NamedTuple):
-    """A leg that was halted, where the robot is, and what is suspected right before it."""
-
-    leg: Entry[Leg]
-    belief: Entry[Hypothesis]
-    suspected: tuple[Entry[Obstacle], ...]
+Halted = tuple[Entry[Leg], tuple[Entry[Obstacle], ...]]
 
 
 class HaltExplainer(RobotKnowledgeSource):
@@ -33,14 +26,14 @@ class HaltExplainer(RobotKnowledgeSource):
     needs = (HELD,)
     writes = (Obstacle,)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        """What is suspected where the robot would sweep next."""
-        belief = HELD.of(view)
-        ahead = find_swept_next(belief, trigger.entry.value, self._settings.action)
+    def bind(self, view: View, trigger: Change) -> Halted | None:
+        """The leg, and what is suspected where the robot would sweep next."""
+        ahead = find_swept_next(HELD.of(view), trigger.entry.value, self._settings.action)
         found = tuple(entry for entry in view.where(Obstacle, lambda o: o.status == "suspected")
                       if build_polygon(entry.value.footprint).intersects(ahead))
-        return Case(trigger.entry, belief.entry, found) if found else None
+        return (trigger.entry, found) if found else None
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        for entry in case.suspected:
-            yield Revise(entry, replace(entry.value, status="there"), (entry, case.leg, case.belief))
+    def act(self, view: View, case: Halted) -> Iterable[Effect]:
+        leg, suspected = case
+        for entry in suspected:
+            yield Revise(entry, replace(entry.value, status="there"), (entry, leg, HELD.of(view).entry))

@@ -4,25 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import islice
-from typing import NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
 from knowledge_sources.methods.floor import see_ranges
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, SURE, UP_TO_DATE, Belief
+from knowledge_sources.reads import HELD, SURE, UP_TO_DATE
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import FreeFloor, Ranges
 
 MAX_BELIEF_SIGMA_M = 0.15  # a less certain place tells of no free floor
 MAX_RANGE_AGE_S = 5.0  # a reading is compared with those that are no older
 MAX_EARLIER_READINGS = 4  # readings that the newest is compared with
-
-
-class Case(NamedTuple):
-    """A reading, and the belief by which it tells of the floor."""
-
-    reading: Entry[Ranges]
-    belief: Belief
 
 
 class RangeWatcher(RobotKnowledgeSource):
@@ -37,15 +29,14 @@ class RangeWatcher(RobotKnowledgeSource):
     needs = (HELD, UP_TO_DATE, SURE)
     writes = (FreeFloor,)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        """The newest reading, and a belief that is sharp enough to tell whether an echo is of a wall."""
-        belief = HELD.of(view)
+    def bind(self, view: View, trigger: Change) -> Entry[Ranges] | None:
+        """The newest reading, where a belief is held that is sharp enough to tell whether an echo is of a wall."""
         is_newest = view.latest(Ranges) is trigger.entry
-        is_told = self._settings.floor.use_ranges and is_newest and belief.value.sigma_m <= MAX_BELIEF_SIGMA_M
-        return Case(trigger.entry, belief) if is_told else None
+        is_told = self._settings.floor.use_ranges and is_newest and HELD.of(view).value.sigma_m <= MAX_BELIEF_SIGMA_M
+        return trigger.entry if is_told else None
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        reading, belief = case
+    def act(self, view: View, case: Entry[Ranges]) -> Iterable[Effect]:
+        reading, belief = case, HELD.of(view)
         b = belief.value
         before = (entry for entry in view.newest_first(FreeFloor) if entry.value.sense == "ranges")
         earlier = tuple(entry for entry in islice(before, MAX_EARLIER_READINGS)

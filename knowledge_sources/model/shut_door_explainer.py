@@ -24,21 +24,21 @@ from knowledge_sources.methods.doors import (
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
+    GOING_ON,
+    HELD,
     MAX_SIGMA_M,
     MAX_SIGMA_RAD,
+    NOT_LOST,
+    PLAN_DOUBT,
+    UP_TO_DATE,
     Watched,
-    find_belief,
     find_door_state,
     find_frames,
-    find_robot_in,
-    is_over,
-    is_up_to_date,
     list_doors_in_view,
-    open_discrepancy,
     with_door_shut,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import CameraPicture, DoorPicture, DoorState, Hypothesis, Milestone, Segments
+from world_models.entries import CameraPicture, DoorPicture, DoorState, Milestone, Segments
 
 MAX_DOUBTED_SIGMA_M = 0.3  # largest standard deviation of the place at which a shut door may explain a picture
 MAX_DOUBTED_SIGMA_RAD = 0.07  # largest standard deviation of the believed heading at which it may
@@ -47,7 +47,7 @@ MIN_SURE_FRAME_SHARE = 0.8  # where there are fewer, least share of the opening'
 
 
 class Case(NamedTuple):
-    """A refuted milestone, the lines of its picture, what is believed and in doubt, and the doors in view.
+    """A refuted milestone, the lines of its picture, and the doors in view.
 
     Attributes:
         doors: that are not believed to be shut.
@@ -55,8 +55,6 @@ class Case(NamedTuple):
 
     milestone: Entry[Milestone]
     segments: Entry[Segments]
-    belief: Entry[Hypothesis]
-    doubt: Entry[Discrepancy]
     doors: tuple[Watched, ...]
 
 
@@ -71,35 +69,34 @@ class ShutDoorExplainer(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.ENTER
     on = (Watch(Milestone, (Revised,), lambda m: m.status in ("refuted", "not testable")),)
+    needs = (GOING_ON, HELD, UP_TO_DATE, NOT_LOST, PLAN_DOUBT)
     writes = (DoorState, Discrepancy)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
-        belief, doubt = find_belief(view), open_discrepancy(view, Level.PLAN)
-        if belief is None or doubt is None or not doubt.value.exceeds or is_over(view) or not is_up_to_date(view):
-            return None
-        segments = _find_segments(view, trigger.entry)
-        if open_discrepancy(view, Level.GOAL) is not None or segments is None:
+        belief, segments = HELD.of(view), _find_segments(view, trigger.entry)
+        if not PLAN_DOUBT.of(view).value.exceeds or segments is None:
             return None
         if belief.value.sigma_m > MAX_DOUBTED_SIGMA_M or belief.value.sigma_rad > MAX_DOUBTED_SIGMA_RAD:
             return None
         doors = tuple(w for w in list_doors_in_view(view, belief.value) if not w.is_shut)
-        return Case(trigger.entry, segments, belief, doubt, doors) if doors else None
+        return Case(trigger.entry, segments, doors) if doors else None
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
+        doubt = PLAN_DOUBT.of(view)
         for watched in case.doors:
             found = self._hold_against(view, watched, case)
             if found is not None:
                 yield found
-                yield Revise(case.doubt, case.doubt.value.corrected(), (found,))
+                yield Revise(doubt, doubt.value.corrected(), (found,))
                 return
 
     def _hold_against(self, view: View, watched: Watched, case: Case) -> Post | Revise | None:
         """The door's state, where the picture says that it is shut and the robot where it believes to be."""
-        milestone, segments, belief, _, _ = case
-        door, locale = watched.doorway, belief.value.locale
+        (milestone, segments, _), belief = case, HELD.of(view)
+        door, locale = watched.doorway, belief.locale
         frame: Entry[CameraPicture] = view[segments.value.frame]
-        robot, frames = find_robot_in(view, locale), find_frames(view, door.between)
-        before, covariance = belief.value.world_from_robot(robot.world), belief.value.covariance_world(robot.world)
+        robot, frames = belief.seeing, find_frames(view, door.between)
+        before, covariance = belief.pose, belief.covariance
         as_shut = robot.in_building(with_door_shut(view, door.name, frames))
         looked = before, covariance, segments.value.segments_px, frame.value.jpeg
         shut, opened = (explain_picture(r, *looked, self._settings) for r in (as_shut, robot))
@@ -128,7 +125,7 @@ class ShutDoorExplainer(RobotKnowledgeSource):
         count = 1 if known is None else known.value.pictures + 1
         now = DoorState(door.name, door.between, "shut", 1.0 / (1.0 + math.exp(-odds)), odds, count, picture,
                         frame.value.sim_time_s)
-        because = (frame, milestone, belief, segments)
+        because = (frame, milestone, belief.entry, segments)
         return Post(now, because) if known is None else Revise(known, now, (*because, known))
 
 

@@ -6,7 +6,6 @@ It is told of by pictures of the floor or by range sensors; and it is forgotten 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import shapely
 
@@ -17,13 +16,6 @@ from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, SEEN_MARGIN_M, SURE, Belief, current_leg, find_known_free, find_swept_next
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import CameraPicture, FreeFloor, Obstacle
-
-
-class Case(NamedTuple):
-    """A sight of the floor in which something may be told of a thing, and the belief."""
-
-    scan: Entry[FreeFloor]
-    belief: Belief
 
 
 class ThingMapper(RobotKnowledgeSource):
@@ -39,15 +31,15 @@ class ThingMapper(RobotKnowledgeSource):
     needs = (HELD, SURE)
     writes = (Obstacle,)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
+    def bind(self, view: View, trigger: Change) -> Entry[FreeFloor] | None:
         """A sight with a thing in it that is certain enough, or of floor on which something may be there."""
         scan: Entry[FreeFloor] = trigger.entry
         is_thing = any(is_telling(thing, self._settings.action) for thing in scan.value.things)
         is_told = is_thing or view.latest(Obstacle, may_be_there) is not None
-        return Case(scan, HELD.of(view)) if is_told else None
+        return scan if is_told else None
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        scan, belief = case
+    def act(self, view: View, case: Entry[FreeFloor]) -> Iterable[Effect]:
+        scan, belief = case, HELD.of(view)
         known, driving = {entry.id: entry for entry in view.all(Obstacle)}, current_leg(view)
         obstacles = {id: entry.value for id, entry in known.items()}
         for found in weigh_sight(self._tell_of(view, scan, belief), obstacles, self._settings):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch
 from knowledge_sources.methods.floor import doubt_thing, may_be_there, move_thing
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_building
+from knowledge_sources.reads import HELD
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Certificate, Hypothesis, Obstacle
 from world_models.frames import Pose2, wrap_angle
@@ -18,14 +18,13 @@ MAX_DRIFT_RAD = 0.35  # the same of its heading
 
 
 class Case(NamedTuple):
-    """The belief by which the robot was found again, what is moved, and the certificate after which it was seen.
+    """What is moved, and the certificate after which it was seen.
 
     Attributes:
         correction: the pose that was found, as seen from the one that was believed.
         sure: the last milestone that was verified, if one was.
     """
 
-    belief: Entry[Hypothesis]
     correction: Pose2
     things: tuple[Entry[Obstacle], ...]
     sure: tuple[Entry[Any], ...]
@@ -42,6 +41,7 @@ class ThingMover(RobotKnowledgeSource):
 
     level, priority = Level.ACTION, Priority.REVISE
     on = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.correction is not None),)
+    needs = (HELD,)
     writes = (Obstacle,)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
@@ -49,15 +49,12 @@ class ThingMover(RobotKnowledgeSource):
         sure = view.latest(Certificate, lambda certificate: certificate.verdict == "verified")
         seen = tuple(entry for entry in view.where(Obstacle, lambda o: may_be_there(o) and o.touched_s is None)
                      if sure is None or entry.cycle > sure.cycle)
-        belief: Entry[Hypothesis] = trigger.entry
-        if not seen or belief.value.correction is None:
-            return None
-        return Case(belief, belief.value.correction, seen, () if sure is None else (sure,))
+        by: Pose2 | None = trigger.entry.value.correction
+        return None if not seen or by is None else Case(by, seen, () if sure is None else (sure,))
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        belief, by, things, sure = case
-        building = find_building(view)
-        here = belief.value.world_from_robot(building)
+        (by, things, sure), held = case, HELD.of(view)
+        belief, here = held.entry, held.pose
         moved_m, turned_rad = by.distance_to(Pose2(0.0, 0.0, 0.0)), abs(wrap_angle(by.heading_rad))
         for entry in things:
             if moved_m > MAX_DRIFT_M or turned_rad > MAX_DRIFT_RAD:
@@ -65,5 +62,5 @@ class ThingMover(RobotKnowledgeSource):
                 now = doubt_thing(entry.value, told, self._settings.action)
             else:
                 told = f"moved with the belief, which {belief.ref} corrected"
-                now = move_thing(building, entry.value, here @ by @ here.inverse(), moved_m, told)
+                now = move_thing(held.world, entry.value, here @ by @ here.inverse(), moved_m, told)
             yield Revise(entry, now, (belief, entry, *sure))

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Revise, Revised, View, Watch
 from knowledge_sources.methods.floor import TOUCH_MARGIN_M, find_touched, locate_touch, touch_again, touch_first
+from knowledge_sources.methods.floor.weigh_touch import Touched
 from knowledge_sources.methods.motion import find_nearest
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD
@@ -18,10 +19,11 @@ MAX_TOUCH_SIGMA_RAD = 0.6  # a contact whose direction is less sure tells of no 
 
 
 class Case(NamedTuple):
-    """What was known of what was touched, if anything was; what is known of it now; and what tells it."""
+    """Where something was touched, by what deviation; what is known to stand there, if anything is; what tells it."""
 
+    touched: Touched
+    sigma_m: float
     known: Entry[Obstacle] | None
-    found: Obstacle
     because: tuple[Entry[Any], ...]
 
 
@@ -41,7 +43,7 @@ class TouchFinder(RobotKnowledgeSource):
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         """The newest contact, where its direction is known well enough and the model does not explain it."""
-        touch, belief, s = _find_new_touch(view), HELD.of(view), self._settings.action
+        touch, belief = _find_new_touch(view), HELD.of(view)
         if touch is None or touch[0].value.sigma_rad > MAX_TOUCH_SIGMA_RAD:
             return None
         contact, turned_rad, turns = touch
@@ -52,15 +54,18 @@ class TouchFinder(RobotKnowledgeSource):
         obstacles = {entry.id: entry for entry in view.all(Obstacle)}
         id = find_touched({id: o.value for id, o in obstacles.items()}, touched, reach_m + 3.0 * sigma_m)
         if id is not None:
-            known = obstacles[id]
-            return Case(known, touch_again(belief.world, touched, known.value, s), (*because, known))
+            return Case(touched, sigma_m, obstacles[id], because)
         if find_nearest(belief.world, b.locale, belief.pose.position, of_model=True)[0] <= radius_m + reach_m:
             return None
-        return Case(None, touch_first(belief.world, touched, b.locale, sigma_m, 1 + len(obstacles), s), because)
+        return Case(touched, sigma_m, None, because)
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        known, found, because = case
-        yield Post(found, because) if known is None else Revise(known, found, because)
+        (touched, sigma_m, known, because), belief, s = case, HELD.of(view), self._settings.action
+        if known is None:
+            number = 1 + len(view.all(Obstacle))
+            yield Post(touch_first(belief.world, touched, belief.locale, sigma_m, number, s), because)
+        else:
+            yield Revise(known, touch_again(belief.world, touched, known.value, s), (*because, known))
 
 
 def _find_new_touch(view: View) -> tuple[Entry[Contact], float, tuple[Entry[MotorCommand], ...]] | None:

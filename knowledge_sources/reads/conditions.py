@@ -31,8 +31,8 @@ from knowledge_sources.reads.questions import (
     rolling_course,
     unmeasured_doubt,
 )
-from world_models.building.building import Building
-from world_models.entries import CameraPicture, Hypothesis
+from world_models.entries import CameraPicture, CameraState, Hypothesis, Outcome, Travel
+from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
@@ -68,7 +68,7 @@ class Belief:
         return find_robot_in(self.view, self.locale)
 
     @cached_property
-    def world(self) -> Building:
+    def world(self) -> FrameBuilding:
         """The building as far as its frames are on the board."""
         return find_building(self.view)
 
@@ -81,6 +81,16 @@ class Belief:
     def covariance(self) -> Floats:
         """(3, 3) over (x, y, heading), world frame."""
         return self.entry.value.covariance_world(self.world)
+
+    def moved_to(
+        self, pose: Pose2, covariance: Floats, basis: str, *, locale: str = "", motion: str = ""
+    ) -> Hypothesis:
+        """What is believed from now on: another pose with its covariance (3, 3), world frame, and what that rests on.
+
+        In the same locale, and with the same motion taken into account, where no other is given.
+        """
+        return Hypothesis.of_world(
+            self.world, locale or self.locale, pose, covariance, basis, motion=motion or self.value.motion)
 
 
 def find_held(view: View) -> Belief | None:
@@ -105,6 +115,10 @@ def _find_lost(view: View) -> Entry[Discrepancy] | None:
     return open_discrepancy(view, Level.GOAL)
 
 
+def _find_plan_doubt(view: View) -> Entry[Discrepancy] | None:
+    return open_discrepancy(view, Level.PLAN)
+
+
 def _list_doubts_above(view: View) -> list[Entry[Discrepancy]]:
     return [entry for entry in open_discrepancies(view) if entry.value.level is not Level.ACTION]
 
@@ -121,6 +135,7 @@ def _tell_doubt(view: View) -> str:
     return ", ".join(f"{entry.ref} was open at the {entry.value.level} level" for entry in found)
 
 
+NOT_ENDED = Condition("not ended", lambda view: view.latest(Outcome) is None, "it had")
 NOT_GIVEN_UP = Condition("not given up", lambda view: not is_given_up(view), "it had ended")
 GOING_ON = Condition("not over", lambda view: not is_over(view), "it had ended")
 HELD = Condition("a belief", find_held, "none was held")
@@ -134,9 +149,15 @@ MEASURED = Condition("no unmeasured doubt", _none_open(unmeasured_doubt),
 NOT_LOST = Condition("not lost", _none_open(_find_lost), _tell_open(_find_lost, "open at the goal level"))
 NO_DOUBT_ABOVE = Condition("no doubt above", lambda view: not _list_doubts_above(view), lambda view: (
     f"{', '.join(str(entry.ref) for entry in _list_doubts_above(view))} was open"))
+DOUBTED = Condition("an unmeasured doubt", unmeasured_doubt, "none was open at the plan level")
+PLAN_DOUBT = Condition("a doubt at the plan level", _find_plan_doubt, "none was open there")
 LOST = Condition("lost", _find_lost, "nothing was open at the goal level")
 SOUND = Condition("no fault", _none_open(find_stop), _tell_open(find_stop, "not over, or nobody has said go on since"))
 MILESTONE = Condition("a milestone awaited", open_milestone, "none was")
 NO_MILESTONE = Condition("no milestone awaited", _none_open(open_milestone), _tell_open(open_milestone, "awaited"))
 GOAL = Condition("a goal", active_goal, "none was pursued")
 SKETCH = Condition("a sketch", deepest_sketch, "there was none")
+CAMERA: Condition[Entry[CameraState]] = Condition(
+    "a camera", lambda view: view.latest(CameraState), "nobody has told of it")
+WAY: Condition[Entry[Travel]] = Condition(
+    "a way since a known place", lambda view: view.latest(Travel), "there was none")

@@ -41,17 +41,17 @@ def rectify(robot: RobotModel, frame: Entry[CameraPicture]) -> Image:
 
 
 def take_new(
-    seeing: RobotModel, frame: str, image: Image, kept: tuple[Track, ...], anchors: tuple[Anchor, ...],
+    held: Belief, frame: str, image: Image, kept: tuple[Track, ...], anchors: tuple[Anchor, ...],
     belief: Hypothesis, camera_covariance: Floats | None, settings: Settings,
 ) -> Renewed:
     """Take new landmarks beside those that are kept, once the belief is aligned with the model's edges.
 
     Args:
-        seeing: the robot on the floor of its locale, with what stands before its camera.
+        belief: what is held, or that corrected by this picture already.
         frame: id of the picture; image: the picture, rectified.
         camera_covariance: (7, 7); None where the belief rests on this very picture: it is not aligned by it again.
     """
-    world = seeing.world
+    seeing, world = held.seeing, held.world
     pose = belief.world_from_robot(world)
     lines = visible_lines(
         world, seeing.camera, seeing.camera_from_world(pose), min_length_px=MIN_EDGE_LENGTH_PX,
@@ -64,7 +64,7 @@ def take_new(
                                camera_covariance, settings.tracking)
     if found is not None:
         pose = found.world_from_robot
-        belief = Hypothesis.of_world(world, belief.locale, pose, found.covariance, "tracks", motion=belief.motion)
+        belief = held.moved_to(pose, found.covariance, "tracks")
     items = (*kept, *select_landmarks(seeing, kept, frame, image, pose, settings))
     return Renewed(with_anchors(seeing, frame, items, anchors, belief, len(items), settings), belief)
 

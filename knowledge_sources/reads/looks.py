@@ -7,24 +7,10 @@ from collections.abc import Callable
 
 from blackboard import Entry, View
 from knowledge_sources.methods.belief import to_log_odds
-from knowledge_sources.reads.questions import find_building, find_robot_in
 from knowledge_sources.settings import Settings
-from world_models.entries import Certificate, Hypothesis, Milestone, PlanSketch
-from world_models.frames import Pose2
-from world_models.robot import RobotModel
+from world_models.entries import Certificate, Milestone, PlanSketch
 
 MAX_LOOK_ERROR_RAD = math.radians(3.5)  # the robot faces a milestone when its heading is off by no more than this
-
-
-def find_robot_and_pose(view: View, belief: Hypothesis) -> tuple[RobotModel, Pose2]:
-    """The robot on its floor, and the believed pose in the world."""
-    robot = find_robot_in(view, belief.locale)
-    return robot, belief.world_from_robot(robot.world)
-
-
-def find_heading(view: View, belief: Hypothesis) -> float:
-    """The believed heading [rad, world]."""
-    return belief.world_from_robot(find_building(view)).heading_rad
 
 
 def find_tried(view: View, is_same: Callable[[Entry[Milestone]], bool]) -> tuple[float, ...]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from blackboard import Condition, Discrepancy, Entry, View
+from blackboard import Condition, Discrepancy, Entry, Level, Post, View
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.features import picture
 from knowledge_sources.methods.localization import CameraView
@@ -19,7 +19,6 @@ from world_models.entries import (
     AROUND_SIGMA_RAD,
     Contact,
     Glimpse,
-    Hypothesis,
     MotionReport,
     Panorama,
     PlanSketch,
@@ -28,16 +27,9 @@ from world_models.entries import (
 from world_models.frames import Pose2
 
 
-class Lost(NamedTuple):
-    """The doubt at the goal level, and what was believed last."""
-
-    doubt: Entry[Discrepancy]
-    belief: Entry[Hypothesis]
-
-
-def find_lost(view: View) -> Lost:
-    """What a lost robot rests on."""
-    return Lost(LOST.of(view), HELD.of(view).entry)
+def declare_lost(what: str, because: tuple[object, ...]) -> Post:
+    """The robot may be elsewhere: the goal level measures that anew, by a look round."""
+    return Post(Discrepancy(Level.GOAL, what, None, (0.0, 0.0), "px"), because)
 
 
 def find_panorama(view: View, doubt: Entry[Discrepancy]) -> Entry[Panorama] | None:

@@ -1,4 +1,4 @@
-"""Twin watcher (§4): is the robot where it believes, or in a place that looked the same until now?"""
+"""Alias monitor (§4): is the robot where it believes, or in a place that looked the same until now?"""
 
 from __future__ import annotations
 
@@ -22,20 +22,19 @@ from knowledge_sources.methods.localization import (
     make_alias_test,
 )
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import count_refuted, find_belief, find_building, find_robot_in, is_over, open_discrepancy
+from knowledge_sources.reads import GOING_ON, HELD, NOT_LOST, Belief, count_refuted, declare_lost
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Certificate, Hypothesis, PoseFix, Segments, Twin, TwinOdds
+from world_models.entries import Certificate, PoseFix, Segments, Twin, TwinOdds
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 
 class Case(NamedTuple):
-    """A verified milestone with its pose and its picture, the belief, and the odds that are known, if any are."""
+    """A verified milestone with its pose and its picture, and the odds that are known, if any are."""
 
     certificate: Entry[Certificate]
     fix: Entry[PoseFix]
     looked: Entry[Segments]
-    belief: Entry[Hypothesis]
     known: Entry[TwinOdds] | None
 
 
@@ -50,24 +49,25 @@ class AliasMonitor(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.REVISE
     on = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
+    needs = (GOING_ON, HELD, NOT_LOST)
     writes = (TwinOdds, Discrepancy)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
-        belief, fix = find_belief(view), view.get(trigger.entry.value.fix)
-        if is_over(view) or open_discrepancy(view, Level.GOAL) is not None or belief is None or fix is None:
+        fix = view.get(trigger.entry.value.fix)
+        if fix is None:
             return None
         known, match = view.latest(TwinOdds), view.get(fix.value.match)
         looked = None if match is None else view.get(match.value.segments)
         is_new = known is None or (known.value.twins and self._is_new(known.value, fix.value))
-        return Case(trigger.entry, fix, looked, belief, known) if is_new and looked is not None else None
+        return Case(trigger.entry, fix, looked, known) if is_new and looked is not None else None
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        certificate, fix, looked, belief, known = case
-        robot, here = find_robot_in(view, belief.value.locale), fix.value.world_from_robot
+        (certificate, fix, looked, known), belief = case, HELD.of(view)
+        robot, here = belief.seeing, fix.value.world_from_robot
         s = self._settings.localization
         if known is None:
             p_prior = compute_prior(count_refuted(view), s)
-            twins = self._find_twins(view, robot, belief.value, here)
+            twins = self._find_twins(belief, robot, here)
         else:
             p_prior, twins = known.value.p_prior, known.value.twins
         weighed = self._weigh(robot, looked.value, here, twins)
@@ -75,12 +75,11 @@ class AliasMonitor(RobotKnowledgeSource):
         kept = tuple(twin for twin, p in zip(weighed, odds[1:], strict=True) if p >= s.min_p_twin)
         counted = (*(() if known is None else known.value.counted), certificate.id)
         found = TwinOdds(p_prior, odds[0], kept, counted, here)
-        because = (certificate, fix, looked, belief)
+        because = (certificate, fix, looked, belief.entry)
         change = Post(found, because) if known is None else Revise(known, found, (*because, known))
         yield change
         if odds[0] < s.min_p_tracked:
-            yield Post(Discrepancy(Level.GOAL, f"it may be elsewhere: {found.sentence()}", None, (0.0, 0.0), "px"),
-                       (change,))
+            yield declare_lost(f"it may be elsewhere: {found.sentence()}", (change,))
 
     def _is_new(self, known: TwinOdds, fix: PoseFix) -> bool:
         """Whether a picture shows something else than the last that was counted."""
@@ -88,9 +87,9 @@ class AliasMonitor(RobotKnowledgeSource):
         turn = abs(wrap_angle(pose.heading_rad - known.last.heading_rad))
         return pose.distance_to(known.last) >= 0.5 * MOVE_M or turn >= MIN_NEW_VIEW_RAD
 
-    def _find_twins(self, view: View, robot: RobotModel, belief: Hypothesis, here: Pose2) -> tuple[Twin, ...]:
+    def _find_twins(self, belief: Belief, robot: RobotModel, here: Pose2) -> tuple[Twin, ...]:
         """The places of the floor that look like the believed one by walls and doors."""
-        building = find_building(view)
+        building = belief.world
         container, level_m = building.locale(belief.locale).parent or belief.locale, building.floor_m(belief.locale)
         rooms = building.list_rooms_in(container, level_m, self._settings.goal.max_floor_difference_m)
         building.require(rooms)

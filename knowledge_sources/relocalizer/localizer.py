@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Retract, Revised, View, Watch
 from knowledge_sources.methods import localization
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
+    HELD,
+    LOST,
     WHILE_LOST,
-    Lost,
     count_refuted,
     find_building,
     find_building_as_filed,
     find_camera,
-    find_lost,
     find_p_there,
     find_robot,
     list_contacts,
@@ -42,15 +41,6 @@ MAX_PROBES = 8  # so many looks are taken when lost and no place fits; then the 
 Candidates = tuple[Entry[Hypothesis], ...]
 
 
-class Case(NamedTuple):
-    """The looks of a lost robot, its doubt and belief, the candidates so far, and what stands before its camera."""
-
-    panorama: Entry[Panorama]
-    lost: Lost
-    candidates: Candidates
-    hidden: Entry[Obstruction] | None
-
-
 class Localizer(RobotKnowledgeSource):
     """Keeps every place of the floor that agrees with the panorama, and says which next look tells most.
 
@@ -66,17 +56,13 @@ class Localizer(RobotKnowledgeSource):
     needs = WHILE_LOST
     writes = (PlaceSearch, Hypothesis, PlaceOdds)
 
-    def bind(self, view: View, trigger: Change) -> Case:
+    def act(self, view: View, case: Change) -> Iterable[Effect]:
+        panorama, doubt, held, hidden = case.entry, LOST.of(view), HELD.of(view), view.latest(Obstruction)
         candidates = view.where(Hypothesis, lambda h: h.status == "candidate")
-        return Case(trigger.entry, find_lost(view), candidates, view.latest(Obstruction))
-
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        panorama, (doubt, belief), candidates, hidden = case
-        building, locale, tuning = find_building(view), belief.value.locale, self._settings.localization
-        here = belief.value.world_from_robot(building)
+        building, locale, here, tuning = held.world, held.locale, held.pose, self._settings.localization
         refuted = count_refuted(view, doubt)
         p_there = find_p_there(view, refuted, tuning)
-        told = localization.StatedPlace(here, belief.value.covariance_world(building), p_there)
+        told = localization.StatedPlace(here, held.covariance, p_there)
         looked = [glimpse.now_from_then for glimpse in panorama.value.glimpses]
         looks, obstruction = list_views(view, panorama.value.glimpses), None if hidden is None else hidden.value
         if obstruction is not None:
@@ -104,17 +90,17 @@ class Localizer(RobotKnowledgeSource):
         said = localization.describe(result, is_far=far is not None) if odds is None else odds.sentence()
         step = result.next_action if result.status is localization.LocalizationStatus.PROBE else None
         probe = None if step is None else (step.turn_rad, step.move_m)
-        because = (panorama, doubt, belief, *candidates, *contacts, *(() if hidden is None else (hidden,)))
+        because = (panorama, doubt, held.entry, *candidates, *contacts, *(() if hidden is None else (hidden,)))
         found = Post(PlaceSearch(result.status.value, said, probe, which >= len(buildings)), because)
         yield found
         yield from (Retract(old, (found,)) for old in candidates)
         if odds is not None:
-            yield Post(odds, (found, belief))
+            yield Post(odds, (found, held.entry))
         is_found = result.status is localization.LocalizationStatus.FOUND
         for c in result.candidates[:1] if is_found else result.candidates:
-            yield Post(Hypothesis.of_world(
-                building, c.room, c.world_from_robot, c.covariance, "relocalization", status="candidate",
-                weight=c.weight, motion=belief.value.motion, evidence=str(c.likelihood)), (found, panorama, belief))
+            there = held.moved_to(c.world_from_robot, c.covariance, "relocalization", locale=c.room)
+            place = replace(there, status="candidate", weight=c.weight, evidence=str(c.likelihood))
+            yield Post(place, (found, panorama, held.entry))
 
     def _list_cameras(self, view: View) -> tuple[CameraState, ...]:
         """The camera as it was learnt; also as it was told, where few pictures taught otherwise: if the place was not

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch, to_say
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch, to_say
 from knowledge_sources.methods.localization import propagate_pose, update_obstruction
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import LOST, WHILE_LOST, find_panorama, find_robot, is_dark, list_views
@@ -16,21 +15,6 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.entries import Glimpse, MotionReport, Obstruction, Panorama, Segments, covariance_tuple
 from world_models.frames import Pose2
-
-
-class Case(NamedTuple):
-    """The segments of a new picture, the doubt of the lost robot, and what it has looked at so far.
-
-    Attributes:
-        before: the panorama without the new picture, and the motions since; None and none where it is the first.
-        hidden: what is known to stand before the camera.
-    """
-
-    segments: Entry[Segments]
-    doubt: Entry[Discrepancy]
-    before: Entry[Panorama] | None
-    motions: tuple[Entry[MotionReport], ...]
-    hidden: Entry[Obstruction] | None
 
 
 class PanoramaBuilder(RobotKnowledgeSource):
@@ -46,17 +30,14 @@ class PanoramaBuilder(RobotKnowledgeSource):
     needs = WHILE_LOST
     writes = (Panorama, Obstruction)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        doubt = LOST.of(view)
-        if is_dark(trigger.entry.value, self._settings.goal):
-            return None
+    def bind(self, view: View, trigger: Change) -> Entry[Segments] | None:
+        """The lines of a picture that is not dark."""
+        return None if is_dark(trigger.entry.value, self._settings.goal) else trigger.entry
+
+    def act(self, view: View, case: Entry[Segments]) -> Iterable[Effect]:
+        segments, doubt, hidden, robot = case, LOST.of(view), view.latest(Obstruction), find_robot(view)
         before = find_panorama(view, doubt)
         motions = () if before is None else view.since(MotionReport, before.cycle)
-        return Case(trigger.entry, doubt, before, motions, view.latest(Obstruction))
-
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        segments, doubt, before, motions, hidden = case
-        robot = find_robot(view)
         old = () if before is None else before.value.glimpses
         for report in motions:
             old = tuple(_move(glimpse, report.value, robot.actuator) for glimpse in old)

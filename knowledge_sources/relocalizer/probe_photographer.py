@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revised, View, Watch
 from knowledge_sources.priority import Priority
@@ -12,13 +12,6 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Hypothesis, MotionReport, PictureRequest, Segments
 
 MAX_DARK_FRAMES = 150  # so many dark frames are taken while waiting for light
-
-
-class Case(NamedTuple):
-    """What makes a picture due, and the doubt that it is to end."""
-
-    cause: Entry[Any]
-    doubt: Entry[Discrepancy]
 
 
 class ProbePhotographer(RobotKnowledgeSource):
@@ -34,12 +27,13 @@ class ProbePhotographer(RobotKnowledgeSource):
     needs = WHILE_LOST
     writes = (PictureRequest,)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        doubt, moved = LOST.of(view), view.latest(MotionReport)
-        probes = [s for s in view.since(Segments, doubt.cycle) if s.value.milestone == ""]
+    def bind(self, view: View, trigger: Change) -> Entry[Any] | None:
+        """What makes a picture due."""
+        moved = view.latest(MotionReport)
+        probes = [s for s in view.since(Segments, LOST.of(view).cycle) if s.value.milestone == ""]
         since = 0 if moved is None else moved.cycle
         is_seen = any(s.cycle >= since and not is_dark(s.value, self._settings.goal) for s in probes)
-        return None if is_seen or len(probes) >= MAX_DARK_FRAMES else Case(trigger.entry, doubt)
+        return None if is_seen or len(probes) >= MAX_DARK_FRAMES else trigger.entry
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        yield Post(PictureRequest("probe"), tuple(case))
+    def act(self, view: View, case: Entry[Any]) -> Iterable[Effect]:
+        yield Post(PictureRequest("probe"), (case, LOST.of(view)))

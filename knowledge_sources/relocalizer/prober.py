@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, View, Watch
+from blackboard import Change, Effect, Level, Post, Posted, View, Watch
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import LOST, SOUND, WHILE_LOST
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import MotorCommand, PlaceSearch
-
-
-class Case(NamedTuple):
-    """A search that did not tell the place, and the doubt that it is to end."""
-
-    search: Entry[PlaceSearch]
-    doubt: Entry[Discrepancy]
 
 
 class Prober(RobotKnowledgeSource):
@@ -28,10 +20,7 @@ class Prober(RobotKnowledgeSource):
     needs = (*WHILE_LOST, SOUND)
     writes = (MotorCommand,)
 
-    def bind(self, view: View, trigger: Change) -> Case:
-        return Case(trigger.entry, LOST.of(view))
-
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        s, (turn_rad, move_m) = self._settings.action, case.search.value.probe or (0.0, 0.0)
+    def act(self, view: View, case: Change) -> Iterable[Effect]:
+        s, (turn_rad, move_m) = self._settings.action, case.entry.value.probe or (0.0, 0.0)
         slowly = s.creep_speed_m_per_s if s.keeps_to_seen_floor and move_m > 0.0 else None  # no floor is known free
-        yield Post(MotorCommand(turn_rad, move_m, slowly), (case.search, case.doubt))
+        yield Post(MotorCommand(turn_rad, move_m, slowly), (case.entry, LOST.of(view)))

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 
 from blackboard import Change, Effect, Entry, Level, Posted, Revise, View, Watch
 from knowledge_sources.methods.calibration import compute_camera_covariance, learn
 from knowledge_sources.priority import Priority
+from knowledge_sources.reads import CAMERA
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.camera import YAW
 from world_models.entries import CameraState, Certificate, PoseFix, Travel, begin_travel
 
-
-class Case(NamedTuple):
-    """A verified milestone whose pose fix says something of the camera, and the camera as it is known."""
-
-    certificate: Entry[Certificate]
-    fix: Entry[PoseFix]
-    camera: Entry[CameraState]
+Verified = tuple[Entry[Certificate], Entry[PoseFix]]
 
 
 class CameraCalibrator(RobotKnowledgeSource):
@@ -32,16 +26,16 @@ class CameraCalibrator(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.ENTER
     on = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
+    needs = (CAMERA,)
     writes = (CameraState, Travel)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        fix, camera = view.get(trigger.entry.value.fix), view.latest(CameraState)
-        if fix is None or not fix.value.camera_step or camera is None:
-            return None
-        return Case(trigger.entry, fix, camera)
+    def bind(self, view: View, trigger: Change) -> Verified | None:
+        """A verified milestone whose pose fix says something of the camera."""
+        fix = view.get(trigger.entry.value.fix)
+        return None if fix is None or not fix.value.camera_step else (trigger.entry, fix)
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        certificate, fix, camera = case
+    def act(self, view: View, case: Verified) -> Iterable[Effect]:
+        (certificate, fix), camera = case, CAMERA.of(view)
         f = fix.value
         state = learn(camera.value, f.camera_step, np.array(f.camera_covariance), f.world_from_robot,
                       self._settings.camera_state)

@@ -5,33 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import NamedTuple
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Posted, Revise, View, Watch
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Posted, Revise, View, Watch, rule
 from knowledge_sources.priority import Priority
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from knowledge_sources.reads import WAY
 from world_models.entries import Travel
 
 
-class Case(NamedTuple):
-    """The way, and what happened on it."""
-
-    travel: Entry[Travel]
-    what: Entry[Discrepancy]
+def find_unbroken(view: View, trigger: Change) -> Entry[Discrepancy] | None:
+    """What happened on a way that is not broken yet."""
+    return None if WAY.of(view).value.is_broken else trigger.entry
 
 
-class TravelBreaker(RobotKnowledgeSource):
+@rule(on=Watch(Discrepancy, (Posted,), lambda d: d.level is Level.GOAL or d.magnitude == math.inf), writes=Travel,
+      needs=(WAY,), bind=find_unbroken, priority=Priority.REVISE)
+def travel_breaker(view: View, what: Entry[Discrepancy]) -> Iterable[Effect]:
     """Marks the way since the last milestone as broken, when the robot is lost, or something pushed or stopped it."""
-
-    level, priority = Level.ACTION, Priority.REVISE
-    on = (Watch(Discrepancy, (Posted,), lambda d: d.level is Level.GOAL or d.magnitude == math.inf),)
-    writes = (Travel,)
-
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        """A way that is not broken yet."""
-        travel = view.latest(Travel)
-        return None if travel is None or travel.value.is_broken else Case(travel, trigger.entry)
-
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        travel, what = case
-        yield Revise(travel, replace(travel.value, is_broken=True), (travel, what))
+    travel = WAY.of(view)
+    yield Revise(travel, replace(travel.value, is_broken=True), (travel, what))

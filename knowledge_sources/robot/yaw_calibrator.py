@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch
+from blackboard import Change, Effect, Level, Revise, Revised, View, Watch
 from knowledge_sources.methods.calibration import compute_camera_covariance, to_tuples
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, STANDING, Belief
+from knowledge_sources.reads import CAMERA, HELD, STANDING, WAY, Belief
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.camera import CAMERA_UNKNOWNS, YAW
 from world_models.entries import CameraState, Drift, Hypothesis, Milestone, Travel, begin_travel, turn_about_camera
@@ -20,19 +20,10 @@ from world_models.frames import wrap_angle
 
 
 class Measured(NamedTuple):
-    """The yaw after a way: by how much it is otherwise than believed, and its variance."""
+    """The yaw after a way: by how much it differs from what is believed, and its variance; None: it tells nothing."""
 
-    step_rad: float
-    variance: float
-
-
-class Case(NamedTuple):
-    """The way that the robot came, the camera, where it is now, and what that tells of the yaw, if anything."""
-
-    travel: Entry[Travel]
-    camera: Entry[CameraState]
-    belief: Belief
-    measured: Measured | None
+    step_rad: float = 0.0
+    variance: float | None = None
 
 
 class YawCalibrator(RobotKnowledgeSource):
@@ -44,34 +35,27 @@ class YawCalibrator(RobotKnowledgeSource):
     """
 
     level, priority = Level.ACTION, Priority.ENTER
-    on = (
-        Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),
-    )
-    needs = (HELD, STANDING)
+    on = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "milestone"),)
+    needs = (HELD, STANDING, CAMERA, WAY)
     writes = (CameraState, Hypothesis, Drift, Travel)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        """A way that tells of the yaw more than is known, or that is spent, so that another begins."""
-        travel, camera, milestone = view.latest(Travel), view.latest(CameraState), view.latest(Milestone)
-        if travel is None or camera is None:
-            return None
+    def bind(self, view: View, trigger: Change) -> Measured | None:
+        """What a way tells of the yaw: more than is known, or it is spent, so that another begins."""
+        travel, camera, milestone = WAY.of(view), CAMERA.of(view), view.latest(Milestone)
         if milestone is not None and milestone.value.displacement_modes:  # an inexact model bends the way
             return None
-        belief, s = HELD.of(view), self._settings.camera_state
-        measured = self._measure(camera.value, travel.value, belief)
+        s, measured = self._settings.camera_state, self._measure(camera.value, travel.value, HELD.of(view))
         known = compute_camera_covariance(camera.value, s)[YAW, YAW]
-        is_told = measured is not None and measured.variance < (1.0 - s.min_learnt) * known
-        return Case(travel, camera, belief, measured) if is_told or self._is_spent(travel.value) else None
+        is_told = measured.variance is not None and measured.variance < (1.0 - s.min_learnt) * known
+        return measured if is_told or self._is_spent(travel.value) else None
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        travel, camera, held, measured = case
-        belief, pose = held.entry, held.pose
-        step_rad, way = 0.0, travel.value
-        if measured is not None:
-            step_rad = measured.step_rad
+    def act(self, view: View, case: Measured) -> Iterable[Effect]:
+        travel, camera, held, (step_rad, told) = WAY.of(view), CAMERA.of(view), HELD.of(view), case
+        belief, pose, way = held.entry, held.pose, travel.value
+        if told is not None:
             covariance = compute_camera_covariance(camera.value, self._settings.camera_state)
             covariance[YAW, :] = covariance[:, YAW] = 0.0
-            covariance[YAW, YAW] = max(measured.variance, self._settings.camera_state.floor_rad**2)
+            covariance[YAW, YAW] = max(told, self._settings.camera_state.floor_rad**2)
             step = [0.0] * len(CAMERA_UNKNOWNS)
             step[YAW] = step_rad
             learnt = replace(camera.value.moved(step), covariance=to_tuples(covariance))
@@ -83,7 +67,7 @@ class YawCalibrator(RobotKnowledgeSource):
             variance = float(compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW])
             way = begin_travel(here, held.covariance,
                                camera.value.mount.yaw_rad + step_rad,
-                               variance if measured is None else measured.variance)
+                               variance if told is None else told)
         yield Revise(travel, way, (travel, belief))
 
     def _is_spent(self, travel: Travel) -> bool:
@@ -92,19 +76,19 @@ class YawCalibrator(RobotKnowledgeSource):
         return travel.is_broken or travel.gone_m > s.max_travel_m or (
             travel.gone_m > s.min_travel_m and travel.net_m < s.min_straightness * travel.gone_m)
 
-    def _measure(self, camera: CameraState, travel: Travel, belief: Belief) -> Measured | None:
-        """The yaw by the whole way, from what was known when it began; None where the way tells too little.
+    def _measure(self, camera: CameraState, travel: Travel, belief: Belief) -> Measured:
+        """The yaw by the whole way, from what was known when it began; nothing where the way tells too little.
 
         Nor does a way tell anything that ends where no likely yaw leads: something else has moved the robot.
         """
         s, pose = self._settings.camera_state, belief.pose
         if travel.is_broken:
-            return None
+            return Measured()
         way = travel.seen(pose.heading_rad)
         came = pose.position - travel.began.position
         net_m = way.net_m
         if net_m < s.min_travel_m or net_m < s.min_straightness * way.gone_m:
-            return None
+            return Measured()
         off_rad = wrap_angle(math.atan2(came[1], came[0]) - math.atan2(way.y_m, way.x_m))
         aside = np.array([-way.y_m, way.x_m]) / net_m
         ends = np.array(travel.covariance)[:2, :2] + belief.covariance[:2, :2]
@@ -115,17 +99,15 @@ class YawCalibrator(RobotKnowledgeSource):
         believed = camera.mount.yaw_rad
         step_rad = believed - off_rad - travel.yaw_rad
         if step_rad**2 > s.max_yaw_sigmas**2 * (travel.yaw_variance + noise):
-            return None
+            return Measured()
         yaw = travel.yaw_rad + gain * step_rad
         return Measured(yaw - believed, (1.0 - gain) * travel.yaw_variance)
 
 
 def _turn(view: View, belief: Belief, camera: CameraState, turn_rad: float) -> Iterable[Effect]:
     """Turn the believed heading, and the one that the drift is measured from."""
-    b = belief.value
     here = turn_about_camera(belief.pose, turn_rad, camera.mount.forward_m)
-    turned = Hypothesis.of_world(belief.world, b.locale, here, belief.covariance, b.basis, motion=b.motion)
-    yield Revise(belief.entry, turned, (belief.entry,))
+    yield Revise(belief.entry, belief.moved_to(here, belief.covariance, belief.value.basis), (belief.entry,))
     drift = view.latest(Drift)
     if drift is not None:
         yield Revise(drift, replace(drift.value, heading_rad=drift.value.heading_rad + turn_rad), (drift,))

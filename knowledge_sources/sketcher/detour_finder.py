@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Revised, View, Watch
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
-    active_goal,
-    find_belief,
+    GOAL,
+    HELD,
     find_first_level,
     find_obstacles,
     find_way_to_goal,
@@ -19,16 +18,9 @@ from knowledge_sources.reads import (
     supersede,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Goal, Hypothesis, Impasse, Leg, PlanSketch
+from world_models.entries import Impasse, Leg, PlanSketch
 
-
-class Case(NamedTuple):
-    """A halted leg, the first-level sketch of which it is a part, the goal, and the belief."""
-
-    leg: Entry[Leg]
-    drawn: Entry[PlanSketch]
-    goal: Entry[Goal]
-    belief: Entry[Hypothesis]
+Halted = tuple[Entry[Leg], Entry[PlanSketch]]
 
 
 class DetourFinder(RobotKnowledgeSource):
@@ -40,19 +32,18 @@ class DetourFinder(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.ADVANCE
     on = (Watch(Leg, (Revised,), lambda leg: leg.status == "halted"),)
+    needs = (GOAL, HELD)
     writes = (PlanSketch, Impasse)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
+    def bind(self, view: View, trigger: Change) -> Halted | None:
+        """The leg, and the first-level sketch of which it is a part."""
         sketch, drawn = view.get(trigger.entry.value.sketch), find_first_level(view)
-        goal, belief = active_goal(view), find_belief(view)
-        if sketch is None or drawn is None or goal is None or belief is None or not sketch.value.is_active:
+        if sketch is None or drawn is None or not sketch.value.is_active:
             return None
-        if not trigger.entry.value.carries_out(sketch.id, sketch.value):
-            return None
-        return Case(trigger.entry, drawn, goal, belief)
+        return (trigger.entry, drawn) if trigger.entry.value.carries_out(sketch.id, sketch.value) else None
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        leg, drawn, goal, belief = case
+    def act(self, view: View, case: Halted) -> Iterable[Effect]:
+        (leg, drawn), goal, belief = case, GOAL.of(view), HELD.of(view).entry
         planner = list_planners(view, self._settings.plan)[0]
         leads_there = find_way_to_goal((planner,), belief.value, goal.value) is not None
         if leads_there and drawn.value.halts < self._settings.plan.max_adjustments:

@@ -3,37 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revised, View, Watch
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
     ACTIVE_SKETCH,
-    active_goal,
-    find_belief,
+    GOAL,
+    GOING_ON,
+    HELD,
     find_building,
     find_frames,
     find_obstacles,
     find_way_to_goal,
     is_just_found,
-    is_over,
     list_locales,
     list_planners,
     name_obstacles,
     supersede,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Goal, Hypothesis, Impasse, PlanSketch
+from world_models.entries import Goal, Impasse, PlanSketch
 
 MAX_WALKED_ROOMS = 200  # so many rooms are searched for a way that people can walk, to say so where wheels have none
 
 
-class Case(NamedTuple):
-    """A goal without a sketch, the belief, and the sketches for it that have ended, the last one first."""
-
-    goal: Entry[Goal]
-    belief: Entry[Hypothesis]
-    ended: tuple[Entry[PlanSketch], ...]
+Ended = tuple[Entry[PlanSketch], ...]
 
 
 class GoalSketcher(RobotKnowledgeSource):
@@ -48,35 +42,38 @@ class GoalSketcher(RobotKnowledgeSource):
         Watch(Goal, (Posted,), lambda goal: goal.is_active),
         Watch(PlanSketch, (Revised,), lambda s: not s.path and s.leaves_goal_open),
     )
+    needs = (GOING_ON, GOAL, HELD)
     writes = (PlanSketch, Impasse)
 
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        goal, belief = active_goal(view), find_belief(view)
-        if goal is None or belief is None or is_over(view) or view.having(ACTIVE_SKETCH, goal.id):
+    def bind(self, view: View, trigger: Change) -> Ended | None:
+        """The last sketch for a goal that has none any more; nothing where it had none yet."""
+        goal = GOAL.of(view)
+        if view.having(ACTIVE_SKETCH, goal.id):
             return None
         ended = view.latest(PlanSketch, lambda s: s.goal == goal.id and not s.path)
-        return Case(goal, belief, () if ended is None else (ended,))
+        return () if ended is None else (ended,)
 
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        yield from supersede(view, case.goal)
-        goal, here = case.goal.value, case.belief.value
+    def act(self, view: View, case: Ended) -> Iterable[Effect]:
+        pursued, belief = GOAL.of(view), HELD.of(view).entry
+        goal, here, because = pursued.value, belief.value, (pursued, belief, *case)
+        yield from supersede(view, pursued)
         planners = list_planners(view, self._settings.plan)
         unfit = planners[-1].explain_unfit(goal.destination)
         if unfit:
             taking = [o for o in find_obstacles(view, (goal.destination.locale,)) if o.value.name in unfit]
             occupied = f"is occupied by {' and '.join(o.value.words() for o in taking)}: it " if taking else ""
             reason = f"the goal {goal.destination} {occupied}{unfit}"
-            yield Post(Impasse("blocked", reason, case.goal.id, tuple(o.id for o in taking)), (*_all(case), *taking))
+            yield Post(Impasse("blocked", reason, pursued.id, tuple(o.id for o in taking)), (*because, *taking))
             return
         way = find_way_to_goal(planners, here, goal)
         if way is None:
             obstacles, why = find_obstacles(view), self._explain_no_way(view, here.locale, goal.destination.locale)
             behind = tuple(o.id for o in obstacles)
-            yield Post(Impasse("blocked", why, case.goal.id, behind), (*_all(case), *obstacles))
+            yield Post(Impasse("blocked", why, pursued.id, behind), (*because, *obstacles))
             return
-        halted = [sketch.value.halts + 1 for sketch in case.ended if sketch.value.status == "halted"]
-        drawn = PlanSketch(case.goal.id, (), "", way, verified=is_just_found(here), halts=max(halted, default=0))
-        yield Post(drawn, (*_all(case), *find_frames(view, list_locales(way))))
+        halted = [sketch.value.halts + 1 for sketch in case if sketch.value.status == "halted"]
+        drawn = PlanSketch(pursued.id, (), "", way, verified=is_just_found(here), halts=max(halted, default=0))
+        yield Post(drawn, (*because, *find_frames(view, list_locales(way))))
 
     def _explain_no_way(self, view: View, here: str, there: str) -> str:
         """Why no sketch leads from one locale to another."""
@@ -90,7 +87,3 @@ class GoalSketcher(RobotKnowledgeSource):
         by_stairs = building.is_walkable(here, there, MAX_WALKED_ROOMS)
         stairs = "; people can walk there, by stairs" * by_stairs
         return f"no passage for wheels leads from {here} to {there}{shut}{stairs}"
-
-
-def _all(case: Case) -> tuple[Entry[object], ...]:
-    return (case.goal, case.belief, *case.ended)

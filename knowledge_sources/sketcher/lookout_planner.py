@@ -14,8 +14,8 @@ from knowledge_sources.methods.floor import MIN_SIDE_M, build_polygon, list_corn
 from knowledge_sources.methods.motion import SubgoalPlanner
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
-    find_belief,
-    find_building,
+    HELD,
+    Belief,
     find_frames,
     find_obstacles,
     find_robot,
@@ -28,11 +28,10 @@ from world_models.entries import DoorState, Goal, Hypothesis, Impasse, Obstacle,
 
 
 class Case(NamedTuple):
-    """An impasse, the goal, the belief, the obstacle or door that may be behind it, and the way to where it is seen."""
+    """An impasse, the goal, the obstacle or door that may be behind it, and the way to where it is seen."""
 
     impasse: Entry[Impasse]
     goal: Entry[Goal]
-    belief: Entry[Hypothesis]
     about: Entry[Obstacle] | Entry[DoorState]
     subgoal: Subgoal
 
@@ -47,26 +46,27 @@ class LookoutPlanner(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.ADVANCE
     on = (Watch(Impasse, (Posted,), lambda impasse: impasse.is_open and bool(impasse.behind)),)
+    needs = (HELD,)
     writes = (PlanSketch, Impasse)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
-        impasse, belief = trigger.entry, find_belief(view)
+        impasse, belief = trigger.entry, HELD.of(view)
         goal, looked = view.get(impasse.value.goal), _count_looks(view, impasse.value.goal)
-        if goal is None or belief is None or looked >= self._settings.plan.max_lookouts:
+        if goal is None or looked >= self._settings.plan.max_lookouts:
             return None
         planner = list_planners(view, self._settings.plan)[0]
-        for door in view.where(DoorState, lambda d: d.may_be_shut and belief.value.locale in d.between):
+        for door in view.where(DoorState, lambda d: d.may_be_shut and belief.locale in d.between):
             subgoal = _plan_door_look(view, planner, belief.value, door.value)
             if subgoal is not None:
-                return Case(impasse, goal, belief, door, subgoal)
-        for obstacle in self._list_in_order(view, impasse.value, goal.value, belief.value, looked):
+                return Case(impasse, goal, door, subgoal)
+        for obstacle in self._list_in_order(view, impasse.value, goal.value, belief, looked):
             subgoal = planner.plan_look(belief.value, obstacle.value)
             if subgoal is not None:
-                return Case(impasse, goal, belief, obstacle, subgoal)
+                return Case(impasse, goal, obstacle, subgoal)
         return None
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        impasse, goal, belief, about, subgoal = case
+        (impasse, goal, about, subgoal), belief = case, HELD.of(view).entry
         yield from supersede(view, impasse)
         looked = Revise(impasse, replace(impasse.value, is_open=False), (impasse, about, belief))
         yield looked
@@ -74,13 +74,13 @@ class LookoutPlanner(RobotKnowledgeSource):
         yield Post(PlanSketch(goal.id, (), "", (subgoal,), is_look=True), (goal, belief, about, looked, *frames))
 
     def _list_in_order(
-        self, view: View, impasse: Impasse, goal: Goal, belief: Hypothesis, looked: int
+        self, view: View, impasse: Impasse, goal: Goal, belief: Belief, looked: int
     ) -> Sequence[Entry[Obstacle]]:
         """The obstacles in the order in which they are worth a look; a look further each time."""
-        here = shapely.Point(belief.world_from_robot(find_building(view)).position)
+        here = shapely.Point(belief.pose.position)
         behind = [o for o in find_obstacles(view) if o.id in impasse.behind]
         nearest = sorted(behind, key=lambda o: (build_polygon(o.value.footprint).distance(here), o.value.name))
-        alone = [o for o in nearest if self._leads_without(view, goal, belief, o)]
+        alone = [o for o in nearest if self._leads_without(view, goal, belief.value, o)]
         first = looked % max(1, len(alone or nearest))
         ordered = [*alone, *(o for o in nearest if o not in alone)]
         return (*ordered[first:], *ordered[:first])

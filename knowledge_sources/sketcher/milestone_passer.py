@@ -9,18 +9,17 @@ from typing import NamedTuple
 from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Revise, Revised, View, Watch
 from knowledge_sources.methods.verification import is_last_look
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_belief, find_building, find_search_here, has_missed, tell_missed
+from knowledge_sources.reads import HELD, declare_lost, find_building, find_search_here, has_missed, tell_missed
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Goal, Hypothesis, Impasse, Milestone, Place, PlaceSearch, PlanSketch
 
 
 class Case(NamedTuple):
-    """A milestone, the sketch that has come to it, the goal, the belief, and by what it holds but by being verified."""
+    """A milestone, the sketch that has come to it, the goal, and by what it holds but by being verified."""
 
     milestone: Entry[Milestone]
     sketch: Entry[PlanSketch]
     goal: Entry[Goal]
-    belief: Entry[Hypothesis]
     found: tuple[Entry[PlaceSearch], ...]
 
 
@@ -35,22 +34,23 @@ class MilestonePasser(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.ADVANCE
     on = (Watch(Milestone, (Revised,), lambda m: m.status in ("verified", "not testable")),)
+    needs = (HELD,)
     writes = (PlanSketch, Discrepancy, Impasse)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
-        milestone, belief = trigger.entry, find_belief(view)
+        milestone = trigger.entry
         sketch = view.get(milestone.value.sketch)
         goal = None if sketch is None else view.get(sketch.value.goal)
-        if sketch is None or goal is None or belief is None or not sketch.value.is_active:
+        if sketch is None or goal is None or not sketch.value.is_active:
             return None
         here = None if milestone.value.status == "verified" else find_search_here(view, sketch.id)
         is_open = here is None or (sketch.value.at_end and not is_last_look(milestone.value, self._settings.plan))
         if sketch.value.at != milestone.value.index or (milestone.value.status == "not testable" and is_open):
             return None
-        return Case(milestone, sketch, goal, belief, () if here is None else (here,))
+        return Case(milestone, sketch, goal, () if here is None else (here,))
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        milestone, sketch, goal, belief, found = case
+        (milestone, sketch, goal, found), belief = case, HELD.of(view).entry
         s = sketch.value
         if found and s.at_end:
             untold = f"{milestone.value.what} is not testable, where a search has found it"
@@ -65,7 +65,7 @@ class MilestonePasser(RobotKnowledgeSource):
             return
         (in_vain, taking), is_first = tell_missed(view, belief.value, s), len(view.all(Goal)) == 1
         if is_first:
-            yield Post(Discrepancy(Level.GOAL, in_vain, None, (0.0, 0.0), "px"), (milestone, goal, *taking))
+            yield declare_lost(in_vain, (milestone, goal, *taking))
         else:
             yield Post(Impasse("blocked", in_vain, goal.id), (milestone, sketch, *taking))
 

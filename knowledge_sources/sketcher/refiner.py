@@ -9,8 +9,9 @@ from blackboard import Change, Effect, Entry, Level, Post, Posted, Revised, View
 from knowledge_sources.methods.motion import SubgoalPlanner
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
+    GOING_ON,
+    HELD,
     Way,
-    find_belief,
     find_building,
     find_first_level,
     find_frames,
@@ -18,7 +19,6 @@ from knowledge_sources.reads import (
     find_way,
     find_way_to_goal,
     is_just_found,
-    is_over,
     list_locales,
     list_planners,
     name_obstacles,
@@ -30,12 +30,11 @@ from world_models.entries import Goal, Hypothesis, Impasse, PlanSketch, Subgoal
 
 
 class Case(NamedTuple):
-    """A sketch whose next subgoal is to be refined, that subgoal, the goal, and the belief."""
+    """A sketch whose next subgoal is to be refined, that subgoal, and the goal."""
 
     sketch: Entry[PlanSketch]
     subgoal: Subgoal
     goal: Entry[Goal]
-    belief: Entry[Hypothesis]
 
 
 class Refiner(RobotKnowledgeSource):
@@ -47,19 +46,19 @@ class Refiner(RobotKnowledgeSource):
 
     level, priority = Level.PLAN, Priority.ADVANCE
     on = (Watch(PlanSketch, (Posted, Revised), lambda s: s.is_active and s.verified and s.is_refinable),)
+    needs = (GOING_ON, HELD)
     writes = (PlanSketch, Impasse)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
-        sketch, belief = trigger.entry, find_belief(view)
-        s: PlanSketch = sketch.value
+        s: PlanSketch = trigger.entry.value
         goal, below = view.get(s.goal), (*s.path, s.at)
         is_refined = view.latest(PlanSketch, lambda o: o.is_active and o.goal == s.goal and o.path == below) is not None
-        if goal is None or belief is None or s.current is None or is_refined or is_over(view):
+        if goal is None or s.current is None or is_refined:
             return None
-        return Case(sketch, s.current, goal, belief)
+        return Case(trigger.entry, s.current, goal)
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        (sketch, subgoal, goal, belief), planners = case, list_planners(view, self._settings.plan)
+        (sketch, subgoal, goal), planners, belief = case, list_planners(view, self._settings.plan), HELD.of(view).entry
         s, locale = sketch.value, find_building(view).common(subgoal.origin.locale, subgoal.destination.locale)
         way = find_way(planners, lambda planner: _plan(planner, subgoal, belief.value))
         if way is not None:

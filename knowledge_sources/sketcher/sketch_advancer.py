@@ -3,37 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
-from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch, rule
 from knowledge_sources.priority import Priority
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Leg, PlanSketch
 
+Done = Entry[Leg] | Entry[PlanSketch]
 
-class Case(NamedTuple):
+
+def find_sketch(view: View, trigger: Change) -> tuple[Done, Entry[PlanSketch]] | None:
     """The leg or the sketch that is done, and the sketch whose current subgoal it carried out."""
+    done = trigger.entry
+    for sketch in view.newest_first(PlanSketch):
+        if sketch.value.is_active and done.value.carries_out(sketch.id, sketch.value):
+            return done, sketch
+    return None
 
-    done: Entry[Leg] | Entry[PlanSketch]
-    sketch: Entry[PlanSketch]
 
-
-class SketchAdvancer(RobotKnowledgeSource):
+@rule(on=(Watch(Leg, (Revised,), lambda leg: leg.status == "arrived"),
+          Watch(PlanSketch, (Revised,), lambda sketch: sketch.status == "done" and bool(sketch.path))),
+      writes=PlanSketch, bind=find_sketch, level=Level.PLAN, priority=Priority.ADVANCE)
+def sketch_advancer(_view: View, case: tuple[Done, Entry[PlanSketch]]) -> Iterable[Effect]:
     """Takes a sketch on to its next milestone when the leg, or the sketch, that carried out its subgoal is done."""
-
-    level, priority = Level.PLAN, Priority.ADVANCE
-    on = (
-        Watch(Leg, (Revised,), lambda leg: leg.status == "arrived"),
-        Watch(PlanSketch, (Revised,), lambda sketch: sketch.status == "done" and bool(sketch.path)),
-    )
-    writes = (PlanSketch,)
-
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        done = trigger.entry
-        for sketch in view.newest_first(PlanSketch):
-            if sketch.value.is_active and done.value.carries_out(sketch.id, sketch.value):
-                return Case(done, sketch)
-        return None
-
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        yield Revise(case.sketch, case.sketch.value.advanced(), (case.done,))
+    done, sketch = case
+    yield Revise(sketch, sketch.value.advanced(), (done,))

@@ -26,7 +26,6 @@ from knowledge_sources.reads import (
     find_camera,
     find_frames,
     find_panorama,
-    find_robot_and_pose,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.camera import YAW
@@ -203,7 +202,7 @@ class ClaimReckoner(RobotKnowledgeSource):
         yaw_variance = float(compute_camera_covariance(camera, self._settings.camera_state)[YAW, YAW])
         aside = np.array([held.pose.y_m - pose.y_m, pose.x_m - held.pose.x_m, 0.0])
         covariance = covariance + np.outer(aside, aside) * yaw_variance
-        moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=told.id)
+        moved = held.moved_to(pose, covariance, "odometry", locale=str(locale), motion=told.id)
         yield Revise(held.entry, moved, (told, held.entry))
         if is_uncounted(report):
             return
@@ -217,14 +216,6 @@ class ClaimReckoner(RobotKnowledgeSource):
         yield Post(way, (told,)) if travel is None else Revise(travel, way, (told, travel))
 
 
-class ViewCase(NamedTuple):
-    """A picture that is to be checked, the belief, and what is known to stand before the camera: one or none."""
-
-    picture: Entry[CameraPicture]
-    belief: Entry[Hypothesis]
-    hidden: tuple[Entry[Obstruction], ...]
-
-
 class ViewExpecter(RobotKnowledgeSource):
     """Says, before a picture is read, what it should show of the place where the robot is believed to be."""
 
@@ -233,17 +224,13 @@ class ViewExpecter(RobotKnowledgeSource):
     needs = (HELD, NOT_LOST, NO_MILESTONE)
     writes = (Milestone,)
 
-    def bind(self, view: View, trigger: Change) -> ViewCase:
-        hidden = view.latest(Obstruction)
-        return ViewCase(trigger.entry, HELD.of(view).entry, () if hidden is None else (hidden,))
-
-    def act(self, view: View, case: ViewCase) -> Iterable[Effect]:
-        picture, belief, hidden = case
-        robot, pose = find_robot_and_pose(view, belief.value)
+    def act(self, view: View, case: Change) -> Iterable[Effect]:
+        belief, hidden = HELD.of(view), view.all(Obstruction)[-1:]
+        robot, pose = belief.seeing, belief.pose
         here = Milestone("", 0, "the place where it believes to be", pose.heading_rad)
         expected = predict_milestone(robot, pose, here, "", self._settings)
-        frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale, self._settings))
-        yield Post(expected, (picture, belief, *hidden, *frames))
+        frames = find_frames(view, list_seen_locales(robot, pose, belief.locale, self._settings))
+        yield Post(expected, (case.entry, belief.entry, *hidden, *frames))
 
 
 class LossDeclarer(RobotKnowledgeSource):

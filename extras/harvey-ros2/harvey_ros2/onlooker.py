@@ -23,20 +23,20 @@ from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.wiring import KNOWLEDGE_SOURCES
 from harvey_ros2.picture_lag import PictureLag
 from harvey_ros2.run_messages import KINDS, RunMessages, TimedMessage
-from knowledge_sources.goal.interpreter import Interpreter
+from knowledge_sources.goal.interpreter import interpreter
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.milestone.line_finder import LineFinder
 from knowledge_sources.milestone.matcher import Matcher
 from knowledge_sources.milestone.med_r_and_t import MedRAndT
 from knowledge_sources.milestone.milestone_judge import MilestoneJudge
-from knowledge_sources.milestone.plan_adjuster import PlanAdjuster
+from knowledge_sources.milestone.plan_adjuster import plan_adjuster
 from knowledge_sources.reads import HELD, LOST, OPEN_FAULT, find_camera
 from knowledge_sources.relocalizer.alias_monitor import AliasMonitor
 from knowledge_sources.relocalizer.localizer import Localizer
 from knowledge_sources.relocalizer.panorama_builder import PanoramaBuilder
-from knowledge_sources.relocalizer.pose_adopter import PoseAdopter
+from knowledge_sources.relocalizer.pose_adopter import pose_adopter
 from knowledge_sources.robot.camera_calibrator import CameraCalibrator
-from knowledge_sources.robot.travel_breaker import TravelBreaker
+from knowledge_sources.robot.travel_breaker import travel_breaker
 from knowledge_sources.robot.yaw_calibrator import YawCalibrator
 from knowledge_sources.settings import DEFAULT
 from logs.run_directory import RunDirectory
@@ -50,8 +50,8 @@ from world_models.frames import Pose2
 from world_models.plugins import GUESTS_GROUP, list_plugins
 from world_models.robot import RobotModel
 
-SEATED = (Interpreter, LineFinder, Matcher, MedRAndT, MilestoneJudge, CameraCalibrator, AliasMonitor, PlanAdjuster,
-          YawCalibrator, TravelBreaker, PanoramaBuilder, Localizer, PoseAdopter)
+SEATED = (interpreter, LineFinder, Matcher, MedRAndT, MilestoneJudge, CameraCalibrator, AliasMonitor, plan_adjuster,
+          YawCalibrator, travel_breaker, PanoramaBuilder, Localizer, pose_adopter)
 """The sources of a mission that are wanted here too."""
 GUESTS = ("claim_reckoner", "view_expecter", "loss_declarer", "place_confirmer")
 AUTHOR = "onlooker"

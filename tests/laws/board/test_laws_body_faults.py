@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from blackboard import Change, Decision, Discrepancy, Effect, Post, Scheduler, View
 from harvey.runner.ports import BodyPort
 from knowledge_sources.action.fault_handler import FaultHandler
-from knowledge_sources.goal.mission_monitor import MissionMonitor
+from knowledge_sources.goal.mission_monitor import mission_monitor
 from knowledge_sources.settings import DEFAULT
 from strategies import Note, Scripted
 from world_models.entries import (
@@ -79,7 +79,7 @@ def drive(requests: list[str], body: ScriptedBody) -> tuple[Scheduler, list[Any]
         told.extend(change.entry for change in (*decision.observed, *decision.made))
 
     scheduler = Scheduler(
-        [FaultHandler(), MissionMonitor(),
+        [FaultHandler(), mission_monitor,
          Scripted("asker", Note, asking, writes=(MotorCommand, PictureRequest))],
         ports=(BodyPort(body),), sinks=(listen,),
     )

@@ -82,7 +82,7 @@ def test_other_sources_or_other_words_part_in_the_first_cycle_that_differs(
     texts: list[str], at: int, priority: float
 ) -> None:
     _, history = drive(texts)
-    hurried = rule(on=Watch(Note, (Posted,)), writes=(Note, Tally), priority=priority)(counter._act)
+    hurried = type("counter", (type(counter),), {"priority": priority})()
     assert history.replay(Scheduler([hurried, complainer])) == 1  # the rating stands in the first line
     at = min(at, len(texts))
     _, other = drive([*texts[:at], "other", *texts[at:]])

@@ -33,7 +33,7 @@ from knowledge_sources.methods.localization import (
 )
 from knowledge_sources.methods.verification import predict_lines
 from knowledge_sources.relocalizer.alias_monitor import AliasMonitor
-from knowledge_sources.relocalizer.pose_adopter import PoseAdopter
+from knowledge_sources.relocalizer.pose_adopter import pose_adopter
 from knowledge_sources.settings import DEFAULT
 from world_models.entries import (
     Certificate,
@@ -237,7 +237,7 @@ def test_found_again_it_begins_anew() -> None:
     old = bench.put(known([0.0], 0.123, Pose2(HERE.x_m - 3.0, HERE.y_m, 0.0)))
     bench.put(Hypothesis(HALL, Pose2(3.0, 1.0, 0.5), diagonal(0.02, 0.01), "relocalization", status="candidate"))
     doubt = bench.doubt()
-    bench.apply(*bench.ask(PoseAdopter(), bench.put(PlaceSearch("found", "one place"))) or ())
+    bench.apply(*bench.ask(pose_adopter, bench.put(PlaceSearch("found", "one place"))) or ())
     assert bench.view.get(old.id) is None
     bench.revise(doubt, status="corrected")
     effect = effect_on(bench.ask(SOURCE, verify(bench)), TwinOdds)

@@ -20,11 +20,11 @@ from generated_boards import (
 )
 from knowledge_sources.methods.doors import MAX_LOG_ODDS, PRIOR_LOG_ODDS, SHUT_LOG_ODDS, touch_door, update_door
 from knowledge_sources.methods.doors.belief import MAX_TOUCH_M, TOUCH_LOG_RATIO
-from knowledge_sources.model.door_toucher import DoorToucher
+from knowledge_sources.model.door_toucher import door_toucher
 from world_models.entries import Contact, DoorPicture, DoorState, Hypothesis, Outcome, diagonal
 from world_models.frames import Pose2
 
-SOURCE, SMALL = DoorToucher(), 1e-3
+SOURCE, SMALL = door_toucher, 1e-3
 AHEAD = Contact("bumper", 0.0, 0.15, 34.3)
 WALL_M = 0.2
 """Between hall and study, whose door is 1 m wide."""

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from blackboard import Level, Posted
 from generated_boards import Bench, all_reasons, effect_on, wakes
-from knowledge_sources.action.elevator_rider import ElevatorRider
+from knowledge_sources.action.elevator_rider import elevator_rider
 from world_models.entries import Place, PlanSketch, Ride, Subgoal
 
 BELOW, ABOVE, FAR = Place("car-1", 1.0, 1.0), Place("car-2", 1.0, 1.0), Place("car-3", 0.0, 0.0)
@@ -33,7 +33,7 @@ def test_it_asks_for_the_next_subgoal_where_that_is_a_ride_and_was_not_asked_for
     sketch = bench.put(PlanSketch(goal.id, (), "", (WALK, step, ON), 1, verified), goal)
     if asked is not None:
         bench.put(Ride(*asked, "lift", "car-1", "car-2"))
-    effects = bench.ask(ElevatorRider(), sketch)
+    effects = bench.ask(elevator_rider, sketch)
     assert (effects is not None) == (step is UP and verified and asked != ("PlanSketch-1", 1))
     if effects is not None:
         (effect,) = effects
@@ -46,7 +46,7 @@ def test_at_the_end_of_a_sketch_there_is_no_ride() -> None:
     bench.believe()
     goal = bench.pursue(FAR)
     sketch = bench.put(PlanSketch(goal.id, (), "", (UP,), 1, True), goal)
-    assert bench.ask(ElevatorRider(), sketch) is None
+    assert bench.ask(elevator_rider, sketch) is None
 
 
 def test_the_second_ride_is_from_where_the_first_one_ended() -> None:
@@ -55,7 +55,7 @@ def test_the_second_ride_is_from_where_the_first_one_ended() -> None:
     goal = bench.pursue(FAR)
     sketch = bench.put(PlanSketch(goal.id, (), "", (UP, ON), 1, True), goal)
     bench.put(Ride(sketch.id, 0, "lift", "car-1", "car-2"))
-    ride = effect_on(bench.ask(ElevatorRider(), sketch), Ride).value
+    ride = effect_on(bench.ask(elevator_rider, sketch), Ride).value
     assert (ride.index, ride.origin, ride.destination) == (1, "car-2", "car-3")
 
 
@@ -66,13 +66,13 @@ def test_in_doubt_above_the_action_level_it_waits(level: Level) -> None:
     goal = bench.pursue(FAR)
     sketch = bench.put(PlanSketch(goal.id, (), "", (UP,), 0, True), goal)
     doubt = bench.doubt(level, 1.0)
-    assert (bench.ask(ElevatorRider(), sketch) is None) == (level > Level.ACTION)
+    assert (bench.ask(elevator_rider, sketch) is None) == (level > Level.ACTION)
     bench.revise(doubt, status="corrected")
-    assert bench.ask(ElevatorRider(), sketch) is not None
+    assert bench.ask(elevator_rider, sketch) is not None
 
 
 @pytest.mark.parametrize(("status", "verified"), [("active", True), ("active", False), ("superseded", True)])
 def test_it_wakes_for_a_verified_sketch_that_is_carried_out(status: str, verified: bool) -> None:
     bench = Bench()
     sketch = bench.put(PlanSketch("Goal-1", (), "", (UP,), 0, verified, status))  # type: ignore[arg-type]
-    assert wakes(ElevatorRider(), Posted(sketch)) == (status == "active" and verified)
+    assert wakes(elevator_rider, Posted(sketch)) == (status == "active" and verified)

@@ -33,7 +33,7 @@ from blackboard.effect import type_of
 from harvey.replay.why_not_again import tell_of_trigger
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import resume_mission
-from harvey.wiring import KNOWLEDGE_SOURCES
+from harvey.wiring import KNOWLEDGE_SOURCES, build
 from hidden_reasons import HidingView, describe, find_named, list_unnamed
 from knowledge_sources.settings import DEFAULT
 from logs.records import read_records, ref_of
@@ -44,6 +44,7 @@ from sim.stage import Stage
 from world_models.entries import (
     BodyFault,
     CameraPicture,
+    CameraState,
     Goal,
     Hypothesis,
     Milestone,
@@ -52,6 +53,7 @@ from world_models.entries import (
     Place,
     PlanSketch,
     Subgoal,
+    Travel,
 )
 
 pytestmark = pytest.mark.slow
@@ -99,7 +101,7 @@ def list_acts(name: str, run: RunDirectory, left: Counter[str]) -> Iterator[Act]
         chosen = decision.chosen
         if chosen is None or decision.cycle not in asked or left[chosen.source] <= 0:
             continue
-        source, entry = SOURCES[chosen.source](DEFAULT), rebuilt.entries[ref_of(chosen.trigger)]
+        source, entry = build(SOURCES[chosen.source], DEFAULT), rebuilt.entries[ref_of(chosen.trigger)]
         trigger, board = CHANGES[chosen.kind](entry), copy_of(rebuilt.board)
         earlier = rebuilt.entries.get(Ref(entry.id, entry.revision - 1))
         try:
@@ -187,6 +189,10 @@ def close(kind: type[Any], **fields: Any) -> Callable[[Blackboard], list[Effect]
     return lambda board: [Revise(entry, replace(entry.value, **fields)) for entry in board.view.all(kind)]
 
 
+def withdraw(kind: type[Any]) -> Callable[[Blackboard], list[Effect]]:
+    return lambda board: [Retract(entry) for entry in board.view.all(kind)]
+
+
 def post(value: Any) -> Callable[[Blackboard], list[Effect]]:
     return lambda board: [Post(value)]
 
@@ -198,7 +204,7 @@ BROKEN: Mapping[str, Callable[[Blackboard], list[Effect]]] = {
     "not given up": post(Outcome("stopped", "by a law")),
     "not over": post(Outcome("stopped", "by a law")),
     "a belief": close(Hypothesis, status="candidate"),
-    "a picture": lambda board: [Retract(entry) for entry in board.view.all(CameraPicture)],
+    "a picture": withdraw(CameraPicture),
     "belief up to date": post(MotorCommand(0.1, 0.0)),
     "standing": post(MotorCommand(0.1, 0.0)),
     "no doubt": post(DOUBT),
@@ -212,6 +218,11 @@ BROKEN: Mapping[str, Callable[[Blackboard], list[Effect]]] = {
     "no milestone awaited": post(Milestone("", 0, "by a law", 0.0)),
     "a goal": close(Goal, status="abandoned"),
     "a sketch": close(PlanSketch, status="done"),
+    "not ended": post(Outcome("stopped", "by a law")),
+    "an unmeasured doubt": close(Discrepancy, status="corrected"),
+    "a doubt at the plan level": close(Discrepancy, status="corrected"),
+    "a camera": withdraw(CameraState),
+    "a way since a known place": withdraw(Travel),
 }
 """What makes a condition false on a board on which it holds."""
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generated_boards import Bench, covariances, effect_on, made, plain_robot, reasons
-from knowledge_sources.action.floor_changer import ELEVATOR_SIGMA_M, ELEVATOR_SIGMA_RAD, FloorChanger
+from knowledge_sources.action.floor_changer import ELEVATOR_SIGMA_M, ELEVATOR_SIGMA_RAD, floor_changer
 from towers import tower
 from world_models.building.world import World
 from world_models.entries import Anchor, Hypothesis, Place, PlanSketch, Ride, RideReport, SketchStatus, Subgoal, Tracks
@@ -43,7 +43,7 @@ def ride(pose: Pose2, covariance: Covariance, *, up: bool = True, at: int = 0, s
         bench.put(Tracks("CameraPicture-1", 9, (), (Anchor("CameraPicture-1", 0.0, 0.0, covariance),), 4))
     origin, destination = ("car-1", "car-2") if up else ("car-2", "car-1")
     asked = bench.put(Ride(sketch.id, index, "elevator", origin, destination))
-    effects = bench.ask(FloorChanger(), bench.put(RideReport("elevator", destination, 9.0, 30.0), asked))
+    effects = bench.ask(floor_changer, bench.put(RideReport("elevator", destination, 9.0, 30.0), asked))
     assert effects is not None
     return bench, effects
 
@@ -93,8 +93,8 @@ def test_without_a_ride_a_report_tells_nothing_and_the_last_one_counts() -> None
     bench = Bench(plain_robot(two_floors()))
     bench.believe(Pose2(1.0, 1.0, 0.0), locale="car-1")
     report = bench.put(RideReport("elevator", "car-2", 9.0, 30.0))
-    assert bench.ask(FloorChanger(), report) is None
+    assert bench.ask(floor_changer, report) is None
     bench.put(Ride("PlanSketch-1", 0, "elevator", "car-2", "car-1"))
     bench.put(replace(bench.view["Ride-1"].value, origin="car-1", destination="car-2"))
-    effects = bench.ask(FloorChanger(), report)
+    effects = bench.ask(floor_changer, report)
     assert [h.locale for h in made(effects, Hypothesis)] == ["car-2"] and len(effects or ()) == 1

@@ -10,8 +10,7 @@ from acting import answer
 from blackboard import Blackboard, Change, Discrepancy, Effect, Level, Post, Retract, Revise
 from generated_boards import reasons
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.goal.goal_changer import GoalChanger
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.goal.goal_changer import goal_changer
 from sim.scenario import load_scenario
 from world_models.entries import Goal, Hypothesis, Milestone, Place, Redirection, diagonal
 from world_models.files.world_files import WORLDS, load_world
@@ -44,7 +43,7 @@ def decide(*texts: str, goal: str = "active", is_lost: bool = False, is_waiting:
     if is_lost:
         apply(Post(Discrepancy(Level.GOAL, "it fits nowhere", None, (0.0, 0.0), "px")))
     asked = [apply(Post(Redirection(text)))[0] for text in texts][-1]
-    effects = answer(GoalChanger(DEFAULT), board.view, asked)
+    effects = answer(goal_changer, board.view, asked)
     assert effects is None or effects
     return None if effects is None else list(effects)
 

@@ -9,11 +9,11 @@ import pytest
 
 from blackboard import Posted, Revised
 from generated_boards import Bench, all_reasons, effect_on, wakes
-from knowledge_sources.goal.goal_closer import GoalCloser
+from knowledge_sources.goal.goal_closer import goal_closer
 from world_models.entries import Goal, SketchStatus
 from world_models.entries.task import GoalStatus
 
-SOURCE = GoalCloser()
+SOURCE = goal_closer
 
 
 @pytest.mark.parametrize("status", get_args(SketchStatus))

@@ -23,11 +23,11 @@ from generated_boards import (
     reasons,
     wakes,
 )
-from knowledge_sources.goal.goal_renewer import GoalRenewer
+from knowledge_sources.goal.goal_renewer import goal_renewer
 from world_models.entries import Goal, Place
 from world_models.frames import Pose2
 
-SOURCE = GoalRenewer()
+SOURCE = goal_renewer
 TO = Place(HALL, 6.0, 1.2, 0.4)
 
 

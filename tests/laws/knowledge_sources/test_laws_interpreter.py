@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from blackboard import MissingEntryError, Posted, Revised
 from generated_boards import HALL, STUDY, Bench, covariances, effect_on, made, plain_robot, reasons, wakes
-from knowledge_sources.goal.interpreter import Interpreter
+from knowledge_sources.goal.interpreter import interpreter
 from world_models.entries import Command, Goal, Hypothesis, Impasse
 from world_models.entries.location import Covariance
 
-SOURCE, FOOT_M = Interpreter(), 0.3048
+SOURCE, FOOT_M = interpreter, 0.3048
 feet = st.integers(10, 1000).map(lambda hundredths: hundredths / 100.0)
 
 

@@ -6,11 +6,11 @@ import pytest
 
 from blackboard import Entry, Level, Posted, Quiescence, Revised
 from generated_boards import HALL, Bench, all_reasons, made, plain_robot, wakes
-from knowledge_sources.goal.mission_monitor import MissionMonitor
+from knowledge_sources.goal.mission_monitor import mission_monitor
 from world_models.entries import Hypothesis, Impasse, Obstruction, Outcome, Twin, TwinOdds, diagonal
 from world_models.frames import Pose2
 
-SOURCE = MissionMonitor()
+SOURCE = mission_monitor
 
 
 def end(bench: Bench, trigger: Entry[object]) -> tuple[str, str, set[str]] | None:

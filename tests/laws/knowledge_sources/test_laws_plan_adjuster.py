@@ -21,12 +21,12 @@ from generated_boards import (
     to_world,
     wakes,
 )
-from knowledge_sources.milestone.plan_adjuster import PlanAdjuster
+from knowledge_sources.milestone.plan_adjuster import plan_adjuster
 from world_models.entries import Certificate, Hypothesis, MilestoneVerdict, PoseFix
 from world_models.entries.location import Covariance
 from world_models.frames import Pose2
 
-SOURCE = PlanAdjuster()
+SOURCE = plan_adjuster
 SLANTED = ((0.04, 0.01, 0.002), (0.01, 0.02, -0.001), (0.002, -0.001, 0.003))
 
 

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from blackboard import Entry, Posted, Retract, Revise
 from generated_boards import HALL, STUDY, Bench, covariances, effect_on, made, plain_robot, poses, reasons, wakes
-from knowledge_sources.relocalizer.pose_adopter import PoseAdopter
+from knowledge_sources.relocalizer.pose_adopter import pose_adopter
 from world_models.entries import CameraState, Hypothesis, PlaceSearch, diagonal
 from world_models.entries.location import Covariance
 from world_models.frames import Pose2
 
-SOURCE = PoseAdopter()
+SOURCE = pose_adopter
 STEP = (0.01, -0.004, 0.0, 0.02, 0.0, 0.0, 0.0)
 
 

@@ -9,11 +9,11 @@ import pytest
 
 from blackboard import Posted, Revised
 from generated_boards import HALL, Bench, all_reasons, effect_on, wakes
-from knowledge_sources.sketcher.sketch_advancer import SketchAdvancer
+from knowledge_sources.sketcher.sketch_advancer import sketch_advancer
 from world_models.entries import Place, PlanSketch, SketchStatus
 from world_models.entries.task import LegStatus
 
-SOURCE = SketchAdvancer()
+SOURCE = sketch_advancer
 WAY = tuple(Place(HALL, 1.0 + x, 2.0) for x in range(4))
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from blackboard import Level, Posted, Revised
 from generated_boards import Bench, all_reasons, wakes
-from knowledge_sources.robot.travel_breaker import TravelBreaker
+from knowledge_sources.robot.travel_breaker import travel_breaker
 from world_models.entries import begin_travel, diagonal
 from world_models.frames import Pose2
 
@@ -21,8 +21,8 @@ lengths = st.floats(0.0, 9.0)
 def test_it_wakes_when_lost_or_when_a_difference_cannot_be_measured(level: Level, magnitude: float | None) -> None:
     bench = Bench()
     doubt = bench.doubt(level, magnitude)
-    assert wakes(TravelBreaker(), Posted(doubt)) == (level is Level.GOAL or magnitude == math.inf)
-    assert not wakes(TravelBreaker(), Revised(doubt))  # it broke the way when it was posted
+    assert wakes(travel_breaker, Posted(doubt)) == (level is Level.GOAL or magnitude == math.inf)
+    assert not wakes(travel_breaker, Revised(doubt))  # it broke the way when it was posted
 
 
 @given(st.booleans(), lengths, lengths, lengths)
@@ -32,7 +32,7 @@ def test_it_marks_the_newest_way_and_no_more(is_broken: bool, x_m: float, y_m: f
     way = replace(old.value, x_m=x_m, y_m=y_m, gone_m=gone_m, is_broken=is_broken)
     travel = bench.put(way)
     doubt = bench.doubt()
-    effects = bench.ask(TravelBreaker(), doubt)
+    effects = bench.ask(travel_breaker, doubt)
     assert (effects is None) == is_broken
     if effects is not None:
         (effect,) = effects
@@ -42,4 +42,4 @@ def test_it_marks_the_newest_way_and_no_more(is_broken: bool, x_m: float, y_m: f
 
 def test_without_a_way_there_is_nothing_to_break() -> None:
     bench = Bench()
-    assert bench.ask(TravelBreaker(), bench.doubt()) is None
+    assert bench.ask(travel_breaker, bench.doubt()) is None

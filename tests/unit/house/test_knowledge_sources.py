@@ -14,7 +14,7 @@ import pytest
 
 from blackboard import Change, Effect, Entry, KnowledgeSource, Level, Post, Ref, Retract, Role, View, plain
 from harvey.simulation.simulated_run import run_mission
-from harvey.wiring import SUBJECTS, knowledge_sources, load_kinds
+from harvey.wiring import SUBJECTS, knowledge_sources, load_kinds, sources_of
 from knowledge_sources.priority import Priority
 from sim.scenario import load_scenario
 from sim.stage import build_stage
@@ -30,9 +30,7 @@ LAWS = Path(__file__).parents[2] / "laws" / "knowledge_sources"
 
 
 def sources_in(stem: str) -> list[type[KnowledgeSource]]:
-    module = importlib.import_module(f"knowledge_sources.{FILES[stem].parent.name}.{stem}")
-    found = [c for _, c in inspect.getmembers(module, inspect.isclass) if c.__module__ == module.__name__]
-    return [c for c in found if issubclass(c, KnowledgeSource) and not inspect.isabstract(c)]
+    return sources_of(importlib.import_module(f"knowledge_sources.{FILES[stem].parent.name}.{stem}"))
 
 
 KNOWLEDGE_SOURCES = {stem: found[0] for stem in FILES if (found := sources_in(stem))}
