@@ -67,10 +67,10 @@ class ViewPredictor(RobotKnowledgeSource):
         milestone, belief, hidden = case
         robot, pose = find_robot_and_pose(view, belief.value)
         here = replace(milestone.value, look_heading_rad=pose.heading_rad)
-        expected = predict_milestone(robot, pose, here, find_car_of(view, here), self._settings)
-        if not find_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
-            precompute_views(robot, belief.value.locale, pose, self._settings)  # the judge asks: another door?
-        frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale, self._settings))
+        expected = predict_milestone(robot, pose, here, find_car_of(view, here))
+        if not find_followed(view) or open_discrepancy(view, Level.PLAN) is not None:
+            precompute_views(robot, belief.value.locale, pose)  # the judge asks: another door?
+        frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale))
         wish = Revise(milestone, expected, (milestone, belief, *hidden, *frames))
         yield wish
         yield Post(PictureRequest("milestone"), (wish,))

@@ -36,6 +36,6 @@ class ViewUpdater(RobotKnowledgeSource):
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         hidden, milestone, belief = case
         robot, pose = find_robot_and_pose(view, belief.value)
-        seen = predict_milestone(robot, pose, milestone.value, find_car_of(view, milestone.value), self._settings)
-        frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale, self._settings))
+        seen = predict_milestone(robot, pose, milestone.value, find_car_of(view, milestone.value))
+        frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale))
         yield Revise(milestone, seen, (hidden, milestone, belief, *frames))

@@ -64,7 +64,7 @@ class DoorWatcher(RobotKnowledgeSource):
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         picture = read_picture(case.frame.value.jpeg)
-        if is_dark(*compute_mean_and_deviation(picture.grey), self._settings.goal):
+        if is_dark(*compute_mean_and_deviation(picture.grey)):
             return
         for watched in case.doors:
             yield from self._watch(view, watched, case.belief, case.frame, picture.half)

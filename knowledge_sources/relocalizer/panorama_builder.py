@@ -48,7 +48,7 @@ class PanoramaBuilder(RobotKnowledgeSource):
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         doubt = LOST.of(view)
-        if is_dark(trigger.entry.value, self._settings.goal):
+        if is_dark(trigger.entry.value):
             return None
         before = find_panorama(view, doubt)
         motions = () if before is None else view.since(MotionReport, before.cycle)

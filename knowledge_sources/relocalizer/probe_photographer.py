@@ -38,7 +38,7 @@ class ProbePhotographer(RobotKnowledgeSource):
         doubt, moved = LOST.of(view), view.latest(MotionReport)
         probes = [s for s in view.since(Segments, doubt.cycle) if s.value.milestone == ""]
         since = 0 if moved is None else moved.cycle
-        is_seen = any(s.cycle >= since and not is_dark(s.value, self._settings.goal) for s in probes)
+        is_seen = any(s.cycle >= since and not is_dark(s.value) for s in probes)
         return None if is_seen or len(probes) >= MAX_DARK_FRAMES else Case(trigger.entry, doubt)
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:

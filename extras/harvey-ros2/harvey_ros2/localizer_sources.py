@@ -200,7 +200,7 @@ class ClaimReckoner(RobotKnowledgeSource):
         there = world.locale_at([*pose.position, world.floor_m(held.locale)])
         locale = there if there and world.is_room(there) else held.locale
         camera, travel = find_camera(view), view.latest(Travel)
-        yaw_variance = float(compute_camera_covariance(camera, self._settings.camera_state)[YAW, YAW])
+        yaw_variance = float(compute_camera_covariance(camera)[YAW, YAW])
         aside = np.array([held.pose.y_m - pose.y_m, pose.x_m - held.pose.x_m, 0.0])
         covariance = covariance + np.outer(aside, aside) * yaw_variance
         moved = Hypothesis.of_world(world, str(locale), pose, covariance, "odometry", motion=told.id)
@@ -241,8 +241,8 @@ class ViewExpecter(RobotKnowledgeSource):
         picture, belief, hidden = case
         robot, pose = find_robot_and_pose(view, belief.value)
         here = Milestone("", 0, "the place where it believes to be", pose.heading_rad)
-        expected = predict_milestone(robot, pose, here, "", self._settings)
-        frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale, self._settings))
+        expected = predict_milestone(robot, pose, here, "")
+        frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale))
         yield Post(expected, (picture, belief, *hidden, *frames))
 
 
