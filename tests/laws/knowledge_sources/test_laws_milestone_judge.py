@@ -51,6 +51,7 @@ from knowledge_sources.methods.verification import (
     is_last_look,
     judge_place,
 )
+from knowledge_sources.methods.verification import weigh as weigh_method
 from knowledge_sources.methods.verification.pose_confidence import compute_motion_tolerance_px
 from knowledge_sources.methods.verification.weigh import MAX_P_UNMISTAKABLE, _find_tolerance_px, _median_shift
 from knowledge_sources.milestone.milestone_judge import Case, MilestoneJudge
@@ -258,8 +259,10 @@ def test_each_state_of_the_robot_asks_for_its_own_evidence(judged: list[Judged])
                 bound = find_prior_at_bound(weighed.p_false)
                 for value, enough in ((bound * 0.99, True), (bound + 0.01 * (1.0 - bound), False)):
                     others = {name: (0.999 if enough else 1e-9) for name in states if name != own}
-                    judge = MilestoneJudge(tune(**others, **{own: value}))
-                    weighed = judge.weigh(view, case_on(view, trigger))
+                    with pytest.MonkeyPatch.context() as patch:
+                        for name, p in {**others, own: value}.items():
+                            patch.setattr(weigh_method, name.upper(), p)
+                        weighed = MilestoneJudge().weigh(view, case_on(view, trigger))
                     assert (weighed.p_wrong <= weighed.most_p_wrong) is enough, (own, in_doubt, followed, value)
                 checked.append(own)
 
