@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
+from knowledge_sources.methods.belief import MAX_CAMERA_CHI2
 from knowledge_sources.methods.calibration import (
-    MAX_CAMERA_CHI2,
     RIGID_DISTANCE_M,
     add_yaw,
     compute_camera_covariance,

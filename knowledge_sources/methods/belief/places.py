@@ -16,6 +16,7 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats
 from world_models.frames import Pose2
 
+MAX_CAMERA_CHI2 = 30.0  # squared distance from what was believed beyond which a picture is no evidence
 TOLD_SIGMA_M = 0.1  # standard deviation that a tracked position has beyond its covariance: it may have slipped
 TOLD_SIGMA_RAD = math.radians(3.0)  # standard deviation that a tracked heading has beyond its covariance
 MAX_TOLD_CHI2 = 21.1

@@ -2,7 +2,7 @@
 
 from knowledge_sources.methods.calibration.calibration_picture import draw_calibration
 from knowledge_sources.methods.calibration.camera_state import (
-    LEAST_SIGMA_CENTRE_PX, LEAST_SIGMA_FOCAL, LEAST_SIGMA_M, LEAST_SIGMA_RAD, MAX_CAMERA_CHI2, MAX_COUNTED,
+    LEAST_SIGMA_CENTRE_PX, LEAST_SIGMA_FOCAL, LEAST_SIGMA_M, LEAST_SIGMA_RAD, MAX_COUNTED,
     RIGID_DISTANCE_M, SIGMA_CENTRE_PX, SIGMA_FOCAL, SIGMA_HEIGHT_M, SIGMA_ROLL_RAD, SIGMA_TILT_RAD, SIGMA_YAW_RAD,
     add_yaw, compute_camera_covariance, compute_knocked_covariance, has_counted, is_camera_known, learn, loosen,
     to_tuples, widen,

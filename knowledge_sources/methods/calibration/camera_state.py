@@ -30,7 +30,6 @@ for two deviations)."""
 SIGMA_FOCAL = 0.02  # standard deviation of the focal length, as a part of it (issue: up to 4 %)
 SIGMA_CENTRE_PX = 0.5  # standard deviation of the principal point, along each axis (harvey experiment calibrate)
 MAX_KNOWN_PX = 4.0  # up to this uncertainty in the picture the camera is taken as believed when lines are matched
-MAX_CAMERA_CHI2 = 30.0  # squared distance from what was believed beyond which a picture is no evidence
 MIN_MOVE_M = 0.3  # a picture counts if it was taken this far from those that have counted
 MIN_TURN_RAD = math.radians(10.0)  # or in a direction that differs by this
 MAX_COUNTED = 40  # number of pictures that are remembered as counted

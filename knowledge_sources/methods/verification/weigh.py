@@ -10,6 +10,7 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import (
+    MAX_CAMERA_CHI2,
     MAX_TOLD_CHI2,
     MIN_P_BELIEVED,
     TOLD_SIGMA_M,
@@ -21,7 +22,6 @@ from knowledge_sources.methods.belief import (
     to_log_odds,
     update,
 )
-from knowledge_sources.methods.calibration import MAX_CAMERA_CHI2
 from knowledge_sources.methods.features import MIN_CONTRAST, read_picture
 from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors
 from knowledge_sources.methods.verification.line_check import (

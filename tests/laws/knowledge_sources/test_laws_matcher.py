@@ -12,7 +12,7 @@ import pytest
 
 from blackboard import Entry, Posted
 from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
-from knowledge_sources.methods.calibration import MAX_CAMERA_CHI2
+from knowledge_sources.methods.belief import MAX_CAMERA_CHI2
 from knowledge_sources.methods.calibration.camera_state import (
     PRIOR_COVARIANCE_FACTOR,
     PRIOR_SIGMA_M,

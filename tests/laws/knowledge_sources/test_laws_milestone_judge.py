@@ -25,6 +25,7 @@ from generated_boards import effect_on, made, reasons
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.belief import (
+    MAX_CAMERA_CHI2,
     MAX_TOLD_CHI2,
     MIN_P_BELIEVED,
     TOLD_SIGMA_M,
@@ -32,7 +33,7 @@ from knowledge_sources.methods.belief import (
     to_log_odds,
     update,
 )
-from knowledge_sources.methods.calibration import MAX_CAMERA_CHI2, compute_camera_covariance
+from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.features import MIN_CONTRAST
 from knowledge_sources.methods.localization import MAX_ALIKE_LOG_RATIO
 from knowledge_sources.methods.localization.aliasing import Alias
