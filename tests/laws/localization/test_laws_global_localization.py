@@ -364,7 +364,7 @@ def test_a_guess_beside_the_right_place_does_not_hide_it(
 def test_refining_that_makes_a_place_worse_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     pose, aside = Pose2(5.0, 1.0, 0.3), np.diag([1e-6, 1e-6, 1e-6])
     views = views_from(CENTRE, pose, (math.pi / 2, 0.0), 3)
-    monkeypatch.setattr(refinement, "refine_pose", lambda r, v, p, s: (p @ Pose2(0.05, 0.0, 0.03), aside))
+    monkeypatch.setattr(refinement, "refine_pose", lambda r, v, p: (p @ Pose2(0.05, 0.0, 0.03), aside))
     told = localize(CENTRE, views, ["hallway"], guess=("hallway", pose))
     (kept,) = [c for c in told.candidates if c.world_from_robot == pose]
     assert kept.covariance[0, 0] > 0.04**2  # and known no better than to where it would move
