@@ -108,7 +108,7 @@ def match_lines(
     for placement in placements:
         space, first, rows = _build_space(table, placement, gates, terms)
         if first_pairs is not None:
-            np.array([pair in first_pairs for pair in zip(space.model, space.data, strict=True)], bool)
+            first = np.array([pair in first_pairs for pair in zip(space.model, space.data, strict=True)], bool)
         tries.append((space, rows, search(space, terms, first)))
     space, rows, result = min(tries, key=lambda tried: float(tried[2].errors[-1]))
     chosen, pairs = list_pairs(space, result.chosen)
