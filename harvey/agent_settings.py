@@ -62,7 +62,7 @@ def _value(
     default: float | str = BY_MISSION,
 ) -> RobotValue:
     kind, part, room = where
-    return RobotValue(kind, part, field, Row(room, key, default, unit, what, "§3.2", bounds.high), bounds)
+    return RobotValue(kind, part, field, Row(room, key, default, unit, what, "§3.2"), bounds)
 
 
 def _wheels(field: str, unit: str, what: str) -> RobotValue:
@@ -188,7 +188,7 @@ def _format_value(value: Any) -> str:
     """A value as after ``--set``."""
     if isinstance(value, bool):
         return "on" if value else "off"
-    return str(list(value)) if isinstance(value, tuple) else str(value)
+    return str(value)
 
 
 def unknown(key: str, others: Sequence[str] = ()) -> BadInput:

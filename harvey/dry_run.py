@@ -30,11 +30,13 @@ from blackboard import (
 from harvey.runner.world_port import build_scheduler
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.features import SIGMA_ACROSS_PX
 from knowledge_sources.methods.verification import (
     CHECK_TOLERANCE_M,
     MAX_SIGMA_PART,
     MAX_SIGMA_RAD,
     MIN_LINES,
+    MIN_MATCHED_LINES,
     POSE_CONFIDENCE,
     check_lines,
     compute_evidence,
@@ -44,7 +46,7 @@ from knowledge_sources.methods.verification import (
     predict_lines,
 )
 from knowledge_sources.reads import find_belief, find_robot
-from knowledge_sources.settings import DEFAULT, Settings, VerificationSettings
+from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.world import World
 from world_models.entries import (
     Command,
@@ -157,7 +159,7 @@ def dry_run(
         elif decision.refused.startswith(RAISED):
             return tuple(previews), Outcome("failed", decision.refused.strip().splitlines()[-1])
         else:
-            previews += _previews(scheduler.view, decision.made, settings)
+            previews += _previews(scheduler.view, decision.made)
     outcome = scheduler.view.latest(Outcome)
     return tuple(previews), outcome.value if outcome else Outcome("failed", f"not there after {MAX_CYCLES} cycles")
 
@@ -172,7 +174,7 @@ def build_dry_run(
 
 
 def _previews(
-    view: View, made: Sequence[Change], settings: Settings
+    view: View, made: Sequence[Change]
 ) -> list[MilestonePreview]:
     """Previews of the milestones that were just verified."""
     belief = find_belief(view)
@@ -180,23 +182,22 @@ def _previews(
         return []
     values = (change.entry.value for change in made)
     milestones = (v for v in values if isinstance(v, Milestone) and v.status == "verified")
-    return [_preview(find_robot(view), view, belief.value, milestone, settings) for milestone in milestones]
+    return [_preview(find_robot(view), view, belief.value, milestone) for milestone in milestones]
 
 
 def _preview(
-    robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone, settings: Settings
+    robot: RobotModel, view: View, belief: Hypothesis, milestone: Milestone
 ) -> MilestonePreview:
     lines = np.array(milestone.expected, float).reshape(-1, 2, 3)
     pose = belief.world_from_robot(robot.world)
     mount = robot.on_floor_of(belief.locale).mount
-    v, sigma_px = settings.verification, settings.features.sigma_across_px
-    quality = compute_view_quality(lines, robot.camera, mount.camera_from_robot, pose, sigma_px)
+    quality = compute_view_quality(lines, robot.camera, mount.camera_from_robot, pose, SIGMA_ACROSS_PX)
     most_m = MAX_SIGMA_PART * (_tolerance_m(view, milestone) or CHECK_TOLERANCE_M)
     sharp = quality.sigma_m <= most_m and quality.sigma_rad <= MAX_SIGMA_RAD
     standing = robot.on_floor_of(belief.locale)
-    seen = len(lines) >= v.min_matched_lines
-    p_false = predict_p_false(standing, pose, lines, np.array(diagonal(FIX_SIGMA_M, FIX_SIGMA_RAD)), v) if seen else 1.0
-    other = find_alias(standing, belief.locale, pose, lines, v) if seen else None
+    seen = len(lines) >= MIN_MATCHED_LINES
+    p_false = predict_p_false(standing, pose, lines, np.array(diagonal(FIX_SIGMA_M, FIX_SIGMA_RAD))) if seen else 1.0
+    other = find_alias(standing, belief.locale, pose, lines) if seen else None
     clear = sharp and len(lines) >= MIN_LINES and p_false <= POSE_CONFIDENCE.accept
     return MilestonePreview(
         milestone.what, belief.locale, belief.locale_from_robot.x_m, belief.locale_from_robot.y_m,
@@ -216,7 +217,6 @@ def _tolerance_m(view: View, milestone: Milestone) -> float | None:
 
 def predict_p_false(
     robot: RobotModel, pose: Pose2, lines_world: Floats, covariance: Floats,
-    settings: VerificationSettings = DEFAULT.verification,
 ) -> float:
     """Predict the probability of a wrong pose if lines (m, 2, 3) and colors are all seen where they are expected.
 
@@ -224,28 +224,27 @@ def predict_p_false(
     """
     projected = robot.camera.project_segments(lines_world, robot.camera_from_world(pose))[0]
     projected = projected[np.isfinite(projected).all(axis=(1, 2))]
-    lines = check_lines(robot, lines_world, projected, pose, settings)
+    lines = check_lines(robot, lines_world, projected, pose)
     colors = predict_color_check(predict_face_colors(robot, pose))
     return POSE_CONFIDENCE.p_false(compute_evidence(pose, covariance, pose, covariance, lines, colors))
 
 
 def find_alias(
     robot: RobotModel, locale: str, pose: Pose2, lines_world: Floats,
-    settings: VerificationSettings = DEFAULT.verification,
 ) -> Pose2 | None:
     """Find another pose in the same locale from which the model looks the same; None if there is none."""
-    colors = _get_colors(robot, pose, settings)
+    colors = _get_colors(robot, pose)
     for other in _repeat(robot, locale, pose):
-        segments = predict_lines(robot, other, settings).segments_px
-        if check_lines(robot, lines_world, segments, pose, settings).coverage >= ALIAS_MIN_COVERAGE:
-            there = _get_colors(robot, other, settings)
+        segments = predict_lines(robot, other).segments_px
+        if check_lines(robot, lines_world, segments, pose).coverage >= ALIAS_MIN_COVERAGE:
+            there = _get_colors(robot, other)
             difference = np.abs(colors[:, None] - there[None]).max(axis=2).min(axis=1, initial=1.0)
             if np.mean(difference <= MAX_COLOR_DIFFERENCE) >= ALIAS_MIN_COLORS:
                 return other
     return None
 
 
-def _get_colors(robot: RobotModel, pose: Pose2, settings: VerificationSettings) -> Floats:
+def _get_colors(robot: RobotModel, pose: Pose2) -> Floats:
     """(n, 3) of the faces in view."""
     return np.array([color for color, _ in predict_face_colors(robot, pose)]).reshape(-1, 3)
 

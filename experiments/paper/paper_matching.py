@@ -14,6 +14,7 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.matching import (
     MAX_MOVES_PER_PAIR,
+    MIN_GAIN,
     Match,
     PairSpace,
     SearchResult,
@@ -22,13 +23,9 @@ from knowledge_sources.methods.matching import (
     fit_state,
     match_lines,
 )
-from knowledge_sources.settings import MatchingSettings
 
 OMISSION_ALPHA = 0.5  # weight of the omission error (§6.1.3, alpha)
 OMISSION_BETA = 4.0  # exponent of the omission error (§6.1.3, beta)
-
-PAPER = MatchingSettings(max_starts=1, max_pair_px=3.0)
-"""One start, and pairs within 3 px (§6.1.4)."""
 
 
 class TraceStep(NamedTuple):
@@ -76,7 +73,7 @@ class PaperSearch:
     exchange: bool = False
     trace: tuple[TraceStep, ...] = field(default=(), init=False)
 
-    def __call__(self, space: PairSpace, terms: Terms, start: Mask, settings: MatchingSettings) -> SearchResult:
+    def __call__(self, space: PairSpace, terms: Terms, start: Mask) -> SearchResult:
         """As :func:`knowledge_sources.methods.matching.search.search_pairs`."""
         chosen, last, steps = start.copy(), -1, []
         everyone = np.arange(len(start))
@@ -84,7 +81,7 @@ class PaperSearch:
         errors = [float(fit_state(space, chosen).errors[0] + state.omissions.sum())]
         steps.append(_build_step(space, chosen, errors[0]))
         while len(errors) <= MAX_MOVES_PER_PAIR * len(start):
-            below = errors[-1] - settings.min_gain
+            below = errors[-1] - MIN_GAIN
             into, out = everyone, np.full(len(start), -1)
             found = state.evaluate(into, out)
             if self.exchange and not np.any(found < below):
@@ -154,15 +151,17 @@ def _build_step(space: PairSpace, chosen: Mask, error: float) -> TraceStep:
 
 
 def match_as_paper(
-    model_px: Any, data_px: Any, settings: MatchingSettings = PAPER, search: PaperSearch | None = None, **given: Any
+    model_px: Any, data_px: Any, search: PaperSearch | None = None, *, max_starts: int = 1, pair_px: Any = 3.0,
+    **given: Any,
 ) -> Match:
     """Match the projected model (m, 2, 2) to data lines (k, 2, 2) under the paper's match error.
 
     Args:
-        search: by default the paper's own.
+        search: by default the paper's own. max_starts, pair_px: as the paper has them [px].
         given: as for :func:`knowledge_sources.methods.matching.match_lines`.
     """
     model, data = (np.asarray(lines, float).reshape(-1, 2, 2) for lines in (model_px, data_px))
     lengths = [np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1) for lines in (model, data)]
     return match_lines(
-        model_px, data_px, settings, terms=build_paper_terms(*lengths), search=search or PaperSearch(), **given)
+        model_px, data_px, max_starts=max_starts, pair_px=pair_px, terms=build_paper_terms(*lengths),
+        search=search or PaperSearch(), **given)

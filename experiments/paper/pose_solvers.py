@@ -15,9 +15,12 @@ from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose import (
     FEW_LINES,
     IMAGE,
+    MAX_BESIDE_PX,
     MAX_ITERATIONS,
     MIN_LINES,
+    OUTLIER_SIGMAS,
     PLANES,
+    SHARED_PX,
     SUBSET_SIZE,
     TINY,
     LandmarkIds,
@@ -41,7 +44,6 @@ from knowledge_sources.methods.pose import (
     reject_behind,
     solve_from_subsets,
 )
-from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -66,7 +68,7 @@ def r_and_t(
     sigma_px: Any = 1.0,
     objective: Literal["E1", "E2"] = "E1",
     weighting: Weighting = "unit",
-    settings: PoseSettings = DEFAULT.pose,
+    shared_px: float = SHARED_PX,
 ) -> PoseEstimate:
     """Camera pose of least squared distances of the model ends to the observed projection planes.
 
@@ -94,7 +96,7 @@ def r_and_t(
         e1 = minimise(PLANES, lines, (prior.rotation, prior.translation), weights=weights)
         return _minimise_e2(lines, weights, e1) if objective == "E2" else e1
 
-    return _solve(lines, prior, landmark_ids, weighting, solve, objective, settings)
+    return _solve(lines, prior, landmark_ids, weighting, solve, objective, shared_px)
 
 
 def r_then_t(
@@ -106,7 +108,7 @@ def r_then_t(
     landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     weighting: Weighting = "unit",
-    settings: PoseSettings = DEFAULT.pose,
+    shared_px: float = SHARED_PX,
 ) -> PoseEstimate:
     """Camera pose in two least-squares problems: n_i . R d_i = 0 for R, then n_i . (R p_i + T) = 0 for T.
 
@@ -118,21 +120,21 @@ def r_then_t(
     def solve(weights: Floats) -> Minimum:
         return _minimise_turn(lines, weights, prior)
 
-    return _solve(lines, prior, landmark_ids, weighting, solve, "turn", settings)
+    return _solve(lines, prior, landmark_ids, weighting, solve, "turn", shared_px)
 
 
 def _solve(
     lines: LineSet, prior: Pose, landmark_ids: LandmarkIds, weighting: Weighting, solve: Callable[[Floats], Minimum],
-    objective: str, settings: PoseSettings,
+    objective: str, shared_px: float,
 ) -> PoseEstimate:
     check_landmarks(landmark_ids, len(lines))
     if len(lines) < MIN_LINES:
-        return build_prior_estimate(lines, prior, FEW_LINES, settings)
+        return build_prior_estimate(lines, prior, FEW_LINES)
     weights = _compute_line_weights(lines, weighting)
     end = solve(weights)
     kept = reject_behind(lines, end.state)
-    covariance = compute_covariance(lines, end.state, kept, _compute_gain(lines, end, weights, objective), settings)
-    return build_estimate(lines, end, covariance, kept, settings, prior)
+    covariance = compute_covariance(lines, end.state, kept, _compute_gain(lines, end, weights, objective), shared_px)
+    return build_estimate(lines, end, covariance, kept, prior)
 
 
 def _compute_line_weights(lines: LineSet, weighting: Weighting) -> Floats:
@@ -238,7 +240,7 @@ def trunc_r_and_t(
     probability: float | None = None,
     rng: np.random.Generator | None = None,
     prior_covariance: Any = None,
-    settings: PoseSettings = DEFAULT.pose,
+    shared_px: float = SHARED_PX,
 ) -> PoseEstimate:
     """Camera pose of least truncated loss (MSAC): holds beyond 50 % of wrong lines, if ``sigma_px`` is true.
 
@@ -250,7 +252,7 @@ def trunc_r_and_t(
     Raises:
         ValueError: as ``med_r_and_t``.
     """
-    bound = 2.0 * settings.outlier_sigmas**2
+    bound = 2.0 * OUTLIER_SIGMAS**2
 
     def choose(lines: LineSet, rotations: Floats, translations: Floats) -> tuple[RigidMotion, Mask, float]:
         def rank(errors: Floats) -> Floats:
@@ -264,13 +266,13 @@ def trunc_r_and_t(
         information = None
         if prior_covariance is not None:
             information, order = np.linalg.inv(prior_covariance), [*order, len(rotations) - 1]
-        loss = TruncatedLoss(lines, prior, information, bound, settings.max_beside_px)
+        loss = TruncatedLoss(lines, prior, information, bound, MAX_BESIDE_PX)
         ends = [loss.refine((rotations[i], translations[i])) for i in order]
         state, _ = min(ends, key=lambda end: end[1])
         return state, loss.measure(state, bound) < bound, bound
 
     return solve_from_subsets(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px, probability,
-                              TRUNC_DRAWN_OUTLIER_PART, rng, prior_covariance, settings, choose)
+                              TRUNC_DRAWN_OUTLIER_PART, rng, prior_covariance, shared_px, choose)
 
 
 class TruncatedLoss(NamedTuple):

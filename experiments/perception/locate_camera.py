@@ -26,11 +26,10 @@ from experiments.perception.rivals import (
     project_leaders,
 )
 from knowledge_sources.methods.arrays import Floats, Indices
-from knowledge_sources.methods.features import LineSegments, find_lines
+from knowledge_sources.methods.features import SIGMA_ACROSS_PX, LineSegments, find_lines
 from knowledge_sources.methods.matching import CameraParameters, build_camera_parameters, match_in_space
 from knowledge_sources.methods.pose import MIN_NOISE_PART, PoseEstimate, med_r_and_t, r_and_t_ml
 from knowledge_sources.methods.verification import Agreement, compute_agreement, compute_p_false
-from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -291,7 +290,7 @@ class CameraSearch:
         i, k = lines[match.pairs[:, 0]], match.pairs[:, 1]
         estimate = solver(
             self.model[i], segments_px[k], self.camera, match.camera_from_world, landmark_ids=i.tolist(),
-            sigma_px=DEFAULT.features.sigma_across_px, probability=CAMERA_PROBABILITY, rng=self.rng)
+            sigma_px=SIGMA_ACROSS_PX, probability=CAMERA_PROBABILITY, rng=self.rng)
         return estimate, np.stack([i, k], axis=1)
 
     def _judge(self, estimate: PoseEstimate, pairs: Indices, near: Floats) -> CameraFix:
@@ -330,7 +329,7 @@ class CameraSearch:
 
     def _state_as_seen(self, estimate: PoseEstimate, pairs: Indices, near: Floats) -> PoseEstimate:
         """The estimate with the covariance that the noise of its own residuals gives, and the shared error."""
-        kept, sigma_px = estimate.inliers, DEFAULT.features.sigma_across_px
+        kept, sigma_px = estimate.inliers, SIGMA_ACROSS_PX
         squares = (estimate.residuals_px[kept] / sigma_px) ** 2
         if not estimate.ok or squares.size <= 6:
             return estimate

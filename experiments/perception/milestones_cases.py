@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.generated.floors import Floor, generated_floor
-from knowledge_sources.methods.verification import choose_heading, predict_milestone
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.methods.verification import LOOK_TURNS_RAD, choose_heading, predict_milestone
 from sim.body.simulated_building import SimulatedBuilding
 from sim.render.sensor import Occluder, SensorParameters, compress_jpeg, expose
 from sim.scenario import CameraSettings
@@ -247,7 +246,7 @@ def _is_free(here: Site, pose: Pose2) -> bool:
 
 
 def _headings(pose: Pose2) -> list[float]:
-    return [pose.heading_rad, *(wrap_angle(pose.heading_rad + turn_rad) for turn_rad in DEFAULT.plan.look_turns_rad)]
+    return [pose.heading_rad, *(wrap_angle(pose.heading_rad + turn_rad) for turn_rad in LOOK_TURNS_RAD)]
 
 
 def _draw_covariance(actuator: ActuatorModel, pose: Pose2, rng: np.random.Generator) -> Floats:

@@ -21,9 +21,8 @@ from experiments.perception.rivals import MIN_LINE_LENGTH_PX
 from experiments.report import OURS, PEER, chart
 from experiments.shared_data import CORRIDOR, data_path, describe_absence
 from harvey.errors import BadInput
-from knowledge_sources.methods.features import LineSegments, find_lines, read_picture
+from knowledge_sources.methods.features import SIGMA_ACROSS_PX, LineSegments, find_lines, read_picture
 from knowledge_sources.methods.pose import med_r_and_t
-from knowledge_sources.settings import DEFAULT
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -213,7 +212,7 @@ def _solve_as_paper(
     i, k = match.pairs.T
     return med_r_and_t(
         model[i], segments.segments_px[k], frame.camera, prior, landmark_ids=i.tolist(),
-        sigma_px=DEFAULT.features.sigma_across_px, probability=0.999, rng=rng,
+        sigma_px=SIGMA_ACROSS_PX, probability=0.999, rng=rng,
     ).camera_from_world
 
 

@@ -14,8 +14,12 @@ from typing import Any
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices
-from knowledge_sources.methods.verification import LINE_TOLERANCE_RAD, MAX_LINE_WEIGHT_PX, compute_coverage
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.methods.verification import (
+    LINE_TOLERANCE_PX,
+    LINE_TOLERANCE_RAD,
+    MAX_LINE_WEIGHT_PX,
+    compute_coverage,
+)
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -76,7 +80,7 @@ def compute_pose_score(leaders_px: Floats, segments_px: Floats, chance: float) -
     ``chance`` is the probability that a line is found at a wrong pose. One that is not found speaks against the pose.
     """
     seen = leaders_px[~np.isnan(leaders_px[:, 0, 0])]
-    covered = compute_coverage(seen, segments_px, DEFAULT.verification.line_tolerance_px, LINE_TOLERANCE_RAD)
+    covered = compute_coverage(seen, segments_px, LINE_TOLERANCE_PX, LINE_TOLERANCE_RAD)
     weights = np.minimum(np.linalg.norm(seen[:, 1] - seen[:, 0], axis=1) / FULL_LINE_PX, 1.0)
     rate, p = DETECTION_RATE, min(max(chance, SCORE_CHANCES[0]), SCORE_CHANCES[1])
     found, missed = math.log(rate / p), math.log((1.0 - rate) / (1.0 - p))

@@ -88,8 +88,7 @@ def select_rows(name: str | None) -> tuple[Row, ...]:
 
 def to_record(row: Row) -> dict[str, Any]:
     """A setting as JSON types."""
-    value = list(row.value) if isinstance(row.value, tuple) else row.value
-    return {"name": row.name, "value": value, "unit": row.unit, "meaning": row.what, "source": row.source}
+    return {"name": row.name, "value": row.value, "unit": row.unit, "meaning": row.what, "source": row.source}
 
 
 def format_rows(rows: Sequence[Row], width: int) -> Iterator[str]:
@@ -129,17 +128,14 @@ def format_value(row: Row) -> str:
     if isinstance(row.value, bool):
         return "on" if row.value else "off"
     unit = "" if row.unit in ("1", "count") else f" {row.unit}"
-    if isinstance(row.value, tuple):
-        numbers = f"{len(row.value)} values" if len(row.value) > 4 else " ".join(f"{n:g}" for n in row.value)
-        return f"{numbers}{unit}"
     return f"{row.value:.4g}{unit}" + (f" ({degrees(row.value):.3g} deg)" if row.unit == "rad" else "")
 
 
 SETTINGS = CliCommand(
-    "settings", "every number of the methods: value, unit, meaning and source",
+    "settings", "every number that can be set: value, unit, meaning and source",
     (
         ("harvey settings", "all rooms"),
-        ("harvey settings matching", "one room"),
+        ("harvey settings floor", "one room"),
         ("harvey settings plan.max_leg_m", "one number"),
         ("harvey settings camera", "what the robot believes of its camera"),
         ("harvey settings --json", "for further use"),

@@ -18,7 +18,7 @@ from harvey.hardware.drivers.base_driver import Base, BaseFault
 from harvey.hardware.drivers.capture import CameraFault
 from harvey.hardware.drivers.video_camera import VideoCamera
 from harvey.hardware.hardware_mission import HardwareMission
-from knowledge_sources.methods.features import read_picture
+from knowledge_sources.methods.features import MIN_CONTRAST, read_picture
 from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.checks import check_world
 from world_models.building.world import World
@@ -212,7 +212,7 @@ class Preflight:
                     f"[camera] rate_hz = {eye.rate_hz:g} is needed: less light needs longer exposure; try MJPG, a "
                     "shorter cable, fewer devices on the bus" if slow else "")
         contrast = float(read_picture(pictures[-1].jpeg).grey.std())
-        is_enough = contrast >= self._settings.plan.min_contrast
+        is_enough = contrast >= MIN_CONTRAST
         yield Check("sight", f"contrast {contrast:.0f} of 255",
                     "" if is_enough else "too dark, or the lens is covered: nothing can be recognized")
 

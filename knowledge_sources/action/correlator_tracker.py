@@ -17,7 +17,14 @@ from blackboard import Change, Discrepancy, Effect, Level, Posted, Revise, View,
 from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.features import Template
-from knowledge_sources.methods.tracking import TrackUpdate, action_px, correct_pose, cut_template, follow_landmarks
+from knowledge_sources.methods.tracking import (
+    TEMPLATE_HALF_PX,
+    TrackUpdate,
+    action_px,
+    correct_pose,
+    cut_template,
+    follow_landmarks,
+)
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
     HELD,
@@ -41,6 +48,12 @@ from knowledge_sources.reads import (
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Anchor, CameraPicture, Drift, Hypothesis, Track, Tracks
 
+MAX_MISSES = 2  # a landmark that is not found so many times in a row is dropped
+MIN_EXPECTED_LANDMARKS = 4  # fewest expected landmarks that can make a discrepancy
+MIN_AGREEING_LANDMARKS = 2
+"""Fewest landmarks that must agree for the belief to be corrected by them; of those that were found alone, one in 17
+was something else (34 of them, on drives to and fro in the Research Center)."""
+MIN_AGREEING_PART = 1.0 / 3.0  # if a smaller part of the expected landmarks agrees, tracking has failed
 MIN_LANDMARKS = 5  # with fewer tracked landmarks than this, new ones are always taken
 ENOUGH_LANDMARKS = 9  # with this many tracked landmarks or more, no new ones are taken
 MIN_REMAINING_PART = 0.5  # between these two, new landmarks are taken below this part of those at the last renewal
@@ -60,7 +73,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
         return Following(PICTURE.of(view), HELD.of(view), view.latest(Tracks))
 
     def act(self, view: View, case: Following) -> Iterable[Effect]:
-        (frame, held, old), s = case, self._settings
+        frame, held, old = case
         belief, image = held.entry, rectify(held.robot, frame)
         followed = [] if old is None else self._follow(view, held, old.value.items, image)
         seen = [f.track for f in followed if f.track.found_px is not None]
@@ -70,14 +83,14 @@ class CorrelatorTracker(RobotKnowledgeSource):
         unseen = 0 if seen or old is None else old.value.unseen + 1
         bare = find_missing_floors(view, unseen)
         what = f"no landmark in {unseen} pictures, and the floor is nowhere free where it should be" if bare else ""
-        if expected >= s.action.min_expected_landmarks and agreeing < s.action.min_agreeing_part * expected:
+        if expected >= MIN_EXPECTED_LANDMARKS and agreeing < MIN_AGREEING_PART * expected:
             what = f"{expected - agreeing} of {expected} landmarks are not where they were expected{tell_worst(seen)}"
         if what:
             tracks = [f.track for f in followed]
             yield from self._post_discrepancy(view, what, math.inf, held, tracks, (*because, *bare))
-            yield post_or_revise(old, Tracks(frame.id, s.tracking.template_half_px, ()), because)
+            yield post_or_revise(old, Tracks(frame.id, TEMPLATE_HALF_PX, ()), because)
             return
-        if agreeing < s.action.min_agreeing_landmarks:
+        if agreeing < MIN_AGREEING_LANDMARKS:
             corrected = None  # nothing bears out that it is not something else that looks the same
         renewed = self._renew(case, image, followed, corrected or belief.value)
         tracked = post_or_revise(old, replace(renewed.tracks, unseen=unseen), because)
@@ -93,18 +106,18 @@ class CorrelatorTracker(RobotKnowledgeSource):
             yield from self._post_discrepancy(view, what, shift, held, seen, (correction,))
 
     def _follow(self, view: View, belief: Belief, tracks: tuple[Track, ...], image: Image) -> list[TrackUpdate]:
-        s, robot = self._settings, belief.robot
+        _s, robot = self._settings, belief.robot
 
         def template_of(track: Track) -> Template:
             jpeg = view[track.template_frame].value.jpeg
-            half_px = s.tracking.template_half_px
-            return cut_template(robot.lens, robot.camera, jpeg, track.template_px, half_px, s.features)
+            half_px = TEMPLATE_HALF_PX
+            return cut_template(robot.lens, robot.camera, jpeg, track.template_px, half_px)
 
-        return follow_landmarks(belief.seeing, tracks, template_of, image, belief.pose, belief.covariance, s)
+        return follow_landmarks(belief.seeing, tracks, template_of, image, belief.pose, belief.covariance)
 
     def _correct(self, held: Belief, seen: list[Track], anchors: tuple[Anchor, ...]) -> tuple[Hypothesis, int]:
         """The belief after the landmarks were found, and how many of them agree with it."""
-        pose, covariance, agreeing = correct_pose(held.robot, seen, anchors, held.pose, held.covariance, self._settings)
+        pose, covariance, agreeing = correct_pose(held.robot, seen, anchors, held.pose, held.covariance)
         return held.moved_to(pose, covariance, "tracks"), agreeing
 
     def _renew(self, case: Following, image: Image, followed: list[TrackUpdate], belief: Hypothesis) -> Renewed:
@@ -112,12 +125,12 @@ class CorrelatorTracker(RobotKnowledgeSource):
         frame, old, robot = case.frame, case.old, case.belief.seeing
         anchors, taken = ((), 0) if old is None else (old.value.anchors, old.value.taken)
         near = find_near_frames(anchors, belief.world_from_robot(robot.world), robot)
-        kept = tuple(f.track for f in followed if f.expected and f.track.misses < self._settings.action.max_misses
+        kept = tuple(f.track for f in followed if f.expected and f.track.misses < MAX_MISSES
                      and f.track.template_frame in near)
         if len(kept) >= max(MIN_LANDMARKS, min(ENOUGH_LANDMARKS, MIN_REMAINING_PART * taken)):
-            return Renewed(with_anchors(robot, frame.id, kept, anchors, belief, taken, self._settings), belief)
-        camera = compute_camera_covariance(find_camera(case.belief.view), self._settings.camera_state)
-        return take_new(case.belief, frame.id, image, kept, anchors, belief, camera, self._settings)
+            return Renewed(with_anchors(robot, frame.id, kept, anchors, belief, taken), belief)
+        camera = compute_camera_covariance(find_camera(case.belief.view))
+        return take_new(case.belief, frame.id, image, kept, anchors, belief, camera)
 
     def _post_discrepancy(
         self, view: View, what: str, magnitude_px: float, belief: Belief, tracks: list[Track],

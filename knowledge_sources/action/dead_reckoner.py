@@ -60,7 +60,7 @@ class DeadReckoner(RobotKnowledgeSource):
             before, held.covariance, report.turn_rad, report.move_m, drift.curvature_per_m
         )
         camera = find_camera(view)
-        yaw_variance = float(compute_camera_covariance(camera, self._settings.camera_state)[YAW, YAW])
+        yaw_variance = float(compute_camera_covariance(camera)[YAW, YAW])
         covariance = covariance + _compute_aside_covariance(before, pose, yaw_variance)
         there = world.locale_at([*pose.position, world.floor_m(belief.value.locale)])
         locale = there if there and world.is_room(there) else belief.value.locale  # in a doorway: still the old room

@@ -24,6 +24,10 @@ from world_models.entries import (
     Ride,
 )
 
+MAX_FAULT_S = 30.0  # a fault that lasts longer ends the mission
+MAX_BROKEN_MOTIONS = 5  # so many motions broken off in a row end the mission
+MIN_RETRY_WAIT_S = 0.25  # pause before the first retry after a fault; each further one is twice as long
+MAX_RETRY_WAIT_S = 2.0  # longest pause between retries
 WORD_WAIT_S = 1.0  # so long it waits before it looks again whether somebody has said go on
 
 
@@ -68,7 +72,7 @@ class FaultHandler(RobotKnowledgeSource):
         return Priority.ENTER if case.is_of_fault else Priority.MOVE  # it waits when nothing else is left to do
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        (fault, recovery), s = case, self._settings.action
+        fault, recovery = case
         if not case.is_of_fault:
             yield _wait_for_word(view, fault, recovery, self._settings.plan.max_deviation_px)
             return
@@ -79,11 +83,11 @@ class FaultHandler(RobotKnowledgeSource):
         elif STOP_KEY in (f.what, "" if asked is None else asked.what):
             yield Post(Impasse("stopped", f.detail if asked is None else asked.detail), because)
         elif recovery is None or asked is None:
-            yield Post(Recovery(fault.id, f.request, f.when_s, s.min_retry_wait_s), because)
-        elif asked.waited_s >= s.max_fault_s:
+            yield Post(Recovery(fault.id, f.request, f.when_s, MIN_RETRY_WAIT_S), because)
+        elif asked.waited_s >= MAX_FAULT_S:
             yield Post(self._give_up(view.get(f.request), f, asked), because)
         else:
-            again = replace(asked, status="asked", wait_s=min(2.0 * asked.wait_s, s.max_retry_wait_s))
+            again = replace(asked, status="asked", wait_s=min(2.0 * asked.wait_s, MAX_RETRY_WAIT_S))
             yield Revise(recovery, again, because)
 
     def _close(self, view: View, fault: Entry[BodyFault], recovery: Entry[Recovery]) -> Iterable[Effect]:
@@ -92,7 +96,7 @@ class FaultHandler(RobotKnowledgeSource):
         motion = view.get(recovery.value.request)
         if motion is None or not isinstance(motion.value, MotorCommand | Course):
             return
-        times = self._settings.action.max_broken_motions
+        times = MAX_BROKEN_MOTIONS
         if _were_all_broken_off(view, times):
             reason = f"{times} motions in a row were broken off, the last one by: {fault.value.what}"
             yield Post(Impasse("failed", reason), (closed,))

@@ -42,8 +42,8 @@ class LandmarkChooser(RobotKnowledgeSource):
         frame, held, old = case
         belief = held.entry
         camera = None if rests_on(view, belief, frame.id) else compute_camera_covariance(
-            find_camera(view), self._settings.camera_state)
-        fresh = take_new(held, frame.id, rectify(held.robot, frame), (), (), belief.value, camera, self._settings)
+            find_camera(view))
+        fresh = take_new(held, frame.id, rectify(held.robot, frame), (), (), belief.value, camera)
         tracks = post_or_revise(old, fresh.tracks, (frame, belief))
         yield tracks
         drift = view.latest(Drift)

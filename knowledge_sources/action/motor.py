@@ -35,6 +35,8 @@ from knowledge_sources.reads import (
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import BodyFault, Drift, Hypothesis, Leg, Milestone, MotorCommand, PlanSketch
 
+LOOKAHEAD_M = 1.2  # distance ahead on the line at which the motor steers (pure pursuit): two increments
+
 
 class Turn(NamedTuple):
     """A milestone that the robot has to turn to, and by which increment it does."""
@@ -108,7 +110,7 @@ class Motor(RobotKnowledgeSource):
     def _command_increment(self, view: View, leg: Entry[Leg], held: Belief) -> Iterable[Effect]:
         (robot, here, belief), drift = (held.robot, held.pose, held.entry), view.latest(Drift)
         curvature_per_m = 0.0 if drift is None else drift.value.curvature_per_m
-        lookahead_m = self._settings.action.lookahead_m
+        lookahead_m = LOOKAHEAD_M
         seen = update_leg(leg.value, here, find_aim(leg.value, here, lookahead_m))
         told: tuple[Entry[Any], ...] = ()
         command = plan_turn(seen.looking_rad, here, robot.actuator, MAX_LOOK_ERROR_RAD)

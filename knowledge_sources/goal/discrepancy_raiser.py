@@ -11,6 +11,9 @@ from knowledge_sources.reads import deepest_sketch, is_over
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Impasse, PlanSketch
 
+MAX_CHECKS_PER_SUBGOAL = 20
+"""So often the action level may ask the plan level on the way to one subgoal; then it is blocked."""
+MAX_LOST_PER_MISSION = 12  # so often the robot may be lost in one mission
 GIVEN_UP: Mapping[Level, tuple[str, str]] = {
     Level.PLAN: ("blocked", "on the way to one place it was not as expected {times} times, the last one:"),
     Level.GOAL: ("lost", "lost {times} times, the last one:"),
@@ -39,8 +42,7 @@ class DiscrepancyRaiser(RobotKnowledgeSource):
         close = Revise(found, replace(closed, tried=tried, times=times), (*found.because, *counted))
         yield close
         yield Post(raised, (close,))
-        s = self._settings.plan
-        most = s.max_checks_per_subgoal if raised.level is Level.PLAN else s.max_lost_per_mission
+        most = MAX_CHECKS_PER_SUBGOAL if raised.level is Level.PLAN else MAX_LOST_PER_MISSION
         if times >= most and not is_over(view):
             kind, why = GIVEN_UP[raised.level]
             yield Post(Impasse(kind, f"{why.format(times=times)} {closed.what}"), (close,))

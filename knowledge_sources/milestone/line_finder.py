@@ -28,8 +28,7 @@ class LineFinder(RobotKnowledgeSource):
     def act(self, view: View, case: Change) -> Iterable[Effect]:
         frame, robot = case.entry, find_robot(view)
         image = read_picture(frame.value.jpeg).rectified(robot.lens, robot.camera)
-        found = find_lines(image, min_length_px=MIN_SEGMENT_LENGTH_PX,
-                           settings=self._settings.features)
+        found = find_lines(image, min_length_px=MIN_SEGMENT_LENGTH_PX)
         brightness, contrast = compute_mean_and_deviation(image)
         waiting = open_milestone(view) if frame.value.purpose == "milestone" else None
         yield Post(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
+from knowledge_sources.methods.belief import MAX_CAMERA_CHI2
 from knowledge_sources.methods.calibration import (
     RIGID_DISTANCE_M,
     add_yaw,
@@ -26,6 +27,8 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import LineMatch, Milestone, Segments
 from world_models.frames import frozen
 
+MIN_SHARP_PART = 0.6  # where less of the lines' length is covered sharply, the camera may have been knocked
+MIN_KNOCK_GAIN = 0.15  # by so much more must be covered sharply with a camera that was knocked
 MAX_RIGID_SIGMA_PX = 6.0  # up to this uncertainty lines are matched in the image (§6.1); beyond it, on the floor
 
 Floats = NDArray[np.float64]
@@ -57,7 +60,7 @@ class Matcher(RobotKnowledgeSource):
         m, data_px = milestone.value, segments.value.segments_px
         lines_world = np.array(m.expected, float).reshape(-1, 2, 3)
         expected_px = np.array(m.expected_px, float).reshape(-1, 2, 2)
-        asked = np.flatnonzero(find_distinct(expected_px, data_px, self._settings.verification))
+        asked = np.flatnonzero(find_distinct(expected_px, data_px))
         if not len(asked):
             none = np.zeros((0, 2), np.int64)
             yield Post(LineMatch(milestone.id, segments.id, none, frozen(lines_world[:0]), frozen(data_px[:0]), 0.0,
@@ -78,19 +81,19 @@ class Matcher(RobotKnowledgeSource):
         self, view: View, expected_px: Floats, lines_world: Floats, data_px: Floats, belief: Belief
     ) -> tuple[Match | PoseMatch, bool]:
         """The match, and whether it takes the camera for knocked: much more agrees with the picture then."""
-        robot, camera, s = belief.robot, find_camera(view), self._settings.camera_state
-        known = compute_camera_covariance(camera, s)
+        robot, camera = belief.robot, find_camera(view)
+        known = compute_camera_covariance(camera)
         prior = belief.pose, belief.covariance
         given = lines_world, data_px, robot.camera, robot.mount
-        if not is_camera_known(robot, known, self._settings):
-            return match_with_camera(*given, *prior, known, self._settings).match, False
+        if not is_camera_known(robot, known):
+            return match_with_camera(*given, *prior, known).match, False
         found = rate_match(self._match_with_known_camera(expected_px, lines_world, data_px, belief), *given,
-                           prior[0], loosen(prior[1]), known, self._settings)
-        if found.sharp_part >= s.min_sharp_part and found.prior_chi2 <= s.max_chi2:
+                           prior[0], loosen(prior[1]), known)
+        if found.sharp_part >= MIN_SHARP_PART and found.prior_chi2 <= MAX_CAMERA_CHI2:
             return found.match, False
-        opened = compute_knocked_covariance(camera, s)
-        knocked = match_with_camera(*given, prior[0], add_yaw(prior[1], opened, known), opened, self._settings)
-        is_knocked = knocked.sharp_part >= found.sharp_part + s.min_knock_gain
+        opened = compute_knocked_covariance(camera)
+        knocked = match_with_camera(*given, prior[0], add_yaw(prior[1], opened, known), opened)
+        is_knocked = knocked.sharp_part >= found.sharp_part + MIN_KNOCK_GAIN
         return (knocked if is_knocked else found).match, is_knocked
 
     def _match_with_known_camera(
@@ -99,7 +102,7 @@ class Matcher(RobotKnowledgeSource):
         robot, b = belief.robot, belief.value
         sigma_px = robot.camera.fx * math.hypot(b.sigma_rad, b.sigma_m / RIGID_DISTANCE_M)
         if sigma_px <= MAX_RIGID_SIGMA_PX:
-            return match_lines(expected_px, data_px, self._settings.matching)
+            return match_lines(expected_px, data_px)
         return match_on_floor(
             lines_world, data_px, robot.camera, robot.mount.camera_from_robot,
-            belief.pose, belief.covariance, self._settings.matching)
+            belief.pose, belief.covariance)

@@ -18,6 +18,8 @@ from knowledge_sources.methods.calibration import (
     to_tuples,
     widen,
 )
+from knowledge_sources.methods.features import SIGMA_ACROSS_PX
+from knowledge_sources.methods.localization import CAMERA_LINE_SIGMA_PX, MIN_CAMERA_LINES
 from knowledge_sources.methods.pose import CameraEstimate, PlanarEstimate, estimate_camera_and_pose, planar_from_lines
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, find_camera, find_robot
@@ -50,15 +52,15 @@ class MedRAndT(RobotKnowledgeSource):
 
     def act(self, view: View, case: Matched) -> Iterable[Effect]:
         (match, milestone), belief = case, HELD.of(view)
-        m, own, camera = milestone.value, self._settings.camera_state, find_camera(view)
+        m, camera = milestone.value, find_camera(view)
         robot, here = belief.robot, belief.pose
-        prior, known = loosen(belief.covariance), compute_camera_covariance(camera, own)
+        prior, known = loosen(belief.covariance), compute_camera_covariance(camera)
         if match.value.is_camera_open:
-            opened = compute_knocked_covariance(camera, own)
+            opened = compute_knocked_covariance(camera)
             prior, known = add_yaw(prior, opened, known), opened
         learnt = None if m.displacement_modes else self._learn(robot, match.value, here, prior, known)
         moves = learnt is not None and (
-            match.value.is_camera_open or not has_counted(camera, learnt.world_from_robot, own))
+            match.value.is_camera_open or not has_counted(camera, learnt.world_from_robot))
         if learnt is not None and moves:
             robot = find_robot(view, camera.moved(tuple(learnt.step.tolist()))).on_floor_of(belief.locale)
         found = self._solve(robot, match.value, here, prior, m)
@@ -82,13 +84,12 @@ class MedRAndT(RobotKnowledgeSource):
         self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, known: Floats
     ) -> CameraEstimate | None:
         """The camera's state beside the pose; None where the lines say too little."""
-        s = self._settings.camera_state
-        if len(match.pairs) < s.min_lines:
+        if len(match.pairs) < MIN_CAMERA_LINES:
             return None
         found = estimate_camera_and_pose(
             match.lines_world, match.segments_px, robot.camera, robot.mount, here, prior, known,
-            sigma_px=s.line_sigma_px, settings=s)
-        return found if np.count_nonzero(found.inliers) >= s.min_lines else None
+            sigma_px=CAMERA_LINE_SIGMA_PX)
+        return found if np.count_nonzero(found.inliers) >= MIN_CAMERA_LINES else None
 
     def _solve(
         self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, milestone: Milestone
@@ -102,7 +103,6 @@ class MedRAndT(RobotKnowledgeSource):
             here,
             prior_covariance=prior,
             landmark_ids=[milestone.landmark_of[i] for i in match.pairs[:, 0]],
-            sigma_px=self._settings.features.sigma_across_px,
+            sigma_px=SIGMA_ACROSS_PX,
             errors=milestone.errors.take(match.pairs[:, 0]),
-            settings=self._settings.pose,
         )

@@ -33,6 +33,7 @@ from knowledge_sources.reads import (
     has_only_turned,
     open_discrepancy,
 )
+from knowledge_sources.reads.place_believed import MAX_P_RIVAL
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import (
     CameraPicture,
@@ -85,12 +86,12 @@ class MilestoneJudge(RobotKnowledgeSource):
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         milestone = case.milestone
         weighed = self.weigh(view, case)
-        verdict = self._hold_against_others(view, case, weighed, judge_place(weighed, self._settings))
-        because = case.fix, milestone, *find_followed(view, self._settings.action), *view.all(Travel)
+        verdict = self._hold_against_others(view, case, weighed, judge_place(weighed))
+        because = case.fix, milestone, *find_followed(view), *view.all(Travel)
         certificate = Post(certify((milestone.id, case.fix.id), weighed, verdict, case.fix.value), because)
         yield certificate
         yield Revise(milestone, replace(milestone.value, status=verdict.kind), (certificate,))
-        more = not is_last_look(milestone.value, self._settings.plan) or find_search_here(view, milestone.value.sketch)
+        more = not is_last_look(milestone.value) or find_search_here(view, milestone.value.sketch)
         if verdict.kind == "not testable" and more:
             return
         most_px = max(self._settings.plan.max_deviation_px, weighed.tolerance_px)
@@ -104,21 +105,21 @@ class MilestoneJudge(RobotKnowledgeSource):
         """What the picture says, with the camera as it was solved for, and with what was believed before."""
         s, fix, belief, camera = self._settings, case.fix.value, case.belief.value, find_camera(view)
         robot = find_robot_in(view, belief.locale, camera.moved(fix.camera_step) if fix.camera_step else None)
-        known = compute_camera_covariance(camera, s.camera_state)
+        known = compute_camera_covariance(camera)
         covariance = belief.covariance_world(robot.world)
         if fix.camera_step:
             covariance = add_yaw(covariance, np.array(fix.camera_covariance), known)
         before = Before(
             belief.world_from_robot(robot.world), covariance, open_discrepancy(view, Level.PLAN) is not None,
-            bool(find_followed(view, s.action)), has_only_turned(view, belief), is_camera_known(robot, known, s))
+            bool(find_followed(view)), has_only_turned(view, belief), is_camera_known(robot, known))
         seen = PictureEvidence(case.frame.value.jpeg, case.segments.value, case.milestone.value, fix)
         return weigh_picture(robot, seen, before, s)
 
     def _hold_against_others(self, view: View, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:
         """What would be verified is not testable where the picture may have been taken elsewhere."""
-        rival = find_rival(view, case.fix, case.belief, weighed, self._settings) if verdict.kind == "verified" else None
-        if rival is None or rival.p <= self._settings.plan.max_p_rival:
+        rival = find_rival(view, case.fix, case.belief, weighed) if verdict.kind == "verified" else None
+        if rival is None or rival.p <= MAX_P_RIVAL:
             return verdict
-        odds = rival.p, self._settings.plan.max_p_rival
+        odds = rival.p, MAX_P_RIVAL
         reason = f"{verdict.reason}; but {rival.said}: {tell_odds(*odds)}"
         return Verdict("not testable", reason, *odds, p_rival=rival.p)

@@ -17,6 +17,7 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import FreeFloor, Obstacle, Obstruction, Segments
 from world_models.frames import Pose2
 
+MAX_OBSTRUCTION_LOOKS = 6  # number of last looks that are compared
 MIN_OBSTRUCTION_LOOKS = 3  # what stands still in so many looks is before the camera; in two it may by chance
 MIN_OBSTRUCTION_PART = 0.04  # smallest part of the picture that an obstruction covers
 
@@ -55,7 +56,7 @@ class ObstructionFinder(RobotKnowledgeSource):
 
     def _find_change(self, view: View) -> Effect | None:
         """The obstruction in all of the last looks, or in fewer, as it may be new; to be said, or None."""
-        looks, known = _list_last_looks(view, self._settings.plan.max_obstruction_looks), view.latest(Obstruction)
+        looks, known = _list_last_looks(view, MAX_OBSTRUCTION_LOOKS), view.latest(Obstruction)
         views = [CameraView(s.value.segments_px, Pose2(0.0, 0.0, heading_rad), np.zeros((3, 3)))
                  for s, heading_rad in looks]
         if len(views) < MIN_OBSTRUCTION_LOOKS:

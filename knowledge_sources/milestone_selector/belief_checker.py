@@ -42,8 +42,8 @@ class BeliefChecker(RobotKnowledgeSource):
         robot, pose, tried = belief.seeing, belief.pose, find_tried(view, lambda m: m.cycle >= doubt.cycle)
         heading = pose.heading_rad
         if tried:
-            headings = find_untried(turn_headings(pose, self._settings), tried) or [heading]
-            heading = choose_heading(robot, pose, headings, CHECK_TOLERANCE_M, settings=self._settings)
+            headings = find_untried(turn_headings(pose), tried) or [heading]
+            heading = choose_heading(robot, pose, headings, CHECK_TOLERANCE_M)
         what = f"the place where it believes to be, because {doubt.value.what}"
         check = Milestone("", -1, what, heading, tried=tried)
-        yield Post(replace(check, told=list_told(view, check, self._settings)), (doubt, belief.entry))
+        yield Post(replace(check, told=list_told(view, check)), (doubt, belief.entry))

@@ -27,6 +27,10 @@ from world_models.building.building import Building
 from world_models.entries import Hypothesis, Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 
+LONG_TURN_RAD = math.radians(100.0)
+"""Before a leg that begins with a longer turn the robot turns first, then looks: few landmarks are followed as it
+turns about."""
+
 
 class ViewChooser(RobotKnowledgeSource):
     """Chooses the direction in which the milestone before a subgoal is looked for (M0 first).
@@ -57,11 +61,11 @@ class ViewChooser(RobotKnowledgeSource):
         tried = find_tried(view, lambda m: (m.value.sketch, m.value.index) == (sketch.id, s.at))
         headings = find_untried(self.list_headings(robot.world, s, pose), tried)
         tolerance_m = s.subgoals[s.at - 1].tolerance_m if s.at else CHECK_TOLERANCE_M
-        heading = choose_heading(robot, pose, headings, tolerance_m, find_car(s, s.at), self._settings)
+        heading = choose_heading(robot, pose, headings, tolerance_m, find_car(s, s.at))
         is_ahead = abs(wrap_angle(pose.heading_rad - heading)) <= MAX_LOOK_ERROR_RAD
         chosen = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}",
                            pose.heading_rad if is_ahead else heading, tried=tried)
-        yield Post(replace(chosen, told=list_told(view, chosen, self._settings)), (sketch, belief.entry))
+        yield Post(replace(chosen, told=list_told(view, chosen)), (sketch, belief.entry))
 
     def list_headings(self, building: Building, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
         """The headings that come into question [rad, world], the first good one is taken."""
@@ -71,12 +75,12 @@ class ViewChooser(RobotKnowledgeSource):
         end = None if sketch.current is None else sketch.current.destination.in_world(building)
         along = None if end is None else math.atan2(end.y_m - pose.y_m, end.x_m - pose.x_m)
         if along is not None and _begins_with_drive(building, sketch, pose):
-            is_long = abs(wrap_angle(along - pose.heading_rad)) > self._settings.plan.long_turn_rad
+            is_long = abs(wrap_angle(along - pose.heading_rad)) > LONG_TURN_RAD
             yield from [along] * is_long  # few landmarks are followed through such a turn: it is done before the look
         yield pose.heading_rad
         if along is not None:
             yield along
-        yield from turn_headings(pose, self._settings)
+        yield from turn_headings(pose)
 
 
 def _begins_with_drive(building: Building, sketch: PlanSketch, pose: Pose2) -> bool:

@@ -56,10 +56,10 @@ class ViewPredictor(RobotKnowledgeSource):
         milestone, belief, hidden = case, HELD.of(view), view.all(Obstruction)[-1:]
         robot, pose = belief.seeing, belief.pose
         here = replace(milestone.value, look_heading_rad=pose.heading_rad)
-        expected = predict_milestone(robot, pose, here, find_car_of(view, here), self._settings)
-        if not find_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
-            precompute_views(robot, belief.locale, pose, self._settings)  # the judge asks: another door?
-        frames = find_frames(view, list_seen_locales(robot, pose, belief.locale, self._settings))
+        expected = predict_milestone(robot, pose, here, find_car_of(view, here))
+        if not find_followed(view) or open_discrepancy(view, Level.PLAN) is not None:
+            precompute_views(robot, belief.locale, pose)  # the judge asks: another door?
+        frames = find_frames(view, list_seen_locales(robot, pose, belief.locale))
         wish = Revise(milestone, expected, (milestone, belief.entry, *hidden, *frames))
         yield wish
         yield Post(PictureRequest("milestone"), (wish,))

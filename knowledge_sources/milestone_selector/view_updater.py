@@ -27,6 +27,6 @@ class ViewUpdater(RobotKnowledgeSource):
     def act(self, view: View, case: Entry[Obstruction]) -> Iterable[Effect]:
         hidden, milestone, belief = case, MILESTONE.of(view), HELD.of(view)
         robot, pose = belief.seeing, belief.pose
-        seen = predict_milestone(robot, pose, milestone.value, find_car_of(view, milestone.value), self._settings)
-        frames = find_frames(view, list_seen_locales(robot, pose, belief.locale, self._settings))
+        seen = predict_milestone(robot, pose, milestone.value, find_car_of(view, milestone.value))
+        frames = find_frames(view, list_seen_locales(robot, pose, belief.locale))
         yield Revise(milestone, seen, (hidden, milestone, belief.entry, *frames))

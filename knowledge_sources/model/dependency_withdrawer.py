@@ -11,7 +11,6 @@ from knowledge_sources.methods.motion import leads_through, meets
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, active_goal, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from knowledge_sources.settings import Settings
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import Milestone, Obstacle, PlanSketch, Track, Tracks
 
@@ -42,7 +41,7 @@ class DependencyWithdrawer(RobotKnowledgeSource):
     def bind(self, view: View, trigger: Change) -> Case | None:
         """What rested on what the frame no longer says."""
         frame: Entry[LocaleFrame] = trigger.entry
-        superseded = _find_misled(view, frame, self._settings)
+        superseded = _find_misled(view, frame)
         misled = {sketch.id for sketch in superseded}
         gone = tuple(entry for entry in view.all(Milestone) if _is_overtaken(entry, frame, misled))
         unverified = {m.sketch for m in (entry.value for entry in gone) if m.status == "verified" and _holds(view, m)}
@@ -98,7 +97,7 @@ def _holds(view: View, milestone: Milestone) -> bool:
     return s.is_active and s.verified and s.at == milestone.index
 
 
-def _find_misled(view: View, frame: Entry[LocaleFrame], settings: Settings) -> tuple[Entry[PlanSketch], ...]:
+def _find_misled(view: View, frame: Entry[LocaleFrame]) -> tuple[Entry[PlanSketch], ...]:
     """The active sketches, all of them, where one leads through what has changed."""
     if active_goal(view) is None:
         return ()
@@ -108,7 +107,7 @@ def _find_misled(view: View, frame: Entry[LocaleFrame], settings: Settings) -> t
     is_misled = False
     if belief is not None and changed:
         robot = find_robot(view)
-        is_misled = any(meets(sketch.value, obstacle, belief.pose, robot, settings.plan)
+        is_misled = any(meets(sketch.value, obstacle, belief.pose, robot)
                         for sketch in active for obstacle in changed)
     if len(changed) < len(found) or not changed:  # something else is otherwise too: a door, or what the file has
         is_misled = is_misled or any(leads_through(sketch.value, frame.value) for sketch in active)

@@ -55,7 +55,7 @@ class DoorWatcher(RobotKnowledgeSource):
     def act(self, view: View, case: tuple[Watched, ...]) -> Iterable[Effect]:
         held, frame = HELD.of(view), PICTURE.of(view)
         picture = read_picture(frame.value.jpeg)
-        if is_dark(*compute_mean_and_deviation(picture.grey), self._settings.goal):
+        if is_dark(*compute_mean_and_deviation(picture.grey)):
             return
         for watched in case:
             yield from self._watch(view, watched, held, frame, picture.half)

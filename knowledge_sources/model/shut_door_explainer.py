@@ -99,7 +99,7 @@ class ShutDoorExplainer(RobotKnowledgeSource):
         before, covariance = belief.pose, belief.covariance
         as_shut = robot.in_building(with_door_shut(view, door.name, frames))
         looked = before, covariance, segments.value.segments_px, frame.value.jpeg
-        shut, opened = (explain_picture(r, *looked, self._settings) for r in (as_shut, robot))
+        shut, opened = (explain_picture(r, *looked) for r in (as_shut, robot))
         is_sure = belief.value.sigma_m <= MAX_SIGMA_M and belief.value.sigma_rad <= MAX_SIGMA_RAD
         if shut is None or not is_explained(shut, opened, is_sure=is_sure):
             return None

@@ -34,7 +34,7 @@ class ThingMapper(RobotKnowledgeSource):
     def bind(self, view: View, trigger: Change) -> Entry[FreeFloor] | None:
         """A sight with a thing in it that is certain enough, or of floor on which something may be there."""
         scan: Entry[FreeFloor] = trigger.entry
-        is_thing = any(is_telling(thing, self._settings.action) for thing in scan.value.things)
+        is_thing = any(is_telling(thing) for thing in scan.value.things)
         is_told = is_thing or view.latest(Obstacle, may_be_there) is not None
         return scan if is_told else None
 

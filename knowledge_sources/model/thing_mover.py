@@ -59,7 +59,7 @@ class ThingMover(RobotKnowledgeSource):
         for entry in things:
             if moved_m > MAX_DRIFT_M or turned_rad > MAX_DRIFT_RAD:
                 told = f"seen before or after the robot was carried off, as {belief.ref} tells"
-                now = doubt_thing(entry.value, told, self._settings.action)
+                now = doubt_thing(entry.value, told)
             else:
                 told = f"moved with the belief, which {belief.ref} corrected"
                 now = move_thing(held.world, entry.value, here @ by @ here.inverse(), moved_m, told)

@@ -9,10 +9,9 @@ from typing import NamedTuple
 from blackboard import Effect, Entry, Post, Revise, View
 from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.features import read_picture
-from knowledge_sources.methods.tracking import align_to_edges, select_landmarks
+from knowledge_sources.methods.tracking import TEMPLATE_HALF_PX, align_to_edges, select_landmarks
 from knowledge_sources.methods.verification import find_errors
 from knowledge_sources.reads.conditions import Belief
-from knowledge_sources.settings import Settings
 from world_models.entries import Anchor, CameraPicture, FreeFloor, Hypothesis, Track, Tracks, covariance_tuple
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -42,7 +41,7 @@ def rectify(robot: RobotModel, frame: Entry[CameraPicture]) -> Image:
 
 def take_new(
     held: Belief, frame: str, image: Image, kept: tuple[Track, ...], anchors: tuple[Anchor, ...],
-    belief: Hypothesis, camera_covariance: Floats | None, settings: Settings,
+    belief: Hypothesis, camera_covariance: Floats | None,
 ) -> Renewed:
     """Take new landmarks beside those that are kept, once the belief is aligned with the model's edges.
 
@@ -61,24 +60,24 @@ def take_new(
     is_exact = find_errors(seeing, lines).is_exact  # else the edges are not where the model has them
     if camera_covariance is not None and is_exact:
         found = align_to_edges(seeing, image, lines.lines_world, pose, belief.covariance_world(world),
-                               camera_covariance, settings.tracking)
+                               camera_covariance)
     if found is not None:
         pose = found.world_from_robot
         belief = held.moved_to(pose, found.covariance, "tracks")
-    items = (*kept, *select_landmarks(seeing, kept, frame, image, pose, settings))
-    return Renewed(with_anchors(seeing, frame, items, anchors, belief, len(items), settings), belief)
+    items = (*kept, *select_landmarks(seeing, kept, frame, image, pose))
+    return Renewed(with_anchors(seeing, frame, items, anchors, belief, len(items)), belief)
 
 
 def with_anchors(
     robot: RobotModel, frame: str, items: tuple[Track, ...], anchors: tuple[Anchor, ...], belief: Hypothesis,
-    taken: int, settings: Settings,
+    taken: int,
 ) -> Tracks:
     """The tracks, with what was believed where their templates were cut."""
     pose = belief.world_from_robot(robot.world)
     here = Anchor(frame, pose.x_m, pose.y_m, covariance_tuple(belief.covariance_world(robot.world)))
     used = {t.template_frame for t in items}
     kept = tuple(a for a in (*anchors, here) if a.frame in used)
-    return Tracks(frame, settings.tracking.template_half_px, items, kept, taken)
+    return Tracks(frame, TEMPLATE_HALF_PX, items, kept, taken)
 
 
 def find_near_frames(anchors: tuple[Anchor, ...], here: Pose2, robot: RobotModel) -> frozenset[str]:

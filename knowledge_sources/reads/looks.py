@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 from blackboard import Entry, View
 from knowledge_sources.methods.belief import to_log_odds
-from knowledge_sources.settings import Settings
+from knowledge_sources.methods.verification import MIN_MATCHED_LINES
 from world_models.entries import Certificate, Milestone, PlanSketch
 
+MAX_LOOK_LOG_ODDS = 3.0  # most that one look counts for or against a place, in log odds, with those in other directions
 MAX_LOOK_ERROR_RAD = math.radians(3.5)  # the robot faces a milestone when its heading is off by no more than this
 
 
@@ -33,11 +34,11 @@ def find_car_of(view: View, milestone: Milestone) -> str:
     return "" if sketch is None else find_car(sketch.value, milestone.index)
 
 
-def list_told(view: View, milestone: Milestone, settings: Settings) -> tuple[float, ...]:
+def list_told(view: View, milestone: Milestone) -> tuple[float, ...]:
     """The log odds of a wrong place by each of the looks that were tried for a milestone; 0 where one told nothing."""
     last, certificate = view.latest(Milestone), view.latest(Certificate)
     if not milestone.tried or last is None or certificate is None or certificate.value.milestone != last.id:
         return (0.0,) * len(milestone.tried)
-    c, most = certificate.value, settings.plan.max_told
-    tells = c.matched >= settings.verification.min_matched_lines
+    c, most = certificate.value, MAX_LOOK_LOG_ODDS
+    tells = c.matched >= MIN_MATCHED_LINES
     return (*last.value.told, min(max(to_log_odds(c.p_false), -most), most) if tells else 0.0)

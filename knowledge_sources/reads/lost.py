@@ -14,7 +14,6 @@ from knowledge_sources.methods.features import picture
 from knowledge_sources.methods.localization import CameraView
 from knowledge_sources.reads.conditions import GOING_ON, HELD, LOST, STANDING
 from knowledge_sources.reads.questions import find_robot
-from knowledge_sources.settings import GoalSettings
 from world_models.entries import (
     AROUND_SIGMA_RAD,
     Contact,
@@ -60,9 +59,9 @@ def locate_contact(view: View, contact: Entry[Contact]) -> Floats:
     return now_from_then.apply(robot.radius_m * np.array([math.cos(direction), math.sin(direction)]))
 
 
-def is_dark(segments: Segments, settings: GoalSettings) -> bool:
+def is_dark(segments: Segments) -> bool:
     """Whether the picture of these segments is dark."""
-    return picture.is_dark(segments.brightness, segments.contrast, settings)
+    return picture.is_dark(segments.brightness, segments.contrast)
 
 
 def _has_just_ridden(view: View) -> bool:

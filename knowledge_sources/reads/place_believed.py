@@ -10,10 +10,16 @@ from typing import NamedTuple
 
 from blackboard import Discrepancy, Entry, Level, View
 from knowledge_sources.methods.belief import BelievedPlace, bound_p_rivals, compute_p_rivals
-from knowledge_sources.methods.localization import DISTINCT, compare_places, compute_prior, list_aliases
-from knowledge_sources.methods.verification import Weighed, compute_coverage_elsewhere
+from knowledge_sources.methods.localization import (
+    DISTINCT,
+    MAX_ALIKE_LOG_RATIO,
+    MIN_P_SURE,
+    compare_places,
+    compute_prior,
+    list_aliases,
+)
+from knowledge_sources.methods.verification import P_WRONG_STANDING, Weighed, compute_coverage_elsewhere
 from knowledge_sources.reads.questions import find_building, find_camera, find_robot_in, open_discrepancy
-from knowledge_sources.settings import LocalizationSettings, Settings
 from world_models.entries import (
     Hypothesis,
     MotionReport,
@@ -27,6 +33,13 @@ from world_models.entries import (
 )
 from world_models.frames import Pose2
 
+MAX_P_RIVAL = 0.03
+"""Largest probability of a place that looks alike, by belief and picture, where one is verified (as
+localization.min_p_believed has it)."""
+P_DISPLACED_TO_ALIAS = 0.001
+"""Probability that a robot that was displaced stands just where everything looks as it should (a window of 0.6 m and
+20 degrees round one place of a room of 20 m2)."""
+MIN_P_TWIN = 1e-6  # smallest probability of a place that looks alike and is kept in mind
 PLACED_BY = ("command", "relocalization")
 """Bases of a belief that no motion has followed yet."""
 MAX_STANDING_M = 0.1
@@ -37,24 +50,24 @@ MAX_P_FALSE_CLEAR = 2e-3
 """Up to this one, only with places at which the room repeats itself; beyond, with the whole room."""
 
 
-def find_p_there(view: View, refuted: int, settings: LocalizationSettings) -> float:
+def find_p_there(view: View, refuted: int) -> float:
     """The probability of the believed place: as told, with all pictures since it was told or found.
 
     ``refuted``: how often a place that was believed by such odds was refuted.
     """
-    known, p_told = view.latest(TwinOdds), compute_prior(refuted, settings)
-    return p_told if known is None else max(settings.min_p_twin, min(known.value.probability, p_told))
+    known, p_told = view.latest(TwinOdds), compute_prior(refuted)
+    return p_told if known is None else max(MIN_P_TWIN, min(known.value.probability, p_told))
 
 
-def find_p_not_alias(view: View, settings: LocalizationSettings) -> float:
+def find_p_not_alias(view: View) -> float:
     """The probability that the robot is where it believes rather than where everything looks the same.
 
     By the pictures since it was told or found. A robot in doubt may have been displaced, but hardly to such a place.
     """
     known = view.latest(TwinOdds)
-    p = compute_prior(count_refuted(view), settings) if known is None else known.value.probability
-    p = min(p, settings.min_p_sure)
-    return p * (1.0 - settings.p_displaced_to_alias) if open_discrepancy(view, Level.PLAN) is not None else p
+    p = compute_prior(count_refuted(view)) if known is None else known.value.probability
+    p = min(p, MIN_P_SURE)
+    return p * (1.0 - P_DISPLACED_TO_ALIAS) if open_discrepancy(view, Level.PLAN) is not None else p
 
 
 def count_refuted(view: View, doubt: Entry[Discrepancy] | None = None) -> int:
@@ -106,31 +119,31 @@ class Rival(NamedTuple):
 
 
 def find_rival(
-    view: View, fix: Entry[PoseFix], belief: Entry[Hypothesis], weighed: Weighed, settings: Settings
+    view: View, fix: Entry[PoseFix], belief: Entry[Hypothesis], weighed: Weighed
 ) -> Rival | None:
     """Where else a picture that agrees with the believed place is most likely taken; None where nowhere."""
-    least, room, s = MIN_ALIAS_PART * weighed.lines.coverage, belief.value.locale, settings
+    least, room = MIN_ALIAS_PART * weighed.lines.coverage, belief.value.locale
     for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
         there = other.value.world_from_robot(weighed.robot.world)
-        if compute_coverage_elsewhere(weighed, there, s) >= least:
+        if compute_coverage_elsewhere(weighed, there) >= least:
             return Rival(f"as much agrees at {other.id}", 0.5)
     if weighed.p_false <= MAX_P_FALSE_UNMISTAKABLE:
         return None
-    storey = _find_storey(view, fix, weighed, s)
-    if (storey is not None and storey.p > s.plan.max_p_rival) or not weighed.is_weak:
+    storey = _find_storey(view, fix, weighed)
+    if (storey is not None and storey.p > MAX_P_RIVAL) or not weighed.is_weak:
         return storey
-    p_there, most = find_p_not_alias(view, s.localization), s.localization.max_alike_log_ratio
+    p_there, most = find_p_not_alias(view), MAX_ALIKE_LOG_RATIO
     believed = BelievedPlace(weighed.before, weighed.covariance + fix.value.covariance, p_there)
-    if bound_p_rivals(believed, weighed.pose, DISTINCT, most) <= s.plan.max_p_rival:
+    if bound_p_rivals(believed, weighed.pose, DISTINCT, most) <= MAX_P_RIVAL:
         return None
     rivals = list_aliases(weighed.robot, weighed.segments.segments_px, room, weighed.pose,
-                          search=weighed.p_false > MAX_P_FALSE_CLEAR, settings=s)
+                          search=weighed.p_false > MAX_P_FALSE_CLEAR)
     p = compute_p_rivals(believed, weighed.pose, [
         (alias.world_from_robot, min(max(-alias.margin, -most), most)) for alias in rivals])
     return Rival(f"it may be another door of {room}, or its other side", p)
 
 
-def _find_storey(view: View, fix: Entry[PoseFix], weighed: Weighed, settings: Settings) -> Rival | None:
+def _find_storey(view: View, fix: Entry[PoseFix], weighed: Weighed) -> Rival | None:
     """The storey, of those where the last ride may have ended, that is likeliest but for the believed one.
 
     What was reported of the ride speaks for the believed one, as what is told of any place where the robot stands.
@@ -138,7 +151,7 @@ def _find_storey(view: View, fix: Entry[PoseFix], weighed: Weighed, settings: Se
     ride = view.latest(Ride)
     if ride is None or view.latest(RideReport) is None:
         return None
-    building, here, most = find_building(view), ride.value.destination, settings.localization.max_alike_log_ratio
+    building, here, most = find_building(view), ride.value.destination, MAX_ALIKE_LOG_RATIO
     stops = {link.other(here): [Pose2(*link.stop_of(name)) for name in (here, link.other(here))]
              for link in building.links_of(here) if link.name == ride.value.passage}
     building.require(list(stops))
@@ -146,8 +159,8 @@ def _find_storey(view: View, fix: Entry[PoseFix], weighed: Weighed, settings: Se
     for other, (stop, there) in stops.items():
         robot = find_robot_in(view, other, find_camera(view).moved(step) if step else None)
         margin = compare_places((weighed.robot, weighed.pose), (robot, there @ (stop.inverse() @ weighed.pose)),
-                                weighed.segments.segments_px, settings)
-        odds[other] = settings.plan.p_wrong_standing / len(stops) * math.exp(min(-margin, most))
+                                weighed.segments.segments_px)
+        odds[other] = P_WRONG_STANDING / len(stops) * math.exp(min(-margin, most))
     likeliest = max(odds, key=odds.__getitem__, default=None)
     return None if likeliest is None else Rival(
         f"the doors may have opened at {likeliest}", odds[likeliest] / (1.0 + math.fsum(odds.values())))

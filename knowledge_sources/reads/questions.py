@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Any
 
 from blackboard import OPEN, Blackboard, Discrepancy, Entry, Index, Level, View
-from knowledge_sources.settings import ActionSettings
 from world_models.building.locale_frame import CHANGED, FRAME_OF, LocaleFrame
 from world_models.entries import (
     GO_ON,
@@ -34,6 +33,8 @@ from world_models.entries import (
 from world_models.frame_building import FrameBuilding
 from world_models.robot import RobotModel
 
+MIN_FOLLOWED_LANDMARKS = 4
+"""With so many landmarks in the last tracked frame, the robot is taken to be still in its room."""
 HELD: Index[Hypothesis] = Index(Hypothesis, lambda h: h.is_held or None, "held")
 ACTIVE_GOAL: Index[Goal] = Index(Goal, lambda g: g.is_active or None, "active")
 OPEN_MILESTONE: Index[Milestone] = Index(Milestone, lambda m: m.is_open or None, "open")
@@ -112,7 +113,7 @@ def find_frames(view: View, locales: Iterable[str]) -> tuple[Entry[LocaleFrame],
     return tuple(entry for name in names if (entry := view.newest(FRAME_OF, name)) is not None)
 
 
-def find_followed(view: View, settings: ActionSettings) -> tuple[Entry[Tracks], ...]:
+def find_followed(view: View) -> tuple[Entry[Tracks], ...]:
     """The landmarks that are followed, if enough of them were in sight in the last tracked frame; else ().
 
     With so many landmarks in sight the robot is at no other door: the tracker drops all of them when they are not where
@@ -122,7 +123,7 @@ def find_followed(view: View, settings: ActionSettings) -> tuple[Entry[Tracks], 
     if tracks is None:
         return ()
     in_sight = sum(track.found_px is not None for track in tracks.value.items)
-    return (tracks,) if in_sight >= settings.min_followed_landmarks else ()
+    return (tracks,) if in_sight >= MIN_FOLLOWED_LANDMARKS else ()
 
 
 def active_goal(view: View) -> Entry[Goal] | None:

@@ -17,6 +17,7 @@ from world_models import words
 from world_models.entries import Goal, Hypothesis, Obstacle, Place, PlanSketch, SketchStatus, Subgoal
 from world_models.frames import wrap_angle
 
+MAX_ADJUSTMENTS = 8  # so often a sketch is adjusted at one milestone; then that was in vain
 GOAL_TOLERANCE_M = 0.010  # tolerance at the goal
 GOAL_HEADING_TOLERANCE_RAD = 0.02  # tolerance of a heading that the goal states
 INEXACT_TOLERANCE_SIGMAS = 2.0

@@ -11,7 +11,11 @@ import numpy as np
 
 from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch
 from knowledge_sources.methods.localization import (
+    ALIKE_LOG_NOISE,
+    MAX_FLOOR_DIFFERENCE_M,
+    MAX_ROOMS,
     MIN_NEW_VIEW_RAD,
+    MIN_P_TRACKED,
     MOVE_M,
     CameraView,
     are_distinct,
@@ -23,6 +27,7 @@ from knowledge_sources.methods.localization import (
 )
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import GOING_ON, HELD, NOT_LOST, Belief, count_refuted, declare_lost
+from knowledge_sources.reads.place_believed import MIN_P_TWIN
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Certificate, PoseFix, Segments, Twin, TwinOdds
 from world_models.frames import Pose2, wrap_angle
@@ -64,21 +69,20 @@ class AliasMonitor(RobotKnowledgeSource):
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         (certificate, fix, looked, known), belief = case, HELD.of(view)
         robot, here = belief.seeing, fix.value.world_from_robot
-        s = self._settings.localization
         if known is None:
-            p_prior = compute_prior(count_refuted(view), s)
+            p_prior = compute_prior(count_refuted(view))
             twins = self._find_twins(belief, robot, here)
         else:
             p_prior, twins = known.value.p_prior, known.value.twins
         weighed = self._weigh(robot, looked.value, here, twins)
         odds = compute_twin_odds([twin.log_ratio for twin in weighed], p_prior)
-        kept = tuple(twin for twin, p in zip(weighed, odds[1:], strict=True) if p >= s.min_p_twin)
+        kept = tuple(twin for twin, p in zip(weighed, odds[1:], strict=True) if p >= MIN_P_TWIN)
         counted = (*(() if known is None else known.value.counted), certificate.id)
         found = TwinOdds(p_prior, odds[0], kept, counted, here)
         because = (certificate, fix, looked, belief.entry)
         change = Post(found, because) if known is None else Revise(known, found, (*because, known))
         yield change
-        if odds[0] < s.min_p_tracked:
+        if odds[0] < MIN_P_TRACKED:
             yield declare_lost(f"it may be elsewhere: {found.sentence()}", (change,))
 
     def _is_new(self, known: TwinOdds, fix: PoseFix) -> bool:
@@ -91,11 +95,11 @@ class AliasMonitor(RobotKnowledgeSource):
         """The places of the floor that look like the believed one by walls and doors."""
         building = belief.world
         container, level_m = building.locale(belief.locale).parent or belief.locale, building.floor_m(belief.locale)
-        rooms = building.list_rooms_in(container, level_m, self._settings.goal.max_floor_difference_m)
+        rooms = building.list_rooms_in(container, level_m, MAX_FLOOR_DIFFERENCE_M)
         building.require(rooms)
         if belief.locale not in rooms:
             return ()
-        nearest = [belief.locale, *(room for room in rooms if room != belief.locale)][:self._settings.goal.max_rooms]
+        nearest = [belief.locale, *(room for room in rooms if room != belief.locale)][:MAX_ROOMS]
         back = here.inverse()
         found = dict[Pose2, str]()
         for room, there in find_repetitions(robot.world, belief.locale, here, nearest):
@@ -107,13 +111,13 @@ class AliasMonitor(RobotKnowledgeSource):
         """The twins with what this picture says of them: less what is noise for those that look the same from here."""
         unmoved = Pose2(0.0, 0.0, 0.0)
         seen = [CameraView(looked.segments_px, unmoved, np.zeros((3, 3)))]
-        look_alike = make_alias_test(robot, [unmoved], self._settings)
-        own = compute_pose_likelihood(robot, seen, here, self._settings).log_likelihood
+        look_alike = make_alias_test(robot, [unmoved])
+        own = compute_pose_likelihood(robot, seen, here).log_likelihood
         weighed = []
         for twin in twins:
             there = twin.there_from_here @ here
-            ratio = compute_pose_likelihood(robot, seen, there, self._settings).log_likelihood - own
+            ratio = compute_pose_likelihood(robot, seen, there).log_likelihood - own
             if look_alike(here, there):
-                ratio = math.copysign(max(0.0, abs(ratio) - self._settings.localization.alike_log_noise), ratio)
+                ratio = math.copysign(max(0.0, abs(ratio) - ALIKE_LOG_NOISE), ratio)
             weighed.append(replace(twin, log_ratio=twin.log_ratio + ratio))
         return tuple(weighed)

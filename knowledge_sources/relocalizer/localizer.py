@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Retract, Revised, View, Watch
 from knowledge_sources.methods import localization
+from knowledge_sources.methods.localization import MAX_FAR_PROBES
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
     HELD,
@@ -36,6 +37,7 @@ from world_models.entries import (
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 
+MAX_DOUBTED_PICTURES = 3  # a camera that so few pictures taught is tried as told too, when the robot is lost
 MAX_PROBES = 8  # so many looks are taken when lost and no place fits; then the robot says that it does not know
 
 Candidates = tuple[Entry[Hypothesis], ...]
@@ -59,15 +61,15 @@ class Localizer(RobotKnowledgeSource):
     def act(self, view: View, case: Change) -> Iterable[Effect]:
         panorama, doubt, held, hidden = case.entry, LOST.of(view), HELD.of(view), view.latest(Obstruction)
         candidates = view.where(Hypothesis, lambda h: h.status == "candidate")
-        building, locale, here, tuning = held.world, held.locale, held.pose, self._settings.localization
+        building, locale, here = held.world, held.locale, held.pose
         refuted = count_refuted(view, doubt)
-        p_there = find_p_there(view, refuted, tuning)
+        p_there = find_p_there(view, refuted)
         told = localization.StatedPlace(here, held.covariance, p_there)
         looked = [glimpse.now_from_then for glimpse in panorama.value.glimpses]
         looks, obstruction = list_views(view, panorama.value.glimpses), None if hidden is None else hidden.value
         if obstruction is not None:
             looks = [replace(g, segments_px=obstruction.without_its_own(g.segments_px)) for g in looks]
-        rooms = localization.list_rooms(building, locale, here, self._settings.goal)
+        rooms = localization.list_rooms(building, locale, here)
         followed = _follow(view, candidates, building)
         contacts = list_contacts(view, doubt)
         touched = [locate_contact(view, contact) for contact in contacts]
@@ -75,16 +77,16 @@ class Localizer(RobotKnowledgeSource):
         robots = [find_robot(view, camera).in_building(among).with_obstruction(obstruction).on_floor_of(locale)
                   for camera in cameras for among in buildings]
         what = localization.Search(looks, rooms, (locale, here), followed, touched, told.p_told)
-        seen, which = localization.search(robots, what, self._settings)
-        is_last = len(looks) >= (self._settings.goal.max_far_probes if seen.candidates else MAX_PROBES)
+        seen, which = localization.search(robots, what)
+        is_last = len(looks) >= (MAX_FAR_PROBES if seen.candidates else MAX_PROBES)
         seen = replace(seen, next_action=None) if is_last else seen
-        look_alike = localization.make_alias_test(robots[which], looked, self._settings)
-        result = localization.weigh_told(seen, told, look_alike, len(looks), tuning)
+        look_alike = localization.make_alias_test(robots[which], looked)
+        result = localization.weigh_told(seen, told, look_alike, len(looks))
         verified = view.latest(Certificate, lambda c: c.verdict == "verified")
         odds = localization.find_odds_used(seen, result, told, was_tracked=verified is not None, refuted=refuted)
         if result.status is localization.LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
             result = localization.prefer_reachable(building, result, locale)
-        far = localization.find_far_action(robots[which], result, looked, rooms, self._settings, touched)
+        far = localization.find_far_action(robots[which], result, looked, rooms, touched)
         if far is not None:
             result = replace(result, status=localization.LocalizationStatus.PROBE, next_action=far)
         said = localization.describe(result, is_far=far is not None) if odds is None else odds.sentence()
@@ -107,7 +109,7 @@ class Localizer(RobotKnowledgeSource):
         where it was believed, they made the camera fit the wrong place.
         """
         camera = find_camera(view)
-        is_sure = camera.told_lens is None or len(camera.counted) > self._settings.localization.max_doubted_pictures
+        is_sure = camera.told_lens is None or len(camera.counted) > MAX_DOUBTED_PICTURES
         return (camera,) if is_sure else (camera, camera.as_told())
 
     def _list_buildings(self, view: View) -> tuple[FrameBuilding, ...]:

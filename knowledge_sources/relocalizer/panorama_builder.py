@@ -32,7 +32,7 @@ class PanoramaBuilder(RobotKnowledgeSource):
 
     def bind(self, view: View, trigger: Change) -> Entry[Segments] | None:
         """The lines of a picture that is not dark."""
-        return None if is_dark(trigger.entry.value, self._settings.goal) else trigger.entry
+        return None if is_dark(trigger.entry.value) else trigger.entry
 
     def act(self, view: View, case: Entry[Segments]) -> Iterable[Effect]:
         segments, doubt, hidden, robot = case, LOST.of(view), view.latest(Obstruction), find_robot(view)

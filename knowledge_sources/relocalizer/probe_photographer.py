@@ -32,7 +32,7 @@ class ProbePhotographer(RobotKnowledgeSource):
         moved = view.latest(MotionReport)
         probes = [s for s in view.since(Segments, LOST.of(view).cycle) if s.value.milestone == ""]
         since = 0 if moved is None else moved.cycle
-        is_seen = any(s.cycle >= since and not is_dark(s.value, self._settings.goal) for s in probes)
+        is_seen = any(s.cycle >= since and not is_dark(s.value) for s in probes)
         return None if is_seen or len(probes) >= MAX_DARK_FRAMES else trigger.entry
 
     def act(self, view: View, case: Entry[Any]) -> Iterable[Effect]:

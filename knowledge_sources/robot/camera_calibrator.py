@@ -37,11 +37,10 @@ class CameraCalibrator(RobotKnowledgeSource):
     def act(self, view: View, case: Verified) -> Iterable[Effect]:
         (certificate, fix), camera = case, CAMERA.of(view)
         f = fix.value
-        state = learn(camera.value, f.camera_step, np.array(f.camera_covariance), f.world_from_robot,
-                      self._settings.camera_state)
+        state = learn(camera.value, f.camera_step, np.array(f.camera_covariance), f.world_from_robot)
         learnt = Revise(camera, state, (certificate, fix, camera))
         yield learnt
-        before = compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW]
+        before = compute_camera_covariance(camera.value)[YAW, YAW]
         travel, variance = view.latest(Travel), state.covariance[YAW][YAW]
         if travel is not None and variance > before:
             way = begin_travel(f.world_from_robot, f.covariance, state.mount.yaw_rad, variance)

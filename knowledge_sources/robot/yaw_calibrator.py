@@ -10,13 +10,22 @@ from typing import NamedTuple
 import numpy as np
 
 from blackboard import Change, Effect, Level, Revise, Revised, View, Watch
-from knowledge_sources.methods.calibration import compute_camera_covariance, to_tuples
+from knowledge_sources.methods.calibration import LEAST_SIGMA_RAD, compute_camera_covariance, to_tuples
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import CAMERA, HELD, STANDING, WAY, Belief
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.camera import CAMERA_UNKNOWNS, YAW
 from world_models.entries import CameraState, Drift, Hypothesis, Milestone, Travel, begin_travel, turn_about_camera
 from world_models.frames import wrap_angle
+
+MIN_TRAVEL_M = 1.0  # shortest way by which the yaw is learnt
+MAX_TRAVEL_M = 15.0  # a longer way is not measured: what the wheels slip adds up
+MIN_STRAIGHTNESS = 0.9  # part of the way's length that its ends are apart; of a more bent one nothing is learnt
+HEADING_SIGMA_RAD = math.radians(0.5)
+"""Standard deviation of the headings on a way of one metre; they average (missions with cameras as told, generated
+floors 3 to 8)."""
+MAX_YAW_SIGMAS = 3.0  # a way that ends further aside than this tells nothing of the yaw
+MIN_LEARNT = 0.05  # the yaw is revised when its variance shrinks by this part
 
 
 class Measured(NamedTuple):
@@ -44,18 +53,18 @@ class YawCalibrator(RobotKnowledgeSource):
         travel, camera, milestone = WAY.of(view), CAMERA.of(view), view.latest(Milestone)
         if milestone is not None and milestone.value.displacement_modes:  # an inexact model bends the way
             return None
-        s, measured = self._settings.camera_state, self._measure(camera.value, travel.value, HELD.of(view))
-        known = compute_camera_covariance(camera.value, s)[YAW, YAW]
-        is_told = measured.variance is not None and measured.variance < (1.0 - s.min_learnt) * known
+        measured = self._measure(camera.value, travel.value, HELD.of(view))
+        known = compute_camera_covariance(camera.value)[YAW, YAW]
+        is_told = measured.variance is not None and measured.variance < (1.0 - MIN_LEARNT) * known
         return measured if is_told or self._is_spent(travel.value) else None
 
     def act(self, view: View, case: Measured) -> Iterable[Effect]:
         travel, camera, held, (step_rad, told) = WAY.of(view), CAMERA.of(view), HELD.of(view), case
         belief, pose, way = held.entry, held.pose, travel.value
         if told is not None:
-            covariance = compute_camera_covariance(camera.value, self._settings.camera_state)
+            covariance = compute_camera_covariance(camera.value)
             covariance[YAW, :] = covariance[:, YAW] = 0.0
-            covariance[YAW, YAW] = max(told, self._settings.camera_state.floor_rad**2)
+            covariance[YAW, YAW] = max(told, LEAST_SIGMA_RAD**2)
             step = [0.0] * len(CAMERA_UNKNOWNS)
             step[YAW] = step_rad
             learnt = replace(camera.value.moved(step), covariance=to_tuples(covariance))
@@ -64,7 +73,7 @@ class YawCalibrator(RobotKnowledgeSource):
             way = way.turned(-step_rad, camera.value.mount.forward_m)
         if self._is_spent(way):
             here = turn_about_camera(pose, -step_rad, camera.value.mount.forward_m)
-            variance = float(compute_camera_covariance(camera.value, self._settings.camera_state)[YAW, YAW])
+            variance = float(compute_camera_covariance(camera.value)[YAW, YAW])
             way = begin_travel(here, held.covariance,
                                camera.value.mount.yaw_rad + step_rad,
                                variance if told is None else told)
@@ -72,33 +81,32 @@ class YawCalibrator(RobotKnowledgeSource):
 
     def _is_spent(self, travel: Travel) -> bool:
         """Whether a way is too long or too bent to measure more by it, or the robot was pushed or lost on it."""
-        s = self._settings.camera_state
-        return travel.is_broken or travel.gone_m > s.max_travel_m or (
-            travel.gone_m > s.min_travel_m and travel.net_m < s.min_straightness * travel.gone_m)
+        return travel.is_broken or travel.gone_m > MAX_TRAVEL_M or (
+            travel.gone_m > MIN_TRAVEL_M and travel.net_m < MIN_STRAIGHTNESS * travel.gone_m)
 
     def _measure(self, camera: CameraState, travel: Travel, belief: Belief) -> Measured:
         """The yaw by the whole way, from what was known when it began; nothing where the way tells too little.
 
         Nor does a way tell anything that ends where no likely yaw leads: something else has moved the robot.
         """
-        s, pose = self._settings.camera_state, belief.pose
+        pose = belief.pose
         if travel.is_broken:
             return Measured()
         way = travel.seen(pose.heading_rad)
         came = pose.position - travel.began.position
         net_m = way.net_m
-        if net_m < s.min_travel_m or net_m < s.min_straightness * way.gone_m:
+        if net_m < MIN_TRAVEL_M or net_m < MIN_STRAIGHTNESS * way.gone_m:
             return Measured()
         off_rad = wrap_angle(math.atan2(came[1], came[0]) - math.atan2(way.y_m, way.x_m))
         aside = np.array([-way.y_m, way.x_m]) / net_m
         ends = np.array(travel.covariance)[:2, :2] + belief.covariance[:2, :2]
         noise = (float(aside @ ends @ aside) + way.slip_m2) / net_m**2 + travel.covariance[2][2]
-        noise += s.heading_sigma_rad**2 / net_m
+        noise += HEADING_SIGMA_RAD**2 / net_m
         gain = travel.yaw_variance / (travel.yaw_variance + noise)
         # The heading is too large by as much as the yaw is too small: the robot came to the right of it.
         believed = camera.mount.yaw_rad
         step_rad = believed - off_rad - travel.yaw_rad
-        if step_rad**2 > s.max_yaw_sigmas**2 * (travel.yaw_variance + noise):
+        if step_rad**2 > MAX_YAW_SIGMAS**2 * (travel.yaw_variance + noise):
             return Measured()
         yaw = travel.yaw_rad + gain * step_rad
         return Measured(yaw - believed, (1.0 - gain) * travel.yaw_variance)

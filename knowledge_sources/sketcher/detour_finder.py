@@ -17,6 +17,7 @@ from knowledge_sources.reads import (
     place_of,
     supersede,
 )
+from knowledge_sources.reads.sketches import MAX_ADJUSTMENTS
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Impasse, Leg, PlanSketch
 
@@ -46,7 +47,7 @@ class DetourFinder(RobotKnowledgeSource):
         (leg, drawn), goal, belief = case, GOAL.of(view), HELD.of(view).entry
         planner = list_planners(view, self._settings.plan)[0]
         leads_there = find_way_to_goal((planner,), belief.value, goal.value) is not None
-        if leads_there and drawn.value.halts < self._settings.plan.max_adjustments:
+        if leads_there and drawn.value.halts < MAX_ADJUSTMENTS:
             yield from supersede(view, leg, "halted")
             return
         obstacles, here = find_obstacles(view), place_of(belief.value)

@@ -10,6 +10,7 @@ from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Revise, 
 from knowledge_sources.methods.verification import is_last_look
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, declare_lost, find_building, find_search_here, has_missed, tell_missed
+from knowledge_sources.reads.sketches import MAX_ADJUSTMENTS
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Goal, Hypothesis, Impasse, Milestone, Place, PlaceSearch, PlanSketch
 
@@ -44,7 +45,7 @@ class MilestonePasser(RobotKnowledgeSource):
         if sketch is None or goal is None or not sketch.value.is_active:
             return None
         here = None if milestone.value.status == "verified" else find_search_here(view, sketch.id)
-        is_open = here is None or (sketch.value.at_end and not is_last_look(milestone.value, self._settings.plan))
+        is_open = here is None or (sketch.value.at_end and not is_last_look(milestone.value))
         if sketch.value.at != milestone.value.index or (milestone.value.status == "not testable" and is_open):
             return None
         return Case(milestone, sketch, goal, () if here is None else (here,))
@@ -60,7 +61,7 @@ class MilestonePasser(RobotKnowledgeSource):
             passed = replace(s, status="done") if s.at_end else replace(s, adjustments=0)
             yield Revise(sketch, replace(passed, verified=True), (milestone, belief, *found))
             return
-        if s.adjustments < self._settings.plan.max_adjustments:
+        if s.adjustments < MAX_ADJUSTMENTS:
             yield Revise(sketch, _repeat(view, s, belief.value), (milestone, belief, *found))
             return
         (in_vain, taking), is_first = tell_missed(view, belief.value, s), len(view.all(Goal)) == 1

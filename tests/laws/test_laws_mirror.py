@@ -30,7 +30,6 @@ from knowledge_sources.methods.pose import planar_from_points
 from knowledge_sources.methods.tracking.edge_alignment import _Edges, _solve
 from knowledge_sources.methods.verification import predict_color_check
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
-from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.entries import DoorPicture, DoorState, Leg, Milestone
 from world_models.files.world_files import WORLDS, load_world
@@ -165,8 +164,8 @@ def test_where_edges_are_linearised_does_not_matter(seed: int, step: tuple[float
     prior, covariance = Pose2(1.0, 2.0, 0.3), np.diag([0.01, 0.02, 0.005]) ** 2
     offsets = slopes @ rng.normal(0.0, 0.005, 3) + rng.normal(0.0, 0.2, 80)
     at = Pose2(*(as_numbers(prior) + step))
-    one = _solve(_Edges(offsets, slopes, line), prior, prior, covariance, DEFAULT.tracking)
-    other = _solve(_Edges(offsets - slopes @ np.array(step), slopes, line), at, prior, covariance, DEFAULT.tracking)
+    one = _solve(_Edges(offsets, slopes, line), prior, prior, covariance)
+    other = _solve(_Edges(offsets - slopes @ np.array(step), slopes, line), at, prior, covariance)
     assert one is not None and other is not None
     assert is_same(one.world_from_robot, other.world_from_robot, 1e-6)
 
@@ -260,7 +259,7 @@ def test_lines_of_a_flipped_picture(seed: int) -> None:
     slant = rng.uniform(-0.3, 0.3)
     image = np.where(columns > 90 + slant * (rows - 100), 180, 60).astype(np.uint8)
     image[rows > 150] = 120
-    pictures = [find_lines(picture, min_length_px=20.0, settings=DEFAULT.features).segments_px
+    pictures = [find_lines(picture, min_length_px=20.0).segments_px
                 for picture in (image, np.ascontiguousarray(image[:, ::-1]))]
     one, other = pictures
     flipped = np.stack([199.0 - other[..., 0], other[..., 1]], axis=-1)

@@ -9,14 +9,14 @@ import pytest
 from blackboard import Revise
 from experiments.robustness.kidnap import Kidnap, _build_lost_agent, _draw_poses, _is_found, _scene, get_floor
 from harvey.runner.run import run_to_outcome
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.relocalizer.localizer import MAX_DOUBTED_PICTURES
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
 from world_models.camera import CAMERA_UNKNOWNS
 from world_models.entries import CameraState, Hypothesis
 from world_models.frames import Pose2
 
-MOST = DEFAULT.localization.max_doubted_pictures
+MOST = MAX_DOUBTED_PICTURES
 WRONGLY = tuple({"focal": 0.025, "tilt_rad": 0.01}.get(name, 0.0) for name in CAMERA_UNKNOWNS)
 
 

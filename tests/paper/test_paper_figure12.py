@@ -15,8 +15,7 @@ import pytest
 
 from experiments.paper.figure12 import format_trace
 from experiments.paper.paper_matching import PaperSearch, TraceStep, match_as_paper
-from knowledge_sources.methods.matching import Match, Peak, match_lines
-from knowledge_sources.settings import MatchingSettings
+from knowledge_sources.methods.matching import Match, Peak, image_matching, match_lines
 
 MODEL = np.array(
     [
@@ -86,9 +85,10 @@ def test_the_evaluations_span_the_figure_s() -> None:
     assert trace[-1].evaluation == pytest.approx(1.61, abs=0.9)
 
 
-def test_the_likelihood_agrees_from_the_nearest_pairs() -> None:
+def test_the_likelihood_agrees_from_the_nearest_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its evidence grows with the logarithm of length: from the false start the exchange would come too late."""
-    assert number_pairs(match_lines(MODEL, SEGMENTS, MatchingSettings(pair_sigmas=10.0), **NEAR)) == BELONGS
+    monkeypatch.setattr(image_matching, "PAIR_SIGMAS", 10.0)
+    assert number_pairs(match_lines(MODEL, SEGMENTS, **NEAR)) == BELONGS
 
 
 def test_the_trace_prints_as_a_table() -> None:

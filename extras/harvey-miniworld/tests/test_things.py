@@ -15,7 +15,6 @@ from harvey_miniworld.drawn_floor import DrawnFloor
 from harvey_miniworld.floor_missions import CAMERA, MOUNT, THINGS
 from harvey_miniworld.textured_floor import FLOORS, StandingThing
 from knowledge_sources.methods.floor import MotionBetween, Seen, is_telling, see_free_floor
-from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -38,7 +37,7 @@ def test_a_thing_on_a_textured_floor_is_seen_where_it_stands_and_no_thing_withou
     earlier = [Seen(jpeg, pose, MotionBetween(pose.inverse() @ poses[2], 0.005, 0.003))
                for pose, jpeg in zip(poses[1::-1], jpegs[1::-1], strict=True)]
     seen = see_free_floor(robot, "corridor", poses[2], 1e-5 * np.eye(3), jpegs[2], earlier, {}, 1.0)[0]
-    found = [shapely.Polygon(thing.footprint) for thing in seen.things if is_telling(thing, DEFAULT.action)]
+    found = [shapely.Polygon(thing.footprint) for thing in seen.things if is_telling(thing)]
     assert bool(found) == bool(added)
     assert all(shape.distance(added[0].shape) < 0.3 for shape in found)
     assert (np.array(seen.far_m) > seen.near_m).mean() > 0.5

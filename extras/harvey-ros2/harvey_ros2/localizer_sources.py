@@ -199,7 +199,7 @@ class ClaimReckoner(RobotKnowledgeSource):
         there = world.locale_at([*pose.position, world.floor_m(held.locale)])
         locale = there if there and world.is_room(there) else held.locale
         camera, travel = find_camera(view), view.latest(Travel)
-        yaw_variance = float(compute_camera_covariance(camera, self._settings.camera_state)[YAW, YAW])
+        yaw_variance = float(compute_camera_covariance(camera)[YAW, YAW])
         aside = np.array([held.pose.y_m - pose.y_m, pose.x_m - held.pose.x_m, 0.0])
         covariance = covariance + np.outer(aside, aside) * yaw_variance
         moved = held.moved_to(pose, covariance, "odometry", locale=str(locale), motion=told.id)
@@ -228,8 +228,8 @@ class ViewExpecter(RobotKnowledgeSource):
         belief, hidden = HELD.of(view), view.all(Obstruction)[-1:]
         robot, pose = belief.seeing, belief.pose
         here = Milestone("", 0, "the place where it believes to be", pose.heading_rad)
-        expected = predict_milestone(robot, pose, here, "", self._settings)
-        frames = find_frames(view, list_seen_locales(robot, pose, belief.locale, self._settings))
+        expected = predict_milestone(robot, pose, here, "")
+        frames = find_frames(view, list_seen_locales(robot, pose, belief.locale))
         yield Post(expected, (case.entry, belief.entry, *hidden, *frames))
 
 

@@ -38,7 +38,6 @@ from knowledge_sources.relocalizer.pose_adopter import pose_adopter
 from knowledge_sources.robot.camera_calibrator import CameraCalibrator
 from knowledge_sources.robot.travel_breaker import travel_breaker
 from knowledge_sources.robot.yaw_calibrator import YawCalibrator
-from knowledge_sources.settings import DEFAULT
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import RunRecorder
@@ -178,7 +177,7 @@ class Onlooker:
         held, camera = HELD.of(view), find_camera(view)
         turn, move = self._agent.robot.actuator, self._moved
         forward = Pose2(move.x_m * turn.reach, move.y_m * turn.reach, move.heading_rad)
-        yaw_variance = compute_camera_covariance(camera, DEFAULT.camera_state)[YAW, YAW]
+        yaw_variance = compute_camera_covariance(camera)[YAW, YAW]
         heading, arm_m = held.pose.heading_rad, camera.mount.forward_m
         turned = np.array([arm_m * math.sin(heading), -arm_m * math.cos(heading), 1.0])  # about the camera
         pose, covariance = held.pose @ forward, held.covariance + yaw_variance * np.outer(turned, turned)

@@ -7,9 +7,15 @@ rivals, by what was believed before and by the picture.
 from knowledge_sources.methods.belief.odds import (
     Alike, Look, add_looks, measure_common, to_log_odds, to_probability, update,
 )
-from knowledge_sources.methods.belief.places import BelievedPlace, bound_p_rivals, compute_chi2, compute_p_rivals
+from knowledge_sources.methods.belief.places import (
+    BelievedPlace, MAX_CAMERA_CHI2, MAX_TOLD_CHI2, MIN_P_BELIEVED, TOLD_SIGMA_M, TOLD_SIGMA_RAD, bound_p_rivals,
+    compute_chi2,
+    compute_p_rivals,
+)
 
 __all__ = [
-    "Alike", "BelievedPlace", "Look", "add_looks", "bound_p_rivals", "compute_chi2", "compute_p_rivals",
-    "measure_common", "to_log_odds", "to_probability", "update",
+    "MAX_CAMERA_CHI2", "MAX_TOLD_CHI2", "MIN_P_BELIEVED", "TOLD_SIGMA_M", "TOLD_SIGMA_RAD", "Alike", "BelievedPlace",
+    "Look",
+    "add_looks", "bound_p_rivals", "compute_chi2", "compute_p_rivals", "measure_common", "to_log_odds",
+    "to_probability", "update",
 ]

@@ -16,6 +16,15 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats
 from world_models.frames import Pose2
 
+MAX_CAMERA_CHI2 = 30.0  # squared distance from what was believed beyond which a picture is no evidence
+TOLD_SIGMA_M = 0.1  # standard deviation that a tracked position has beyond its covariance: it may have slipped
+TOLD_SIGMA_RAD = math.radians(3.0)  # standard deviation that a tracked heading has beyond its covariance
+MAX_TOLD_CHI2 = 21.1
+"""Largest squared distance of a place from where it was told or tracked to be that is still that place, in
+deviations; three unknowns, 99.99 %."""
+MIN_P_BELIEVED = 0.97  # smallest probability of a place that is believed where no look within reach tells more
+
+
 CHI2_95 = 7.815
 """Of three unknowns: 95 % lie within. Up to it a pose is where it was believed."""
 SURVEY_M, SURVEY_RAD = 0.015, math.radians(0.5)

@@ -10,38 +10,57 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import compute_chi2
 from knowledge_sources.methods.pose import CameraEstimate
-from knowledge_sources.settings import CameraStateSettings, Settings
 from world_models.camera import YAW, Camera
 from world_models.entries import CameraState
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
+SIGMA_TILT_RAD = math.radians(1.5)
+"""Standard deviation of the mounting's tilt (issue: mounted by hand, up to 3 degrees and 8 cm otherwise than
+believed, taken for two deviations)."""
+SIGMA_ROLL_RAD = math.radians(1.5)
+"""Standard deviation of its roll (issue: mounted by hand, up to 3 degrees and 8 cm otherwise than believed, taken for
+two deviations)."""
+SIGMA_YAW_RAD = math.radians(1.5)
+"""Standard deviation of its yaw (issue: mounted by hand, up to 3 degrees and 8 cm otherwise than believed, taken for
+two deviations)."""
+SIGMA_HEIGHT_M = 0.04
+"""Standard deviation of its height (issue: mounted by hand, up to 3 degrees and 8 cm otherwise than believed, taken
+for two deviations)."""
+SIGMA_FOCAL = 0.02  # standard deviation of the focal length, as a part of it (issue: up to 4 %)
+SIGMA_CENTRE_PX = 0.5  # standard deviation of the principal point, along each axis (harvey experiment calibrate)
+MAX_KNOWN_PX = 4.0  # up to this uncertainty in the picture the camera is taken as believed when lines are matched
+MIN_MOVE_M = 0.3  # a picture counts if it was taken this far from those that have counted
+MIN_TURN_RAD = math.radians(10.0)  # or in a direction that differs by this
+MAX_COUNTED = 40  # number of pictures that are remembered as counted
+LEAST_SIGMA_RAD = math.radians(0.02)  # tilt, roll and yaw are never known better: lines share errors
+LEAST_SIGMA_M = 0.0015  # nor the height
+LEAST_SIGMA_FOCAL = 0.001  # nor the focal length
+LEAST_SIGMA_CENTRE_PX = 0.2  # nor the principal point
 RIGID_DISTANCE_M = 2.5  # distance at which that uncertainty is taken
 PRIOR_COVARIANCE_FACTOR = 4.0  # factor by which the belief's covariance is loosened as a prior of the pose
 PRIOR_SIGMA_M = 0.05  # standard deviation of the place that is added to that prior
 PRIOR_SIGMA_RAD = math.radians(1.5)  # standard deviation of the heading that is added to that prior
 
 
-def compute_camera_covariance(camera: CameraState, settings: CameraStateSettings) -> Floats:
-    """(7, 7) over :data:`~world_models.camera.CAMERA_UNKNOWNS`: as learnt, as stated, or as settings have it."""
-    return np.array(camera.covariance) if camera.covariance else compute_first_covariance(camera, settings)
+def compute_camera_covariance(camera: CameraState) -> Floats:
+    """(7, 7) over :data:`~world_models.camera.CAMERA_UNKNOWNS`: as learnt, as stated, or as taken where nobody has."""
+    return np.array(camera.covariance) if camera.covariance else compute_first_covariance(camera)
 
 
-def compute_first_covariance(camera: CameraState, settings: CameraStateSettings) -> Floats:
-    """(7, 7) before anything is learnt: what was stated, and the settings where nothing was."""
-    s = settings
-    sigmas = (camera.sigma_tilt_rad or s.sigma_tilt_rad, camera.sigma_roll_rad or s.sigma_roll_rad,
-              camera.sigma_yaw_rad or s.sigma_yaw_rad, camera.sigma_height_m or s.sigma_height_m,
-              camera.sigma_focal or s.sigma_focal,
-              s.sigma_centre_px, s.sigma_centre_px)
+def compute_first_covariance(camera: CameraState) -> Floats:
+    """(7, 7) before anything is learnt: what was stated, and what is taken where nothing was."""
+    sigmas = (camera.sigma_tilt_rad or SIGMA_TILT_RAD, camera.sigma_roll_rad or SIGMA_ROLL_RAD,
+              camera.sigma_yaw_rad or SIGMA_YAW_RAD, camera.sigma_height_m or SIGMA_HEIGHT_M,
+              camera.sigma_focal or SIGMA_FOCAL,
+              SIGMA_CENTRE_PX, SIGMA_CENTRE_PX)
     return np.asarray(np.diag(np.square(sigmas)))
 
 
-def compute_knocked_covariance(camera: CameraState, settings: CameraStateSettings) -> Floats:
+def compute_knocked_covariance(camera: CameraState) -> Floats:
     """(7, 7) of a camera that may have been knocked: its directions are open again, height and lens as they were."""
-    s = settings
-    covariance = compute_camera_covariance(camera, settings)
-    opened = np.square((s.sigma_tilt_rad, s.sigma_roll_rad, s.sigma_yaw_rad, 0.0, 0.0, 0.0, 0.0))
+    covariance = compute_camera_covariance(camera)
+    opened = np.square((SIGMA_TILT_RAD, SIGMA_ROLL_RAD, SIGMA_YAW_RAD, 0.0, 0.0, 0.0, 0.0))
     return np.asarray(covariance + np.diag(opened))
 
 
@@ -64,17 +83,17 @@ def compute_camera_px(camera: Camera, covariance: Floats, distance_m: float) -> 
     return math.hypot(camera.fy * tilt, aside_px * roll, camera.fy * height / distance_m, aside_px * focal)
 
 
-def is_camera_known(robot: RobotModel, covariance: Floats, settings: Settings) -> bool:
+def is_camera_known(robot: RobotModel, covariance: Floats) -> bool:
     """Whether a covariance (7, 7) moves what is seen by no more than lines are looked for where they are predicted."""
     px = compute_camera_px(robot.camera, covariance, RIGID_DISTANCE_M)
-    return px <= settings.camera_state.max_known_px
+    return px <= MAX_KNOWN_PX
 
 
-def has_counted(camera: CameraState, pose: Pose2, settings: CameraStateSettings) -> bool:
+def has_counted(camera: CameraState, pose: Pose2) -> bool:
     """Whether a picture from about this pose (world) has counted already: it would be evidence counted twice."""
     return any(
-        math.hypot(pose.x_m - x, pose.y_m - y) < settings.min_move_m
-        and abs(wrap_angle(pose.heading_rad - heading)) < settings.min_turn_rad
+        math.hypot(pose.x_m - x, pose.y_m - y) < MIN_MOVE_M
+        and abs(wrap_angle(pose.heading_rad - heading)) < MIN_TURN_RAD
         for x, y, heading in camera.counted)
 
 
@@ -95,14 +114,13 @@ def widen(found: CameraEstimate, believed: Pose2, covariance: Floats) -> Floats:
 
 
 def learn(
-    camera: CameraState, step: tuple[float, ...], covariance: Floats, pose: Pose2, settings: CameraStateSettings
+    camera: CameraState, step: tuple[float, ...], covariance: Floats, pose: Pose2
 ) -> CameraState:
     """The state after a picture from a pose (world); no covariance below the floor of what lines have in common."""
-    s = settings
-    floors = np.array([s.floor_rad, s.floor_rad, s.floor_rad, s.floor_m, s.floor_focal, s.floor_centre_px,
-                       s.floor_centre_px])
+    floors = np.array([LEAST_SIGMA_RAD, LEAST_SIGMA_RAD, LEAST_SIGMA_RAD, LEAST_SIGMA_M, LEAST_SIGMA_FOCAL,
+                       LEAST_SIGMA_CENTRE_PX, LEAST_SIGMA_CENTRE_PX])
     raised = covariance + np.diag(np.maximum(floors**2 - np.diag(covariance), 0.0))
-    looks = (*camera.counted, (pose.x_m, pose.y_m, pose.heading_rad))[-s.counted:]
+    looks = (*camera.counted, (pose.x_m, pose.y_m, pose.heading_rad))[-MAX_COUNTED:]
     return replace(camera.moved(step), covariance=to_tuples(raised), counted=looks)
 
 

@@ -12,10 +12,11 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import Alike, Look, add_looks, measure_common, to_probability
-from knowledge_sources.methods.features import read_picture
+from knowledge_sources.methods.features import SIGMA_ACROSS_PX, read_picture
 from knowledge_sources.methods.matching import match_on_floor
 from knowledge_sources.methods.pose import planar_from_lines
 from knowledge_sources.methods.verification import (
+    MIN_MATCHED_LINES,
     POSE_CONFIDENCE,
     check_colors,
     check_lines,
@@ -23,7 +24,6 @@ from knowledge_sources.methods.verification import (
     predict_face_colors,
     predict_lines,
 )
-from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.locales import Doorway
 from world_models.entries import DoorCondition, DoorPicture, DoorState, Hypothesis
 from world_models.frames import Pose2, wrap_angle
@@ -141,7 +141,7 @@ class Explanation:
 
 
 def explain_picture(
-    robot: RobotModel, belief: Pose2, covariance: Floats, segments_px: Floats, jpeg: bytes, settings: Settings = DEFAULT
+    robot: RobotModel, belief: Pose2, covariance: Floats, segments_px: Floats, jpeg: bytes
 ) -> Explanation | None:
     """Find the pose near a belief from which a picture was taken; None where no line is expected.
 
@@ -150,23 +150,22 @@ def explain_picture(
         covariance: (3, 3) of the belief.
         segments_px: (k, 2, 2) found in the picture.
     """
-    s = settings.verification
-    lines = predict_lines(robot, belief, s)
+    lines = predict_lines(robot, belief)
     if not len(lines) or not len(segments_px):
         return None
     mount = robot.mount.camera_from_robot
-    found = match_on_floor(lines.lines_world, segments_px, robot.camera, mount, belief, covariance, settings.matching)
+    found = match_on_floor(lines.lines_world, segments_px, robot.camera, mount, belief, covariance)
     pairs = np.asarray(found.pairs, np.int64).reshape(-1, 2)
-    if len(np.unique(pairs[:, 0])) < s.min_matched_lines:
-        agreed = check_lines(robot, lines.lines_world, segments_px, belief, s)
+    if len(np.unique(pairs[:, 0])) < MIN_MATCHED_LINES:
+        agreed = check_lines(robot, lines.lines_world, segments_px, belief)
         return Explanation(belief, covariance, 1.0, agreed.agreement.matched, len(lines), is_solved=False)
     fix = planar_from_lines(
         lines.lines_world[pairs[:, 0]], segments_px[pairs[:, 1]], robot.camera, mount, belief,
         prior_covariance=covariance, landmark_ids=[int(lines.landmark[i]) for i in pairs[:, 0]],
-        sigma_px=settings.features.sigma_across_px, settings=settings.pose)
+        sigma_px=SIGMA_ACROSS_PX)
     pose = fix.world_from_robot
-    agreed = check_lines(robot, lines.lines_world, segments_px, pose, s)
-    faces = check_colors(robot, pose, read_picture(jpeg).quarter, predict_face_colors(robot, pose), settings)
+    agreed = check_lines(robot, lines.lines_world, segments_px, pose)
+    faces = check_colors(robot, pose, read_picture(jpeg).quarter, predict_face_colors(robot, pose))
     weight = compute_evidence(pose, fix.covariance, belief, covariance, agreed, faces)
     return Explanation(pose, fix.covariance, POSE_CONFIDENCE.p_false(weight), agreed.agreement.matched, len(lines))
 

@@ -19,7 +19,15 @@ from numba import njit
 from knowledge_sources.methods.arrays import Floats, Floats32, Indices
 from knowledge_sources.methods.features.line_candidates import MIN_GRADIENT_SIGMAS, find_in_bands, find_line_regions
 from knowledge_sources.methods.features.picture import estimate_noise_sigma, to_grey_float
-from knowledge_sources.settings import DEFAULT, FeaturesSettings
+
+LINE_SYSTEMATIC_PX = 0.03
+"""Error of a segment's place that does not average out along it, added in quadrature (measured: a lens not quite
+known, a renderer that places edges to a sixteenth of a pixel)."""
+SIGMA_ACROSS_PX = 0.7
+"""Standard deviation of a segment's end across its model line, with the model's own errors (measured on rendered
+edges (tests/laws/features))."""
+BAND_PX = 12.0  # half-width of the band searched round a predicted line, also beyond its ends (§6.1.4, Figure 1)
+
 
 # px; standard deviation of the Gaussian smoothing before an edge is located (engineering judgement; the phase-bias
 # table below was computed for it)
@@ -86,14 +94,13 @@ def find_lines(
     *,
     band_px: float | None = None,
     min_length_px: float | None = None,
-    settings: FeaturesSettings = DEFAULT.features,
 ) -> LineSegments:
     """Find the straight edges of an image, everywhere or near predicted lines only.
 
     Args:
         image: (h, w) grey levels, uint8 or float on the same scale of 0 to 255.
         predicted_px: None, or (m, 2, 2) lines expected [px]; NaN rows (not visible) find nothing.
-        band_px: half-width of the band round a prediction, also beyond its ends [px]; by default ``settings.band_px``.
+        band_px: half-width of the band round a prediction, also beyond its ends [px]; by default ``BAND_PX``.
         min_length_px: least length of a segment [px]; by default ``MIN_LINE_LENGTH_PX``.
 
     Raises:
@@ -102,7 +109,7 @@ def find_lines(
     Source: §1.2 [21, 6], §6.1.4.
     """
     pixels = to_grey_float(image)
-    band_px = settings.band_px if band_px is None else band_px
+    band_px = BAND_PX if band_px is None else band_px
     min_length_px = MIN_LINE_LENGTH_PX if min_length_px is None else min_length_px
     if not (band_px > 0 and min_length_px > 0):
         raise ValueError(f"expected positive band_px and min_length_px, got {band_px} and {min_length_px}")
@@ -112,10 +119,10 @@ def find_lines(
             MIN_GRADIENT_PER_PX, MIN_GRADIENT_SIGMAS * compute_noise_gain() * noise)
         rough = find_line_regions(smooth, min_gradient, min_length_px)
         fit = refine_segments(smooth, rough, np.ones(len(rough)), noise, 2)
-        return _select(fit, np.full(len(rough), -1, np.intp), min_length_px, settings)
+        return _select(fit, np.full(len(rough), -1, np.intp), min_length_px)
     near = find_in_bands(pixels, _require_segments(predicted_px), noise, band_px, min_length_px)
     fit = refine_segments(smooth, near.segments_px, near.sign, noise, 1)
-    return _select(fit, near.predicted, min_length_px, settings)
+    return _select(fit, near.predicted, min_length_px)
 
 
 def _require_segments(predicted_px: Any) -> Floats:
@@ -129,13 +136,13 @@ def _require_segments(predicted_px: Any) -> Floats:
 
 
 def _select(
-    fit: RefinedSegments, predicted: Indices, min_length: float, settings: FeaturesSettings
+    fit: RefinedSegments, predicted: Indices, min_length: float
 ) -> LineSegments:
     """The segments long, strong and straight enough, with the systematic error in their deviations."""
     length = np.linalg.norm(fit.segments_px[:, 1] - fit.segments_px[:, 0], axis=1)
     keep = (length >= min_length) & (np.abs(fit.contrast) >= MIN_LINE_CONTRAST)
     keep &= fit.support >= MIN_LINE_SUPPORT
-    systematic = settings.line_systematic_px
+    systematic = LINE_SYSTEMATIC_PX
     offset = np.hypot(fit.sigma_offset_px, systematic)
     # A displacement spread evenly along a segment of length L has, as a slope, deviation sqrt(12) / L.
     angle = np.hypot(fit.sigma_angle_rad, 12.0**0.5 * systematic / np.maximum(length, 1.0))

@@ -19,9 +19,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats32, Image
-from knowledge_sources.settings import GoalSettings
 from world_models.camera import Camera
 
+MIN_CONTRAST = 6.0  # a dark frame has less contrast (standard deviation of its grey values, 0 to 255) than this
+MIN_BRIGHTNESS = 40.0  # a dark frame also has a lower mean than this; a brighter one shows a bare wall
 NOISE_ROWS = 64  # rows of an image, about, on which its pixel noise is estimated
 
 ROUNDING_SIGMA = 12.0**-0.5
@@ -151,9 +152,9 @@ def compute_mean_and_deviation(image: Image) -> tuple[float, float]:
     return float(mean[0, 0]), float(deviation[0, 0])
 
 
-def is_dark(brightness: float, contrast: float, settings: GoalSettings) -> bool:
+def is_dark(brightness: float, contrast: float) -> bool:
     """Whether a picture of this mean and deviation is dark; a bright one without contrast shows a bare wall."""
-    return contrast < settings.min_contrast and brightness < settings.min_brightness
+    return contrast < MIN_CONTRAST and brightness < MIN_BRIGHTNESS
 
 
 def estimate_noise_sigma(image: Floats32) -> float:

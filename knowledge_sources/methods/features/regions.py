@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats, Floats32, Image, Ints
 from knowledge_sources.methods.features.picture import to_grey_float
-from knowledge_sources.settings import DEFAULT, FeaturesSettings
 
+MAX_VALLEY_SHARE = 0.6  # largest height of a histogram's valley as a share of the lower of its two peaks
+MIN_MODE_SHARE = 0.02  # least share of a sector's pixels on each side of a valley
 HISTOGRAM_BINS = 64  # bins of a sector's histogram of grey levels
 MAX_BORDER_STEP = 12.0  # grey levels; largest step across a sector's border between parts that are joined
 
@@ -26,7 +27,7 @@ Labels = NDArray[np.int32]
 
 
 def segment_regions(
-    image: Any, *, sector_px: int = 64, min_area_px: int = 60, settings: FeaturesSettings = DEFAULT.features
+    image: Any, *, sector_px: int = 64, min_area_px: int = 60
 ) -> Labels:
     """Segment an image (h, w) of grey levels into connected regions of like brightness: labels (h, w), 0 .. n - 1.
 
@@ -42,12 +43,12 @@ def segment_regions(
         raise ValueError(f"expected sector_px >= 8 and min_area_px >= 1, got {sector_px} and {min_area_px}")
     levels = np.clip(np.rint(pixels), 0, 255).astype(np.uint8)
     smooth = np.asarray(cv2.medianBlur(levels, 3), np.uint8)
-    labels = _label_sectors(smooth, sector_px, settings)
+    labels = _label_sectors(smooth, sector_px)
     labels = _merge_sectors(labels, smooth.astype(np.float32), sector_px, MAX_BORDER_STEP)
     return _merge_small(labels, pixels, min_area_px)
 
 
-def find_histogram_valleys(levels: Image, settings: FeaturesSettings = DEFAULT.features) -> Floats:
+def find_histogram_valleys(levels: Image) -> Floats:
     """Grey levels (n,) that separate the modes of a histogram; empty where there is one mode.
 
     A valley counts where it is low enough against the lower of its two peaks (``max_valley_share``) and each side holds
@@ -62,14 +63,14 @@ def find_histogram_valleys(levels: Image, settings: FeaturesSettings = DEFAULT.f
     for valley in minima.tolist():
         left, right = smooth[start : valley + 1].max(), smooth[valley:].max()
         pixels = min(counts[start:valley].sum(), counts[valley:].sum())
-        is_low = smooth[valley] < settings.max_valley_share * min(left, right)
-        if is_low and pixels >= settings.min_mode_share * levels.size:
+        is_low = smooth[valley] < MAX_VALLEY_SHARE * min(left, right)
+        if is_low and pixels >= MIN_MODE_SHARE * levels.size:
             valleys.append(valley)
             start = valley
     return (np.array(valleys, float) + 0.5) * (256.0 / bins)
 
 
-def _label_sectors(levels: Image, side: int, settings: FeaturesSettings) -> Labels:
+def _label_sectors(levels: Image, side: int) -> Labels:
     """Connected parts of one histogram mode, each within one sector.
 
     A sector's histogram is taken a quarter of its side beyond it, so that what only just reaches into it has a mode.
@@ -82,7 +83,7 @@ def _label_sectors(levels: Image, side: int, settings: FeaturesSettings) -> Labe
         for left in range(0, width, side):
             sector = levels[top : top + side, left : left + side]
             around = levels[max(top - margin, 0) : top + side + margin, max(left - margin, 0) : left + side + margin]
-            modes = np.digitize(sector, find_histogram_valleys(around, settings))
+            modes = np.digitize(sector, find_histogram_valleys(around))
             for mode in range(int(modes.max()) + 1):
                 count, parts = cv2.connectedComponents((modes == mode).astype(np.uint8), connectivity=4)
                 block = labels[top : top + side, left : left + side]

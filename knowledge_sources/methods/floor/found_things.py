@@ -17,12 +17,12 @@ from knowledge_sources.methods.floor.footprints import (
     measure_width_m,
 )
 from knowledge_sources.methods.floor.thing_shapes import MIN_COMMON_DIRECTIONS
-from knowledge_sources.settings import ActionSettings
 from world_models.building.building import Building
 from world_models.building.locales import EXTRA_KIND, Doorway
 from world_models.entries import Obstacle, ObstacleStatus, Place
 from world_models.frames import Pose2
 
+MIN_OBSTACLE_CERTAINTY = 0.9  # with this certainty an obstacle is there: by one sure picture, or by two unsure ones
 VAGUE_SIGMA_M = 0.05  # an obstacle of which the place is less sure is not known well
 MAX_BEHIND_DOOR_M = 4.0  # a thing that is seen through a doorway stands at most so far behind it
 
@@ -32,9 +32,9 @@ def may_be_there(obstacle: Obstacle) -> bool:
     return obstacle.status != "gone"
 
 
-def tell_status(certainty: float, settings: ActionSettings) -> ObstacleStatus:
+def tell_status(certainty: float) -> ObstacleStatus:
     """Whether something so certain is acted on."""
-    return "there" if certainty >= settings.min_obstacle_certainty else "suspected"
+    return "there" if certainty >= MIN_OBSTACLE_CERTAINTY else "suspected"
 
 
 def find_same(
@@ -96,10 +96,10 @@ def move_thing(world: Building, thing: Obstacle, by: Pose2, off_m: float, told: 
     return place(world, moved, build_polygon(moved.footprint))
 
 
-def doubt_thing(thing: Obstacle, told: str, settings: ActionSettings) -> Obstacle:
+def doubt_thing(thing: Obstacle, told: str) -> Obstacle:
     """A thing that was seen there, or elsewhere, one as likely as the other."""
     certainty = 0.5 * thing.certainty
-    return replace(thing, certainty=certainty, evidence=told, status=tell_status(certainty, settings))
+    return replace(thing, certainty=certainty, evidence=told, status=tell_status(certainty))
 
 
 def find_room(world: Building, shape: shapely.Polygon, near: str) -> str:

@@ -124,7 +124,7 @@ def see_free_floor(
     grid = build_floor_grid(robot.camera, robot.mount, height_m, SIGHT_PART * SIGHT_M)
     eye = pose @ Pose2(robot.mount.forward_m, 0.0, 0.0)
     shown = read_picture(jpeg)
-    if grid is None or is_dark(*compute_mean_and_deviation(shown.grey), settings.goal):
+    if grid is None or is_dark(*compute_mean_and_deviation(shown.grey)):
         return _blind(locale, eye, seen_s), ()
     sigma_rad = math.sqrt(max(float(covariance[2, 2]), 0.0))
     margin_px = MODEL_MARGIN_PX + 2.0 * sigma_rad * robot.camera.fx

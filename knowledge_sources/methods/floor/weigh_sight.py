@@ -35,6 +35,7 @@ from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.building import Building
 from world_models.entries import FloorThing, FreeFloor, Obstacle, ObstacleStatus
 
+MIN_THING_CERTAINTY = 0.5  # what is seen on the floor with less certainty than this tells of no obstacle
 MIN_FREE_PART = 0.5  # part of an obstacle's footprint that must be seen free to tell that it is not there any more
 MAX_SHARED_PART = 0.25  # where a thing that is seen takes more of the footprint, the rest seen free tells nothing of it
 FREE_FLOOR_ODDS = (1.0 - MAX_P_SEEN_ONCE) / MAX_P_SEEN_ONCE
@@ -91,9 +92,9 @@ class Sighted(NamedTuple):
     is_next: bool = False
 
 
-def is_telling(thing: FloorThing, settings: ActionSettings) -> bool:
+def is_telling(thing: FloorThing) -> bool:
     """Whether a thing in a sight is certain and sharp enough to conclude anything from."""
-    return thing.p_thing >= settings.min_thing_certainty and thing.sigma_m <= MAX_OBSTACLE_SIGMA_M
+    return thing.p_thing >= MIN_THING_CERTAINTY and thing.sigma_m <= MAX_OBSTACLE_SIGMA_M
 
 
 def weigh_sight(
@@ -113,7 +114,7 @@ def weigh_sight(
     drafts: dict[str, Sighted] = {}
     fresh = 0
     for thing in f.things:
-        if not is_telling(thing, s):
+        if not is_telling(thing):
             continue
         new = _shape_of(sight, thing)
         rest, whole = {id: o for id, o in known.items() if id not in drafts}, MAX_HULL_PART
@@ -194,7 +195,7 @@ def see_first(
     found = Obstacle(
         f"{locale}/obstacle-{number}", locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m,
         thing.sigma_height_m, min(thing.p_thing, settings.max_obstacle_certainty), f.seen_s, None, f.sense,
-        _tell(thing, sight), tell_status(thing.p_thing, settings), core, thing.is_alike, shape.from_m,
+        _tell(thing, sight), tell_status(thing.p_thing), core, thing.is_alike, shape.from_m,
         sight.eye)
     return place(world, found, own)
 
@@ -219,12 +220,12 @@ def see_again(
     seen_before = known.core or known.footprint
     moved = max(measure_change_m(known.footprint, footprint),
                 measure_change_m(seen_before, core or footprint)) >= s.min_footprint_change_m
-    surer = certainty > known.certainty + 0.005 or tell_status(certainty, s) != known.status
+    surer = certainty > known.certainty + 0.005 or tell_status(certainty) != known.status
     higher = thing.sigma_height_m < 0.7 * known.sigma_height_m
     if not (moved or surer or higher or f.seen_s - known.seen_s >= SEEN_AGAIN_S):
         return None
     height, sigma = (thing.height_m, thing.sigma_height_m) if higher else (known.height_m, known.sigma_height_m)
-    status: ObstacleStatus = "there" if known.is_there else tell_status(certainty, s)
+    status: ObstacleStatus = "there" if known.is_there else tell_status(certainty)
     new = replace(known, certainty=certainty, seen_s=f.seen_s, status=status, height_m=height,
                   sigma_height_m=sigma, sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight),
                   is_alike=known.is_alike and thing.is_alike, told_from=sight.eye)

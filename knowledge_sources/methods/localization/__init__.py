@@ -23,21 +23,36 @@ Could a known pose be another one that looks the same?
 from knowledge_sources.methods.localization.aliasing import (
     compare_places, find_repetitions, list_aliases, precompute_views,
 )
-from knowledge_sources.methods.localization.camera_matching import match_with_camera, rate_match
-from knowledge_sources.methods.localization.global_localization import LocalizationStatus, make_alias_test
+from knowledge_sources.methods.localization.camera_matching import (
+    CAMERA_LINE_SIGMA_PX, MIN_CAMERA_LINES, match_with_camera, rate_match,
+)
+from knowledge_sources.methods.localization.global_localization import (
+    LocalizationStatus, MAX_HYPOTHESES, MAX_SEARCHED_VIEWS, MIN_LOG_LIKELIHOOD, MIN_P_TRACKED, MIN_VIEWS,
+    REFUTING_LOG_RATIO, make_alias_test,
+)
 from knowledge_sources.methods.localization.next_view import MIN_NEW_VIEW_RAD, MOVE_M
-from knowledge_sources.methods.localization.place_odds import StatedPlace, compute_prior, compute_twin_odds, weigh_told
+from knowledge_sources.methods.localization.place_odds import (
+    LOST_AGAIN_ODDS, MAX_ALIKE_LOG_RATIO, MIN_P_SURE, P_TOLD, StatedPlace, compute_prior, compute_twin_odds, weigh_told,
+)
 from knowledge_sources.methods.localization.place_search import (
-    Search, describe, find_far_action, find_odds_used, list_rooms, prefer_reachable, search,
+    MAX_FAR_PROBES, MAX_FLOOR_DIFFERENCE_M, MAX_ROOMS, Search, describe, find_far_action, find_odds_used,
+    list_rooms, prefer_reachable, search,
 )
 from knowledge_sources.methods.localization.pose_candidates import DISTINCT, are_distinct, get_visibility_map
-from knowledge_sources.methods.localization.refinement import compute_pose_likelihood
+from knowledge_sources.methods.localization.refinement import (
+    ALIKE_LOG_NOISE, MIN_EXPLAINED_FRACTION, MIN_FRACTION_SUM, MIN_MATCHED_FRACTION, MIN_PLACE_LINES,
+    MIN_VIEW_FRACTION, SURE_LOG_LIKELIHOOD, SURE_MATCHED_FRACTION, compute_pose_likelihood,
+)
 from knowledge_sources.methods.localization.views import CameraView, propagate_pose, update_obstruction
 
 __all__ = [
-    "DISTINCT", "MIN_NEW_VIEW_RAD", "MOVE_M", "CameraView", "LocalizationStatus", "Search", "StatedPlace",
-    "are_distinct", "compare_places", "compute_pose_likelihood", "compute_prior", "compute_twin_odds", "describe",
-    "find_far_action", "find_odds_used", "find_repetitions", "get_visibility_map", "list_aliases", "list_rooms",
-    "make_alias_test", "match_with_camera", "precompute_views", "prefer_reachable", "propagate_pose", "rate_match",
-    "search", "update_obstruction", "weigh_told",
+    "ALIKE_LOG_NOISE", "CAMERA_LINE_SIGMA_PX", "DISTINCT", "LOST_AGAIN_ODDS", "MAX_ALIKE_LOG_RATIO",
+    "MAX_FAR_PROBES", "MAX_FLOOR_DIFFERENCE_M", "MAX_HYPOTHESES", "MAX_ROOMS", "MAX_SEARCHED_VIEWS",
+    "MIN_CAMERA_LINES", "MIN_EXPLAINED_FRACTION", "MIN_FRACTION_SUM", "MIN_LOG_LIKELIHOOD", "MIN_MATCHED_FRACTION",
+    "MIN_NEW_VIEW_RAD", "MIN_PLACE_LINES", "MIN_P_SURE", "MIN_P_TRACKED", "MIN_VIEWS", "MIN_VIEW_FRACTION",
+    "MOVE_M", "P_TOLD", "REFUTING_LOG_RATIO", "SURE_LOG_LIKELIHOOD", "SURE_MATCHED_FRACTION", "CameraView",
+    "LocalizationStatus", "Search", "StatedPlace", "are_distinct", "compare_places", "compute_pose_likelihood",
+    "compute_prior", "compute_twin_odds", "describe", "find_far_action", "find_odds_used", "find_repetitions",
+    "get_visibility_map", "list_aliases", "list_rooms", "make_alias_test", "match_with_camera", "precompute_views",
+    "prefer_reachable", "propagate_pose", "rate_match", "search", "update_obstruction", "weigh_told",
 ]

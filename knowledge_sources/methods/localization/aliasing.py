@@ -23,6 +23,7 @@ from knowledge_sources.methods.localization.refinement import refine_to_likelier
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.pose import fit_displacements
 from knowledge_sources.methods.verification import (
+    LINE_TOLERANCE_PX,
     LINE_TOLERANCE_RAD,
     MAX_LINE_WEIGHT_PX,
     MIN_COVERED_FRACTION,
@@ -30,7 +31,6 @@ from knowledge_sources.methods.verification import (
     find_errors,
     predict_lines,
 )
-from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.building import Building
 from world_models.building.model_errors import LineErrors
 from world_models.frames import Pose, Pose2
@@ -81,7 +81,6 @@ class Alias(NamedTuple):
 
 def list_aliases(
     robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, *, search: bool = False,
-    settings: Settings = DEFAULT,
 ) -> list[Alias]:
     """List the other poses of a room at which segments (k, 2, 2) may have been seen, each with its margin.
 
@@ -89,20 +88,20 @@ def list_aliases(
     notices and painted doors that no plan shows may repeat themselves. A search takes half a second.
     """
     others = [*find_repeated_poses(robot, room, pose),
-              *(find_fitting_poses(robot, segments_px, room, pose, settings) if search else ())]
+              *(find_fitting_poses(robot, segments_px, room, pose) if search else ())]
     if not others:
         return []
-    views = predict_views_on_grid(robot, (pose, *others), settings, segments_px)
-    own, *there = (score_view(lines_px, segments_px, settings) for lines_px in views)
+    views = predict_views_on_grid(robot, (pose, *others), segments_px)
+    own, *there = (score_view(lines_px, segments_px) for lines_px in views)
     return [Alias(other, compute_margin(own, view)) for other, view in zip(others, there, strict=True)]
 
 
 def compare_places(
-    one: tuple[RobotModel, Pose2], other: tuple[RobotModel, Pose2], segments_px: Floats, settings: Settings = DEFAULT
+    one: tuple[RobotModel, Pose2], other: tuple[RobotModel, Pose2], segments_px: Floats
 ) -> float:
     """By how many lines segments (k, 2, 2) support one robot and pose more than another, as on another storey."""
-    views = (predict_views_on_grid(robot, (pose,), settings, segments_px)[0] for robot, pose in (one, other))
-    return compute_margin(*(score_view(lines_px, segments_px, settings) for lines_px in views))
+    views = (predict_views_on_grid(robot, (pose,), segments_px)[0] for robot, pose in (one, other))
+    return compute_margin(*(score_view(lines_px, segments_px) for lines_px in views))
 
 
 def find_repeated_poses(robot: RobotModel, room: str, pose: Pose2) -> list[Pose2]:
@@ -114,28 +113,28 @@ def find_repeated_poses(robot: RobotModel, room: str, pose: Pose2) -> list[Pose2
 
 
 def find_fitting_poses(
-    robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, settings: Settings = DEFAULT
+    robot: RobotModel, segments_px: Floats, room: str, pose: Pose2
 ) -> list[Pose2]:
     """Find the poses of a room, distinct from a pose, at which segments (k, 2, 2) fit best."""
     views = (CameraView(segments_px, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))),)
-    candidates = find_pose_candidates(robot, views, (room,), MAX_FITTING_POSES, settings)
-    refined = (refine_to_likelier(robot, views, c.world_from_robot, settings)[0] for c in candidates)
+    candidates = find_pose_candidates(robot, views, (room,), MAX_FITTING_POSES)
+    refined = (refine_to_likelier(robot, views, c.world_from_robot)[0] for c in candidates)
     return [other for other in refined if are_distinct(other, pose)]
 
 
-def precompute_views(robot: RobotModel, room: str, pose: Pose2, settings: Settings = DEFAULT) -> None:
+def precompute_views(robot: RobotModel, room: str, pose: Pose2) -> None:
     """Compute what should be visible from a pose and from where the room repeats itself, so that it is at hand."""
-    predict_views_on_grid(robot, (pose, *find_repeated_poses(robot, room, pose)), settings)
+    predict_views_on_grid(robot, (pose, *find_repeated_poses(robot, room, pose)))
 
 
 def predict_views_on_grid(
-    robot: RobotModel, poses: Sequence[Pose2], settings: Settings = DEFAULT, segments_px: Floats | None = None
+    robot: RobotModel, poses: Sequence[Pose2], segments_px: Floats | None = None
 ) -> list[Floats]:
     """Predict the view (n, 2, 2) [px] from each pose: the lines visible from the nearest pose of the grid.
 
     Lines of a model that is inexact are displaced as they fit segments (k, 2, 2) best, where these are given.
     """
-    lines = [robot.camera_from_world(pose).apply(_find_displaced_on_grid(robot, pose, segments_px, settings))
+    lines = [robot.camera_from_world(pose).apply(_find_displaced_on_grid(robot, pose, segments_px))
              for pose in poses]
     seen, inside = robot.camera.project_segments(np.concatenate(lines).reshape(-1, 2, 3), Pose.identity())
     ends = np.cumsum([len(some) for some in lines])[:-1]
@@ -149,11 +148,11 @@ class ScoredView(NamedTuple):
     scores: Floats
 
 
-def score_view(lines_px: Floats, segments_px: Floats, settings: Settings = DEFAULT) -> ScoredView:
+def score_view(lines_px: Floats, segments_px: Floats) -> ScoredView:
     """Score the lines of a view (n, 2, 2) by how much of each segments (k, 2, 2) cover, more or less than half."""
-    tuning, length = settings.verification, np.linalg.norm(lines_px[:, 1] - lines_px[:, 0], axis=1)
+    length = np.linalg.norm(lines_px[:, 1] - lines_px[:, 0], axis=1)
     lines = np.minimum(length, MAX_LINE_WEIGHT_PX) / ALIAS_LINE_LENGTH_PX
-    covered = _cover(lines_px, segments_px, tuning.line_tolerance_px, LINE_TOLERANCE_RAD)
+    covered = _cover(lines_px, segments_px, LINE_TOLERANCE_PX, LINE_TOLERANCE_RAD)
     return ScoredView(lines_px, lines * (covered - MIN_COVERED_FRACTION))
 
 
@@ -162,16 +161,15 @@ def compute_margin(one: ScoredView, other: ScoredView) -> float:
     return _sum_own(one, other) - _sum_own(other, one)
 
 
-def _find_displaced_on_grid(robot: RobotModel, pose: Pose2, segments_px: Floats | None, settings: Settings) -> Floats:
+def _find_displaced_on_grid(robot: RobotModel, pose: Pose2, segments_px: Floats | None) -> Floats:
     """(n, 2, 3) the lines [m, world] of the grid's nearest pose, displaced as far as the model is inexact."""
-    lines, errors = _find_visible_on_grid(robot, pose, settings)
+    lines, errors = _find_visible_on_grid(robot, pose)
     if segments_px is None or errors.is_exact:
         return lines
-    return fit_displacements(lines, errors, segments_px, robot.camera, robot.mount.camera_from_robot, pose,
-                             settings=settings.pose).lines_world
+    return fit_displacements(lines, errors, segments_px, robot.camera, robot.mount.camera_from_robot, pose).lines_world
 
 
-def _find_visible_on_grid(robot: RobotModel, pose: Pose2, settings: Settings) -> tuple[Floats, LineErrors]:
+def _find_visible_on_grid(robot: RobotModel, pose: Pose2) -> tuple[Floats, LineErrors]:
     """The lines (n, 2, 3) [m, world] that are visible from the pose of the grid nearest to a pose, and their errors.
 
     Kept.
@@ -180,10 +178,10 @@ def _find_visible_on_grid(robot: RobotModel, pose: Pose2, settings: Settings) ->
     turned = round(pose.heading_rad / grid_rad) % round(math.tau / grid_rad)
     nearest = (round(pose.x_m / grid_m), round(pose.y_m / grid_m), turned)
     of_grid = Pose2(nearest[0] * grid_m, nearest[1] * grid_m, nearest[2] * grid_rad)
-    key = robot.camera, robot.mount.height_m, nearest, settings.verification
+    key = robot.camera, robot.mount.height_m, nearest
 
     def predict() -> tuple[Floats, LineErrors]:
-        lines = predict_lines(robot, of_grid, settings.verification)
+        lines = predict_lines(robot, of_grid)
         return lines.lines_world, find_errors(robot, lines)
 
     return robot.world.cached("views on a grid", CACHED_VIEWS, key, predict)

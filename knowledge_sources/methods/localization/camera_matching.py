@@ -11,10 +11,15 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.matching import Match, PoseMatch, match_in_space
 from knowledge_sources.methods.pose import CameraEstimate, estimate_camera_and_pose
 from knowledge_sources.methods.verification import LINE_TOLERANCE_RAD, MAX_LINE_WEIGHT_PX, compute_coverage
-from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, move_camera
 from world_models.frames import Pose, Pose2
 
+FOCAL_STARTS = (-1.5, 0.0, 1.5)  # focal lengths that are tried beyond it, in deviations
+CAMERA_PAIR_PX = 8.0  # largest distance of a data end from its model line then
+CAMERA_MATCH_SIGMA_PX = 2.5  # standard deviation of a data end across its model line then
+SHARP_PX = 1.0  # a line is covered sharply by segments within this distance
+MIN_CAMERA_LINES = 10  # fewest lines by which the camera is learnt
+CAMERA_LINE_SIGMA_PX = 0.5  # standard deviation of a line's end across it, with what model and picture have in common
 STEP = 1e-5
 """Of the numeric derivatives [m, rad]."""
 MOUNTING = 4
@@ -39,7 +44,7 @@ class CameraMatch:
 
 def match_with_camera(
     model_lines_world: Any, data_px: Any, camera: Camera, mount: CameraMount, prior: Pose2, prior_covariance: Floats,
-    camera_covariance: Floats, settings: Settings = DEFAULT,
+    camera_covariance: Floats,
 ) -> CameraMatch:
     """Match model lines to data lines within what the priors of pose and camera allow.
 
@@ -53,45 +58,43 @@ def match_with_camera(
     Raises:
         ValueError: no model line, or a wrong shape.
     """
-    s = settings.camera_state
     lines, data = np.asarray(model_lines_world, float), np.asarray(data_px, float)
     spread = compute_space_covariance(mount, prior, prior_covariance, camera_covariance)
     expected = mount.camera_from_robot @ prior.lifted().inverse()
     found: list[CameraMatch] = []
-    for sigmas in s.focal_starts:
+    for sigmas in FOCAL_STARTS:
         factor = 1.0 + sigmas * float(np.sqrt(camera_covariance[FOCAL, FOCAL]))
         zoomed = replace(camera, fx=factor * camera.fx, fy=factor * camera.fy)
-        match = match_in_space(lines, data, zoomed, expected, spread, settings.matching,
-                               pair_px=s.pair_px, sigma_px=s.match_sigma_px)
+        match = match_in_space(lines, data, zoomed, expected, spread,
+                               pair_px=CAMERA_PAIR_PX, sigma_px=CAMERA_MATCH_SIGMA_PX)
         found.append(rate_match(
-            match, lines, data, camera, mount, prior, prior_covariance, camera_covariance, settings))
+            match, lines, data, camera, mount, prior, prior_covariance, camera_covariance))
     return max(found, key=lambda tried: tried.sharp_part)
 
 
 def rate_match(
     match: Match | PoseMatch, lines_world: Floats, data_px: Floats, camera: Camera, mount: CameraMount, prior: Pose2,
-    prior_covariance: Floats, camera_covariance: Floats, settings: Settings = DEFAULT,
+    prior_covariance: Floats, camera_covariance: Floats,
 ) -> CameraMatch:
     """What a match is worth; arguments as for :func:`match_with_camera`."""
-    s, pairs = settings.camera_state, np.asarray(match.pairs, np.intp).reshape(-1, 2)
-    if len(pairs) < s.min_lines:
+    pairs = np.asarray(match.pairs, np.intp).reshape(-1, 2)
+    if len(pairs) < MIN_CAMERA_LINES:
         return CameraMatch(match, 0.0, 0.0)
     estimate = estimate_camera_and_pose(
         lines_world[pairs[:, 0]], data_px[pairs[:, 1]], camera, mount, prior, prior_covariance, camera_covariance,
-        sigma_px=s.line_sigma_px, settings=s)
-    sharp = compute_sharp_part(lines_world, data_px, camera, mount, estimate, settings)
+        sigma_px=CAMERA_LINE_SIGMA_PX)
+    sharp = compute_sharp_part(lines_world, data_px, camera, mount, estimate)
     return CameraMatch(match, sharp, estimate.prior_chi2)
 
 
 def compute_sharp_part(
     lines_world: Floats, data_px: Floats, camera: Camera, mount: CameraMount, estimate: CameraEstimate,
-    settings: Settings = DEFAULT,
 ) -> float:
     """Which part of the length in view of model lines (m, 2, 3) segments (k, 2, 2) cover sharply, 0..1."""
     lens, mounted = move_camera(camera, mount, estimate.step)
     camera_from_world = mounted.camera_from_robot @ estimate.world_from_robot.lifted().inverse()
     seen, _ = lens.project_segments(lines_world, camera_from_world)
-    covered = compute_coverage(seen, data_px, settings.camera_state.sharp_px, LINE_TOLERANCE_RAD)
+    covered = compute_coverage(seen, data_px, SHARP_PX, LINE_TOLERANCE_RAD)
     lengths = np.minimum(np.nan_to_num(np.linalg.norm(seen[:, 1] - seen[:, 0], axis=1)), MAX_LINE_WEIGHT_PX)
     total = float(lengths.sum())
     return float(np.sum(np.nan_to_num(covered) * lengths)) / total if total > 0.0 else 0.0

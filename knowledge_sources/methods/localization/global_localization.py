@@ -32,15 +32,25 @@ from knowledge_sources.methods.localization.pose_candidates import (
     are_distinct,
 )
 from knowledge_sources.methods.localization.refinement import (
+    ALIKE_LOG_NOISE,
     PoseLikelihood,
     refine_to_likelier,
 )
 from knowledge_sources.methods.localization.views import CameraView, align_headings
 from knowledge_sources.methods.verification import predict_lines
-from knowledge_sources.settings import DEFAULT, LocalizationSettings, Settings
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
+MIN_VIEWS = 2
+"""Fewest views by which a pose is accepted: one may fit a place that the model lacks (checked with harvey experiment
+kidnap)."""
+MAX_SEARCHED_VIEWS = 4  # views after which places are followed, and no longer searched for, while two are accepted
+MIN_LOG_LIKELIHOOD = 2.0  # smallest log likelihood of a hypothesis that is kept (checked with harvey experiment kidnap)
+REFUTING_LOG_RATIO = 8.0
+"""Log likelihood ratio (Bayes factor) by which a better hypothesis refutes a distinct one (checked with harvey
+experiment kidnap)."""
+MAX_HYPOTHESES = 6  # most hypotheses that are kept
+MIN_P_TRACKED = 0.8  # smallest probability, against all places that look alike, of a place that is not doubted
 MAX_VIEWS_OF_SEARCH = 8  # most views, the last, by which the floor is searched; what is found is refined by all
 MAX_CANDIDATES = 14  # most candidates of a floor that are refined
 BUMP_REACH_M = 2.0  # so far from where it was believed a robot may be that nobody carried off
@@ -99,7 +109,7 @@ class LocalizationResult:
 
 
 def localize(
-    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT,
+    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str],
     guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (),
     touched: Sequence[Floats] = (), p_guess: float = 0.0,
 ) -> LocalizationResult:
@@ -111,13 +121,13 @@ def localize(
         followed: the candidates of the last localization, moved as the robot moved since: they are tried too.
         touched: where something was touched, (2,) [m] in the robot's frame now: no move leads there.
     """
-    aligned = align_headings(views, robot.camera, robot.mount.camera_from_robot, settings)
-    candidates = find_candidates(robot, aligned, rooms, settings, guess, followed, p_guess)
-    return decide(robot, candidates, [view.now_from_then for view in aligned], settings, touched)
+    aligned = align_headings(views, robot.camera, robot.mount.camera_from_robot)
+    candidates = find_candidates(robot, aligned, rooms, guess, followed, p_guess)
+    return decide(robot, candidates, [view.now_from_then for view in aligned], touched)
 
 
 def find_candidates(
-    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings = DEFAULT,
+    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str],
     guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (), p_guess: float = 0.0,
 ) -> tuple[PlaceCandidate, ...]:
     """Find the places in these rooms that explain all views (with aligned headings), the likeliest first.
@@ -127,36 +137,36 @@ def find_candidates(
     are followed and not searched for, while two of them are accepted. If one accepted place is left, its aliases on the
     whole floor are weighed too.
     """
-    look_alike, tuning = make_alias_test(robot, [view.now_from_then for view in views], settings), settings.localization
-    found = _build_distinct(robot, views, [] if guess is None else [guess], settings)
+    look_alike = make_alias_test(robot, [view.now_from_then for view in views])
+    found = _build_distinct(robot, views, [] if guess is None else [guess])
     known: list[PlaceCandidate] = []
-    if len(views) > tuning.max_searched_views:
-        known = _build_distinct(robot, views, followed, settings, found)
+    if len(views) > MAX_SEARCHED_VIEWS:
+        known = _build_distinct(robot, views, followed, found)
     if sum(bool(c.is_accepted) for c in (*found, *known)) >= 2:
-        return rank_candidates([*found, *known], look_alike, len(views), settings, found[0] if found else None)
-    pictures = PictureSearch.from_views(robot, views[-MAX_VIEWS_OF_SEARCH:], settings)
-    searched, likely = [*found], choose_rooms(robot, rooms, guess, found, p_guess, len(views), tuning)
-    for candidate in _find_refined(robot, views, likely, settings, pictures):
+        return rank_candidates([*found, *known], look_alike, len(views), found[0] if found else None)
+    pictures = PictureSearch.from_views(robot, views[-MAX_VIEWS_OF_SEARCH:])
+    searched, likely = [*found], choose_rooms(robot, rooms, guess, found, p_guess, len(views))
+    for candidate in _find_refined(robot, views, likely, pictures):
         _keep_likelier(searched, candidate)
     first = None
     if found:  # the place of the guess, though the search may have found more exactly where it is
         first = min(searched, key=lambda c: c.world_from_robot.distance_to(found[0].world_from_robot))
-    for candidate in known or _build_distinct(robot, views, followed, settings):
+    for candidate in known or _build_distinct(robot, views, followed):
         _keep_likelier(searched, candidate)
-    kept = rank_candidates(searched, look_alike, len(views), settings, first)
+    kept = rank_candidates(searched, look_alike, len(views), first)
     if len(kept) != 1 or not kept[0].is_accepted:
         return kept
-    aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, settings, likely)
-    beside = [_build_candidate(robot, views, c.room, c.world_from_robot, settings) for c in aliases]
+    aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, likely)
+    beside = [_build_candidate(robot, views, c.room, c.world_from_robot) for c in aliases]
     repeated = _sift(pictures, kept[0].room, kept[0].world_from_robot, _list_repetitions(robot, kept[0], rooms))
-    beside += _build_distinct(robot, views, repeated, settings, [*kept, *beside])
-    rivals = [_polish(robot, views, c, settings) for c in (*kept, *beside)]
-    return rank_candidates(rivals, look_alike, len(views), settings, rivals[0])
+    beside += _build_distinct(robot, views, repeated, [*kept, *beside])
+    rivals = [_polish(robot, views, c) for c in (*kept, *beside)]
+    return rank_candidates(rivals, look_alike, len(views), rivals[0])
 
 
 def choose_rooms(
     robot: RobotModel, rooms: Sequence[str], guess: tuple[str, Pose2] | None, found: Sequence[PlaceCandidate],
-    p_guess: float, looks: int, tuning: LocalizationSettings = DEFAULT.localization,
+    p_guess: float, looks: int,
 ) -> list[str]:
     """Choose the rooms in which places are searched for, in the order in which they are given: the nearest first.
 
@@ -168,9 +178,9 @@ def choose_rooms(
         found: the places to which the guess leads.
         p_guess: how likely the robot was there, before these looks.
     """
-    if guess is None or p_guess < tuning.min_p_tracked:
+    if guess is None or p_guess < MIN_P_TRACKED:
         return list(rooms)
-    if looks >= tuning.min_views and not any(c.is_accepted for c in found):
+    if looks >= MIN_VIEWS and not any(c.is_accepted for c in found):
         return list(rooms)
     here = shapely.Point(guess[1].position)
     return [room for room in rooms if shapely.Polygon(robot.world.outline(room)).distance(here) <= BUMP_REACH_M]
@@ -190,13 +200,13 @@ def _sift(
 
 
 def _build_distinct(
-    robot: RobotModel, views: Sequence[CameraView], rough: Iterable[tuple[str, Pose2]], settings: Settings,
+    robot: RobotModel, views: Sequence[CameraView], rough: Iterable[tuple[str, Pose2]],
     known: Sequence[PlaceCandidate] = (),
 ) -> list[PlaceCandidate]:
     """Candidates from rough poses in rooms, refined, that are none of those that are known, each once."""
     found: list[PlaceCandidate] = []
     for room, pose in rough:
-        candidate = _build_candidate(robot, views, room, pose, settings)
+        candidate = _build_candidate(robot, views, room, pose)
         if all(are_distinct(candidate.world_from_robot, c.world_from_robot) for c in (*known, *found)):
             found.append(candidate)
     return found
@@ -210,10 +220,10 @@ def _keep_likelier(found: list[PlaceCandidate], new: PlaceCandidate) -> None:
 
 
 def _polish(
-    robot: RobotModel, views: Sequence[CameraView], rough: PlaceCandidate, settings: Settings
+    robot: RobotModel, views: Sequence[CameraView], rough: PlaceCandidate
 ) -> PlaceCandidate:
     """The candidate refined once more, from where it ended: what decides between two is not from where each began."""
-    again = _build_candidate(robot, views, rough.room, rough.world_from_robot, settings)
+    again = _build_candidate(robot, views, rough.room, rough.world_from_robot)
     return max((rough, again), key=lambda c: c.likelihood.log_likelihood)
 
 
@@ -226,7 +236,7 @@ def _list_repetitions(
 
 
 def find_aliases(
-    robot: RobotModel, views: Sequence[CameraView], pose: Pose2, rooms: Sequence[str], settings: Settings = DEFAULT,
+    robot: RobotModel, views: Sequence[CameraView], pose: Pose2, rooms: Sequence[str],
     likely: Sequence[str] | None = None,
 ) -> tuple[PlaceCandidate, ...]:
     """Find the other places of these rooms that would look the same in all views, by the model alone.
@@ -236,29 +246,29 @@ def find_aliases(
     find an alias, so the places at which the plan repeats itself are tried too. ``likely``: the rooms that are
     searched, all of them by default.
     """
-    lines = [predict_lines(robot, view.pose_then(pose), settings.verification) for view in views]
+    lines = [predict_lines(robot, view.pose_then(pose)) for view in views]
     predicted = [replace(view, segments_px=seen.segments_px) for view, seen in zip(views, lines, strict=True)]
-    look_alike = make_alias_test(robot, [view.now_from_then for view in views], settings)
+    look_alike = make_alias_test(robot, [view.now_from_then for view in views])
     found: list[PlaceCandidate] = []
 
     def is_alias(other: Pose2) -> bool:
         known = (pose, *(alias.world_from_robot for alias in found))
         return all(are_distinct(other, one) for one in known) and look_alike(pose, other)
 
-    pictures = PictureSearch.from_views(robot, predicted[-MAX_VIEWS_OF_SEARCH:], settings)
-    for refined in _find_refined(robot, predicted, rooms if likely is None else likely, settings, pictures):
+    pictures = PictureSearch.from_views(robot, predicted[-MAX_VIEWS_OF_SEARCH:])
+    for refined in _find_refined(robot, predicted, rooms if likely is None else likely, pictures):
         if is_alias(refined.world_from_robot):
             found.append(refined)
     here = _find_room(robot, rooms[0], pose)
     for room, other in _sift(pictures, here, pose, find_repetitions(robot.world, here, pose, rooms)):
         if is_alias(other):
-            found.append(_build_candidate(robot, predicted, room, other, settings))
+            found.append(_build_candidate(robot, predicted, room, other))
     return tuple(found)
 
 
-def make_alias_test(robot: RobotModel, looked: Sequence[Pose2], settings: Settings = DEFAULT) -> LookAlike:
+def make_alias_test(robot: RobotModel, looked: Sequence[Pose2]) -> LookAlike:
     """Return a test whether two poses would look the same in all views, by the model."""
-    predict = lru_cache(maxsize=64)(make_view_predictor(robot, settings))
+    predict = lru_cache(maxsize=64)(make_view_predictor(robot))
 
     def look_alike(one: Pose2, other: Pose2) -> bool:
         views, others = ([predict(pose @ look) for look in looked] for pose in (one, other))
@@ -268,7 +278,7 @@ def make_alias_test(robot: RobotModel, looked: Sequence[Pose2], settings: Settin
 
 
 def rank_candidates(
-    found: Sequence[PlaceCandidate], look_alike: LookAlike, looks: int, settings: Settings = DEFAULT,
+    found: Sequence[PlaceCandidate], look_alike: LookAlike, looks: int,
     first: PlaceCandidate | None = None,
 ) -> tuple[PlaceCandidate, ...]:
     """Keep the likely candidates that the likeliest does not refute, with their weights, the likeliest first.
@@ -279,16 +289,15 @@ def rank_candidates(
     beyond the noise of all ``looks``, as if all of it pointed one way. Where too many are left, ``first`` is none that
     is left out.
     """
-    tuning = settings.localization
-    noise = tuning.alike_log_noise * looks
-    order = sorted((c for c in found if c.likelihood.log_likelihood >= tuning.min_log_likelihood),
+    noise = ALIKE_LOG_NOISE * looks
+    order = sorted((c for c in found if c.likelihood.log_likelihood >= MIN_LOG_LIKELIHOOD),
                    key=lambda c: -c.likelihood.log_likelihood)
-    kept = [c for c in order if not _is_refuted(c.likelihood, order[0].likelihood, tuning.refuting_log_ratio)
-            or (c.likelihood.log_likelihood >= order[0].likelihood.log_likelihood - tuning.refuting_log_ratio - noise
+    kept = [c for c in order if not _is_refuted(c.likelihood, order[0].likelihood, REFUTING_LOG_RATIO)
+            or (c.likelihood.log_likelihood >= order[0].likelihood.log_likelihood - REFUTING_LOG_RATIO - noise
                 and look_alike(order[0].world_from_robot, c.world_from_robot))]
-    if first in kept[tuning.max_hypotheses:]:
-        kept[tuning.max_hypotheses - 1] = first
-    kept = kept[:tuning.max_hypotheses]
+    if first in kept[MAX_HYPOTHESES:]:
+        kept[MAX_HYPOTHESES - 1] = first
+    kept = kept[:MAX_HYPOTHESES]
     weights = normalize_log_likelihoods([c.likelihood.log_likelihood for c in kept])
     return tuple(replace(c, weight=weight) for c, weight in zip(kept, weights, strict=True))
 
@@ -302,16 +311,16 @@ def _is_refuted(one: PoseLikelihood, best: PoseLikelihood, log_ratio: float) -> 
 
 
 def decide(
-    robot: RobotModel, candidates: Sequence[PlaceCandidate], looked: Sequence[Pose2], settings: Settings = DEFAULT,
+    robot: RobotModel, candidates: Sequence[PlaceCandidate], looked: Sequence[Pose2],
     touched: Sequence[Floats] = (),
 ) -> LocalizationResult:
     """Decide whether the robot is found, cannot be found, or needs another look, and which."""
-    kept, enough = tuple(candidates), len(looked) >= settings.localization.min_views
+    kept, enough = tuple(candidates), len(looked) >= MIN_VIEWS
     if len(kept) == 1 and kept[0].is_accepted and enough:
         return LocalizationResult(LocalizationStatus.FOUND, kept)
     if not kept:
         return LocalizationResult(LocalizationStatus.PROBE, (), SensingAction(find_widest_gap(looked), 0.0, 0.0))
-    predict, is_safe = make_view_predictor(robot, settings), make_safety_check(robot, touched)
+    predict, is_safe = make_view_predictor(robot), make_safety_check(robot, touched)
     hypotheses = [c.hypothesis for c in kept]
     tied = len(kept) > 1 and all(c.is_accepted for c in kept[:2]) and enough
     if tied and not can_distinguish(hypotheses[0], hypotheses[1], looked, predict, is_safe):
@@ -321,13 +330,13 @@ def decide(
 
 
 def _find_refined(
-    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], settings: Settings,
+    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str],
     pictures: PictureSearch | None,
 ) -> list[PlaceCandidate]:
     """The best candidates by the last views, refined by all; not the same pose twice."""
     found = list[PlaceCandidate]()
     for rough in () if pictures is None else pictures.find(rooms, MAX_CANDIDATES):
-        new = _build_candidate(robot, views, rough.room, rough.world_from_robot, settings)
+        new = _build_candidate(robot, views, rough.room, rough.world_from_robot)
         pose = new.world_from_robot
         if all(pose.distance_to(other.world_from_robot) > FINE_CLIMB_M
                or abs(wrap_angle(pose.heading_rad - other.world_from_robot.heading_rad)) > FINE_CLIMB_RAD
@@ -337,11 +346,11 @@ def _find_refined(
 
 
 def _build_candidate(
-    robot: RobotModel, views: Sequence[CameraView], room: str, rough: Pose2, settings: Settings
+    robot: RobotModel, views: Sequence[CameraView], room: str, rough: Pose2
 ) -> PlaceCandidate:
     """A candidate from a rough pose, found in a room: refined, where that makes it likelier."""
-    pose, covariance, likelihood = refine_to_likelier(robot, views, rough, settings)
-    is_accepted = likelihood.is_sufficient(settings.localization)
+    pose, covariance, likelihood = refine_to_likelier(robot, views, rough)
+    is_accepted = likelihood.is_sufficient()
     return PlaceCandidate(_find_room(robot, room, pose), pose, covariance, likelihood, is_accepted)
 
 

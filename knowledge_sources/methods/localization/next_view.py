@@ -21,7 +21,6 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import find_floor
 from knowledge_sources.methods.motion import SLACK_M, find_bends, find_free_space, is_clear
 from knowledge_sources.methods.verification import compute_coverage, predict_lines
-from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.building import Building
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
@@ -71,10 +70,10 @@ def normalize_log_likelihoods(log_likelihoods: Sequence[float]) -> tuple[float, 
     return tuple(part / total for part in parts)
 
 
-def make_view_predictor(robot: RobotModel, settings: Settings = DEFAULT) -> PredictView:
+def make_view_predictor(robot: RobotModel) -> PredictView:
     """Return a function that predicts the long and clear lines visible from a pose."""
     def predict(pose: Pose2) -> Floats:
-        lines = predict_lines(robot, pose, settings.verification).segments_px
+        lines = predict_lines(robot, pose).segments_px
         length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
         return np.asarray(lines[length >= MIN_COMPARED_LENGTH_PX])
 

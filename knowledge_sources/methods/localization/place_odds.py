@@ -14,16 +14,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.belief import compute_chi2, update
+from knowledge_sources.methods.belief import (
+    MAX_TOLD_CHI2,
+    MIN_P_BELIEVED,
+    TOLD_SIGMA_M,
+    TOLD_SIGMA_RAD,
+    compute_chi2,
+    update,
+)
 from knowledge_sources.methods.localization.global_localization import (
+    MAX_SEARCHED_VIEWS,
+    MIN_VIEWS,
     LocalizationResult,
     LocalizationStatus,
     LookAlike,
     PlaceCandidate,
 )
-from knowledge_sources.settings import DEFAULT, LocalizationSettings
+from knowledge_sources.methods.localization.refinement import SURE_LOG_LIKELIHOOD
 from world_models.frames import Pose2
 
+P_TOLD = 0.98  # probability that the robot is where it was told to be at the start
+LOST_AGAIN_ODDS = 0.2  # factor on the odds of that for every time that it was believed by them, and the robot got lost
+MAX_ALIKE_LOG_RATIO = 3.0
+"""Largest log likelihood ratio of the pictures between places that look alike by the model: more is chance."""
+MIN_P_SURE = 0.999  # smallest probability of a place that is believed although another look could tell more
 LOG_PLACES = 12.0
 """Logarithm of the number of distinct poses on a floor of forty rooms, 0.45 m or 10 degrees apart."""
 
@@ -41,15 +55,14 @@ class StatedPlace:
     covariance: Floats
     p_told: float
 
-    def includes(self, candidate: PlaceCandidate, settings: LocalizationSettings = DEFAULT.localization) -> bool:
+    def includes(self, candidate: PlaceCandidate) -> bool:
         """Whether a candidate is this place."""
         return is_within_reach(candidate.world_from_robot, candidate.covariance, self.world_from_robot,
-                               self.covariance, settings)
+                               self.covariance)
 
 
 def weigh_told(
     result: LocalizationResult, told: StatedPlace, look_alike: LookAlike, looks: int,
-    settings: LocalizationSettings = DEFAULT.localization,
 ) -> LocalizationResult:
     """Weigh the candidates by what was told and by the pictures, the likeliest first.
 
@@ -59,37 +72,35 @@ def weigh_told(
     told to be, no strange place has to be ruled out. Where the pictures alone have found a place, or none of the
     candidates is the told place, nothing is changed.
     """
-    is_told = [told.includes(c, settings) for c in result.candidates]
+    is_told = [told.includes(c) for c in result.candidates]
     if result.status is LocalizationStatus.FOUND or not any(is_told):
         return result
     best = next(c for c, here in zip(result.candidates, is_told, strict=True) if here)
     alike = [look_alike(best.world_from_robot, c.world_from_robot) for c in result.candidates]
-    odds = compute_place_odds([c.likelihood.log_likelihood for c in result.candidates], is_told, alike, told.p_told,
-                              settings)
+    odds = compute_place_odds([c.likelihood.log_likelihood for c in result.candidates], is_told, alike, told.p_told)
     weighed = tuple(sorted((replace(c, weight=p) for c, p in zip(result.candidates, odds, strict=True)),
                            key=lambda c: -c.weight))
     likeliest = weighed[0]
     is_tied = result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None
-    enough = settings.min_p_believed if is_tied else settings.min_p_sure
-    is_borne_out = likeliest.is_accepted and looks >= settings.min_views
-    is_borne_out |= looks >= settings.max_searched_views and _is_far_from_chance(likeliest, settings)
+    enough = MIN_P_BELIEVED if is_tied else MIN_P_SURE
+    is_borne_out = likeliest.is_accepted and looks >= MIN_VIEWS
+    is_borne_out |= looks >= MAX_SEARCHED_VIEWS and _is_far_from_chance(likeliest)
     is_settled = is_borne_out and likeliest.weight >= enough
-    if is_settled and told.includes(likeliest, settings):
+    if is_settled and told.includes(likeliest):
         return LocalizationResult(LocalizationStatus.FOUND, (likeliest,))
     return replace(result, candidates=weighed)
 
 
-def _is_far_from_chance(candidate: PlaceCandidate, settings: LocalizationSettings) -> bool:
+def _is_far_from_chance(candidate: PlaceCandidate) -> bool:
     """Whether so much agrees that only the same place shows it, though a model that is inexact lacks many lines.
 
     It is one place, not the best of a floor, which chance has so many trials to be.
     """
-    return candidate.likelihood.log_likelihood >= settings.sure_log_likelihood - LOG_PLACES
+    return candidate.likelihood.log_likelihood >= SURE_LOG_LIKELIHOOD - LOG_PLACES
 
 
 def compute_place_odds(
     log_likelihoods: Sequence[float], is_told: Sequence[bool], is_alike: Sequence[bool], p_told: float,
-    settings: LocalizationSettings = DEFAULT.localization,
 ) -> tuple[float, ...]:
     """Compute the posterior probabilities of places, which sum to one.
 
@@ -107,7 +118,7 @@ def compute_place_odds(
         return ()
     logs = list(log_likelihoods)
     if told:
-        most, best = settings.max_alike_log_ratio, max(log_likelihoods[i] for i in told)
+        most, best = MAX_ALIKE_LOG_RATIO, max(log_likelihoods[i] for i in told)
         logs = [best + min(most, max(-most, value - best)) if alike and not here else value
                 for value, here, alike in zip(logs, is_told, is_alike, strict=True)]
         others = len(logs) - len(told)
@@ -131,15 +142,14 @@ def compute_twin_odds(log_ratios: Sequence[float], p_prior: float) -> tuple[floa
                               p_prior)
 
 
-def compute_prior(times_refuted: int, settings: LocalizationSettings = DEFAULT.localization) -> float:
+def compute_prior(times_refuted: int) -> float:
     """Compute the prior probability of the told place after it was believed by it so often, and then refuted."""
-    return update(settings.p_told, times_refuted * math.log(settings.lost_again_odds))
+    return update(P_TOLD, times_refuted * math.log(LOST_AGAIN_ODDS))
 
 
 def is_within_reach(
     pose: Pose2, covariance: Floats, told: Pose2, told_covariance: Floats,
-    settings: LocalizationSettings = DEFAULT.localization,
 ) -> bool:
     """Whether a pose may be where the robot was told to be, or was tracked to, by both covariances (3, 3)."""
-    beyond = np.diag(np.square([settings.told_sigma_m, settings.told_sigma_m, settings.told_sigma_rad]))
-    return compute_chi2(pose, told, covariance + told_covariance + beyond) <= settings.max_told_chi2
+    beyond = np.diag(np.square([TOLD_SIGMA_M, TOLD_SIGMA_M, TOLD_SIGMA_RAD]))
+    return compute_chi2(pose, told, covariance + told_covariance + beyond) <= MAX_TOLD_CHI2

@@ -10,16 +10,26 @@ from typing import NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.localization.global_localization import LocalizationResult, LocalizationStatus, localize
+from knowledge_sources.methods.localization.global_localization import (
+    MAX_SEARCHED_VIEWS,
+    MIN_VIEWS,
+    LocalizationResult,
+    LocalizationStatus,
+    localize,
+)
 from knowledge_sources.methods.localization.next_view import SensingAction, choose_far_action, make_view_predictor
 from knowledge_sources.methods.localization.place_odds import StatedPlace
 from knowledge_sources.methods.localization.views import CameraView
-from knowledge_sources.settings import GoalSettings, Settings
 from world_models.building.building import Building
 from world_models.entries import PlaceOdds
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
+
+MAX_FAR_PROBES = 20
+"""So many looks are taken when lost and places fit: it turns, and drives to views that tell them apart."""
+MAX_ROOMS = 80  # most rooms that are searched, the nearest to the last belief first
+MAX_FLOOR_DIFFERENCE_M = 0.5  # rooms whose floors differ by less are on one floor
 
 
 class Search(NamedTuple):
@@ -42,9 +52,9 @@ class Search(NamedTuple):
     p_here: float = 0.0
 
 
-def search(robots: Iterable[RobotModel], what: Search, settings: Settings) -> tuple[LocalizationResult, int]:
+def search(robots: Iterable[RobotModel], what: Search) -> tuple[LocalizationResult, int]:
     """The result of the robot, camera and building, in which the best place fits best, and which it is."""
-    tried = [localize(robot, what.looks, what.rooms, settings, what.here, what.followed, what.touched, what.p_here)
+    tried = [localize(robot, what.looks, what.rooms, what.here, what.followed, what.touched, what.p_here)
              for robot in robots]
     best = max(range(len(tried)), key=lambda k: _measure_fit(tried[k]))  # of equals the first
     return tried[best], best
@@ -80,34 +90,34 @@ def find_odds_used(
 
 
 def find_far_action(
-    robot: RobotModel, result: LocalizationResult, looked: Sequence[Pose2], rooms: Sequence[str], settings: Settings,
+    robot: RobotModel, result: LocalizationResult, looked: Sequence[Pose2], rooms: Sequence[str],
     touched: Sequence[Floats] = (),
 ) -> SensingAction | None:
     """The first leg of the way to a view that tells places apart that look alike from wherever the robot has looked.
 
     ``looked``: the poses of the looks, as seen from the present one.
     """
-    s, looks = settings, len(looked)
+    looks = len(looked)
     is_stuck = result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None
     accepted = sum(bool(c.is_accepted) for c in result.candidates)
-    if result.status is LocalizationStatus.FOUND or accepted < 2 or looks >= s.goal.max_far_probes:
+    if result.status is LocalizationStatus.FOUND or accepted < 2 or looks >= MAX_FAR_PROBES:
         return None
-    if looks < s.localization.min_views or not (is_stuck or looks >= s.localization.max_searched_views):
+    if looks < MIN_VIEWS or not (is_stuck or looks >= MAX_SEARCHED_VIEWS):
         return None
     hypotheses = [c.hypothesis for c in result.candidates]
-    return choose_far_action(robot, hypotheses, looked, rooms, make_view_predictor(robot, s), touched)
+    return choose_far_action(robot, hypotheses, looked, rooms, make_view_predictor(robot), touched)
 
 
-def list_rooms(building: FrameBuilding, locale: str, here: Pose2, settings: GoalSettings) -> list[str]:
+def list_rooms(building: FrameBuilding, locale: str, here: Pose2) -> list[str]:
     """The rooms of a locale's floor, the nearest to a pose (world) first; other floors are not searched."""
     level_m = building.floor_m(locale)
     container = building.locale(locale).parent or locale
-    rooms = _list_rooms_of_floor(building, container, level_m, settings.max_floor_difference_m)
+    rooms = _list_rooms_of_floor(building, container, level_m, MAX_FLOOR_DIFFERENCE_M)
     while len(rooms) < 2 and (above := building.locale(container).parent) is not None:  # as from an elevator's car
         container = above
-        rooms = _list_rooms_of_floor(building, container, level_m, settings.max_floor_difference_m)
+        rooms = _list_rooms_of_floor(building, container, level_m, MAX_FLOOR_DIFFERENCE_M)
     away = [(_distance(building.outline(name), here), name) for name in rooms]
-    return [name for _, name in sorted(away)[:settings.max_rooms]]
+    return [name for _, name in sorted(away)[:MAX_ROOMS]]
 
 
 def _list_rooms_of_floor(building: FrameBuilding, container: str, level_m: float, same_m: float) -> list[str]:

@@ -24,7 +24,6 @@ from knowledge_sources.methods.features import RIGHT_ANGLE_RAD, find_level_direc
 from knowledge_sources.methods.localization.views import CameraView
 from knowledge_sources.methods.motion import compute_free_space
 from knowledge_sources.methods.verification import take_distinct
-from knowledge_sources.settings import DEFAULT, Settings
 from world_models.building.building import Building
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2, wrap_angle
@@ -168,13 +167,13 @@ class PoseCandidate(NamedTuple):
 
 
 def find_pose_candidates(
-    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], max_count: int, settings: Settings = DEFAULT
+    robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str], max_count: int
 ) -> tuple[PoseCandidate, ...]:
     """Find the poses in these rooms that fit all views best, the best first, distinct from each other.
 
     Empty where no view shows level lines. A large grid is sieved by few of the points.
     """
-    search = PictureSearch.from_views(robot, views, settings)
+    search = PictureSearch.from_views(robot, views)
     return () if search is None else search.find(rooms, max_count)
 
 
@@ -197,13 +196,13 @@ class PictureSearch:
     direction_rad: float
 
     @staticmethod
-    def from_views(robot: RobotModel, views: Sequence[CameraView], settings: Settings) -> PictureSearch | None:
+    def from_views(robot: RobotModel, views: Sequence[CameraView]) -> PictureSearch | None:
         """None where no view shows level lines. The view with the longest segments that does is taken."""
         mount = robot.mount.camera_from_robot
         for view in sorted(views, key=lambda v: -_total_length(v.segments_px)):
             direction = find_level_direction(view.segments_px, robot.camera, mount)
             if direction is not None:
-                maps = tuple(compute_chamfer_maps(take_distinct(v.segments_px, settings.verification), robot.camera)
+                maps = tuple(compute_chamfer_maps(take_distinct(v.segments_px), robot.camera)
                              for v in views)
                 heading = direction + view.now_from_then.heading_rad
                 return PictureSearch(robot, tuple(views), maps, heading)

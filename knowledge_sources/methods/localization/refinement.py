@@ -16,10 +16,12 @@ import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints
+from knowledge_sources.methods.features import SIGMA_ACROSS_PX
 from knowledge_sources.methods.localization.views import CameraView, find_lever, join_covariances
 from knowledge_sources.methods.pose import planar_from_lines, to_pose2
 from knowledge_sources.methods.verification import (
     DISPLACEMENT_M,
+    LINE_TOLERANCE_PX,
     LINE_TOLERANCE_RAD,
     check_lines,
     compute_agreement,
@@ -32,11 +34,32 @@ from knowledge_sources.methods.verification import (
     predict_lines,
     take_distinct,
 )
-from knowledge_sources.settings import DEFAULT, LocalizationSettings, Settings
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines
 
+MIN_PLACE_LINES = 12  # fewest matched lines of an accepted pose (checked with harvey experiment kidnap)
+MIN_MATCHED_FRACTION = 0.6
+"""Smallest part of the predicted lines that an accepted pose matches (checked with harvey experiment kidnap)."""
+MIN_VIEW_FRACTION = 0.35
+"""Smallest part of the predicted lines that an accepted pose matches in any view (checked with harvey experiment
+kidnap)."""
+MIN_EXPLAINED_FRACTION = 0.35
+"""Smallest part of the segments that an accepted pose explains (checked with harvey experiment kidnap)."""
+MIN_FRACTION_SUM = 1.15
+"""Smallest sum of matched and explained parts: a pose nearby has a little of both (rough-day, seed 91)."""
+SURE_LOG_LIKELIHOOD = 30.0
+"""Log likelihood from which segments need no explanation: the model lacks what is on full shelves (own floors, plain
+and textured, and development floors of miniworld: the best place in rooms where it is not)."""
+SURE_MATCHED_FRACTION = 0.75
+"""Part of the predicted lines from which, at that likelihood, segments need no explanation (checked with harvey
+experiment kidnap)."""
+CLEAR_LOG_LIKELIHOOD = 80.0
+"""Log likelihood from which a single view may show nothing of what should be seen: it may be hidden (miniworld's
+development floors)."""
+ALIKE_LOG_NOISE = 2.0
+"""Log likelihood ratio of one picture between places that look alike by the model that is noise (generated floors of
+seeds 0 to 2)."""
 TURN_STEP_RAD = math.radians(1.5)  # step of the search for an uncertain turn
 
 CANDIDATE_SIGMA_M = 0.15  # standard deviation of a candidate's position
@@ -90,7 +113,7 @@ class _State:
 
 
 def refine_pose(
-    robot: RobotModel, views: Sequence[CameraView], pose: Pose2, settings: Settings = DEFAULT
+    robot: RobotModel, views: Sequence[CameraView], pose: Pose2
 ) -> tuple[Pose2, Floats]:
     """Refine a rough pose of the robot now, by all views together; returns the pose and its covariance (3, 3).
 
@@ -99,8 +122,8 @@ def refine_pose(
     view in which most model lines are visible: once the pose is known from it, clutter in the others, or a wrong turn,
     does no harm. Where the views contradict one another, the covariance grows by Birge's ratio.
     """
-    views = [replace(v, segments_px=take_distinct(v.segments_px, settings.verification)) for v in views]
-    visible = [len(predict_lines(robot, view.pose_then(pose), settings.verification)) for view in views]
+    views = [replace(v, segments_px=take_distinct(v.segments_px)) for v in views]
+    visible = [len(predict_lines(robot, view.pose_then(pose))) for view in views]
     order = sorted(range(len(views)), key=lambda k: (_is_turn_uncertain(views[k]), -visible[k]))
     state = _start(views, pose, order[0])
     surprises = []
@@ -108,8 +131,8 @@ def refine_pose(
         then, jacobian = state.predict(k)
         prior = np.asarray(jacobian @ state.covariance @ jacobian.T)
         uncertain = _is_turn_uncertain(views[k])
-        start = _search_turn(robot, views[k], then, settings) if uncertain else then
-        solved, posterior = _solve(robot, views[k], then, prior, start, settings)
+        start = _search_turn(robot, views[k], then) if uncertain else then
+        solved, posterior = _solve(robot, views[k], then, prior, start)
         if posterior is prior:
             continue
         off = solved.minus(then)
@@ -156,7 +179,7 @@ def _add(pose: Pose2, off: Floats) -> Pose2:
 
 
 def refine_view_motions(
-    robot: RobotModel, views: Sequence[CameraView], pose: Pose2, covariance: Floats, settings: Settings = DEFAULT
+    robot: RobotModel, views: Sequence[CameraView], pose: Pose2, covariance: Floats
 ) -> tuple[CameraView, ...]:
     """Refine where the robot was at each view, given its pose now and the covariance (3, 3).
 
@@ -168,8 +191,8 @@ def refine_view_motions(
             before = view.pose_then(pose)
             lever, turn = find_lever(pose, before), _build_rotation(pose.heading_rad)
             prior = np.asarray(lever @ covariance @ lever.T + turn @ view.covariance @ turn.T)
-            start = _search_turn(robot, view, before, settings)
-            then, _ = _solve(robot, view, before, prior, start, settings)
+            start = _search_turn(robot, view, before)
+            then, _ = _solve(robot, view, before, prior, start)
             view = replace(view, now_from_then=pose.inverse() @ then)
         out.append(view)
     return tuple(out)
@@ -179,19 +202,19 @@ def _is_turn_uncertain(view: CameraView) -> bool:
     return bool(view.covariance[2, 2] > KNOWN_TURN_RAD**2)
 
 
-def _search_turn(robot: RobotModel, view: CameraView, then: Pose2, settings: Settings) -> Pose2:
+def _search_turn(robot: RobotModel, view: CameraView, then: Pose2) -> Pose2:
     """Of the headings that a view may have had, the one with most pairs of segment and line, then the nearest."""
     step = TURN_STEP_RAD
     most = int(TURN_SEARCH_SIGMAS * math.sqrt(float(view.covariance[2, 2])) / step)
     turns = sorted((k * step for k in range(-most, most + 1)), key=abs)
     tried = [then @ Pose2(0.0, 0.0, turn) for turn in turns]
-    predicted = [predict_lines(robot, then, settings.verification).segments_px for then in tried]
+    predicted = [predict_lines(robot, then).segments_px for then in tried]
     pairs = [_pair(lines, view.segments_px, COARSE_GATE_PX) for lines in predicted]
     return tried[int(np.argmax([len(p) for p in pairs]))]
 
 
 def _solve(
-    robot: RobotModel, view: CameraView, then: Pose2, prior: Floats, start: Pose2, settings: Settings
+    robot: RobotModel, view: CameraView, then: Pose2, prior: Floats, start: Pose2
 ) -> tuple[Pose2, Floats]:
     """The pose at a view, and its covariance: pair and solve, with a coarse and a fine gate.
 
@@ -199,7 +222,7 @@ def _solve(
     """
     solved, posterior = start, prior
     for gate_px in (COARSE_GATE_PX, FINE_GATE_PX):
-        lines = predict_lines(robot, solved, settings.verification)
+        lines = predict_lines(robot, solved)
         pairs = _pair(lines.segments_px, view.segments_px, gate_px)
         if len(pairs) < MIN_PAIRS:
             break
@@ -207,7 +230,7 @@ def _solve(
         fix = planar_from_lines(
             lines.lines_world[model], view.segments_px[data], robot.camera, robot.mount.camera_from_robot, then,
             prior_covariance=prior, landmark_ids=lines.landmark[model].tolist(),
-            sigma_px=settings.features.sigma_across_px, settings=settings.pose,
+            sigma_px=SIGMA_ACROSS_PX,
         )
         solved, posterior = fix.world_from_robot, np.asarray(fix.covariance)
     return (then if posterior is prior else solved), posterior
@@ -278,7 +301,7 @@ class PoseLikelihood:
             matched, visible, self.matched - matched, self.visible - visible) < MIN_P_LOOKS / len(self.looks)
             for visible, matched, _ in self.looks)
 
-    def is_sufficient(self, settings: LocalizationSettings = DEFAULT.localization) -> bool:
+    def is_sufficient(self) -> bool:
         """Whether the pose can be accepted.
 
         Enough lines must be matched, in every view as in the others, and the segments be explained, or else the log
@@ -286,14 +309,14 @@ class PoseLikelihood:
         more lines may be missing, and in a single view all of them, as what stands before the camera hides them.
         """
         fraction = self.matched / max(self.visible, 1)
-        enough = settings.sure_log_likelihood
+        enough = SURE_LOG_LIKELIHOOD
         is_sure = (self.log_likelihood >= enough
-                   and fraction >= settings.sure_matched_fraction * enough / self.log_likelihood)
-        is_explained = self.explained >= max(settings.min_explained_fraction, settings.min_fraction_sum - fraction)
-        is_clear = (self.log_likelihood >= settings.clear_log_likelihood
-                    or (self.weakest_view >= settings.min_view_fraction and not self.contradicts_itself()))
-        return (self.matched >= settings.min_matched_lines
-                and self.matched >= settings.min_matched_fraction * self.visible
+                   and fraction >= SURE_MATCHED_FRACTION * enough / self.log_likelihood)
+        is_explained = self.explained >= max(MIN_EXPLAINED_FRACTION, MIN_FRACTION_SUM - fraction)
+        is_clear = (self.log_likelihood >= CLEAR_LOG_LIKELIHOOD
+                    or (self.weakest_view >= MIN_VIEW_FRACTION and not self.contradicts_itself()))
+        return (self.matched >= MIN_PLACE_LINES
+                and self.matched >= MIN_MATCHED_FRACTION * self.visible
                 and is_clear and (is_explained or is_sure))
 
     def __str__(self) -> str:
@@ -302,25 +325,25 @@ class PoseLikelihood:
 
 
 def refine_to_likelier(
-    robot: RobotModel, views: Sequence[CameraView], rough: Pose2, settings: Settings = DEFAULT
+    robot: RobotModel, views: Sequence[CameraView], rough: Pose2
 ) -> tuple[Pose2, Floats, PoseLikelihood]:
     """Refine a rough pose of the robot now, with its covariance (3, 3), or keep it where all views are likelier there.
 
     The last view may move a pose off the lines of those before it. By less than chance makes of so many views, the
     refined one is kept. One that is not refined is no surer than refining moves it.
     """
-    refined, covariance = refine_pose(robot, views, rough, settings)
+    refined, covariance = refine_pose(robot, views, rough)
     off = rough.minus(refined)
     tried = []
     for pose, spread in ((refined, covariance), (rough, covariance + np.outer(off, off))):
-        moved = refine_view_motions(robot, views, pose, spread, settings)
-        tried.append((pose, spread, compute_pose_likelihood(robot, moved, pose, settings)))
+        moved = refine_view_motions(robot, views, pose, spread)
+        tried.append((pose, spread, compute_pose_likelihood(robot, moved, pose)))
     lost = tried[1][2].log_likelihood - tried[0][2].log_likelihood
-    return tried[lost > settings.localization.alike_log_noise * len(views)]
+    return tried[lost > ALIKE_LOG_NOISE * len(views)]
 
 
 def compute_pose_likelihood(
-    robot: RobotModel, views: Sequence[CameraView], world_from_now: Pose2, settings: Settings = DEFAULT
+    robot: RobotModel, views: Sequence[CameraView], world_from_now: Pose2
 ) -> PoseLikelihood:
     """Compute the likelihood of the robot's pose now by all views; lines of an inexact model are displaced as they fit.
     """
@@ -328,15 +351,15 @@ def compute_pose_likelihood(
     weakest, lengths, explained = 1.0, 0.0, 0.0
     for view in views:
         then = view.pose_then(world_from_now)
-        shown = predict_lines(robot, then, settings.verification)
+        shown = predict_lines(robot, then)
         projected = _project(robot, shown.lines_world, [then, *_displace(then)])
-        tells = find_distinct(projected[0], view.segments_px, settings.verification)
+        tells = find_distinct(projected[0], view.segments_px)
         shown, projected = shown[tells], projected[:, tells]
         errors = find_errors(robot, shown)
         agreement = compute_agreement(
-            projected[0], view.segments_px, projected[1:], settings.verification.line_tolerance_px
+            projected[0], view.segments_px, projected[1:], LINE_TOLERANCE_PX
         ) if errors.is_exact else check_lines(
-            robot, shown.lines_world, view.segments_px, then, settings.verification, errors, settings.pose,
+            robot, shown.lines_world, view.segments_px, then, errors,
             list_names(shown)).agreement
         found, expected = agreement.matched, agreement.visible
         visible, matched = visible + expected, matched + found

@@ -17,7 +17,6 @@ from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints, Mask
 from knowledge_sources.methods.features import RIGHT_ANGLE_RAD, find_level_direction
-from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import Camera
 from world_models.entries import Obstruction
 from world_models.frames import Pose, Pose2, wrap_angle
@@ -102,7 +101,7 @@ def find_lever(here: Pose2, there: Pose2) -> Floats:
 
 
 def align_headings(
-    views: Sequence[CameraView], camera: Camera, camera_from_robot: Pose, settings: Settings = DEFAULT
+    views: Sequence[CameraView], camera: Camera, camera_from_robot: Pose
 ) -> tuple[CameraView, ...]:
     """Correct the turns between views, in the order in which they were taken, by the level lines they show.
 
@@ -111,7 +110,7 @@ def align_headings(
     the robot is now. If it shows no level lines, the reference is the last view that does, and all turns are known no
     better than that view's.
     """
-    axes = _find_axes(views, camera, camera_from_robot, settings)
+    axes = _find_axes(views, camera, camera_from_robot)
     if len(axes) < 2:
         return tuple(views)
     reference = max(axes)
@@ -131,7 +130,7 @@ def align_headings(
 
 
 def _find_axes(
-    views: Sequence[CameraView], camera: Camera, camera_from_robot: Pose, settings: Settings
+    views: Sequence[CameraView], camera: Camera, camera_from_robot: Pose
 ) -> dict[int, float]:
     """By index of the views that show level lines: their direction in the frame of now, modulo a right angle [rad]."""
     found = [find_level_direction(v.segments_px, camera, camera_from_robot) for v in views]

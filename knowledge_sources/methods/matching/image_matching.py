@@ -31,8 +31,14 @@ from knowledge_sources.methods.matching.search import (
     list_pairs,
     search_pairs,
 )
-from knowledge_sources.settings import DEFAULT, MatchingSettings
 
+MAX_PAIR_PX = 4.0
+"""Largest distance of a data end from its model line in the image (§6.1.4 says 3 px; wider for perspective)."""
+PAIR_SIGMAS = 3.0  # standard deviations of a data end in that largest distance
+MAX_STARTS = 3  # placements that are searched (paper: 1) (§6.1.4, experiment matcher)
+HOUGH_WINDOW_PX = 30.0  # largest shift of the model (§6.1.4)
+HOUGH_STEP_RAD = 0.03  # turn between two planes of the accumulator
+HOUGH_CELLS = 33  # cells along each of the accumulator's two axes of shift
 HOUGH_WINDOW_RAD = 0.3  # rad; largest turn of the model (§6.1.4)
 COVERAGE_CELLS = 48  # cells along a model line by which its coverage is counted
 MAX_PAIR_RAD = 0.3  # rad; largest angle between a data line and its model line (§6.1.4)
@@ -44,7 +50,7 @@ MIN_LENGTH_PX = 1e-12  # keeps the direction of a segment without length finite
 
 Pair = tuple[int, int]
 """Model index, data index."""
-Search = Callable[[PairSpace, Terms, Mask, MatchingSettings], SearchResult]
+Search = Callable[[PairSpace, Terms, Mask], SearchResult]
 """As :func:`search_pairs`."""
 
 
@@ -64,9 +70,9 @@ class Match(Correspondence):
 def match_lines(
     model_px: Any,
     data_px: Any,
-    settings: MatchingSettings = DEFAULT.matching,
     *,
-    pair_px: Any = None,
+    pair_px: Any = MAX_PAIR_PX,
+    max_starts: int = MAX_STARTS,
     start: Peak | None = None,
     first_pairs: Collection[Pair] | None = None,
     terms: Terms | None = None,
@@ -80,8 +86,9 @@ def match_lines(
 
     Args:
         model_px: (m, 2, 2) projected model lines. data_px: (k, 2, 2) data lines.
-        pair_px: how far a data end may lie from its model line, in place of ``settings.max_pair_px``: one number, or
-            (m,) when some model lines are predicted worse than others. Wider when perspective bends the prediction.
+        pair_px: how far a data end may lie from its model line: one number, or (m,) when some model lines are
+            predicted worse than others. Wider when perspective bends the prediction.
+        max_starts: placements that are searched.
         start: this placement (about the mean of the model's ends) instead of Hough's.
         first_pairs: pairs of the first state; ``None``: each near data line to its nearest model line.
         terms, search: another objective than the likelihood, and another local search.
@@ -92,17 +99,17 @@ def match_lines(
     model, data = _check_lines(model_px, "model_px"), _check_lines(data_px, "data_px")
     centre = model.reshape(-1, 2).mean(axis=0) if len(model) else np.zeros(2)
     still, scene = build_line_table(model, centre), build_line_table(data, centre)
-    gates = _check_gates(settings.max_pair_px if pair_px is None else pair_px, len(model))
-    terms = terms or _build_terms(still, scene, gates, settings)
-    window_px = settings.hough_window_px + np.maximum(gates, START_WIDTHS_PX[0])
+    gates = _check_gates(pair_px, len(model))
+    terms = terms or _build_terms(still, scene, gates)
+    window_px = HOUGH_WINDOW_PX + np.maximum(gates, START_WIDTHS_PX[0])
     table = build_pair_table(still, scene, window_px, HOUGH_WINDOW_RAD + MAX_PAIR_RAD)
-    placements = [compute_placement(start)] if start else _find_starts(still, scene, table, settings)
+    placements = [compute_placement(start)] if start else _find_starts(still, scene, table, max_starts)
     tries = []
     for placement in placements:
         space, first, rows = _build_space(table, placement, gates, terms)
         if first_pairs is not None:
             first = np.array([pair in first_pairs for pair in zip(space.model, space.data, strict=True)], bool)
-        tries.append((space, rows, search(space, terms, first, settings)))
+        tries.append((space, rows, search(space, terms, first)))
     space, rows, result = min(tries, key=lambda tried: float(tried[2].errors[-1]))
     chosen, pairs = list_pairs(space, result.chosen)
     fit, covered = fit_state(space, result.chosen), compute_coverage(space, result.chosen)
@@ -117,20 +124,20 @@ def match_lines(
     )
 
 
-def _build_terms(model: LineTable, data: LineTable, gates: Floats, settings: MatchingSettings) -> Terms:
+def _build_terms(model: LineTable, data: LineTable, gates: Floats) -> Terms:
     """The objective, its noise taken from the median distance (m,) within which pairs are looked for [px]."""
-    width = float(np.median(gates)) if len(gates) else settings.max_pair_px
-    sigma_px = max(MIN_SIGMA_PX, width / settings.pair_sigmas)
+    width = float(np.median(gates)) if len(gates) else MAX_PAIR_PX
+    sigma_px = max(MIN_SIGMA_PX, width / PAIR_SIGMAS)
     start_px = max(width, MIN_START_ERROR_PX)
-    return build_likelihood_terms(model.lengths, len(data.ends), sigma_px, start_px, settings)
+    return build_likelihood_terms(model.lengths, len(data.ends), sigma_px, start_px)
 
 
-def _find_starts(still: LineTable, scene: LineTable, table: PairTable, settings: MatchingSettings) -> Floats:
+def _find_starts(still: LineTable, scene: LineTable, table: PairTable, max_starts: int) -> Floats:
     """Placements (k, 5) to search from: Hough's peaks, refined, the best supported that differ.
 
     They differ by 1 px of shift, or 0.01 of turn or scale.
     """
-    peaks = find_hough_peaks(still, scene, HOUGH_PEAKS_PER_START * settings.max_starts, settings)
+    peaks = find_hough_peaks(still, scene, HOUGH_PEAKS_PER_START * max_starts)
     coarse = np.stack([compute_placement(peak) for peak in peaks])
     placements, support = refine_placements(table, coarse, START_WIDTHS_PX)
     kept: list[int] = []
@@ -138,7 +145,7 @@ def _find_starts(still: LineTable, scene: LineTable, table: PairTable, settings:
         apart = [np.abs((placements[i] - placements[j]) * (100.0, 100.0, 1.0, 1.0, 100.0)).max() for j in kept]
         if all(a > 1.0 for a in apart):
             kept.append(int(i))
-    return placements[kept[: settings.max_starts]]
+    return placements[kept[:max_starts]]
 
 
 def _build_space(
@@ -227,7 +234,7 @@ class Peak:
 NO_MOTION = Peak(0.0, (0.0, 0.0), 0.0)
 
 
-def find_hough_peaks(model: LineTable, data: LineTable, count: int, settings: MatchingSettings) -> list[Peak]:
+def find_hough_peaks(model: LineTable, data: LineTable, count: int) -> list[Peak]:
     """The best ``count`` separate peaks, best first; no motion if nothing votes.
 
     A data line in the window of a model line votes, at each turn that makes them nearly parallel, for the shift across
@@ -236,16 +243,16 @@ def find_hough_peaks(model: LineTable, data: LineTable, count: int, settings: Ma
     """
     if not (len(model.ends) and len(data.ends)):
         return [NO_MOTION]
-    window_px, window_rad = settings.hough_window_px, HOUGH_WINDOW_RAD
-    half = int(np.ceil(window_rad / settings.hough_step_rad))
-    turns = np.linspace(-half * settings.hough_step_rad, half * settings.hough_step_rad, 2 * half + 1)
-    axis = np.linspace(-window_px, window_px, settings.hough_cells)
-    step = 2.0 * window_px / (settings.hough_cells - 1)
+    window_px, window_rad = HOUGH_WINDOW_PX, HOUGH_WINDOW_RAD
+    half = int(np.ceil(window_rad / HOUGH_STEP_RAD))
+    turns = np.linspace(-half * HOUGH_STEP_RAD, half * HOUGH_STEP_RAD, 2 * half + 1)
+    axis = np.linspace(-window_px, window_px, HOUGH_CELLS)
+    step = 2.0 * window_px / (HOUGH_CELLS - 1)
     rows, columns = find_pairs_within(model, data, np.full(len(model.ends), window_px), window_rad)
     votes = _vote(
         turns, 2 * int(np.ceil(1.5 * window_px / step)) + 1, rows, columns,
         wrap_undirected(data.angles[columns] - model.angles[rows]), model.normals, model.offsets, model.lengths,
-        data.middles, data.lengths, step, settings.hough_step_rad,
+        data.middles, data.lengths, step, HOUGH_STEP_RAD,
     )
     scores = _gather(votes, turns, axis, model.normals, step)
     cells = _suppress_non_maxima(scores, turns, axis, count, window_px, window_rad).tolist()

@@ -35,10 +35,14 @@ from knowledge_sources.methods.matching.search import (
     search_pairs,
 )
 from knowledge_sources.methods.pose import LineSet, build_line_set
-from knowledge_sources.settings import DEFAULT, MatchingSettings
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2, frozen
 
+MAX_ALLOWED_PAIRS = 60000  # most pairs that are looked at; of more, each model line's longest (experiment matcher)
+MAX_START_PAIRS = 12000
+"""Most pairs that the starts are refined with; of more, each model line's longest (experiment matcher)."""
+MAX_NEAR_PAIRS = 2500
+"""Most pairs near a pose that are searched; of more, each model line's longest (experiment matcher)."""
 MAX_POSE_PAIR_PX = 5.0  # px; largest distance of a data end from its model line at a pose
 MAX_POSE_PAIR_RAD = 0.15  # rad; largest angle between a data line and its model line at a pose
 POSE_SIGMA_PX = 1.5  # px; standard deviation of a data end across its model line
@@ -86,7 +90,6 @@ def match_on_floor(
     camera_from_robot: Pose,
     prior: Pose2,
     prior_covariance: Any,
-    settings: MatchingSettings = DEFAULT.matching,
 ) -> FloorMatch:
     """Match model lines to data lines within what the prior of a robot on the floor allows.
 
@@ -100,7 +103,7 @@ def match_on_floor(
     """
     parameters = build_floor_parameters(camera_from_robot, prior, prior_covariance)
     match = _match(
-        model_lines_world, data_px, camera, parameters, MAX_POSE_PAIR_PX, POSE_SIGMA_PX, settings
+        model_lines_world, data_px, camera, parameters, MAX_POSE_PAIR_PX, POSE_SIGMA_PX
     )
     return FloorMatch(
         match.pairs, match.e_fit, match.e_omission, match.coverage, match.residuals_px, match.camera_from_world,
@@ -114,7 +117,6 @@ def match_in_space(
     camera: Camera,
     prior: Pose,
     prior_covariance: Any,
-    settings: MatchingSettings = DEFAULT.matching,
     *,
     pair_px: float | None = None,
     sigma_px: float | None = None,
@@ -133,12 +135,12 @@ def match_in_space(
     parameters = build_camera_parameters(prior, prior_covariance)
     pair_px = MAX_POSE_PAIR_PX if pair_px is None else pair_px
     sigma_px = POSE_SIGMA_PX if sigma_px is None else sigma_px
-    return _match(model_lines_world, data_px, camera, parameters, pair_px, sigma_px, settings)
+    return _match(model_lines_world, data_px, camera, parameters, pair_px, sigma_px)
 
 
 def _match(
     model_lines_world: Any, data_px: Any, camera: Camera, parameters: PoseParameters, pair_px: float,
-    sigma_px: float, settings: MatchingSettings,
+    sigma_px: float,
 ) -> PoseMatch:
     """Match model lines (m, 2, 3) to data lines (k, 2, 2).
 
@@ -147,15 +149,15 @@ def _match(
     """
     scene = build_scene(model_lines_world, data_px, camera, parameters)
     lengths = project_model(scene, parameters.prior)[1]
-    terms = build_likelihood_terms(lengths, len(scene.data), sigma_px, pair_px, settings)
-    wide = keep_longest(find_allowed_pairs(scene), settings.max_allowed_pairs)
+    terms = build_likelihood_terms(lengths, len(scene.data), sigma_px, pair_px)
+    wide = keep_longest(find_allowed_pairs(scene), MAX_ALLOWED_PAIRS)
     tries = []
-    for pose in find_start_poses(scene, keep_longest(wide, settings.max_start_pairs)):
+    for pose in find_start_poses(scene, keep_longest(wide, MAX_START_PAIRS)):
         pairs = linearise_pairs(scene, pose, wide.model, wide.data)
         pairs = pairs.take(find_near_pairs(pairs, pair_px, MAX_POSE_PAIR_RAD))
-        pairs = keep_longest(pairs, settings.max_near_pairs)
+        pairs = keep_longest(pairs, MAX_NEAR_PAIRS)
         space, first = _build_space(scene, pose, pairs, pair_px, sigma_px)
-        tries.append((space, pairs, pose, search_pairs(space, terms, first, settings)))
+        tries.append((space, pairs, pose, search_pairs(space, terms, first)))
     space, pairs, pose, result = min(tries, key=lambda tried: float(tried[3].errors[-1]))
     fit, (rows, chosen) = fit_state(space, result.chosen), list_pairs(space, result.chosen)
     e_fit, step = float(fit.errors[0]), fit.placements[0]

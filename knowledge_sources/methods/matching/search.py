@@ -22,8 +22,10 @@ from knowledge_sources.methods.matching.matching_kernels import (
     count_cover,
     search_locally,
 )
-from knowledge_sources.settings import MatchingSettings
 
+MIN_GAIN = 1e-9  # a move must lower the match error by more than this (rounding)
+CHANCE_EXPONENT = 3.0  # how fast clutter along a model line becomes rarer with its length
+CHANCE_LENGTH_PX = 10.0  # length from which clutter along a model line is rare
 MAX_MOVES_PER_PAIR = 4  # the search stops after this many moves for each possible pair
 
 
@@ -111,7 +113,7 @@ class Terms:
 
 
 def build_likelihood_terms(
-    model_lengths: Floats, data_count: int, sigma_px: float, start_px: float, settings: MatchingSettings
+    model_lengths: Floats, data_count: int, sigma_px: float, start_px: float
 ) -> Terms:
     """Minus the log likelihood ratio of "the model is here" against "only clutter is here".
 
@@ -127,7 +129,7 @@ def build_likelihood_terms(
     Raises:
         ValueError: a number that must be positive is not.
     """
-    exponent, length_px = settings.chance_exponent, settings.chance_length_px
+    exponent, length_px = CHANCE_EXPONENT, CHANCE_LENGTH_PX
     if not (sigma_px > 0 and exponent > 0 and length_px > 0):
         raise ValueError(
             f"expected sigma, chance_exponent and chance_length_px > 0, got {sigma_px}, {exponent}, {length_px}"
@@ -197,7 +199,7 @@ class SearchResult(NamedTuple):
     errors: Floats
 
 
-def search_pairs(space: PairSpace, terms: Terms, start: Mask, settings: MatchingSettings) -> SearchResult:
+def search_pairs(space: PairSpace, terms: Terms, start: Mask) -> SearchResult:
     """Local search by steepest descent: add or delete one pair at a time (k = 1) while the match error falls.
 
     A data line goes to one model line: adding a pair takes its data line from the pair that had it. A state that no
@@ -206,7 +208,7 @@ def search_pairs(space: PairSpace, terms: Terms, start: Mask, settings: Matching
     """
     most = MAX_MOVES_PER_PAIR * len(start)
     return SearchResult(*search_locally(
-        space.arrays, terms.arrays, *space.fitting, start, most, settings.min_gain))
+        space.arrays, terms.arrays, *space.fitting, start, most, MIN_GAIN))
 
 
 def evaluate_state(space: PairSpace, terms: Terms, chosen: Mask) -> float:

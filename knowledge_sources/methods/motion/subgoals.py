@@ -33,6 +33,7 @@ from world_models.entries import Hypothesis, Obstacle, Place, Subgoal
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
+CLEARANCES_M = (0.12, 0.06, 0.03)  # margins round the robot's disc, tried in this order; the last must always be kept
 DOORWAY_DISTANCES_M = (0.65, 0.55, 0.47, 0.40)
 """Distances from a doorway at which it is approached straight, tried in this order."""
 SEEING_PARTS = (1.0, 0.75, 0.6)
@@ -95,7 +96,7 @@ class SubgoalPlanner:
         if not building.locale(name).contains((there.x_m, there.y_m)):
             return f"is not within {name}"
         distance_m, what = find_nearest(building, name, there.in_world(building).position, self._cores)
-        radius_m, margin_m = self._robot.radius_m, self._settings.clearances_m[-1]
+        radius_m, margin_m = self._robot.radius_m, CLEARANCES_M[-1]
         if distance_m >= radius_m + margin_m:
             return ""
         return (f"is {distance_m:.2f} m from {what}: the robot cannot stand there, with a radius of {radius_m:.2f} m"
@@ -196,7 +197,7 @@ class SubgoalPlanner:
         ends = [self._find_place_before(passage, side, m) for side, m in zip(sides, rooms_m, strict=True)]
         if None in ends and not isinstance(passage, Link) and (aslant or not self._cluttered.intersection(sides)):
             middles = [self._find_middle(passage, side) for side in sides]
-            for clearance_m in self._settings.clearances_m:
+            for clearance_m in CLEARANCES_M:
                 free = self._find_free_passage(passage, sides, clearance_m)
                 line = find_line_through(free, middles, passage.outward_from(origin), DOORWAY_DISTANCES_M,
                                          DOORWAY_OFFSETS_M)
@@ -225,7 +226,7 @@ class SubgoalPlanner:
         beside = passage.width_m / 2 - self._robot.radius_m
         if beside >= MIN_DOORWAY_CLEARANCE_M:
             return WAY_TOLERANCE_M
-        return max(beside, self._settings.clearances_m[-1])
+        return max(beside, CLEARANCES_M[-1])
 
     def _find_place_before(self, passage: Passage, locale: str, most_m: float, is_tried: bool = False) -> Place | None:
         """The place from which a passage is passed straight, rather no farther from it; None where something is in the
@@ -235,7 +236,7 @@ class SubgoalPlanner:
             x, y, heading = passage.stop_of(locale)
             return Place.of_world(self._building, locale, float(x), float(y), float(heading))
         middle, outward = self._find_middle(passage, locale), passage.outward_from(locale)
-        wide, free = (self._free_space(locale, self._settings.clearances_m[k]) for k in (0, -1))
+        wide, free = (self._free_space(locale, CLEARANCES_M[k]) for k in (0, -1))
         seeing = (m for m in self._seeing_m if m <= most_m and wide.covers(Point(middle - m * outward)))
         near = (m for m in DOORWAY_DISTANCES_M if free.covers(Point(middle - m * outward)))
         fit: Iterator[float] = chain(seeing, near)
@@ -252,7 +253,7 @@ class SubgoalPlanner:
         if origin.locale != destination.locale:
             return Subgoal(origin, destination, False, tolerance_m=tolerance_m)
         a, b = origin.in_world(self._building), destination.in_world(self._building)
-        free = self._free_space(destination.locale, self._settings.clearances_m[-1])
+        free = self._free_space(destination.locale, CLEARANCES_M[-1])
         straight = a.distance_to(b) <= self._settings.max_leg_m and is_clear(free, a.position, b.position)
         return Subgoal(origin, destination, straight, tolerance_m=tolerance_m)
 
@@ -288,9 +289,9 @@ class SubgoalPlanner:
 
         It is so far away that the floor before the obstacle is in the picture; near, but rather on another side.
         """
-        s, locale, here = self._settings, belief.locale, belief.world_from_robot(self._building)
+        locale, here = belief.locale, belief.world_from_robot(self._building)
         poses = list_lookouts(
-            self._free_space(locale, s.clearances_m[0], is_round=True),
+            self._free_space(locale, CLEARANCES_M[0], is_round=True),
             find_floor(self._building, {locale, obstacle.locale}), obstacle.footprint, LOOKOUT_DISTANCES_M,
             LOOKOUT_DIRECTIONS, LOOKOUT_SHORT_M)
         away = np.linalg.norm(poses[:, :2] - here.position, axis=1)
@@ -308,7 +309,7 @@ class SubgoalPlanner:
         """
         locale, here = belief.locale, belief.world_from_robot(self._building)
         poses = list_lookouts(
-            self._free_space(locale, self._settings.clearances_m[0], is_round=True),
+            self._free_space(locale, CLEARANCES_M[0], is_round=True),
             find_floor(self._building, {locale}), doorway.threshold_of(locale), DOOR_LOOK_DISTANCES_M,
             LOOKOUT_DIRECTIONS, LOOKOUT_SHORT_M)
         outward = doorway.outward_from(locale)
@@ -350,7 +351,7 @@ class SubgoalPlanner:
 
     def _list_free_spaces(self, locale: str) -> Iterator[Geometry]:
         """Where the robot's centre may be, with ever smaller margins."""
-        margins_m = self._settings.clearances_m
+        margins_m = CLEARANCES_M
         if locale in self._cluttered:
             yield self._find_wide_space(locale)
         for margin_m in margins_m:
@@ -363,14 +364,14 @@ class SubgoalPlanner:
         s = self._settings
         found = [obstacle.footprint for obstacle in self._obstacles if obstacle.locale == locale]
         low_x, low_y, high_x, high_y = shapely.bounds(shapely.multipoints(np.asarray(self._building.outline(locale))))
-        away_m = self._robot.radius_m + s.clearances_m[0] + s.overhang_m
+        away_m = self._robot.radius_m + CLEARANCES_M[0] + s.overhang_m
         around = shapely.box(*(np.array([low_x, low_y, high_x, high_y]) + away_m * np.array([-2.0, -2.0, 2.0, 2.0])))
         clear = compute_free_space(shapely.get_coordinates(around)[:-1], found, away_m)
-        return shapely.intersection(self._free_space(locale, s.clearances_m[0]), clear)
+        return shapely.intersection(self._free_space(locale, CLEARANCES_M[0]), clear)
 
     def _is_passed(self, middle: Floats, before: Floats, locale: str) -> bool:
         """Whether the robot clears all obstacles of a locale between a doorway and a place before it."""
-        line, reach_m = LineString([middle, before]), self._robot.radius_m + self._settings.clearances_m[-1]
+        line, reach_m = LineString([middle, before]), self._robot.radius_m + CLEARANCES_M[-1]
         return all(line.distance(build_polygon(obstacle.footprint)) >= reach_m
                    for obstacle in self._obstacles if obstacle.locale == locale)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shapely
 
 from knowledge_sources.methods.floor import build_polygon, measure_approach_m
-from knowledge_sources.settings import PlanSettings
+from knowledge_sources.methods.motion.subgoals import CLEARANCES_M
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import Obstacle, PlanSketch
 from world_models.frames import Pose2
@@ -14,14 +14,14 @@ from world_models.robot import RobotModel
 LEG_SLACK_M = 0.03  # an obstacle that is nearer to a leg than the least clearance by so much blocks it
 
 
-def meets(sketch: PlanSketch, obstacle: Obstacle, here: Pose2, robot: RobotModel, settings: PlanSettings) -> bool:
+def meets(sketch: PlanSketch, obstacle: Obstacle, here: Pose2, robot: RobotModel) -> bool:
     """Whether what is left of a sketch leads against an obstacle that is there, or round one that is gone.
 
     Args:
         here: the robot's pose [world].
     """
     world, footprint, at = robot.world, build_polygon(obstacle.footprint), shapely.Point(here.position)
-    clearance_m = settings.clearances_m[-1] if obstacle.is_there else settings.clearances_m[0]
+    clearance_m = CLEARANCES_M[-1] if obstacle.is_there else CLEARANCES_M[0]
     reach_m = robot.radius_m + clearance_m + (-LEG_SLACK_M if obstacle.is_there else LEG_SLACK_M)
     for index, subgoal in enumerate(sketch.subgoals[sketch.at:]):
         if obstacle.locale not in (subgoal.origin.locale, subgoal.destination.locale):

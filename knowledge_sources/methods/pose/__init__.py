@@ -17,8 +17,7 @@ The paper's other ones, which only its tables use, are in :mod:`experiments.pape
 The solvers of a camera's six unknowns take ``(model_lines_world (n, 2, 3) [m], segments_px (n, 2, 2), camera, prior)``,
 ``prior`` being a guess of ``camera_from_world``, and return a :class:`PoseEstimate`. Those on the floor take the
 mounting ``camera_from_robot`` and a prior ``world_from_robot``, and return a :class:`PlanarEstimate`. All of them say
-which lines they rejected and why, and state a covariance. Their numbers are in
-:class:`knowledge_sources.settings.PoseSettings`.
+which lines they rejected and why, and state a covariance.
 
 >>> import numpy as np
 >>> from knowledge_sources.methods.pose import med_r_and_t
@@ -46,18 +45,19 @@ True
 (True, 'too far from the model line')
 """
 
-from knowledge_sources.methods.pose.displacements import fit_displacements
+from knowledge_sources.methods.pose.displacements import MARGINAL_SPREAD, fit_displacements
 from knowledge_sources.methods.pose.estimate import (
-    FEW_LINES, MAX_ITERATIONS, MIN_LINES, Minimum, PlanarEstimate, PoseEstimate, build_estimate, build_prior_estimate,
-    compute_covariance, compute_weak_information, knows_more, minimise, reject_behind,
+    FEW_LINES, MAX_CHI2_SIGMAS, MAX_ITERATIONS, MAX_RESIDUAL_SIGMAS, MIN_LINES, Minimum, PlanarEstimate,
+    PoseEstimate, SHARED_PX, build_estimate, build_prior_estimate, compute_covariance, compute_weak_information,
+    knows_more, minimise, reject_behind,
 )
 from knowledge_sources.methods.pose.kernels import IMAGE, PLANES, RigidMotion, TINY
 from knowledge_sources.methods.pose.line_set import (
-    LandmarkIds, LineSet, build_line_set, check_landmarks, compute_image_jacobian, compute_squared_distances, cross,
-    invert_information, measure_lines,
+    LandmarkIds, LineSet, MAX_BESIDE_PX, OUTLIER_SIGMAS, build_line_set, check_landmarks, compute_image_jacobian,
+    compute_squared_distances, cross, invert_information, measure_lines,
 )
 from knowledge_sources.methods.pose.planar import (
-    compute_camera_poses, compute_point_jacobian, planar_from_points, to_pose2,
+    POINT_OUTLIER_SIGMAS, compute_camera_poses, compute_point_jacobian, planar_from_points, to_pose2,
 )
 from knowledge_sources.methods.pose.planar_from_lines import planar_from_lines
 from knowledge_sources.methods.pose.r_and_t import (
@@ -66,12 +66,13 @@ from knowledge_sources.methods.pose.r_and_t import (
 from knowledge_sources.methods.pose.with_camera import CameraEstimate, compute_pose_slopes, estimate_camera_and_pose
 
 __all__ = [
-    "FEW_LINES", "IMAGE", "MAX_ITERATIONS", "MIN_LINES", "MIN_NOISE_PART", "PLANES", "SUBSET_SIZE", "TINY",
-    "CameraEstimate", "LandmarkIds", "LineSet", "Minimum", "PlanarEstimate", "PoseEstimate", "RigidMotion",
-    "add_concentrated", "build_estimate", "build_line_set", "build_prior_estimate", "check_landmarks",
-    "compute_camera_poses", "compute_covariance", "compute_image_jacobian", "compute_point_jacobian",
-    "compute_pose_slopes", "compute_squared_distances", "compute_weak_information", "cross",
-    "estimate_camera_and_pose", "fit_displacements", "invert_information", "keep_possible", "knows_more",
+    "FEW_LINES", "IMAGE", "MARGINAL_SPREAD", "MAX_BESIDE_PX", "MAX_CHI2_SIGMAS", "MAX_ITERATIONS",
+    "MAX_RESIDUAL_SIGMAS", "MIN_LINES", "MIN_NOISE_PART", "OUTLIER_SIGMAS", "PLANES", "POINT_OUTLIER_SIGMAS",
+    "SHARED_PX", "SUBSET_SIZE", "TINY", "CameraEstimate", "LandmarkIds", "LineSet", "Minimum", "PlanarEstimate",
+    "PoseEstimate", "RigidMotion", "add_concentrated", "build_estimate", "build_line_set", "build_prior_estimate",
+    "check_landmarks", "compute_camera_poses", "compute_covariance", "compute_image_jacobian",
+    "compute_point_jacobian", "compute_pose_slopes", "compute_squared_distances", "compute_weak_information",
+    "cross", "estimate_camera_and_pose", "fit_displacements", "invert_information", "keep_possible", "knows_more",
     "measure_lines", "med_r_and_t", "minimise", "planar_from_lines", "planar_from_points", "r_and_t_ml",
     "reject_behind", "solve_from_subsets", "to_pose2",
 ]

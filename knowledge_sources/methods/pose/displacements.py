@@ -19,18 +19,34 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
-from knowledge_sources.methods.pose.line_set import LineSet, build_line_set, compute_distance_slopes, cross
+from knowledge_sources.methods.pose.line_set import (
+    MAX_BESIDE_PX,
+    OUTLIER_SIGMAS,
+    LineSet,
+    build_line_set,
+    compute_distance_slopes,
+    cross,
+)
 from knowledge_sources.methods.pose.planar import (
     PlanarPrior,
     compute_camera_poses,
     compute_line_jacobian,
     compute_scatter,
 )
-from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2, wrap_angle
 
+SHARED_PRIOR_FACTOR = 3.0
+"""A prior of the same model is loosened by so many times what the model's errors make uncertain."""
+MARGINAL_SPREAD = 1.4
+"""Factor on the standard deviations of such a pose, for segments matched to a wrong line nearby (after a few poses on
+generated floors)."""
+DISPLACED_WIDTHS_PX = (12.0, 8.0, 5.0, 3.0, 2.0, 1.5)
+"""Widths of the loss by which displacements of the model are fitted."""
+DISPLACED_STEPS = 2  # steps of that fit at each width
+DISPLACED_PAIR_PX = 2.5  # largest distance of a segment from its line, once that is displaced
+DISPLACED_UNIT_PX = 20.0  # a segment of this length weighs like one measurement
 MAX_FEW_LINES = 3  # so few lines move a prior of unknown worth only as far as their noise demands
 MAX_MARGINAL_ROUNDS = 12  # rounds in which lines that do not agree are left out
 MAX_MARGINAL_STEPS = 8  # steps of Gauss-Newton in each of them
@@ -101,7 +117,6 @@ def fit_displacements(
     camera_from_robot: Pose,
     pose: Pose2,
     covariance: Floats | None = None,
-    settings: PoseSettings = DEFAULT.pose,
 ) -> DisplacedFit:
     """Displace model lines by their modes, and move the pose, until segments lie on them: least robust squares.
 
@@ -114,7 +129,7 @@ def fit_displacements(
     """
     lines, segments = np.asarray(lines_world, float), np.asarray(segments_px, float).reshape(-1, 2, 2)
     state, start = pose.vector, pose.vector
-    which, data = _find_candidates(lines, errors, segments, camera, camera_from_robot, state, covariance, settings)
+    which, data = _find_candidates(lines, errors, segments, camera, camera_from_robot, state, covariance)
     amplitudes = np.zeros(len(errors.displacement_modes))
     if not len(which):
         return DisplacedFit(state, amplitudes, lines, np.zeros((0, 2), np.int64))
@@ -123,9 +138,9 @@ def fit_displacements(
     information = np.eye(free + len(amplitudes))
     if covariance is not None:
         information[:3, :3] = np.linalg.inv(covariance)
-    weight = np.minimum(1.0, observed.lengths_px / settings.displaced_unit_px)
-    for width in _choose_widths(lines, errors, camera, camera_from_robot, pose, settings):
-        for _ in range(settings.displaced_steps):
+    weight = np.minimum(1.0, observed.lengths_px / DISPLACED_UNIT_PX)
+    for width in _choose_widths(lines, errors, camera, camera_from_robot, pose):
+        for _ in range(DISPLACED_STEPS):
             moved = _displace(observed, shifts, amplitudes)
             distances, by_pose, by_mode = compute_displaced_jacobian(moved, shifts, state, camera_from_robot)
             slopes = by_mode if covariance is None else np.concatenate([by_pose, by_mode], axis=2)
@@ -135,16 +150,16 @@ def fit_displacements(
             state, amplitudes = state + np.pad(step[:free], (0, 3 - free)), amplitudes + step[free:]
     moved = _displace(observed, shifts, amplitudes)
     distances, _, _ = compute_displaced_jacobian(moved, shifts, state, camera_from_robot)
-    near = np.abs(distances).max(axis=1) <= settings.displaced_pair_px
+    near = np.abs(distances).max(axis=1) <= DISPLACED_PAIR_PX
     return DisplacedFit(state, amplitudes, errors.displace(lines, amplitudes), np.column_stack([which, data])[near])
 
 
 def _choose_widths(
-    lines: Floats, errors: LineErrors, camera: Camera, mount: Pose, pose: Pose2, settings: PoseSettings
+    lines: Floats, errors: LineErrors, camera: Camera, mount: Pose, pose: Pose2
 ) -> tuple[float, ...]:
     """The widths that are not much wider than the model is inexact: a wider loss draws to other lines."""
     most_px = DISPLACED_WIDTH_SIGMAS * float(np.median(compute_sigmas_px(lines, errors, camera, mount, pose)))
-    return tuple(w for w in settings.displaced_widths_px if w <= max(most_px, DISPLACED_GATE_PX))
+    return tuple(w for w in DISPLACED_WIDTHS_PX if w <= max(most_px, DISPLACED_GATE_PX))
 
 
 def _solve(slopes: Floats, distances: Floats, weights: Floats, information: Floats, away: Floats) -> Floats:
@@ -163,7 +178,7 @@ def _displace(lines: LineSet, shifts: Floats, amplitudes: Floats) -> LineSet:
 
 def _find_candidates(
     lines: Floats, errors: LineErrors, segments: Floats, camera: Camera, mount: Pose, state: Floats,
-    covariance: Floats | None, settings: PoseSettings,
+    covariance: Floats | None,
 ) -> tuple[Indices, Indices]:
     """Lines and segments (p,) that may belong together, by what belief and model may be wrong."""
     rotation, translation = compute_camera_poses(state, mount)
@@ -181,7 +196,7 @@ def _find_candidates(
         variances = variances + np.einsum("nei,ij,nej->ne", by_pose, covariance, by_pose)
     reach = DISPLACED_GATE_SIGMAS * np.sqrt(variances) + DISPLACED_GATE_PX
     at = np.einsum("ni,nei->ne", along[which], segments[data] - projected[which, :1])
-    beside = reach.max(axis=1) + settings.max_beside_px
+    beside = reach.max(axis=1) + MAX_BESIDE_PX
     overlaps = (at.max(axis=1) >= -beside) & (at.min(axis=1) <= lengths[which] + beside)
     near: Mask = np.all(np.abs(distances) <= reach, axis=1) & overlaps
     return which[near], data[near]
@@ -218,19 +233,18 @@ class MarginalFit(NamedTuple):
 
 def maximise_marginal(
     lines: LineSet, shifts: Floats, sigma_px: float, mount: Pose, prior: PlanarPrior, state: Floats, near: Mask,
-    settings: PoseSettings,
 ) -> MarginalFit:
     """The pose of greatest marginal likelihood from lines of which some are wrong.
 
-    Lines whose remaining residual is beyond ``settings.outlier_sigmas`` are left out, the worst first.
+    Lines whose remaining residual is beyond ``OUTLIER_SIGMAS`` are left out, the worst first.
 
     Args:
         shifts: (k, n, 3) displacement of each line by one standard deviation of each mode [m, world].
         sigma_px: of a segment's end across its line.
         state, near: where to start, and the lines (n,) that are used at first.
     """
-    bound, near = 2.0 * settings.outlier_sigmas**2, near.copy()
-    prior = _loosen(prior, lines.take(near), shifts[:, near], sigma_px, mount, state, settings)
+    bound, near = 2.0 * OUTLIER_SIGMAS**2, near.copy()
+    prior = _loosen(prior, lines.take(near), shifts[:, near], sigma_px, mount, state)
     for _ in range(MAX_MARGINAL_ROUNDS):
         state = _minimise(lines.take(near), shifts[:, near], sigma_px, mount, prior, state)
         squares = np.where(near, np.sum(_explain(lines, shifts, sigma_px, mount, state, near) ** 2, axis=1), 0.0)
@@ -241,7 +255,7 @@ def maximise_marginal(
     r, slopes, weights = _linearise(lines.take(near), shifts[:, near], sigma_px, mount, state)
     away = _subtract(state, prior.mean)
     chi2 = float(r @ weights @ r)
-    scatter = settings.marginal_spread**2 * compute_scatter(chi2, len(r), bound)
+    scatter = MARGINAL_SPREAD**2 * compute_scatter(chi2, len(r), bound)
     return MarginalFit(
         state, np.asarray(np.linalg.inv(slopes.T @ weights @ slopes + prior.information) * scatter, float), near,
         _explain(lines, shifts, sigma_px, mount, state, near), chi2 + float(away @ prior.information @ away))
@@ -249,7 +263,6 @@ def maximise_marginal(
 
 def _loosen(
     prior: PlanarPrior, lines: LineSet, shifts: Floats, sigma_px: float, mount: Pose, state: Floats,
-    settings: PoseSettings,
 ) -> PlanarPrior:
     """The prior without what it may share with these lines: it came of the same model, with the same errors.
 
@@ -260,7 +273,7 @@ def _loosen(
     _, slopes, weights = _linearise(lines, shifts, sigma_px, mount, state)
     exact = slopes.T @ slopes / sigma_px**2 + prior.information
     share = np.linalg.inv(slopes.T @ weights @ slopes + prior.information) - np.linalg.inv(exact)
-    loose = np.linalg.inv(prior.information) + settings.shared_prior_factor * share
+    loose = np.linalg.inv(prior.information) + SHARED_PRIOR_FACTOR * share
     return PlanarPrior(prior.mean, np.asarray(np.linalg.inv(loose), float), True)
 
 

@@ -18,14 +18,22 @@ from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.pose import kernels
 from knowledge_sources.methods.pose.kernels import TINY, RigidMotion
 from knowledge_sources.methods.pose.line_set import (
+    MAX_BESIDE_PX,
     LineSet,
     compute_image_jacobian,
     compute_normals_px,
     measure_lines,
 )
-from knowledge_sources.settings import PoseSettings
 from world_models.frames import Pose, Pose2, frozen
 
+MAX_RESIDUAL_SIGMAS = 1.5
+"""Lines whose noise is this many times the stated one no longer decide a pose (of six unknowns) (experiment
+covariance)."""
+SHARED_PX = 0.3
+"""Error shared by all lines of a picture: of calibration and survey (six unknowns) (experiment covariance)."""
+MAX_CHI2_SIGMAS = 3.0
+"""How far a sum of squares may exceed its mean where a pose explains its lines, in deviations (Morozov's discrepancy
+principle)."""
 WEAK_ROTATION_RAD = 0.3  # rad; standard deviation of a camera's rotation where none is given
 WEAK_TRANSLATION_M = 3.0  # m; standard deviation of a camera's translation where none is given
 MAX_PRIOR_WEIGHT_LOG10 = 10.0  # largest weight of a weak prior that is tried, as a power of ten
@@ -132,9 +140,9 @@ def compute_spread(mean: float, bound: float, most: float) -> float:
 State = TypeVar("State")
 
 
-def compute_max_chi2(freedom: float, settings: PoseSettings) -> float:
+def compute_max_chi2(freedom: float) -> float:
     """The largest sum of squares, over their variance, that noise of so many degrees of freedom leaves."""
-    return freedom + settings.max_chi2_sigmas * math.sqrt(2.0 * freedom)
+    return freedom + MAX_CHI2_SIGMAS * math.sqrt(2.0 * freedom)
 
 
 def solve_near_prior(
@@ -231,10 +239,10 @@ def is_mostly_in_front(lines: LineSet, state: RigidMotion) -> bool:
 
 
 def find_rejections(
-    lines: LineSet, state: RigidMotion, near: Mask, settings: PoseSettings
+    lines: LineSet, state: RigidMotion, near: Mask
 ) -> tuple[str | None, ...]:
     """Why each line is no inlier (n); ``near`` (n,) says which are near enough to their model line."""
-    _, front, overlap = measure_lines(lines, *state, settings.max_beside_px)
+    _, front, overlap = measure_lines(lines, *state, MAX_BESIDE_PX)
     tests = (
         (lines.lengths_px <= MIN_LENGTH_PX, NO_LENGTH), (~near, DISTANCE), (~front, BEHIND), (~overlap, NO_OVERLAP)
     )
@@ -251,7 +259,7 @@ def reject_behind(lines: LineSet, state: RigidMotion) -> tuple[str | None, ...]:
 
 
 def build_estimate(
-    lines: LineSet, end: Minimum, covariance: Floats, rejected: tuple[str | None, ...], settings: PoseSettings,
+    lines: LineSet, end: Minimum, covariance: Floats, rejected: tuple[str | None, ...],
     prior: Pose | None = None, known: Floats | None = None, reason: str | None = None, bound: float = math.inf,
     kept: Mask | None = None,
 ) -> PoseEstimate:
@@ -263,7 +271,7 @@ def build_estimate(
     if prior is not None and not is_mostly_in_front(
         lines if kept is None else lines.take(kept), (rotation, end.translation)
     ):
-        instead = build_prior_estimate(lines, prior, ALL_BEHIND, settings, known)
+        instead = build_prior_estimate(lines, prior, ALL_BEHIND, known)
         return replace(instead, iterations=end.iterations)
     residuals = measure_lines(lines, *end.state)[0]
     return PoseEstimate(
@@ -274,18 +282,18 @@ def build_estimate(
         rejected=rejected,
         cost=end.cost,
         iterations=end.iterations,
-        reason=reason or find_doubt(residuals / lines.sigma_px[:, None], rejected, settings, bound),
+        reason=reason or find_doubt(residuals / lines.sigma_px[:, None], rejected, bound),
     )
 
 
 def build_prior_estimate(
-    lines: LineSet, prior: Pose, reason: str, settings: PoseSettings, covariance: Floats | None = None
+    lines: LineSet, prior: Pose, reason: str, covariance: Floats | None = None
 ) -> PoseEstimate:
     """The prior unchanged, with the reason why and its ``covariance`` (6, 6); lines behind it are no inliers."""
     if covariance is None:
         covariance = np.asarray(np.linalg.inv(compute_weak_information()), float)
     end = Minimum(prior.rotation, prior.translation, np.zeros((6, 6)), math.inf, 0)
-    return build_estimate(lines, end, covariance, reject_behind(lines, end.state), settings, reason=reason)
+    return build_estimate(lines, end, covariance, reject_behind(lines, end.state), reason=reason)
 
 
 def orthonormalise(rotation: Floats) -> Floats:
@@ -295,7 +303,7 @@ def orthonormalise(rotation: Floats) -> Floats:
 
 
 def find_doubt(
-    whitened: Floats, rejected: tuple[str | None, ...], settings: PoseSettings, bound: float = math.inf
+    whitened: Floats, rejected: tuple[str | None, ...], bound: float = math.inf
 ) -> str | None:
     """Why a pose has not earned to be called decided by its lines, ``None`` if it has.
 
@@ -310,13 +318,13 @@ def find_doubt(
     if 2 * count < len(rejected):
         return MINORITY
     freedom = 2.0 * count
-    limit = compute_mean_square(settings.max_residual_sigmas**2, bound) * compute_max_chi2(freedom, settings)
+    limit = compute_mean_square(MAX_RESIDUAL_SIGMAS**2, bound) * compute_max_chi2(freedom)
     return FAR_LINES if float(np.sum(whitened[kept] ** 2)) > limit else None
 
 
 def compute_covariance(
     lines: LineSet, state: RigidMotion, rejected: tuple[str | None, ...], gain: tuple[Floats, Floats],
-    settings: PoseSettings, bound: float | None = None, doubtful: Mask | None = None,
+    shared_px: float, bound: float | None = None, doubtful: Mask | None = None,
 ) -> Floats:
     """(6, 6) covariance from how the pose moves with the ends of the lines, see :func:`spread_errors`.
 
@@ -325,14 +333,14 @@ def compute_covariance(
     allows have more noise. And ``doubtful`` ones (n,) may be wrong by as much as an inlier can be.
     """
     kept = np.array([r is None for r in rejected], bool)
-    noise = _measure_scatter(lines.take(kept), state, settings)
+    noise = _measure_scatter(lines.take(kept), state, shared_px)
     if bound is not None:
         mean = noise if noise > 1.0 else compute_mean_square(1.0, bound)
         noise = compute_spread(mean, bound, MAX_SCATTER)
     if bound is not None and doubtful is not None:
         wide = np.where(doubtful, math.sqrt(max(0.5 * bound, 1.0)), 1.0)
         lines = replace(lines, sigma_px=lines.sigma_px * wide)
-    return spread_errors(lines, *gain, noise, settings.shared_px)
+    return spread_errors(lines, *gain, noise, shared_px)
 
 
 def compute_gain(lines: LineSet, weights: Floats, state: RigidMotion, covariance: Floats) -> tuple[Floats, Floats]:
@@ -394,7 +402,7 @@ def _list_places(lines: LineSet) -> Floats:
     return np.concatenate([np.ones((*lines.rays.shape[:2], 1)), lines.rays[..., :2]], axis=2)
 
 
-def _measure_scatter(lines: LineSet, state: RigidMotion, settings: PoseSettings) -> float:
+def _measure_scatter(lines: LineSet, state: RigidMotion, shared_px: float) -> float:
     """The lines' variance over the stated one, if that does not allow it; else 1.
 
     From what is left of the residuals when the pose, and the error that all lines share, are fitted to them: a pose
@@ -403,11 +411,11 @@ def _measure_scatter(lines: LineSet, state: RigidMotion, settings: PoseSettings)
     freedom = 2.0 * len(lines) - 6.0
     distances = measure_lines(lines, *state)[0]
     chi2 = float(np.sum((distances / lines.sigma_px[:, None]) ** 2))
-    if freedom < MIN_SCATTER_FREEDOM or chi2 <= compute_max_chi2(freedom, settings):
+    if freedom < MIN_SCATTER_FREEDOM or chi2 <= compute_max_chi2(freedom):
         return 1.0
     residuals, slopes = compute_image_jacobian(lines, *state)
     shared = np.einsum("ia,iec->ieac", compute_normals_px(lines, *state), _list_places(lines))
-    shared = shared.reshape(len(lines), 2, 6) * (settings.shared_px > 0.0)
+    shared = shared.reshape(len(lines), 2, 6) * (shared_px > 0.0)
     sigma = np.repeat(lines.sigma_px, 2)
     columns = np.concatenate([slopes, shared], axis=2).reshape(-1, 12) / sigma[:, None]
     whitened = residuals.reshape(-1) / sigma
@@ -415,5 +423,5 @@ def _measure_scatter(lines: LineSet, state: RigidMotion, settings: PoseSettings)
     basis = basis[:, sizes > 1e-9 * sizes[0]]
     freedom = len(whitened) - basis.shape[1]
     left = float(np.sum((whitened - basis @ (basis.T @ whitened)) ** 2))
-    is_more = freedom >= MIN_SCATTER_FREEDOM and left > compute_max_chi2(freedom, settings)
+    is_more = freedom >= MIN_SCATTER_FREEDOM and left > compute_max_chi2(freedom)
     return left / freedom if is_more else 1.0

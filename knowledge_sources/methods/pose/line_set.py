@@ -26,6 +26,10 @@ from knowledge_sources.methods.pose.kernels import (
 )
 from world_models.camera import Camera
 
+MAX_BESIDE_PX = 5.0  # how far beyond the end of its model line an observed segment may lie
+OUTLIER_SIGMAS = 3.0  # a line further than this many standard deviations from its model line is an outlier (§6.2.4)
+
+
 LandmarkIds = Sequence[Any] | NDArray[Any] | None
 """A hashable name for each line, or none at all."""
 

@@ -23,10 +23,10 @@ from knowledge_sources.methods.pose.line_set import (
     cross,
     invert_information,
 )
-from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2, wrap_angle
 
+POINT_OUTLIER_SIGMAS = 4.0  # a point further than this many standard deviations off is an outlier
 WEAK_POSITION_M = 1.0  # m; standard deviation of a robot's position where none is given
 WEAK_HEADING_RAD = 0.3  # rad; standard deviation of a robot's heading where none is given
 MAX_FLOOR_ITERATIONS = 20  # levenberg-Marquardt steps for the three unknowns of a robot
@@ -171,11 +171,10 @@ def planar_from_points(
     prior_covariance: Any = None,
     *,
     sigma_px: Any = 1.0,
-    settings: PoseSettings = DEFAULT.pose,
 ) -> PlanarEstimate:
     """Robot pose on the floor by Levenberg-Marquardt on Huber's loss, on the points that agree with it.
 
-    First on all points; then points beyond ``settings.point_outlier_sigmas`` are left out, until they stay the same.
+    First on all points; then points beyond ``POINT_OUTLIER_SIGMAS`` are left out, until they stay the same.
 
     Args:
         points_world: (n, 3) [m]. points_px: (n, 2) observed, as the lens shows them.
@@ -193,7 +192,7 @@ def planar_from_points(
     observed = camera.undistort(pixels) - (camera.cx, camera.cy)
     mount = to_rigid_motion(camera_from_robot)
     points = world, observed, sigma, focal, belief.mean, belief.information, mount
-    bound = settings.point_outlier_sigmas**2
+    bound = POINT_OUTLIER_SIGMAS**2
 
     def minimise(state: Floats, chosen: Mask, iterations: int = MAX_FLOOR_ITERATIONS) -> tuple[Floats, float]:
         end, _, loss, _ = kernels.minimise_points(points, state, chosen, HUBER_SIGMAS, NEAR_PLANE_M, iterations)

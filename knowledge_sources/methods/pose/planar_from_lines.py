@@ -22,6 +22,8 @@ from knowledge_sources.methods.pose.estimate import (
 )
 from knowledge_sources.methods.pose.kernels import FloorArrays
 from knowledge_sources.methods.pose.line_set import (
+    MAX_BESIDE_PX,
+    OUTLIER_SIGMAS,
     LandmarkIds,
     LineSet,
     build_line_set,
@@ -40,11 +42,11 @@ from knowledge_sources.methods.pose.planar import (
     to_pose2,
     to_rigid_motion,
 )
-from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
+FLOOR_WIDENINGS = (4.0, 2.0, 1.0, 1.0)  # factors on the squared bound on inliers in that refinement, round by round
 FLOOR_START_ITERATIONS = 8  # levenberg-Marquardt steps on all lines, for a first candidate
 FLOOR_SUBSET_LINES = 28  # pairs are formed of this many of the longest segments
 FLOOR_PAIR_ITERATIONS = 4  # gauss-Newton steps on each pair
@@ -69,7 +71,6 @@ def planar_from_lines(
     sigma_px: Any = 1.0,
     robust: bool = True,
     errors: LineErrors | None = None,
-    settings: PoseSettings = DEFAULT.pose,
 ) -> PlanarEstimate:
     """Robot pose on the floor of maximum likelihood, robust beyond 50 % of wrong lines.
 
@@ -94,12 +95,12 @@ def planar_from_lines(
     """
     if errors is not None and not errors.is_exact:
         return _solve_inexact(model_lines_world, segments_px, camera, camera_from_robot, prior, prior_covariance,
-                              landmark_ids, float(sigma_px), robust, errors, settings)
+                              landmark_ids, float(sigma_px), robust, errors)
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
     groups = group_by_landmark(landmark_ids, len(lines))
-    floor = _Floor(lines, build_planar_prior(prior, prior_covariance), camera_from_robot, settings)
+    floor = _Floor(lines, build_planar_prior(prior, prior_covariance), camera_from_robot)
     mean = floor.prior.mean
-    bound = 2.0 * settings.outlier_sigmas**2
+    bound = 2.0 * OUTLIER_SIGMAS**2
     if not len(lines):
         return _build_estimate(floor, mean, (), bound, FEW)
     if not robust:
@@ -108,7 +109,7 @@ def planar_from_lines(
     candidates = _compute_candidates(floor, groups)
     order = np.argsort(floor.compute_costs(candidates, bound), kind="stable")[: FLOOR_FINALISTS]
     finalists = kernels.refine_floor_states(
-        floor.arrays, candidates[order], _max_step(), bound, np.array(settings.floor_widenings))
+        floor.arrays, candidates[order], _max_step(), bound, np.array(FLOOR_WIDENINGS))
     best = int(np.argmin(floor.compute_costs(finalists, bound)))
     state, near = _alternate(floor, finalists[best], bound)
     return _finish(floor, near, state, bound)
@@ -117,14 +118,13 @@ def planar_from_lines(
 def _solve_inexact(
     model_lines_world: Any, segments_px: Any, camera: Camera, camera_from_robot: Pose, prior: Pose2,
     prior_covariance: Any, landmark_ids: LandmarkIds, sigma_px: float, robust: bool, errors: LineErrors,
-    settings: PoseSettings,
 ) -> PlanarEstimate:
     """From lines whose model is inexact: robustly with each line's own error first, then with those that they share."""
     wide_px = np.hypot(sigma_px, compute_sigmas_px(
         np.asarray(model_lines_world, float).reshape(-1, 2, 3), errors, camera, camera_from_robot, prior))
     first = planar_from_lines(
         model_lines_world, segments_px, camera, camera_from_robot, prior, prior_covariance=prior_covariance,
-        landmark_ids=landmark_ids, sigma_px=wide_px, robust=robust, settings=settings)
+        landmark_ids=landmark_ids, sigma_px=wide_px, robust=robust)
     if first.reason is not None:
         return first
     lines = build_line_set(model_lines_world, segments_px, camera, sigma_px)
@@ -133,7 +133,7 @@ def _solve_inexact(
         belief = belief._replace(information=np.zeros((3, 3)))
     found = maximise_marginal(
         lines, errors.displacements, sigma_px, camera_from_robot, belief, first.world_from_robot.vector,
-        first.inliers, settings)
+        first.inliers)
     rejected = tuple(None if near else reason or DISTANCE
                      for near, reason in zip(found.near, first.rejected, strict=True))
     return PlanarEstimate(to_pose2(found.state), found.covariance, found.near, found.residuals_px, rejected, found.cost)
@@ -146,7 +146,6 @@ class _Floor:
     lines: LineSet
     prior: PlanarPrior
     mount: Pose
-    settings: PoseSettings
 
     def take(self, near: Mask) -> _Floor:
         """With some of the lines only."""
@@ -172,7 +171,7 @@ class _Floor:
     def measure_lines(self, state: Floats) -> tuple[Floats, Mask, Mask]:
         """See :func:`.line_set.measure_lines`."""
         rotation, translation = compute_camera_poses(state, self.mount)
-        return measure_lines(self.lines, rotation, translation, self.settings.max_beside_px)
+        return measure_lines(self.lines, rotation, translation, MAX_BESIDE_PX)
 
     def find_near(self, state: Floats, bound: float) -> Mask:
         """(n,) the lines within the bound, in front of the camera and beside their model line."""
@@ -215,7 +214,7 @@ def _alternate(floor: _Floor, state: Floats, bound: float) -> tuple[Floats, Mask
 
 def _finish(floor: _Floor, near: Mask, state: Floats, bound: float) -> PlanarEstimate:
     """Drop a weak prior where the lines know better, and return the prior where no pose fits better."""
-    kept, settings = floor.take(near), floor.settings
+    kept = floor.take(near)
     mean = floor.prior.mean
     reason = None
     if not floor.prior.given:
@@ -226,7 +225,7 @@ def _finish(floor: _Floor, near: Mask, state: Floats, bound: float) -> PlanarEst
             state, _ = alone.minimise(state, MAX_FLOOR_ITERATIONS)
         else:
             state = _solve_near_prior(kept)
-    rejected = find_rejections(floor.lines, compute_camera_poses(state, floor.mount), near, settings)
+    rejected = find_rejections(floor.lines, compute_camera_poses(state, floor.mount), near)
     if bound == NO_BOUND:
         rejected = tuple(r if r == BEHIND else None for r in rejected)
     costs = floor.compute_costs(np.stack([state, mean]), bound)
@@ -237,7 +236,7 @@ def _finish(floor: _Floor, near: Mask, state: Floats, bound: float) -> PlanarEst
 
 def _solve_near_prior(floor: _Floor) -> Floats:
     """The state nearest to the prior that explains the lines, see :func:`solve_near_prior`."""
-    prior, settings = floor.prior, floor.settings
+    prior = floor.prior
 
     def solve(weight: float) -> Floats:
         pulled = replace(floor, prior=prior._replace(information=weight * prior.information))
@@ -246,7 +245,7 @@ def _solve_near_prior(floor: _Floor) -> Floats:
     def compute_chi2(state: Floats) -> float:
         return float(np.sum(kernels.compute_floor_squares(floor.arrays, np.array(state))))
 
-    max_chi2 = compute_max_chi2(2.0 * len(floor.lines), settings)
+    max_chi2 = compute_max_chi2(2.0 * len(floor.lines))
     return solve_near_prior(prior.mean, solve, compute_chi2, max_chi2)
 
 

@@ -21,6 +21,7 @@ from knowledge_sources.methods.pose.estimate import (
     MIN_LINES,
     NO_SUBSET,
     NOT_BETTER,
+    SHARED_PX,
     UNDECIDED,
     Minimum,
     PoseEstimate,
@@ -39,6 +40,7 @@ from knowledge_sources.methods.pose.estimate import (
 )
 from knowledge_sources.methods.pose.kernels import IMAGE, PLANES, RigidMotion
 from knowledge_sources.methods.pose.line_set import (
+    OUTLIER_SIGMAS,
     LandmarkIds,
     LineSet,
     build_line_set,
@@ -48,7 +50,6 @@ from knowledge_sources.methods.pose.line_set import (
     group_by_landmark,
     invert_information,
 )
-from knowledge_sources.settings import DEFAULT, PoseSettings
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -79,7 +80,7 @@ def r_and_t_ml(
     landmark_ids: LandmarkIds = None,
     sigma_px: Any = 1.0,
     prior_covariance: Any = None,
-    settings: PoseSettings = DEFAULT.pose,
+    shared_px: float = SHARED_PX,
 ) -> PoseEstimate:
     """Camera pose of maximum likelihood: the smallest error, where every line is matched rightly.
 
@@ -102,17 +103,17 @@ def r_and_t_ml(
     check_landmarks(landmark_ids, len(lines))
     information, known = invert_covariance(prior_covariance)
     if not len(lines):
-        return build_prior_estimate(lines, prior, FEW_LINES, settings, known)
-    end, reason = find_likeliest(lines, prior, information, settings)
+        return build_prior_estimate(lines, prior, FEW_LINES, known)
+    end, reason = find_likeliest(lines, prior, information)
     if _compute_chi2(lines, end.state) > _compute_chi2(lines, (prior.rotation, prior.translation)):
-        return build_prior_estimate(lines, prior, NOT_BETTER, settings, known)
+        return build_prior_estimate(lines, prior, NOT_BETTER, known)
     kept = reject_behind(lines, end.state)
-    covariance = compute_likeliest_covariance(lines, end, np.ones(len(lines)), kept, settings)
-    return build_estimate(lines, end, covariance, kept, settings, prior, known, reason)
+    covariance = compute_likeliest_covariance(lines, end, np.ones(len(lines)), kept, shared_px)
+    return build_estimate(lines, end, covariance, kept, prior, known, reason)
 
 
 def compute_likeliest_covariance(
-    lines: LineSet, end: Minimum, weights: Floats, rejected: tuple[str | None, ...], settings: PoseSettings,
+    lines: LineSet, end: Minimum, weights: Floats, rejected: tuple[str | None, ...], shared_px: float,
     bound: float | None = None, doubtful: Mask | None = None,
 ) -> Floats:
     """(6, 6) covariance of the likeliest pose: what the prior knew, and :func:`compute_covariance`.
@@ -124,11 +125,11 @@ def compute_likeliest_covariance(
     gain = compute_gain(lines, weights, end.state, inverse)
     scaled = gain[0].reshape(-1, 6) * np.repeat(lines.sigma_px, 2)[:, None]
     return inverse - scaled.T @ scaled + compute_covariance(
-        lines, end.state, rejected, gain, settings, bound, doubtful)
+        lines, end.state, rejected, gain, shared_px, bound, doubtful)
 
 
 def find_likeliest(
-    lines: LineSet, prior: Pose, information: Floats | None, settings: PoseSettings, start: RigidMotion | None = None
+    lines: LineSet, prior: Pose, information: Floats | None, start: RigidMotion | None = None
 ) -> tuple[Minimum, str | None]:
     """The likeliest pose from ``start``, and why the prior had to help.
 
@@ -137,10 +138,10 @@ def find_likeliest(
     ``information`` (6, 6) is the prior's, ``None`` if it does not count.
     """
     if information is None and len(lines) < MIN_LINES:
-        return _solve_near_prior(lines, prior, settings), FEW_LINES
+        return _solve_near_prior(lines, prior), FEW_LINES
     if information is None and start is None:
         end = minimise(IMAGE, lines, (prior.rotation, prior.translation))
-        explains = end.cost <= compute_max_chi2(2.0 * len(lines) - 6.0, settings)
+        explains = end.cost <= compute_max_chi2(2.0 * len(lines) - 6.0)
         if explains and is_mostly_in_front(lines, end.state) and knows_more(end.hessian, compute_weak_information()):
             return end, None
     end = minimise(IMAGE, lines, start or _find_start(lines, prior), prior, information)
@@ -149,10 +150,10 @@ def find_likeliest(
     undecided = not knows_more(end.hessian, compute_weak_information())
     if len(lines) > MIN_LINES and not undecided:
         return end, None
-    return _solve_near_prior(lines, prior, settings), UNDECIDED if undecided else None
+    return _solve_near_prior(lines, prior), UNDECIDED if undecided else None
 
 
-def _solve_near_prior(lines: LineSet, prior: Pose, settings: PoseSettings) -> Minimum:
+def _solve_near_prior(lines: LineSet, prior: Pose) -> Minimum:
     """See :func:`solve_near_prior`. The covariance is that of a weak prior, as nobody stated how good the prior is."""
     here = (prior.rotation, prior.translation)
     weak = compute_weak_information()
@@ -160,7 +161,7 @@ def _solve_near_prior(lines: LineSet, prior: Pose, settings: PoseSettings) -> Mi
         here,
         lambda weight: minimise(IMAGE, lines, here, prior, weight * weak).state,
         lambda state: _compute_chi2(lines, state),
-        compute_max_chi2(2.0 * len(lines), settings),
+        compute_max_chi2(2.0 * len(lines)),
     )
     return minimise(IMAGE, lines, state, prior, weak, iterations=0)
 
@@ -200,7 +201,7 @@ def med_r_and_t(
     probability: float | None = None,
     rng: np.random.Generator | None = None,
     prior_covariance: Any = None,
-    settings: PoseSettings = DEFAULT.pose,
+    shared_px: float = SHARED_PX,
 ) -> PoseEstimate:
     """Camera pose by least median of squares: holds up to about 45 % of wrong lines.
 
@@ -232,13 +233,13 @@ def med_r_and_t(
         errors = compute_squared_distances(lines, rotations, translations)
         medians = rank(errors)
         least = float(medians.min())
-        bound = 2.0 * (settings.outlier_sigmas * _compute_robust_scale(least, len(lines))) ** 2
+        bound = 2.0 * (OUTLIER_SIGMAS * _compute_robust_scale(least, len(lines))) ** 2
         tied = np.flatnonzero(medians <= max(least, _compute_tied_median()))
         best = int(tied[np.argmin(np.minimum(errors[tied], bound).sum(axis=1))])
         return (rotations[best], translations[best]), errors[best] <= bound, bound
 
     return solve_from_subsets(model_lines_world, segments_px, camera, prior, landmark_ids, sigma_px, probability,
-                              MED_DRAWN_OUTLIER_PART, rng, prior_covariance, settings, choose)
+                              MED_DRAWN_OUTLIER_PART, rng, prior_covariance, shared_px, choose)
 
 
 Choose = Callable[[LineSet, Floats, Floats], tuple[RigidMotion, Mask, float]]
@@ -247,7 +248,7 @@ Choose = Callable[[LineSet, Floats, Floats], tuple[RigidMotion, Mask, float]]
 def solve_from_subsets(
     model_lines_world: Any, segments_px: Any, camera: Camera, prior: Pose, landmark_ids: LandmarkIds, sigma_px: Any,
     probability: float | None, outlier_part: float, rng: np.random.Generator | None, prior_covariance: Any,
-    settings: PoseSettings, choose: Choose,
+    shared_px: float, choose: Choose,
 ) -> PoseEstimate:
     """The likeliest pose from the candidate that ``choose`` takes; of all lines, where they are 3 or fewer.
 
@@ -262,13 +263,13 @@ def solve_from_subsets(
     if len(lines) <= SUBSET_SIZE:
         return r_and_t_ml(
             model_lines_world, segments_px, camera, prior, sigma_px=sigma_px, prior_covariance=prior_covariance,
-            settings=settings,
+            shared_px=shared_px,
         )
     needed = None if probability is None else count_subsets(SUBSET_SIZE, outlier_part, probability)
     rows, real = _pad_rows(groups, list_subsets(len(groups), SUBSET_SIZE, needed, rng))
     starts = np.tile(prior.rotation, (len(rows), 1, 1)), np.tile(prior.translation, (len(rows), 1))
     candidates = kernels.solve_subsets(lines.arrays, rows, real, *starts, SUBSET_ITERATIONS)
-    return _refine_on_inliers(lines, prior, prior_covariance, landmark_ids, *choose(lines, *candidates), settings)
+    return _refine_on_inliers(lines, prior, prior_covariance, landmark_ids, *choose(lines, *candidates), shared_px)
 
 
 def keep_possible(
@@ -307,7 +308,7 @@ def _find_doubtful(landmark_ids: LandmarkIds, kept: Mask) -> Mask:
 
 def _refine_on_inliers(
     lines: LineSet, prior: Pose, prior_covariance: Any, landmark_ids: LandmarkIds, start: RigidMotion, near: Mask,
-    bound: float, settings: PoseSettings,
+    bound: float, shared_px: float,
 ) -> PoseEstimate:
     """The likeliest pose of the lines kept, with reasons for the others (§6.2.4, steps 3 and 4).
 
@@ -319,19 +320,19 @@ def _refine_on_inliers(
     information, known = invert_covariance(prior_covariance)
     near = near & (lines.lengths_px > MIN_LENGTH_PX)
     if int(np.count_nonzero(near)) < SUBSET_SIZE:
-        return build_prior_estimate(lines, prior, NO_SUBSET, settings, known)
+        return build_prior_estimate(lines, prior, NO_SUBSET, known)
     for _ in range(MAX_REFINEMENTS):
-        end, reason = find_likeliest(lines.take(near), prior, information, settings, start)
+        end, reason = find_likeliest(lines.take(near), prior, information, start)
         start = end.state
         fine = compute_squared_distances(lines, *start) <= bound
-        rejected = find_rejections(lines, start, fine, settings)
+        rejected = find_rejections(lines, start, fine)
         again = np.array([r is None for r in rejected], bool)
         if np.array_equal(again, near) or int(np.count_nonzero(again)) < SUBSET_SIZE:
             break
         near = again
     doubtful = _find_doubtful(landmark_ids, near)
-    covariance = compute_likeliest_covariance(lines, end, near.astype(float), rejected, settings, bound, doubtful)
-    return build_estimate(lines, end, covariance, rejected, settings, prior, known, reason, bound, near)
+    covariance = compute_likeliest_covariance(lines, end, near.astype(float), rejected, shared_px, bound, doubtful)
+    return build_estimate(lines, end, covariance, rejected, prior, known, reason, bound, near)
 
 
 def add_concentrated(

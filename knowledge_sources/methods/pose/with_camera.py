@@ -17,10 +17,14 @@ from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose.camera_kernel import measure_lines
 from knowledge_sources.methods.pose.line_set import check_matched_arrays
 from knowledge_sources.methods.pose.planar import to_pose2
-from knowledge_sources.settings import DEFAULT, CameraStateSettings
 from world_models.camera import CAMERA_UNKNOWNS, YAW, Camera, CameraMount
 from world_models.frames import Pose2
 
+WIDTHS_PX = (24.0, 12.0, 6.0, 3.0, 1.5)  # widths of the loss by which pose and camera are refined
+STEPS_A_WIDTH = 2  # steps of Gauss-Newton at each width
+OUTLIER_SIGMAS = 3.0  # a line further off than this is an outlier
+MAX_ROUNDS = 8  # most rounds of choosing the lines that agree
+MIN_FREEDOM = 6  # fewest degrees of freedom by which the noise is judged
 POSE = 3
 """Unknowns of the robot's pose; those of the camera come after them."""
 UNKNOWNS = POSE + len(CAMERA_UNKNOWNS)
@@ -65,7 +69,6 @@ def estimate_camera_and_pose(
     *,
     starts: tuple[Pose2, ...] = (),
     sigma_px: float = 0.5,
-    settings: CameraStateSettings = DEFAULT.camera_state,
 ) -> CameraEstimate:
     """Estimate the pose of a robot on the floor together with its camera's state.
 
@@ -87,15 +90,15 @@ def estimate_camera_and_pose(
         raise ValueError(f"expected a camera_covariance of shape (7, 7), got {covariance.shape}")
     information = _build_information(prior_covariance, covariance)
     problem = _Problem(model, segments, camera, mount, sigma_px, information, prior)
-    bound = 2.0 * settings.outlier_sigmas**2
-    ends = [problem.anneal(problem.start_at(start), settings) for start in (prior, *starts)]
+    bound = 2.0 * OUTLIER_SIGMAS**2
+    ends = [problem.anneal(problem.start_at(start)) for start in (prior, *starts)]
     state = min(ends, key=lambda end: problem.compute_cost(end, bound))
-    for _ in range(settings.max_rounds):
+    for _ in range(MAX_ROUNDS):
         near = problem.find_near(state, bound)
         before, state = state, problem.minimise(state, near.astype(float))
         if np.abs((state - before) / STILL).max() < 1.0 and np.array_equal(near, problem.find_near(state, bound)):
             break
-    return _build_estimate(problem, state, covariance, bound, settings)
+    return _build_estimate(problem, state, covariance, bound)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,10 +153,10 @@ class _Problem:
                 break
         return state
 
-    def anneal(self, state: Floats, settings: CameraStateSettings) -> Floats:
+    def anneal(self, state: Floats) -> Floats:
         """The state under a robust loss whose width narrows."""
-        for width in settings.widths_px:
-            for _ in range(settings.steps_a_width):
+        for width in WIDTHS_PX:
+            for _ in range(STEPS_A_WIDTH):
                 squares = 0.5 * self.measure_squares(state) * (self.sigma_px / width) ** 2
                 state = self.solve(state, 1.0 / (1.0 + squares) ** 2 * (self.sigma_px / width) ** 2 * 4.0)
         return state
@@ -187,13 +190,13 @@ def _build_information(pose_covariance: Any, camera_covariance: Floats) -> Float
 
 
 def _build_estimate(
-    problem: _Problem, state: Floats, camera_covariance: Floats, bound: float, settings: CameraStateSettings
+    problem: _Problem, state: Floats, camera_covariance: Floats, bound: float
 ) -> CameraEstimate:
     near = problem.find_near(state, bound)
     distances, slopes = (measured[near] for measured in problem.measure(state))
     lines = np.einsum("nea,neb->ab", slopes, slopes)
     freedom = 2 * int(near.sum()) - len(FREE)
-    scatter = max(1.0, float(np.sum(distances**2)) / freedom) if freedom >= settings.min_freedom else 1.0
+    scatter = max(1.0, float(np.sum(distances**2)) / freedom) if freedom >= MIN_FREEDOM else 1.0
     hessian = (lines / scatter + problem.information)[np.ix_(FREE, FREE)]
     joint = np.linalg.inv(hessian)
     covariance = np.array(camera_covariance)

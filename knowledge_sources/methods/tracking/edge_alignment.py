@@ -17,10 +17,10 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Image, Ints, Mask
 from knowledge_sources.methods.pose import compute_point_jacobian, compute_pose_slopes, to_pose2
-from knowledge_sources.settings import DEFAULT, TrackingSettings
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
+MIN_EDGE_LINES = 6  # least number of lines that must agree with the fit
 EDGE_SMOOTHING_PX = 1.0  # standard deviation of the smoothing before edges are located
 EDGE_SPACING_PX = 8.0
 """Distance of the places along a model line at which its edge is looked for (Harris and Stennett 1990)."""
@@ -54,7 +54,7 @@ class EdgeAlignment:
 
 def align_to_edges(
     robot: RobotModel, image: Image, lines_world: Floats, world_from_robot: Pose2, covariance: Floats,
-    camera_covariance: Floats, settings: TrackingSettings = DEFAULT.tracking,
+    camera_covariance: Floats,
 ) -> EdgeAlignment | None:
     """Find the pose that moves model lines onto the edges of a picture.
 
@@ -77,7 +77,7 @@ def align_to_edges(
         doubt_px = EDGE_GATE_SIGMAS * edges.compute_sigmas(doubt)
         if found is None and (not len(doubt_px) or np.quantile(doubt_px, MIN_SURE_SHARE) > reach_px):
             return None
-        found = _solve(edges.take(doubt_px <= reach_px), pose, world_from_robot, covariance, settings)
+        found = _solve(edges.take(doubt_px <= reach_px), pose, world_from_robot, covariance)
         if found is None:
             return None
         pose, doubt = found.world_from_robot, found.covariance
@@ -181,7 +181,7 @@ def _find_steepest(image: Image, at_px: Floats, normal: Floats, reach_px: float)
 
 
 def _solve(
-    edges: _Edges, at: Pose2, prior: Pose2, covariance: Floats, settings: TrackingSettings
+    edges: _Edges, at: Pose2, prior: Pose2, covariance: Floats
 ) -> EdgeAlignment | None:
     """Least squares with a hard cut-off, from one step with Huber weights; the belief is one more measurement."""
     sigma_px, cutoff_px = EDGE_SIGMA_PX, MAX_EDGE_RESIDUAL_PX
@@ -197,6 +197,6 @@ def _solve(
         pull = edges.slopes.T @ (w * edges.offsets_px) - information @ away
         step = np.asarray(np.linalg.solve(hessian, pull), float)
     lines = len(np.unique(edges.line[np.abs(edges.offsets_px - edges.slopes @ step) <= cutoff_px]))
-    if lines < max(settings.min_edge_lines, MIN_EDGE_LINE_SHARE * len(np.unique(edges.line))):
+    if lines < max(MIN_EDGE_LINES, MIN_EDGE_LINE_SHARE * len(np.unique(edges.line))):
         return None
     return EdgeAlignment(to_pose2(at.vector + step), np.linalg.inv(hessian), lines)

@@ -21,13 +21,16 @@ from knowledge_sources.methods.features import (
     read_picture,
 )
 from knowledge_sources.methods.pose import compute_point_jacobian, planar_from_points
-from knowledge_sources.settings import DEFAULT, FeaturesSettings, Settings
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.entries import Anchor, Track
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_points
 
+TEMPLATE_HALF_PX = 10  # half-width of a landmark's template (experiment table1)
+MAX_TRACKS = 14  # largest number of landmarks followed at a time (experiment table1)
+MIN_SPACING_PX = 28.0  # least distance in the picture between landmarks
+MAX_LANDMARK_DISTANCE_M = 15.0  # largest distance of a landmark when it is chosen
 MIN_LANDMARK_CONTRAST = 0.08  # least contrast of a model point that may be followed
 MIN_CORNER_PER_PX = 3.0  # least corner strength of a landmark's patch (Shi-Tomasi)
 MAX_SECOND_PEAK = 0.8  # largest correlation of a landmark's patch with another place near it when it is chosen
@@ -65,7 +68,7 @@ class PoseCorrection(NamedTuple):
 
 def follow_landmarks(
     robot: RobotModel, tracks: tuple[Track, ...], template_of: Callable[[Track], Template], image: Image, pose: Pose2,
-    covariance: Floats, settings: Settings = DEFAULT,
+    covariance: Floats,
 ) -> list[TrackUpdate]:
     """Predict each landmark from the believed pose, and find its template near the prediction.
 
@@ -76,15 +79,14 @@ def follow_landmarks(
     """
     if not tracks:
         return []
-    s = settings.tracking
     depth, predicted, spread = _predict(robot, np.array([t.point_world for t in tracks]), pose, covariance)
     obstruction = robot.camera.obstruction
-    hidden = np.zeros(len(tracks), bool) if obstruction is None else obstruction.covers(predicted, s.template_half_px)
+    hidden = np.zeros(len(tracks), bool) if obstruction is None else obstruction.covers(predicted, TEMPLATE_HALF_PX)
     out = []
     for track, z, at, sigma, is_hidden in zip(
             tracks, depth.tolist(), predicted, spread.tolist(), hidden.tolist(), strict=True):
         scale = track.template_depth_m / max(z, NEAR_PLANE_M)
-        in_view = z > NEAR_PLANE_M and not is_hidden and lies_inside(image.shape, at, s.template_half_px + 2)
+        in_view = z > NEAR_PLANE_M and not is_hidden and lies_inside(image.shape, at, TEMPLATE_HALF_PX + 2)
         expected = in_view and MIN_SCALE <= scale <= MAX_SCALE
         found = None
         if expected:
@@ -96,7 +98,7 @@ def follow_landmarks(
 
 @lru_cache(maxsize=MAX_TEMPLATES)
 def cut_template(
-    lens: Camera, pinhole: Camera, jpeg: bytes, at_px: tuple[float, float], half_px: int, settings: FeaturesSettings
+    lens: Camera, pinhole: Camera, jpeg: bytes, at_px: tuple[float, float], half_px: int
 ) -> Template:
     """The template round a pixel of a rectified picture; cached, as it serves for many frames."""
     return extract_template(read_picture(jpeg).rectified(lens, pinhole), at_px, half_px)
@@ -104,7 +106,6 @@ def cut_template(
 
 def correct_pose(
     robot: RobotModel, seen: list[Track], anchors: tuple[Anchor, ...], pose: Pose2, covariance: Floats,
-    settings: Settings = DEFAULT,
 ) -> PoseCorrection:
     """Solve for the pose from landmarks that were found; no surer than the beliefs at which their templates were cut.
 
@@ -119,7 +120,6 @@ def correct_pose(
         pose,
         covariance,
         sigma_px=np.array([t.sigma_px for t in seen]),
-        settings=settings.pose,
     )
     after = estimate.world_from_robot
     spread = np.asarray(estimate.covariance + _compute_anchor_covariance(after, seen, anchors))
@@ -127,7 +127,7 @@ def correct_pose(
 
 
 def select_landmarks(
-    robot: RobotModel, kept: tuple[Track, ...], frame: str, image: Image, pose: Pose2, settings: Settings = DEFAULT
+    robot: RobotModel, kept: tuple[Track, ...], frame: str, image: Image, pose: Pose2
 ) -> tuple[Track, ...]:
     """Choose new tracks beside those that are kept: visible model points that are strong corners, unique, well apart.
 
@@ -135,25 +135,24 @@ def select_landmarks(
         frame: the entry of the picture ``image`` (h, w), in which their templates will be cut.
         pose: ``world_from_robot`` as believed.
     """
-    s = settings.tracking
-    half_px = s.template_half_px
+    half_px = TEMPLATE_HALF_PX
     camera_from_world = robot.camera_from_world(pose)
     points = visible_points(
         robot.world, robot.camera, camera_from_world, margin_px=half_px + 4.0,
-        min_contrast=MIN_LANDMARK_CONTRAST, max_distance_m=s.max_landmark_distance_m,
+        min_contrast=MIN_LANDMARK_CONTRAST, max_distance_m=MAX_LANDMARK_DISTANCE_M,
     )
     strength = measure_corner_strengths(image, points.points_px, half_px)
     taken_px = [t.found_px or t.predicted_px for t in kept]
-    free = (strength >= MIN_CORNER_PER_PX) & _are_apart(points.points_px, taken_px, s.min_spacing_px)
+    free = (strength >= MIN_CORNER_PER_PX) & _are_apart(points.points_px, taken_px, MIN_SPACING_PX)
     new: list[Track] = []
     for i in np.argsort(-strength, kind="stable"):
         px, point = points.points_px[i], points.points_world[i]
-        if len(kept) + len(new) >= s.max_tracks:
+        if len(kept) + len(new) >= MAX_TRACKS:
             break
         if not free[i]:
             continue
         if compute_second_peak(image, px, half_px, SECOND_PEAK_WINDOW_PX) < MAX_SECOND_PEAK:
-            free &= _are_apart(points.points_px, px, s.min_spacing_px)
+            free &= _are_apart(points.points_px, px, MIN_SPACING_PX)
             name = points.marks[int(points.landmark[i])].name
             new.append(_begin_track(point, px, float(camera_from_world.apply(point)[2]), name, frame, MIN_SIGMA_PX))
     return tuple(new)

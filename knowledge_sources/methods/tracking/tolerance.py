@@ -13,6 +13,9 @@ from world_models.camera import NEAR_PLANE_M
 from world_models.entries import Hypothesis
 from world_models.robot import RobotModel
 
+TOLERANCE_SIGMAS = 3.0  # standard deviations of the believed pose that the action level may correct (§3.2)
+
+
 Floats = NDArray[np.float64]
 
 
@@ -29,5 +32,5 @@ def action_px(robot: RobotModel, belief: Hypothesis, points_world: Floats, setti
     near = ahead_m[ahead_m > NEAR_PLANE_M]
     spread = math.hypot(belief.sigma_rad, belief.sigma_m / median(near.tolist()) if len(near) else 0.0)
     action = settings.action
-    return min(action.min_tolerance_px + action.tolerance_sigmas * robot.camera.fx * spread,
+    return min(action.min_tolerance_px + TOLERANCE_SIGMAS * robot.camera.fx * spread,
                settings.plan.max_deviation_px)

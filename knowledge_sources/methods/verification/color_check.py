@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from knowledge_sources.methods.arrays import Floats, Image, Ints
 from knowledge_sources.methods.features import segment_regions
 from knowledge_sources.methods.verification.predicted_colors import BORDER_MARGIN_PX, MIN_FACE_POINTS, FaceColor
-from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import NEAR_PLANE_M
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -54,7 +53,7 @@ NOT_TESTED = ColorCheck(0, 0.0, 0.0, is_testable=False)
 
 
 def check_colors(
-    robot: RobotModel, pose: Pose2, image: Image, face_colors: Sequence[FaceColor], settings: Settings = DEFAULT
+    robot: RobotModel, pose: Pose2, image: Image, face_colors: Sequence[FaceColor]
 ) -> ColorCheck:
     """Compare a picture with the face colors predicted from a pose.
 
@@ -74,7 +73,7 @@ def check_colors(
     parts = (pixels[inside] + 0.5) / (robot.lens.width, robot.lens.height)
     side = REGION_IMAGE_PX
     tiny = cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA).mean(axis=2)
-    labels = segment_regions(tiny, sector_px=side, min_area_px=MIN_REGION_AREA_PX, settings=settings.features)
+    labels = segment_regions(tiny, sector_px=side, min_area_px=MIN_REGION_AREA_PX)
     smooth = np.asarray(cv2.blur(image, (3, 3)), np.float64)
     colors = np.array([color for color, _ in face_colors])
     return _measure(_sample(smooth, parts), _sample(labels, parts), face[inside], colors)

@@ -20,7 +20,6 @@ from scipy.special import betainc, betaln
 
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose import compute_camera_poses, compute_point_jacobian, fit_displacements, to_pose2
-from knowledge_sources.settings import DEFAULT, PoseSettings, VerificationSettings
 from world_models.building.building import Building
 from world_models.building.model_errors import LineErrors, find_line_errors
 from world_models.camera import Camera
@@ -28,6 +27,11 @@ from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import VisibleLines, visible_lines
 
+MIN_LINE_LENGTH_PX = 12.0  # shortest projected model line that is predicted
+LINE_TOLERANCE_PX = 2.5
+"""Largest distance of a segment from the line that it covers (checked with harvey experiment milestones)."""
+MIN_MATCHED_LINES = 6
+"""Fewest matched lines by which a milestone is testable (checked with harvey experiment milestones)."""
 MIN_LINE_CONTRAST = 0.05  # smallest contrast of a model line that is predicted, 0..1
 MAX_LINE_DISTANCE_M = 15.0  # largest distance of a model line that is predicted
 CELLS_PER_LINE = 24  # cells into which a line is cut to measure how much of it is covered
@@ -52,12 +56,12 @@ MAX_LINE_WEIGHT_PX = 100.0  # length from which a longer line weighs no more
 
 
 def predict_lines(
-    robot: RobotModel, world_from_robot: Pose2, settings: VerificationSettings = DEFAULT.verification
+    robot: RobotModel, world_from_robot: Pose2
 ) -> VisibleLines:
     """Predict the model lines that are long, clear and near enough to be looked for from a pose."""
     return visible_lines(
         robot.world, robot.camera, robot.camera_from_world(world_from_robot),
-        min_length_px=settings.min_line_length_px, min_contrast=MIN_LINE_CONTRAST,
+        min_length_px=MIN_LINE_LENGTH_PX, min_contrast=MIN_LINE_CONTRAST,
         max_distance_m=MAX_LINE_DISTANCE_M,
     )
 
@@ -99,7 +103,7 @@ class Agreement:
 
 def compute_agreement(
     lines_px: Floats, segments_px: Floats, displaced_px: Floats,
-    tolerance_px: float = DEFAULT.verification.line_tolerance_px,
+    tolerance_px: float = LINE_TOLERANCE_PX,
 ) -> Agreement:
     """Compute how well projected lines agree with segments, and how well they would by chance.
 
@@ -155,7 +159,7 @@ def compute_p_share(matched: int, visible: int, matched_before: int, visible_bef
 
 
 def find_distinct(
-    lines_px: Floats, segments_px: Floats, settings: VerificationSettings = DEFAULT.verification
+    lines_px: Floats, segments_px: Floats
 ) -> Mask:
     """Which (m,) of the lines (m, 2, 2) tell of a place: beside the others segments (k, 2, 2) lie wherever one looks.
 
@@ -164,15 +168,15 @@ def find_distinct(
     the other lines cover by the model.
     """
     expected = lines_px[~np.isnan(lines_px).any(axis=(1, 2))]
-    tolerance_px = settings.line_tolerance_px
+    tolerance_px = LINE_TOLERANCE_PX
     found, by_model = (_measure_pattern(lines_px, some, tolerance_px) for some in (segments_px, expected))
     return np.asarray(found - by_model <= MAX_PATTERN_PART)
 
 
-def take_distinct(segments_px: Floats, settings: VerificationSettings = DEFAULT.verification) -> Floats:
+def take_distinct(segments_px: Floats) -> Floats:
     """The segments (k, 2, 2) of a picture without those of bricks, planks and tiles: beside these lie others."""
     segments = np.array(segments_px, float, order="C").reshape(-1, 2, 2)
-    return segments[_find_distinct_segments(segments.tobytes(), settings.line_tolerance_px)]
+    return segments[_find_distinct_segments(segments.tobytes(), LINE_TOLERANCE_PX)]
 
 
 @lru_cache(maxsize=32)  # a lost robot searches with the same pictures again and again
@@ -260,8 +264,8 @@ class LineCheck:
 
 def check_lines(
     robot: RobotModel, lines_world: Floats, segments_px: Floats, world_from_robot: Pose2,
-    settings: VerificationSettings = DEFAULT.verification, errors: LineErrors | None = None,
-    pose_settings: PoseSettings = DEFAULT.pose, landmarks: Sequence[str] = (),
+    errors: LineErrors | None = None,
+    landmarks: Sequence[str] = (),
 ) -> LineCheck:
     """Compare model lines (m, 2, 3) [m, world], visible from a pose, with segments (k, 2, 2) of the picture.
 
@@ -276,12 +280,12 @@ def check_lines(
     else:
         few = np.concatenate([states[:1], _take_few(states[1:])])
         projected = np.concatenate([
-            _project_displaced(robot, lines_world, errors, segments_px, s, pose_settings) for s in few])
-        found = compute_agreement(projected[0], segments_px, projected[1:], settings.line_tolerance_px)
+            _project_displaced(robot, lines_world, errors, segments_px, s) for s in few])
+        found = compute_agreement(projected[0], segments_px, projected[1:], LINE_TOLERANCE_PX)
         projected[:, _find_unasked(robot.world, projected[0], found, landmarks)] = np.nan
     here, displaced = np.split(projected, [1])
     agreement, sharp = (compute_agreement(here[0], segments_px, displaced, tolerance_px)
-                        for tolerance_px in (settings.line_tolerance_px, SHARP_TOLERANCE_PX))
+                        for tolerance_px in (LINE_TOLERANCE_PX, SHARP_TOLERANCE_PX))
     lengths = np.linalg.norm(here[0, :, 1] - here[0, :, 0], axis=1)
     return LineCheck(agreement, sharp, agreement.covered_length(lengths), here[0])
 
@@ -320,12 +324,10 @@ def _project(robot: RobotModel, lines_world: Floats, states: Floats) -> Floats:
 
 def _project_displaced(
     robot: RobotModel, lines_world: Floats, errors: LineErrors, segments_px: Floats, state: Floats,
-    settings: PoseSettings,
 ) -> Floats:
     """(1, m, 2, 2) the lines as seen from a state (3,), displaced as they fit the segments best [px]."""
     fit = fit_displacements(
-        lines_world, errors, segments_px, robot.camera, robot.mount.camera_from_robot, to_pose2(state),
-        settings=settings)
+        lines_world, errors, segments_px, robot.camera, robot.mount.camera_from_robot, to_pose2(state))
     return _project(robot, fit.lines_world, state[None])
 
 

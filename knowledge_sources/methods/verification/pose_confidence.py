@@ -29,10 +29,12 @@ from knowledge_sources.methods.verification.line_check import (
     MAX_LINE_WEIGHT_PX,
     LineCheck,
 )
-from knowledge_sources.settings import DEFAULT, VerificationSettings
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
+MOTION_TOLERANCE_SIGMAS = 4.0
+"""Deviations that the wheels are allowed: of three numbers, one in a thousand lies further out (chi-square with three
+degrees of freedom)."""
 MAX_BELIEF_SIGMAS = 6.0  # mahalanobis distance from the belief from which a pose gets no credit for being near it
 MIN_P_FALSE = 1e-40  # probability of chance agreement that counts as certainty
 LEAST_P_FALSE = 1e-4  # smallest probability of a wrong place by one picture: of less the cases of the fit say nothing
@@ -91,7 +93,6 @@ def compute_evidence(
 
 def compute_motion_tolerance_px(
     robot: RobotModel, lines_world: Floats, pose: Pose2, covariance: Floats,
-    settings: VerificationSettings = DEFAULT.verification,
 ) -> float:
     """Compute how far lines (m, 2, 3) may lie from where they are expected, by a pose covariance (3, 3) [px].
 
@@ -102,7 +103,7 @@ def compute_motion_tolerance_px(
     across = _compute_slopes(robot, lines_world, pose)
     middle = across.mean(axis=1)
     sigmas = np.sqrt(np.einsum("nk,kl,nl->n", middle, covariance, middle))
-    return settings.motion_tolerance_sigmas * float(np.median(sigmas))
+    return MOTION_TOLERANCE_SIGMAS * float(np.median(sigmas))
 
 
 def _ratio(part: Floats, whole: Floats) -> float:

@@ -9,10 +9,23 @@ from typing import NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.belief import Alike, BelievedPlace, Look, add_looks, to_log_odds, update
-from knowledge_sources.methods.features import read_picture
+from knowledge_sources.methods.belief import (
+    MAX_CAMERA_CHI2,
+    MAX_TOLD_CHI2,
+    MIN_P_BELIEVED,
+    TOLD_SIGMA_M,
+    TOLD_SIGMA_RAD,
+    Alike,
+    BelievedPlace,
+    Look,
+    add_looks,
+    to_log_odds,
+    update,
+)
+from knowledge_sources.methods.features import MIN_CONTRAST, read_picture
 from knowledge_sources.methods.verification.color_check import ColorCheck, check_colors
 from knowledge_sources.methods.verification.line_check import (
+    MIN_MATCHED_LINES,
     LineCheck,
     check_lines,
     find_distinct,
@@ -23,16 +36,28 @@ from knowledge_sources.methods.verification.line_check import (
 )
 from knowledge_sources.methods.verification.pose_confidence import (
     LEAST_P_FALSE,
+    MOTION_TOLERANCE_SIGMAS,
     POSE_CONFIDENCE,
     PoseEvidence,
     compute_evidence,
     compute_motion_tolerance_px,
 )
-from knowledge_sources.settings import PlanSettings, Settings
+from knowledge_sources.settings import Settings
 from world_models.entries import Certificate, Milestone, MilestoneVerdict, PoseFix, Segments
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
+P_WRONG_STANDING = 0.02
+"""Prior probability of a wrong belief where the robot stands as it was put down, or found (as localization.p_told has
+it)."""
+P_WRONG_FOLLOWED = 0.05  # the same where landmarks were followed up to here
+MAX_FOLLOWED_PX = 15.0
+"""Where the belief leaves more than this open in the picture, followed landmarks tell of no place (half of
+max_deviation_px)."""
+P_WRONG_UNFOLLOWED = 0.12  # the same where no landmarks were followed
+P_WRONG_IN_DOUBT = 0.5  # the same where the belief is in doubt
+MAX_MILESTONE_LOOKS = 3  # a milestone is looked for from so many directions before it counts as a discrepancy
+MAX_INEXACT_LOOKS = 5  # the same where the model is inexact: each look tells less
 OTHER_DIRECTIONS = Alike(step_m=math.inf, turn_rad=math.radians(65.0))
 """Looks from one place are independent where they show nothing in common: about the width of a picture."""
 
@@ -148,33 +173,32 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     """
     milestone, fix, segments_px, s = seen.milestone, seen.fix, seen.segments.segments_px, settings
     lines, pose = np.array(milestone.expected, float).reshape(-1, 2, 3), fix.world_from_robot
-    asked = find_distinct(project_lines(robot, lines, pose), segments_px, s.verification)
+    asked = find_distinct(project_lines(robot, lines, pose), segments_px)
     patterned = int(np.count_nonzero(~asked))
     lines, errors = lines[asked], milestone.errors.take(np.flatnonzero(asked))
-    agreed = check_lines(robot, lines, segments_px, pose, s.verification, errors, s.pose,
+    agreed = check_lines(robot, lines, segments_px, pose, errors,
                          [milestone.landmarks[i] for i in np.array(milestone.landmark_of, np.intp)[asked]])
     plain_px = agreed.projected_px if not milestone.displacement_modes else check_lines(
-        robot, lines, segments_px, pose, s.verification).projected_px
-    faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors, s)
+        robot, lines, segments_px, pose).projected_px
+    faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors)
     evidence = compute_evidence(pose, fix.covariance, before.pose, before.covariance, agreed, faces)
     p_false = max(POSE_CONFIDENCE.p_false(evidence), LEAST_P_FALSE)
     spread = before.covariance + fix.covariance
-    motion_px = compute_motion_tolerance_px(robot, lines, before.pose, spread, s.verification)
-    followed = before.has_followed and motion_px <= s.plan.max_followed_px
+    motion_px = compute_motion_tolerance_px(robot, lines, before.pose, spread)
+    followed = before.has_followed and motion_px <= MAX_FOLLOWED_PX
     expected_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)[asked]
     if fix.camera_step:  # how far the robot is from where it was believed, not the camera
         expected_px = robot.camera.project_segments(lines, robot.camera_from_world(before.pose))[0]
-    believed = BelievedPlace(before.pose, spread,
-                             1.0 - _find_prior(before, s.plan, followed=followed))
+    believed = BelievedPlace(before.pose, spread, 1.0 - _find_prior(before, followed=followed))
     by_looks = _sum_told(milestone) + to_log_odds(p_false)
     p_after = update(believed.compute_p_wrong(pose), by_looks)
-    tolerance_px, place = _find_tolerance_px(before, motion_px, p_after <= POSE_CONFIDENCE.accept, s), s.localization
+    tolerance_px = _find_tolerance_px(before, motion_px, p_after <= POSE_CONFIDENCE.accept, s)
     if p_after <= MAX_P_UNMISTAKABLE:  # as far as what a search finds is still the place where it was tracked to
-        slipped = spread + np.diag(np.square([place.told_sigma_m, place.told_sigma_m, place.told_sigma_rad]))
-        slip_px = compute_motion_tolerance_px(robot, lines, before.pose, slipped, s.verification)
-        slip_px *= math.sqrt(place.max_told_chi2) / s.verification.motion_tolerance_sigmas
+        slipped = spread + np.diag(np.square([TOLD_SIGMA_M, TOLD_SIGMA_M, TOLD_SIGMA_RAD]))
+        slip_px = compute_motion_tolerance_px(robot, lines, before.pose, slipped)
+        slip_px *= math.sqrt(MAX_TOLD_CHI2) / MOTION_TOLERANCE_SIGMAS
         tolerance_px = max(tolerance_px, s.action.min_tolerance_px + slip_px)
-    most = 1.0 - s.localization.min_p_believed if is_last_look(milestone, s.plan) else POSE_CONFIDENCE.accept
+    most = 1.0 - MIN_P_BELIEVED if is_last_look(milestone) else POSE_CONFIDENCE.accept
     return Weighed(
         robot=robot,
         segments=seen.segments,
@@ -199,13 +223,13 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     )
 
 
-def _find_prior(before: Before, plan: PlanSettings, *, followed: bool) -> float:
+def _find_prior(before: Before, *, followed: bool) -> float:
     """The probability that the belief is wrong, before the look. Who only turned is where it was told to be."""
     if before.in_doubt:
-        return plan.p_wrong_in_doubt
+        return P_WRONG_IN_DOUBT
     if before.stands:
-        return plan.p_wrong_standing
-    return plan.p_wrong_followed if followed else plan.p_wrong_unfollowed
+        return P_WRONG_STANDING
+    return P_WRONG_FOLLOWED if followed else P_WRONG_UNFOLLOWED
 
 
 def _sum_told(milestone: Milestone) -> float:
@@ -222,11 +246,11 @@ def _find_tolerance_px(before: Before, motion_px: float, is_sure: bool, settings
     return tolerance_px if before.stands or is_sure else min(tolerance_px, most_px)
 
 
-def judge_place(w: Weighed, settings: Settings) -> Verdict:
+def judge_place(w: Weighed) -> Verdict:
     """The verdict by this place alone, and why."""
     a, faces, odds = w.lines.agreement, w.faces, (w.p_wrong, w.most_p_wrong)
-    least = settings.verification.min_matched_lines
-    if w.segments.contrast < settings.plan.min_contrast:
+    least = MIN_MATCHED_LINES
+    if w.segments.contrast < MIN_CONTRAST:
         return Verdict("not testable", f"the frame is dark (contrast {w.segments.contrast:.1f} of 255)", *odds)
     others = f"; {w.patterned} more in a pattern" * (w.patterned > 0)
     if w.expected < least:
@@ -241,7 +265,7 @@ def judge_place(w: Weighed, settings: Settings) -> Verdict:
         kind: MilestoneVerdict = "not testable" if w.is_inexact else "refuted"
         return Verdict(kind, f"{found}: by what was seen {tell_odds(*odds)}", *odds)
     where = f"{found}, {w.shift_px:.1f} px from where expected"
-    if w.camera_chi2 > settings.camera_state.max_chi2:
+    if w.camera_chi2 > MAX_CAMERA_CHI2:
         return Verdict("refuted", f"{where}: only with a camera that is mounted otherwise than it can be", *odds)
     if w.p_wrong > w.most_p_wrong:
         return Verdict("not testable", f"{where}: not enough to tell the place by: {tell_odds(*odds)}", *odds)
@@ -253,18 +277,18 @@ def judge_place(w: Weighed, settings: Settings) -> Verdict:
     return Verdict("verified", f"{where}: {tell_odds(*odds)}", *odds)
 
 
-def is_last_look(milestone: Milestone, plan: PlanSettings) -> bool:
+def is_last_look(milestone: Milestone) -> bool:
     """Whether so many views were tried that no other one may be."""
-    most = plan.max_inexact_looks if milestone.displacement_modes else plan.max_looks
+    most = MAX_INEXACT_LOOKS if milestone.displacement_modes else MAX_MILESTONE_LOOKS
     return len(milestone.tried) + 1 >= most
 
 
-def compute_coverage_elsewhere(w: Weighed, there: Pose2, settings: Settings) -> float:
+def compute_coverage_elsewhere(w: Weighed, there: Pose2) -> float:
     """The part of the lines' length that the picture shows of what should be seen at another place, so corrected."""
     corrected = there @ (w.before.inverse() @ w.pose)
-    lines = predict_lines(w.robot, corrected, settings.verification)
-    return check_lines(w.robot, lines.lines_world, w.segments.segments_px, corrected, settings.verification,
-                       find_errors(w.robot, lines), settings.pose, list_names(lines)).coverage
+    lines = predict_lines(w.robot, corrected)
+    return check_lines(w.robot, lines.lines_world, w.segments.segments_px, corrected,
+                       find_errors(w.robot, lines), list_names(lines)).coverage
 
 
 def certify(names: tuple[str, str], w: Weighed, verdict: Verdict, fix: PoseFix) -> Certificate:

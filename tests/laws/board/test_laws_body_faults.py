@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 
 from blackboard import Change, Decision, Discrepancy, Effect, Post, Scheduler, View
 from harvey.runner.ports import BodyPort
-from knowledge_sources.action.fault_handler import FaultHandler
+from knowledge_sources.action.fault_handler import (
+    MAX_BROKEN_MOTIONS,
+    MAX_FAULT_S,
+    MAX_RETRY_WAIT_S,
+    MIN_RETRY_WAIT_S,
+    FaultHandler,
+)
 from knowledge_sources.goal.mission_monitor import mission_monitor
 from knowledge_sources.settings import DEFAULT
 from strategies import Note, Scripted
@@ -117,13 +123,13 @@ def test_each_request_is_answered_once_or_the_mission_ends_declared(
 def test_waits_double_and_the_patience_is_the_stated_one(asked: list[str], script: list[str], ever_after: str) -> None:
     body = ScriptedBody(script, ever_after)
     scheduler, told = drive(asked, body)
-    assert all(S.min_retry_wait_s <= wait <= S.max_retry_wait_s for wait in body.waits)
+    assert all(MIN_RETRY_WAIT_S <= wait <= MAX_RETRY_WAIT_S for wait in body.waits)
     last: dict[str, float] = {}
     for r in (e.value for e in told if isinstance(e.value, Recovery) and e.value.status == "asked"):
-        assert r.wait_s == min(2.0 * last.get(r.fault, S.min_retry_wait_s / 2.0), S.max_retry_wait_s)
+        assert r.wait_s == min(2.0 * last.get(r.fault, MIN_RETRY_WAIT_S / 2.0), MAX_RETRY_WAIT_S)
         last[r.fault] = r.wait_s
     for recovery in scheduler.view.all(Recovery):
-        assert recovery.value.waited_s < S.max_fault_s + S.max_retry_wait_s
+        assert recovery.value.waited_s < MAX_FAULT_S + MAX_RETRY_WAIT_S
 
 
 @given(st.lists(st.sampled_from(["", "link lost"]), max_size=12))
@@ -143,12 +149,12 @@ def test_a_stop_key_ends_it_at_once_also_while_something_else_is_wrong() -> None
         assert len(body.waits) == len(script) - 1
 
 
-@pytest.mark.parametrize("whole", [0, S.max_broken_motions - 1])
+@pytest.mark.parametrize("whole", [0, MAX_BROKEN_MOTIONS - 1])
 def test_a_base_that_breaks_off_every_motion_is_given_up(whole: int) -> None:
     """Each fault passes at once, but so many in a row are too many; one whole motion starts the count anew."""
-    script = ["stalled", ""] * (S.max_broken_motions - 1) + [""] * bool(whole) + ["stalled", ""] * S.max_broken_motions
+    script = ["stalled", ""] * (MAX_BROKEN_MOTIONS - 1) + [""] * bool(whole) + ["stalled", ""] * MAX_BROKEN_MOTIONS
     scheduler, told = drive(["move"] * 20, ScriptedBody(script, ""))
     outcome = scheduler.view.latest(Outcome)
-    assert outcome is not None and f"{S.max_broken_motions} motions in a row" in outcome.value.reason
+    assert outcome is not None and f"{MAX_BROKEN_MOTIONS} motions in a row" in outcome.value.reason
     moves = [e for e in told if isinstance(e.value, MotorCommand)]
-    assert len(moves) == (2 * S.max_broken_motions if whole else S.max_broken_motions)
+    assert len(moves) == (2 * MAX_BROKEN_MOTIONS if whole else MAX_BROKEN_MOTIONS)

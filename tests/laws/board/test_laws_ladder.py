@@ -35,6 +35,8 @@ from blackboard import (
 from harvey.runner.world_port import build_scheduler
 from harvey.simulation.simulated_run import build_robot_model
 from harvey.wiring import KNOWLEDGE_SOURCES
+from knowledge_sources.goal.discrepancy_raiser import MAX_CHECKS_PER_SUBGOAL, MAX_LOST_PER_MISSION
+from knowledge_sources.methods.verification import MAX_MILESTONE_LOOKS
 from knowledge_sources.reads import (
     active_goal,
     find_belief,
@@ -127,7 +129,7 @@ class ScriptedJudge(RobotKnowledgeSource):
                            0.0, 0.0, 0.006)
         yield Post(told, (fix, milestone))
         yield Revise(milestone, replace(milestone.value, status=verdict), (fix,))
-        if px == UNTOLD and len(milestone.value.tried) + 1 < DEFAULT.plan.max_looks:
+        if px == UNTOLD and len(milestone.value.tried) + 1 < MAX_MILESTONE_LOOKS:
             return
         magnitude = math.inf if px == UNTOLD else px
         found = Discrepancy(Level.PLAN, "a milestone is elsewhere", magnitude, (0.0, PLAN_PX), "px")
@@ -264,7 +266,7 @@ class Ladder:
                 assert unmeasured_doubt(self.view) is not None and Level.GOAL not in above
                 assert any(reason.id.startswith("Milestone") for reason in entry.because)
             elif isinstance(value, Milestone):
-                assert len(value.tried) < DEFAULT.plan.max_looks
+                assert len(value.tried) < MAX_MILESTONE_LOOKS
             elif isinstance(value, Course) and value.is_rolling:
                 assert not self.is_in_doubt(above)
 
@@ -352,7 +354,7 @@ def test_whatever_pictures_go_on_saying_the_mission_ends_and_says_how(
     ladder.go_on(6000)
     assert ladder.outcome is not None
     raised = [d for d in ladder.seen.values() if d.times]
-    checks, lost = DEFAULT.plan.max_checks_per_subgoal, DEFAULT.plan.max_lost_per_mission
+    checks, lost = MAX_CHECKS_PER_SUBGOAL, MAX_LOST_PER_MISSION
     assert all(d.times <= (checks if d.level is Level.ACTION else lost) for d in raised)
     if track <= ACTION_PX and 0.0 <= milestone <= PLAN_PX:
         assert ladder.outcome.kind == "reached" and not raised
@@ -366,14 +368,14 @@ def test_in_doubt_it_looks_in_other_directions_before_it_is_lost() -> None:
     ladder.go_on(30)
     ladder.body.says.update(track=500.0, milestone=UNTOLD)
     looked: list[float] = []
-    while len(looked) < DEFAULT.plan.max_looks and ladder.outcome is None:
-        if len(looked) == DEFAULT.plan.max_looks - 1:
+    while len(looked) < MAX_MILESTONE_LOOKS and ladder.outcome is None:
+        if len(looked) == MAX_MILESTONE_LOOKS - 1:
             ladder.body.says.update(track=1.0, milestone=1.0)
         ladder.go_on(1)
         milestone = open_milestone(ladder.view)
         if unmeasured_doubt(ladder.view) is not None and milestone is not None and milestone.value.status == "expected":
             looked = [*milestone.value.tried, milestone.value.look_heading_rad]
-    assert len({round(heading, 3) for heading in looked}) == DEFAULT.plan.max_looks
+    assert len({round(heading, 3) for heading in looked}) == MAX_MILESTONE_LOOKS
     ladder.go_on(2000)
     assert ladder.outcome is not None and ladder.outcome.kind == "reached"
     assert not any(d.level is Level.GOAL for d in ladder.seen.values())
@@ -385,7 +387,7 @@ def test_a_robot_that_something_stops_again_and_again_gives_up() -> None:
     ladder.body.is_stuck = True
     ladder.go_on(3000)
     assert ladder.outcome is not None and ladder.outcome.kind == "blocked"
-    assert str(DEFAULT.plan.max_checks_per_subgoal) in ladder.outcome.reason
+    assert str(MAX_CHECKS_PER_SUBGOAL) in ladder.outcome.reason
 
 
 @settings(max_examples=10, deadline=None)

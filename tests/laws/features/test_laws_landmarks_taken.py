@@ -7,15 +7,21 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
 
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.features import read_picture
-from knowledge_sources.methods.tracking import select_landmarks
+from knowledge_sources.methods.tracking import (
+    MAX_LANDMARK_DISTANCE_M,
+    MAX_TRACKS,
+    MIN_SPACING_PX,
+    select_landmarks,
+    template_tracking,
+)
 from knowledge_sources.methods.tracking.template_tracking import _compute_anchor_covariance
-from knowledge_sources.settings import DEFAULT
 from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
@@ -25,7 +31,6 @@ from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
 seeds = st.integers(0, 2**32 - 1)
-TUNING = DEFAULT.tracking
 
 
 @cache
@@ -50,20 +55,20 @@ def test_new_landmarks_are_apart_from_each_other_and_from_those_kept(seed: int, 
     assume(len(first) >= 2)
     kept = tuple(replace(track, found_px=None) if rng.random() < 0.3 else track
                  for track in first if rng.random() < part)
-    few = replace(DEFAULT, tracking=replace(TUNING, max_tracks=most))
-    for taken, tuned in (((), DEFAULT), (kept, DEFAULT), (kept, few)):
-        limit = tuned.tracking.max_tracks
-        new = select_landmarks(robot(), taken, "CameraPicture-2", image, pose, tuned)
+    for taken, limit in (((), MAX_TRACKS), (kept, MAX_TRACKS), (kept, most)):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(template_tracking, "MAX_TRACKS", limit)
+            new = select_landmarks(robot(), taken, "CameraPicture-2", image, pose)
         assert len(new) <= max(0, limit - len(taken))
         at = [track.found_px or track.predicted_px for track in (*taken, *new)]
         for i, here in enumerate(at[len(taken):], len(taken)):
-            assert all(math.dist(here, other) >= TUNING.min_spacing_px for other in at[:i])
+            assert all(math.dist(here, other) >= MIN_SPACING_PX for other in at[:i])
         for track in new:
             point = robot().camera_from_world(pose).apply(np.array(track.point_world))
             assert track.found_px is not None and track.template_frame == "CameraPicture-2"
             np.testing.assert_allclose(robot().camera.project(point), track.found_px, atol=1e-6)
             assert math.isclose(track.template_depth_m, point[2], rel_tol=1e-9)
-            assert track.template_depth_m <= 1.001 * TUNING.max_landmark_distance_m
+            assert track.template_depth_m <= 1.001 * MAX_LANDMARK_DISTANCE_M
 
 
 @given(seed=seeds, count=st.integers(1, 5))

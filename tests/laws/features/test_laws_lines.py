@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -12,11 +11,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from knowledge_sources.methods.arrays import Floats, Image
-from knowledge_sources.methods.features import LineSegments, find_lines
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.methods.features import LineSegments, find_lines, lines
 
 SIZE = 81
-NO_SYSTEMATIC = replace(DEFAULT.features, line_systematic_px=0.005)
 angles = st.floats(0.0, 2.0 * np.pi)
 phases = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
 few = settings(deadline=None, max_examples=25)
@@ -172,7 +169,10 @@ def line_distance(segment: Floats, point: Floats) -> float:
 
 
 @pytest.mark.parametrize(("noise", "contrast", "quality"), [(4.0, 60.0, None), (2.0, 30.0, 90), (6.0, 40.0, None)])
-def test_the_standard_deviations_are_true(noise: float, contrast: float, quality: int | None) -> None:
+def test_the_standard_deviations_are_true(
+    noise: float, contrast: float, quality: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lines, "LINE_SYSTEMATIC_PX", 0.005)
     rng = np.random.default_rng(7)
     offsets, turns = [], []
     for _ in range(80):
@@ -182,7 +182,7 @@ def test_the_standard_deviations_are_true(noise: float, contrast: float, quality
             coded = cv2.imencode(".jpg", seen, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
             seen = np.asarray(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE), np.uint8)
         predicted = prediction(point, normal, rng.uniform(-5, 5), rng.uniform(-0.08, 0.08))
-        found = find_lines(seen, predicted, settings=NO_SYSTEMATIC)
+        found = find_lines(seen, predicted)
         k = longest(found)
         error = off_line(found, point, normal)
         offsets.append(error.mean() / found.sigma_offset_px[k])

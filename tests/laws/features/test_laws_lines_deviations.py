@@ -5,7 +5,6 @@ Edges and corners are drawn in closed form, seen through a blurring lens and a n
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -15,12 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_sources.methods.arrays import Floats, Image
-from knowledge_sources.methods.features import LineSegments, find_lines
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.methods.features import LineSegments, find_lines, lines
 
 SIZE = 81
 SIGMA_END_PX = 0.7
-NO_SYSTEMATIC = replace(DEFAULT.features, line_systematic_px=0.005)
 LOOKS = [(4.0, 60.0, None), (2.0, 30.0, 90), (6.0, 40.0, None)]
 
 
@@ -59,8 +56,9 @@ def off_and_turn(found: LineSegments, point: Floats, normal: Floats) -> tuple[fl
 @pytest.mark.parametrize(("noise", "contrast", "quality"), LOOKS)
 @pytest.mark.parametrize("focused", [False, True])
 def test_two_thirds_lie_within_one_deviation_and_nearly_all_within_two(
-    noise: float, contrast: float, quality: int | None, focused: bool
+    noise: float, contrast: float, quality: int | None, focused: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(lines, "LINE_SYSTEMATIC_PX", 0.005)
     rng = np.random.default_rng(11)
     errors = []
     for _ in range(100):
@@ -69,7 +67,7 @@ def test_two_thirds_lie_within_one_deviation_and_nearly_all_within_two(
         picture = seen(100.0 + contrast * share_beyond(point, normal), noise, quality, rng)
         along = 28.0 * np.array([-normal[1], normal[0]])
         near = predictions(np.array([[point - along, point + along]]), rng) if focused else None
-        errors.append(off_and_turn(find_lines(picture, near, settings=NO_SYSTEMATIC), point, normal))
+        errors.append(off_and_turn(find_lines(picture, near), point, normal))
     sizes = np.abs(errors)
     assert np.all(np.abs(np.mean(errors, axis=0)) < 0.35)  # unbiased
     assert np.all((np.mean(sizes < 1.0, axis=0) > 0.5) & (np.mean(sizes < 1.0, axis=0) < 0.88))

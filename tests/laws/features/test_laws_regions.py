@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_sources.methods.arrays import Image
-from knowledge_sources.methods.features import segment_regions
+from knowledge_sources.methods.features import MAX_VALLEY_SHARE, MIN_MODE_SHARE, segment_regions
 from knowledge_sources.methods.features.regions import find_histogram_valleys
-from knowledge_sources.settings import DEFAULT
 
 few = settings(deadline=None, max_examples=20)
 seeds = st.integers(0, 10_000)
@@ -87,16 +86,15 @@ def test_two_modes_are_parted_between_them(low: int, gap: int, spread: float, sh
 @given(st.sampled_from([-1, 1]), st.booleans())
 def test_a_valley_needs_so_many_pixels_on_each_side_and_to_be_so_low(side: int, is_share: bool) -> None:
     """Just below and just above the least share of a mode, and the greatest share of the lower peak."""
-    tuning = DEFAULT.features
     total = 20_000
     if is_share:
-        fewer = int((tuning.min_mode_share * (1.0 + 0.05 * side)) * total)
+        fewer = int((MIN_MODE_SHARE * (1.0 + 0.05 * side)) * total)
         levels = np.concatenate([np.full(total - fewer, 50), np.full(fewer, 200)])
         is_valley = side > 0
     else:
         weights = np.ones(41)
         weights[24:] = 2.0  # the lower peak counts
-        weights[17:24] = tuning.max_valley_share * (1.0 + 0.05 * side)  # as wide as the smoothing: its bottom stays
+        weights[17:24] = MAX_VALLEY_SHARE * (1.0 + 0.05 * side)  # as wide as the smoothing: its bottom stays
         counts = np.rint(weights * 400).astype(int)
         levels = np.repeat(40 + 4 * np.arange(41), counts)
         is_valley = side < 0

@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 
 from consistency import assert_consistent, compute_error, compute_nees
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.methods.tracking import action_px, correct_pose, follow_landmarks, template_tracking
+from knowledge_sources.methods.tracking import (
+    TOLERANCE_SIGMAS,
+    action_px,
+    correct_pose,
+    follow_landmarks,
+    template_tracking,
+)
 from knowledge_sources.methods.tracking.template_tracking import (
     MAX_SCALE,
     MAX_SEARCH_PX,
@@ -114,7 +120,7 @@ def test_the_tolerance_is_what_the_belief_leaves_open_up_to_the_plans_bound(
     """By moving the believed camera by so many deviations, and looking how far the landmark goes in the picture."""
     s, focal_px = DEFAULT.action, build_robot().camera.fx
     aside_px, turned_px = focal_px * sigma_m / ahead_m, focal_px * math.tan(sigma_rad)
-    open_px = s.min_tolerance_px + s.tolerance_sigmas * math.hypot(aside_px, turned_px)
+    open_px = s.min_tolerance_px + TOLERANCE_SIGMAS * math.hypot(aside_px, turned_px)
     assert compute_tolerance_px(sigma_m, sigma_rad, ahead_m) == pytest.approx(
         min(open_px, DEFAULT.plan.max_deviation_px), rel=1e-3)
 
@@ -122,7 +128,7 @@ def test_the_tolerance_is_what_the_belief_leaves_open_up_to_the_plans_bound(
 def test_the_tolerance_ends_at_the_plans_bound_and_not_before() -> None:
     """Just below the bound, and far beyond: no belief is so loose that the action level may correct more."""
     s, most_px = DEFAULT.action, DEFAULT.plan.max_deviation_px
-    at_bound = math.atan((most_px - s.min_tolerance_px) / s.tolerance_sigmas / build_robot().camera.fx)
+    at_bound = math.atan((most_px - s.min_tolerance_px) / TOLERANCE_SIGMAS / build_robot().camera.fx)
     assert compute_tolerance_px(0.0, 0.98 * at_bound, 3.0) == pytest.approx(most_px, rel=0.03)
     assert compute_tolerance_px(0.0, 0.98 * at_bound, 3.0) < most_px
     for more in (1.02, 2.0, 10.0):

@@ -18,7 +18,6 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import MotionBetween, Seen, is_telling, see_free_floor
 from knowledge_sources.methods.floor.model_floor import build_floor_grid, predict_model_floor
 from knowledge_sources.methods.floor.relief import FLAT, STANDING, UNTOLD, Modelled, Relief, TwoPictures
-from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries import FreeFloor
@@ -128,7 +127,7 @@ def test_a_texture_of_the_floor_is_no_thing_and_the_floor_is_seen_free(
     texture: Texture, seed: int, turned_rad: float
 ) -> None:
     floor = see(texture, seed, turned_rad)
-    assert not any(is_telling(thing, DEFAULT.action) for thing in floor.things)
+    assert not any(is_telling(thing) for thing in floor.things)
     far_m = np.array(floor.far_m)
     assert (far_m > floor.near_m).mean() > 0.8 and (far_m[np.array(floor.ends) == "thing"] > 2.5).all()
 

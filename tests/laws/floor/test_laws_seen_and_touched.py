@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generated_boards import HALL, house, plain_robot, to_world
-from knowledge_sources.methods.floor import Sight, build_polygon, see_ranges, touch_again
+from knowledge_sources.methods.floor import MIN_OBSTACLE_CERTAINTY, Sight, build_polygon, see_ranges, touch_again
 from knowledge_sources.methods.floor.found_things import find_same
 from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M
 from knowledge_sources.methods.floor.thing_shapes import ThingShape
@@ -127,7 +127,7 @@ def test_only_from_elsewhere_it_is_further_evidence(p: float, way_m: float, stat
     odds = 0.4 / 0.6 * p / (1.0 - p)
     wanted = p if status == "gone" else odds / (1.0 + odds) if way_m else max(p, 0.4)
     assert new.certainty == pytest.approx(min(wanted, DEFAULT.action.max_obstacle_certainty))
-    is_there = status == "there" or new.certainty >= DEFAULT.action.min_obstacle_certainty
+    is_there = status == "there" or new.certainty >= MIN_OBSTACLE_CERTAINTY
     assert new.status == ("there" if is_there else "suspected")
 
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from blackboard import Discrepancy, Level, Post, Revise
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.floor import MIN_OBSTACLE_CERTAINTY, MIN_THING_CERTAINTY
 from knowledge_sources.methods.floor.weigh_sight import FREE_FLOOR_ODDS
 from knowledge_sources.reads import find_building_as_filed
 from knowledge_sources.reads.floor_ahead import PUT_DOWN_FREE_M, list_free_discs
@@ -242,7 +243,7 @@ def total_length(segments: Floats) -> float:
 
 def test_the_numbers_fit_together() -> None:
     s = DEFAULT.action
-    assert s.min_thing_certainty < s.min_obstacle_certainty < s.max_obstacle_certainty
+    assert MIN_THING_CERTAINTY < MIN_OBSTACLE_CERTAINTY < s.max_obstacle_certainty
     odds = s.max_obstacle_certainty / (1.0 - s.max_obstacle_certainty) * FREE_FLOOR_ODDS**2
     assert odds < s.min_gone_certainty / (1.0 - s.min_gone_certainty)  # two pictures are enough
 

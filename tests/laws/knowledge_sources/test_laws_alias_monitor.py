@@ -25,16 +25,21 @@ from generated_boards import (
     wakes,
 )
 from knowledge_sources.methods.localization import (
+    ALIKE_LOG_NOISE,
+    LOST_AGAIN_ODDS,
     MIN_NEW_VIEW_RAD,
+    MIN_P_TRACKED,
     MOVE_M,
+    P_TOLD,
     CameraView,
     compute_pose_likelihood,
     make_alias_test,
 )
 from knowledge_sources.methods.verification import predict_lines
+from knowledge_sources.reads.place_believed import MIN_P_TWIN
+from knowledge_sources.relocalizer import alias_monitor
 from knowledge_sources.relocalizer.alias_monitor import AliasMonitor
 from knowledge_sources.relocalizer.pose_adopter import pose_adopter
-from knowledge_sources.settings import DEFAULT
 from world_models.entries import (
     Certificate,
     Hypothesis,
@@ -51,13 +56,17 @@ from world_models.entries import (
 )
 from world_models.frames import Pose2, wrap_angle
 
-SOURCE, S, ROBOT, SMALL = AliasMonitor(), DEFAULT.localization, plain_robot(), 1e-6
-EVERY_TWIN = AliasMonitor(replace(DEFAULT, localization=replace(S, min_p_twin=0.0)))
-"""It keeps a twin in mind however unlikely that is."""
+SOURCE, ROBOT, SMALL = AliasMonitor(), plain_robot(), 1e-6
 HERE = to_world(Pose2(2.0, 2.0, 0.0))
 SAME = Pose2(0.0, 0.0, 0.0)
 """A twin at the very same place: what the picture says of it is what it says of the believed one."""
 BARE = np.zeros((0, 2, 2))
+
+
+@pytest.fixture()
+def keeps_every_twin(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A twin is kept in mind however unlikely it is."""
+    monkeypatch.setattr(alias_monitor, "MIN_P_TWIN", 0.0)
 
 
 def verify(
@@ -77,7 +86,7 @@ def say(seen: np.ndarray, here: Pose2, there: Pose2) -> float:
     """By how much a picture is likelier there than here [log], less what is noise where both look alike."""
     view, unmoved = CameraView(seen, Pose2(0.0, 0.0, 0.0), np.zeros((3, 3))), Pose2(0.0, 0.0, 0.0)
     one, other = (compute_pose_likelihood(ROBOT, [view], pose).log_likelihood for pose in (here, there))
-    noise = S.alike_log_noise * make_alias_test(ROBOT, [unmoved])(here, there)
+    noise = ALIKE_LOG_NOISE * make_alias_test(ROBOT, [unmoved])(here, there)
     return math.copysign(max(abs(other - one) - noise, 0.0), other - one)
 
 
@@ -100,15 +109,15 @@ def test_each_place_is_weighed_by_its_own_pictures(ratios: list[float], p_prior:
     share = (1.0 - p_prior) / len(ratios)
     weights = [p_prior, *(share * math.exp(ratio) for ratio in ratios)]
     own, *others = (weight / sum(weights) for weight in weights)
-    assume(all(abs(p - S.min_p_twin) > 1e-9 for p in others) and abs(own - S.min_p_tracked) > 1e-9)
+    assume(all(abs(p - MIN_P_TWIN) > 1e-9 for p in others) and abs(own - MIN_P_TRACKED) > 1e-9)
     found = effect.value
     assert effect.entry.id == old.id and found.probability == pytest.approx(own)
-    assert [t.locale for t in found.twins] == [f"twin-{k}" for k, p in enumerate(others) if p >= S.min_p_twin]
+    assert [t.locale for t in found.twins] == [f"twin-{k}" for k, p in enumerate(others) if p >= MIN_P_TWIN]
     assert all(t.log_ratio == pytest.approx(ratios[int(t.locale[5:])]) for t in found.twins)
     assert (found.p_prior, found.counted, found.last) == (p_prior, ("Certificate-9", certificate.id), HERE)
     assert reasons(effect) == {certificate.id, "PoseFix-1", "Segments-1", belief.id, old.id}
     doubts = made(effects, Discrepancy)
-    assert bool(doubts) == (own < S.min_p_tracked)
+    assert bool(doubts) == (own < MIN_P_TRACKED)
     if doubts:
         assert (doubts[0].level, doubts[0].magnitude) == (Level.GOAL, None)
         assert reasons(effect_on(effects, Discrepancy)) == {"TwinOdds"}
@@ -130,11 +139,12 @@ def test_the_first_time_the_odds_are_those_that_were_told() -> None:
     bench = Bench(plain_robot())
     bench.believe()
     found = effect_on(bench.ask(SOURCE, verify(bench)), TwinOdds).value
-    assert found.p_prior == pytest.approx(S.p_told) and len(found.counted) == 1
+    assert found.p_prior == pytest.approx(P_TOLD) and len(found.counted) == 1
 
 
 @pytest.mark.parametrize("there", [Pose2(5.2, 2.3, -1.2), Pose2(4.1, 1.7, 0.6), Pose2(9.5, 1.0, 2.8)])
 @pytest.mark.parametrize("seen_from", ["here", "there", "between"])
+@pytest.mark.usefixtures("keeps_every_twin")
 def test_each_is_weighed_where_the_robot_would_be_there(there: Pose2, seen_from: str) -> None:
     """Wherever it has driven since the twin was found; between places that look alike what is noise says nothing."""
     here, other = to_world(Pose2(3.2, 1.8, 1.9)), to_world(there)
@@ -144,11 +154,12 @@ def test_each_is_weighed_where_the_robot_would_be_there(there: Pose2, seen_from:
     bench.believe(Pose2(3.2, 1.8, 1.9))
     twin = Twin(HALL, other @ here.inverse(), 0.7)
     bench.put(TwinOdds(0.5, 0.9, (twin,), ("Certificate-9",), Pose2(HERE.x_m - 3.0, HERE.y_m, 0.0)))
-    (found,) = effect_on(bench.ask(EVERY_TWIN, verify(bench, here, seen=seen)), TwinOdds).value.twins
+    (found,) = effect_on(bench.ask(SOURCE, verify(bench, here, seen=seen)), TwinOdds).value.twins
     assert found.there_from_here == twin.there_from_here
     assert found.log_ratio == pytest.approx(0.7 + say(seen, here, other))
 
 
+@pytest.mark.usefixtures("keeps_every_twin")
 def test_what_is_noise_between_places_that_look_alike_says_nothing() -> None:
     """The hall is the same turned round; a few centimetres aside a picture is likelier at one of both than it may."""
     here = to_world(Pose2(3.2, 1.8, -2.4))
@@ -160,18 +171,19 @@ def test_what_is_noise_between_places_that_look_alike_says_nothing() -> None:
             bench = Bench(ROBOT)
             bench.believe(Pose2(3.2, 1.8, -2.4))
             bench.put(TwinOdds(0.5, 0.9, (Twin(HALL, other @ here.inverse(), 0.0),), (), Pose2(0.0, 0.0, 0.0)))
-            (found,) = effect_on(bench.ask(EVERY_TWIN, verify(bench, here, seen=seen)), TwinOdds).value.twins
+            (found,) = effect_on(bench.ask(SOURCE, verify(bench, here, seen=seen)), TwinOdds).value.twins
             assert found.log_ratio == pytest.approx(say(seen, here, other))
             told.append(found.log_ratio)
     assert min(told) < 0.0 < max(told) and told.count(0.0) > 0
 
 
 @pytest.mark.parametrize("pose", [Pose2(6.0, 2.6, 1.4), Pose2(3.0, 1.1, -2.0), Pose2(6.8, 3.0, 3.0)])
+@pytest.mark.usefixtures("keeps_every_twin")
 def test_twins_are_where_walls_and_doors_are_as_here(pose: Pose2) -> None:
     """The hall turned round, and behind its door what lies to that as the robot does; each goes with the robot."""
     bench, here = Bench(ROBOT), to_world(pose)
     bench.believe(pose)
-    twins = effect_on(bench.ask(EVERY_TWIN, verify(bench, here)), TwinOdds).value.twins
+    twins = effect_on(bench.ask(SOURCE, verify(bench, here)), TwinOdds).value.twins
     wanted = [
         (HALL, Pose2(LENGTH_M - pose.x_m, WIDTH_M - pose.y_m, pose.heading_rad + math.pi)),
         (STUDY, Pose2(LENGTH_M + 8.2 - pose.x_m, WIDTH_M - pose.y_m, pose.heading_rad + math.pi)),
@@ -227,7 +239,7 @@ def test_a_place_that_was_believed_by_odds_and_refuted_is_believed_less(refuted:
     bench.believe()
     bench.put(PlaceOdds(HALL, 2, "told", 0.9, 0.99, refuted))
     found = effect_on(bench.ask(SOURCE, verify(bench)), TwinOdds).value
-    odds = S.p_told / (1.0 - S.p_told) * S.lost_again_odds**refuted
+    odds = P_TOLD / (1.0 - P_TOLD) * LOST_AGAIN_ODDS**refuted
     assert found.p_prior == pytest.approx(odds / (1.0 + odds))
 
 

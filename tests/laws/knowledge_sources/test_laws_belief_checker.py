@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 
 from blackboard import Discrepancy, Entry, Level
 from generated_boards import Bench, effect_on, plain_robot, poses, reasons, to_world
-from knowledge_sources.methods.verification import turn_headings
+from knowledge_sources.methods.verification import MIN_MATCHED_LINES, turn_headings
 from knowledge_sources.milestone_selector.belief_checker import BeliefChecker
 from knowledge_sources.reads import list_told
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.reads.looks import MAX_LOOK_LOG_ODDS
 from world_models.entries import Certificate, Milestone, Outcome
 from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2, wrap_angle
 
 SOURCE = BeliefChecker()
-FEW = DEFAULT.verification.min_matched_lines
+FEW = MIN_MATCHED_LINES
 
 
 def doubtful(pose: Pose2 | None = None) -> tuple[Bench, Entry[Discrepancy]]:
@@ -61,7 +61,7 @@ def test_the_second_is_another_view_and_never_one_that_was_tried() -> None:
 def test_where_all_was_tried_it_looks_as_it_stands(left_out: int) -> None:
     bench, doubt = doubtful()
     here = to_world(Pose2(2.0, 2.0, 0.0))
-    around = turn_headings(here, DEFAULT)
+    around = turn_headings(here)
     tried = (*around[:len(around) - left_out], here.heading_rad)
     bench.revise(bench.await_milestone(look_heading_rad=tried[-1], tried=tried[:-1]), status="not testable")
     check = effect_on(bench.ask(SOURCE, doubt), Milestone).value
@@ -108,8 +108,8 @@ def test_each_look_is_told_by_what_it_said_alone(before: list[float], p_false: f
     last = bench.await_milestone(look_heading_rad=tried[-1], tried=tried[:-1], told=tuple(before),
                                  status="not testable")
     certify(bench, last.id, p_false, matched)
-    told = list_told(bench.view, Milestone("", -1, "", 9.0, tried=tried), DEFAULT)
-    p, most = min(max(p_false, 1e-12), 1.0 - 1e-12), DEFAULT.plan.max_told
+    told = list_told(bench.view, Milestone("", -1, "", 9.0, tried=tried))
+    p, most = min(max(p_false, 1e-12), 1.0 - 1e-12), MAX_LOOK_LOG_ODDS
     said = min(max(math.log(p / (1.0 - p)), -most), most) if matched >= FEW else 0.0
     assert told == pytest.approx((*before, said))
 
@@ -117,10 +117,10 @@ def test_each_look_is_told_by_what_it_said_alone(before: list[float], p_false: f
 def test_nothing_was_told_without_a_look_or_by_the_verdict_on_another() -> None:
     bench = Bench()
     fresh, again = (Milestone("", -1, "", 1.0, tried=tried) for tried in ((), (0.0,)))
-    assert list_told(bench.view, again, DEFAULT) == (0.0,)
+    assert list_told(bench.view, again) == (0.0,)
     last = bench.await_milestone(status="not testable")
-    assert list_told(bench.view, again, DEFAULT) == (0.0,)
+    assert list_told(bench.view, again) == (0.0,)
     certify(bench, last.id, 0.1, 20)
-    assert list_told(bench.view, fresh, DEFAULT) == () and list_told(bench.view, again, DEFAULT)[0] < 0.0
+    assert list_told(bench.view, fresh) == () and list_told(bench.view, again)[0] < 0.0
     certify(bench, "Milestone-9", 0.1, 20)
-    assert list_told(bench.view, again, DEFAULT) == (0.0,)
+    assert list_told(bench.view, again) == (0.0,)

@@ -11,14 +11,20 @@ from hypothesis import strategies as st
 
 from blackboard import Entry, Posted, Revise
 from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
-from knowledge_sources.methods.calibration import compute_camera_covariance
+from knowledge_sources.methods.calibration import (
+    LEAST_SIGMA_CENTRE_PX,
+    LEAST_SIGMA_FOCAL,
+    LEAST_SIGMA_M,
+    LEAST_SIGMA_RAD,
+    MAX_COUNTED,
+    compute_camera_covariance,
+)
 from knowledge_sources.robot.camera_calibrator import CameraCalibrator
-from knowledge_sources.settings import DEFAULT
 from world_models.entries import CameraState, Certificate, MilestoneVerdict, PoseFix, Travel, begin_travel, diagonal
 from world_models.frames import Pose2
 
-SOURCE, S = CameraCalibrator(), DEFAULT.camera_state
-FLOORS = (S.floor_rad, S.floor_rad, S.floor_rad, S.floor_m, S.floor_focal, S.floor_centre_px, S.floor_centre_px)
+SOURCE = CameraCalibrator()
+FLOORS = (*(LEAST_SIGMA_RAD,) * 3, LEAST_SIGMA_M, LEAST_SIGMA_FOCAL, LEAST_SIGMA_CENTRE_PX, LEAST_SIGMA_CENTRE_PX)
 YAW = 2
 HERE = Pose2(3.0, 1.5, 0.4)
 small = st.floats(-0.02, 0.02)
@@ -58,20 +64,20 @@ def test_the_camera_is_moved_by_the_step_and_no_surer_than_lines_may_make_it(
 def test_so_many_looks_are_remembered_and_what_was_told_first() -> None:
     bench = Bench(plain_robot())
     told = bench.view["CameraState-1"].value
-    for number in range(S.counted + 3):
+    for number in range(MAX_COUNTED + 3):
         _, certificate = verify(bench, (1e-3,) + (0.0,) * 6, (0.01,) * 7, Pose2(float(number), 0.0, 0.0))
         bench.apply(*bench.ask(SOURCE, certificate) or ())
     now = bench.view["CameraState-1"].value
-    assert [look[0] for look in now.counted] == [float(n) for n in range(3, S.counted + 3)]
+    assert [look[0] for look in now.counted] == [float(n) for n in range(3, MAX_COUNTED + 3)]
     assert now.as_told().mount == told.mount
-    assert now.mount.tilt_rad == pytest.approx(told.mount.tilt_rad + 1e-3 * (S.counted + 3))
+    assert now.mount.tilt_rad == pytest.approx(told.mount.tilt_rad + 1e-3 * (MAX_COUNTED + 3))
 
 
 @pytest.mark.parametrize("more", [-1e-6, 1e-6])
 def test_only_where_the_yaw_is_less_sure_than_before_does_its_way_end(more: float) -> None:
     bench = Bench(plain_robot())
     camera = bench.view["CameraState-1"].value
-    before = math.sqrt(compute_camera_covariance(camera, S)[YAW, YAW])
+    before = math.sqrt(compute_camera_covariance(camera)[YAW, YAW])
     travel = bench.put(begin_travel(Pose2(0.0, 0.0, 0.0), diagonal(0.1, 0.1), 0.0, 0.1))
     sigmas = [0.01] * 7
     sigmas[YAW] = before + more

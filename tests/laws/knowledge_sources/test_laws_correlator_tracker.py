@@ -23,13 +23,17 @@ from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.action import correlator_tracker
 from knowledge_sources.action.correlator_tracker import (
     ENOUGH_LANDMARKS,
+    MAX_MISSES,
+    MIN_AGREEING_LANDMARKS,
+    MIN_AGREEING_PART,
     MIN_DRIFT_STRETCH_M,
+    MIN_EXPECTED_LANDMARKS,
     MIN_LANDMARKS,
     MIN_REMAINING_PART,
     CorrelatorTracker,
 )
 from knowledge_sources.methods.features import read_picture
-from knowledge_sources.methods.tracking import select_landmarks
+from knowledge_sources.methods.tracking import TEMPLATE_HALF_PX, TOLERANCE_SIGMAS, edge_alignment, select_landmarks
 from knowledge_sources.settings import DEFAULT
 from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
@@ -54,9 +58,6 @@ ROOM = "robot-laboratory"
 SURE, TURNED = diagonal(0.004, 0.001), diagonal(0.004, 0.02)
 TURN_RAD, SLIP_RAD = math.radians(3.0), math.radians(0.6)
 """It turns by the first, and believes to have turned by less."""
-ACTION = DEFAULT.action
-NO_EDGES = replace(DEFAULT, tracking=replace(DEFAULT.tracking, min_edge_lines=10**6))
-"""So that only landmarks correct the belief."""
 
 
 class Setting(NamedTuple):
@@ -90,10 +91,10 @@ def setting() -> Setting:
         start = Pose2(x_m, y_m, rng.uniform(-3.0, 3.0))
         end = Pose2(start.x_m, start.y_m, start.heading_rad + TURN_RAD)
         before = picture(start)
-        found = select_landmarks(robot, (), "CameraPicture-1", read_picture(before).grey, start, DEFAULT)
+        found = select_landmarks(robot, (), "CameraPicture-1", read_picture(before).grey, start)
         half = robot.camera.width / 2
         inside = tuple(track for track in found if abs(place_px(robot, end, track)[0] - half) < half - 60)
-        if len(inside) >= 2 * ACTION.min_expected_landmarks:
+        if len(inside) >= 2 * MIN_EXPECTED_LANDMARKS:
             return Setting(before, picture(end), inside, start, end)
     raise AssertionError("expected a place with enough landmarks")
 
@@ -130,13 +131,15 @@ def follow(
           Post(Hypothesis.of_world(world, ROOM, believed, np.array(TURNED), "odometry")),
           Post(CameraPicture(seen.before, 0, 0.0)))
     anchor = Anchor("CameraPicture-1", seen.start.x_m, seen.start.y_m, covariance_tuple(np.array(SURE)))
-    apply(Post(Tracks("CameraPicture-1", DEFAULT.tracking.template_half_px, tuple(tracks), (anchor,),
+    apply(Post(Tracks("CameraPicture-1", TEMPLATE_HALF_PX, tuple(tracks), (anchor,),
                       len(tracks) if taken is None else taken, unseen)))
     for value in (drift, doubt, *floors):
         if value is not None:
             apply(Post(value))
     (picture,) = apply(Post(CameraPicture(compress_jpeg(image, 95), 1, 1.0, "track")))
-    effects = answer(CorrelatorTracker(NO_EDGES), board.view, picture)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(edge_alignment, "MIN_EDGE_LINES", 10**6)  # so that only landmarks correct the belief
+        effects = answer(CorrelatorTracker(), board.view, picture)
     assert effects is not None
     return list(effects)
 
@@ -153,20 +156,20 @@ def discrepancies(effects: Sequence[Effect]) -> list[Discrepancy]:
     return [value for value in written(effects) if isinstance(value, Discrepancy)]
 
 
-@pytest.mark.parametrize("found", [ACTION.min_agreeing_landmarks - 1, ACTION.min_agreeing_landmarks])
+@pytest.mark.parametrize("found", [MIN_AGREEING_LANDMARKS - 1, MIN_AGREEING_LANDMARKS])
 def test_so_many_landmarks_must_agree_that_one_alone_corrects_nothing(found: int) -> None:
-    assert ACTION.min_agreeing_landmarks >= 2
+    assert MIN_AGREEING_LANDMARKS >= 2
     corrected = corrections(follow(found))
-    assert len(corrected) == (found >= ACTION.min_agreeing_landmarks)
+    assert len(corrected) == (found >= MIN_AGREEING_LANDMARKS)
     for belief in corrected:
         off_rad = belief.world_from_robot(stage().world).heading_rad
         assert abs(off_rad - setting().end.heading_rad) < 0.2 * SLIP_RAD
 
 
-@pytest.mark.parametrize("hidden", [ACTION.min_expected_landmarks - 1, ACTION.min_expected_landmarks])
+@pytest.mark.parametrize("hidden", [MIN_EXPECTED_LANDMARKS - 1, MIN_EXPECTED_LANDMARKS])
 def test_tracking_has_failed_where_enough_landmarks_are_expected_and_none_is_found(hidden: int) -> None:
     found = discrepancies(follow(0, hidden))
-    has_failed = hidden >= ACTION.min_expected_landmarks
+    has_failed = hidden >= MIN_EXPECTED_LANDMARKS
     assert [one.level for one in found if one.magnitude == math.inf] == [Level.ACTION] * has_failed
 
 
@@ -186,8 +189,8 @@ def test_no_landmark_in_three_pictures_and_no_floor_where_it_should_be_is_a_doub
 
 
 def test_tracking_has_failed_where_too_small_a_part_of_them_agrees() -> None:
-    expected = 2 * ACTION.min_expected_landmarks
-    least = math.ceil(ACTION.min_agreeing_part * expected)
+    expected = 2 * MIN_EXPECTED_LANDMARKS
+    least = math.ceil(MIN_AGREEING_PART * expected)
     for agreeing in (least - 1, least):
         found = discrepancies(follow(agreeing, expected - agreeing))
         assert (math.inf in [one.magnitude for one in found]) == (agreeing < least)
@@ -195,11 +198,11 @@ def test_tracking_has_failed_where_too_small_a_part_of_them_agrees() -> None:
 
 def test_a_landmark_is_dropped_when_it_was_missed_so_often_in_a_row() -> None:
     hidden = 1
-    for misses in (ACTION.max_misses - 2, ACTION.max_misses - 1):
+    for misses in (MAX_MISSES - 2, MAX_MISSES - 1):
         effects = follow(2, hidden, misses)
         (tracks,) = (value for value in written(effects) if isinstance(value, Tracks))
         kept = [track for track in tracks.items if track.template_frame == "CameraPicture-1"]
-        assert len(kept) == 2 + (misses + 1 < ACTION.max_misses)
+        assert len(kept) == 2 + (misses + 1 < MAX_MISSES)
 
 
 def test_what_is_told_rests_on_the_picture_the_belief_and_the_landmarks() -> None:
@@ -222,7 +225,7 @@ def test_the_difference_is_the_median_shift_and_its_bound_that_of_the_belief() -
     assert found.magnitude == pytest.approx(sorted(shifts)[3], abs=0.5)
     ahead = [float(robot.camera_from_world(believed).apply(np.array(t.point_world))[2]) for t in seen.tracks[:7]]
     spread = math.hypot(0.02, 0.004 / sorted(ahead)[3])
-    bound = ACTION.min_tolerance_px + ACTION.tolerance_sigmas * robot.camera.fx * spread
+    bound = DEFAULT.action.min_tolerance_px + TOLERANCE_SIGMAS * robot.camera.fx * spread
     assert found.bounds == (pytest.approx(min(bound, DEFAULT.plan.max_deviation_px)), DEFAULT.plan.max_deviation_px)
     assert found.level is Level.ACTION and found.unit == "px" and found.what.startswith("7 landmarks are ")
 
@@ -273,7 +276,7 @@ def test_few_landmarks_are_added_to_and_many_are_not() -> None:
 
 
 def test_the_part_that_must_agree_is_enough() -> None:
-    assert ACTION.min_agreeing_part * 6 == 2.0
+    assert MIN_AGREEING_PART * 6 == 2.0
     assert math.inf not in [one.magnitude for one in discrepancies(follow(2, 4))]
 
 
@@ -284,7 +287,7 @@ def test_landmarks_are_taken_anew_where_fewer_are_left_than_serve(
 ) -> None:
     """Those count that should be in sight, were not missed too often, and whose template is of near here."""
     least = max(MIN_LANDMARKS, math.ceil(min(ENOUGH_LANDMARKS, MIN_REMAINING_PART * taken)))
-    most = DEFAULT.action.max_misses
+    most = MAX_MISSES
 
     def follow(expected: bool, misses: int, frame: str) -> Any:
         return SimpleNamespace(expected=expected, track=SimpleNamespace(misses=misses, template_frame=frame))

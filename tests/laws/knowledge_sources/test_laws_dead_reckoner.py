@@ -29,6 +29,7 @@ from generated_boards import (
     to_world,
 )
 from knowledge_sources.action.dead_reckoner import MIN_CLAIMED_PART, DeadReckoner
+from knowledge_sources.methods.calibration import SIGMA_YAW_RAD
 from knowledge_sources.reads import PLACED_BY
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
@@ -48,7 +49,7 @@ from world_models.entries.location import Covariance
 from world_models.frames import Pose2
 
 ACTUATOR = ActuatorModel()
-YAW_VARIANCE = DEFAULT.camera_state.sigma_yaw_rad**2
+YAW_VARIANCE = SIGMA_YAW_RAD**2
 SMALL = 1e-6
 turns, moves = st.floats(-0.6, 0.6), st.floats(0.0, 0.6)
 bends = st.none() | st.floats(-0.03, 0.03)

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from acting import answer
 from blackboard import Blackboard, Entry, Post, Revise, Revised, View
 from generated_boards import HALL, STUDY, Bench, made, plain_robot, reasons, to_world
+from knowledge_sources.methods.motion import CLEARANCES_M
 from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M
 from knowledge_sources.model.dependency_withdrawer import DependencyWithdrawer
-from knowledge_sources.settings import DEFAULT
 from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.entries import Milestone, Obstacle, Place, PlanSketch, Subgoal, Track, Tracks
 from world_models.entries.task import MilestoneStatus
@@ -84,7 +84,7 @@ def test_what_rested_on_a_frame_is_withdrawn_and_nothing_else(
 
 # What blocks a way, or has led round it: on boards of the plain house, the sketch along the middle of the hall.
 
-LEAST_M, MOST_M = DEFAULT.plan.clearances_m[-1], DEFAULT.plan.clearances_m[0]
+LEAST_M, MOST_M = CLEARANCES_M[-1], CLEARANCES_M[0]
 RADIUS_M = plain_robot().radius_m
 SMALL = 1e-3
 FROM, MIDDLE, TO = Place(HALL, 1.0, 2.0), Place(HALL, 4.0, 2.0), Place(HALL, 7.0, 2.0)

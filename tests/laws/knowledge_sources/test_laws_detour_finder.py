@@ -6,7 +6,7 @@ import pytest
 
 from blackboard import Entry, Posted, Revised
 from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, wakes
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.reads.sketches import MAX_ADJUSTMENTS
 from knowledge_sources.sketcher.detour_finder import DetourFinder
 from world_models.entries import Impasse, Leg, Place, PlanSketch
 from world_models.entries.task import LegStatus
@@ -14,7 +14,7 @@ from world_models.frames import Pose2
 
 SOURCE = DetourFinder()
 FROM, TO = Place(HALL, 1.0, 2.0), Place(HALL, 6.0, 2.0)
-MOST = DEFAULT.plan.max_adjustments
+MOST = MAX_ADJUSTMENTS
 
 
 def halt(halts: int = 0, aim: Place = TO) -> tuple[Bench, Entry[Leg]]:

@@ -8,13 +8,12 @@ from hypothesis import strategies as st
 
 from blackboard import Discrepancy, Level, Posted, Revise
 from generated_boards import Bench, effect_on, made, reasons, wakes
-from knowledge_sources.goal.discrepancy_raiser import DiscrepancyRaiser
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.goal.discrepancy_raiser import MAX_CHECKS_PER_SUBGOAL, MAX_LOST_PER_MISSION, DiscrepancyRaiser
 from world_models.entries import Impasse, Outcome
 
 SOURCE = DiscrepancyRaiser()
 BOUNDS = (5.0, 30.0)
-MOST = {Level.ACTION: DEFAULT.plan.max_checks_per_subgoal, Level.PLAN: DEFAULT.plan.max_lost_per_mission}
+MOST = {Level.ACTION: MAX_CHECKS_PER_SUBGOAL, Level.PLAN: MAX_LOST_PER_MISSION}
 ABOVE = {Level.ACTION: Level.PLAN, Level.PLAN: Level.GOAL}
 
 

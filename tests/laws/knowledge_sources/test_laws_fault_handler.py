@@ -15,7 +15,13 @@ from hypothesis import strategies as st
 from acting import answer
 from blackboard import Blackboard, Discrepancy, Entry, Level, Post, Posted, Revise, Revised
 from generated_boards import Bench, made, plain_robot
-from knowledge_sources.action.fault_handler import FaultHandler
+from knowledge_sources.action.fault_handler import (
+    MAX_BROKEN_MOTIONS,
+    MAX_FAULT_S,
+    MAX_RETRY_WAIT_S,
+    MIN_RETRY_WAIT_S,
+    FaultHandler,
+)
 from knowledge_sources.action.motor import Motor
 from knowledge_sources.settings import DEFAULT
 from world_models.entries import (
@@ -37,12 +43,12 @@ from world_models.entries import (
 from world_models.entries.body import RecoveryStatus
 
 SOURCE, S = FaultHandler(), DEFAULT.action
-MOST = S.max_broken_motions
+MOST = MAX_BROKEN_MOTIONS
 REQUESTS = (MotorCommand(0.1, 0.5), Course("Leg-1", 0.4, 0.0), PictureRequest("track"))
 steps = st.lists(st.tuples(st.sampled_from(REQUESTS), st.booleans()), min_size=1, max_size=2 * MOST)
 """What was asked for, in order, and whether it was broken off."""
-PATIENCE_S = S.max_fault_s
-waits_s = st.sampled_from((0.05, 0.3, 1.0, S.max_retry_wait_s))
+PATIENCE_S = MAX_FAULT_S
+waits_s = st.sampled_from((0.05, 0.3, 1.0, MAX_RETRY_WAIT_S))
 whats = st.sampled_from(("link lost", STOP_KEY))
 recoveries = st.none() | st.builds(
     Recovery, st.just(""), st.just("MotorCommand-1"), st.just(1.0), waits_s, st.just(2),
@@ -119,12 +125,12 @@ def test_the_oldest_open_fault_for_which_nobody_waits_is_answered(drawn: list[An
         detail = fault.value.detail if tried is None else tried.value.detail
         assert effect.value == Impasse("stopped", detail)
     elif tried is None:
-        assert effect == Post(Recovery(fault.id, "MotorCommand-1", 1.0, S.min_retry_wait_s), effect.because)
+        assert effect == Post(Recovery(fault.id, "MotorCommand-1", 1.0, MIN_RETRY_WAIT_S), effect.because)
     elif tried.value.waited_s >= PATIENCE_S:
         assert effect.value.kind == "failed" and fault.value.what in effect.value.reason
     else:
         assert isinstance(effect, Revise) and effect.entry is tried
-        wait_s = min(2.0 * tried.value.wait_s, S.max_retry_wait_s)
+        wait_s = min(2.0 * tried.value.wait_s, MAX_RETRY_WAIT_S)
         assert effect.value == replace(tried.value, status="asked", wait_s=wait_s)
 
 

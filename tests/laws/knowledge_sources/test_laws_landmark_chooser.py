@@ -14,8 +14,7 @@ from generated_boards import Bench, effect_on, made, plain_robot, reasons, to_wo
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.action.landmark_chooser import LandmarkChooser
 from knowledge_sources.methods.features import read_picture
-from knowledge_sources.methods.tracking import select_landmarks
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.methods.tracking import edge_alignment, select_landmarks
 from sim.render.optics import Optics
 from sim.render.sensor import compress_jpeg, expose
 from sim.scenario import load_scenario
@@ -24,8 +23,12 @@ from world_models.entries import Anchor, CameraPicture, Drift, Hypothesis, Segme
 from world_models.frames import Pose2
 
 ROOM, SURE = "robot-laboratory", diagonal(0.004, 0.002)
-NO_EDGES = replace(DEFAULT, tracking=replace(DEFAULT.tracking, min_edge_lines=10**6))
-"""So that the belief stays as it is."""
+
+
+@pytest.fixture()
+def no_edges(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that the belief stays as it is."""
+    monkeypatch.setattr(edge_alignment, "MIN_EDGE_LINES", 10**6)
 
 
 @cache
@@ -45,7 +48,7 @@ def setting() -> tuple[Pose2, bytes]:
         radiance = Optics.of(scenario.camera.camera).radiance(stage().building.renderer, robot.camera_from_world(pose))
         exposed = expose(radiance, scenario.sensor, rng, lights_on=True)
         jpeg = compress_jpeg(exposed, scenario.sensor.jpeg_quality)
-        if len(select_landmarks(robot, (), "CameraPicture-2", read_picture(jpeg).grey, pose, DEFAULT)) >= 8:
+        if len(select_landmarks(robot, (), "CameraPicture-2", read_picture(jpeg).grey, pose)) >= 8:
             return pose, jpeg
     raise AssertionError("expected a place with enough landmarks")
 
@@ -78,12 +81,13 @@ def choose(source: LandmarkChooser, *, off_rad: float = 0.0, has_old: bool = Tru
 
 
 @pytest.mark.parametrize("has_old", [False, True])
+@pytest.mark.usefixtures("no_edges")
 def test_all_landmarks_are_of_the_newest_picture(has_old: bool) -> None:
-    effects = choose(LandmarkChooser(NO_EDGES), has_old=has_old).effects
+    effects = choose(LandmarkChooser(), has_old=has_old).effects
     effect = effect_on(effects, Tracks)
     tracks, (pose, jpeg) = effect.value, setting()
     robot = build_robot_model(stage().scenario)
-    expected = select_landmarks(robot, (), "CameraPicture-2", read_picture(jpeg).grey, pose, NO_EDGES)
+    expected = select_landmarks(robot, (), "CameraPicture-2", read_picture(jpeg).grey, pose)
     assert [t.landmark for t in tracks.items] == [t.landmark for t in expected] and tracks.taken == len(expected) >= 8
     assert np.allclose([t.template_px for t in tracks.items], [t.template_px for t in expected])
     assert tracks.frame == "CameraPicture-2" and {t.template_frame for t in tracks.items} == {"CameraPicture-2"}
@@ -96,21 +100,23 @@ def test_all_landmarks_are_of_the_newest_picture(has_old: bool) -> None:
 
 
 @pytest.mark.parametrize("has_old", [False, True])
+@pytest.mark.usefixtures("no_edges")
 def test_a_new_stretch_of_the_drift_starts_at_the_believed_heading(has_old: bool) -> None:
-    effects = choose(LandmarkChooser(NO_EDGES), has_old=has_old).effects
+    effects = choose(LandmarkChooser(), has_old=has_old).effects
     drifts = made(effects, Drift)
     assert drifts == [Drift(0.003, 0.004, pytest.approx(setting()[0].heading_rad))] * has_old
     if has_old:
         assert reasons(effect_on(effects, Drift)) == {"Tracks"}
 
 
+@pytest.mark.usefixtures("no_edges")
 def test_the_stretch_starts_at_the_heading_in_the_world_whatever_the_locale() -> None:
     """The plain house is turned in the world, and the picture is of a fog."""
     bench, pose = Bench(plain_robot()), Pose2(3.0, 2.0, 0.4)
     belief = bench.believe(pose)
     bench.put(CameraPicture(compress_jpeg(np.full((256, 256), 128, np.uint8), 90), 0, 0.0, "milestone"))
     bench.put(Drift(0.003, 0.004, 9.0))
-    effects = bench.ask(LandmarkChooser(NO_EDGES), bench.revise(belief))
+    effects = bench.ask(LandmarkChooser(), bench.revise(belief))
     assert made(effects, Drift) == [Drift(0.003, 0.004, pytest.approx(to_world(pose).heading_rad))]
     assert made(effects, Tracks)[0].items == ()
 
@@ -134,8 +140,9 @@ def test_the_same_picture_twice_is_once() -> None:
 
 @pytest.mark.parametrize(("level", "acts"), [
     (None, True), (Level.ACTION, True), (Level.PLAN, False), (Level.GOAL, False)])
+@pytest.mark.usefixtures("no_edges")
 def test_in_doubt_or_lost_it_chooses_nothing(level: Level | None, acts: bool) -> None:
-    assert (choose(LandmarkChooser(NO_EDGES), lost=level).effects is not None) == acts
+    assert (choose(LandmarkChooser(), lost=level).effects is not None) == acts
 
 
 @pytest.mark.parametrize("basis", ["milestone", "relocalization", "tracks", "odometry"])

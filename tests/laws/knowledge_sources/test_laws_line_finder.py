@@ -12,7 +12,6 @@ from blackboard import Entry, Posted, Revised
 from generated_boards import Bench, effect_on, plain_robot, reasons, wakes
 from knowledge_sources.methods.features import find_lines, read_picture
 from knowledge_sources.milestone.line_finder import MIN_SEGMENT_LENGTH_PX, LineFinder
-from knowledge_sources.settings import DEFAULT
 from world_models.entries import CameraPicture, Segments
 from world_models.entries.task import MilestoneStatus
 
@@ -83,7 +82,7 @@ def test_how_sure_each_line_is_goes_with_it() -> None:
     frame = take(bench, image)
     seen = effect_on(bench.ask(SOURCE, frame), Segments).value
     found = find_lines(read_picture(frame.value.jpeg).rectified(plain_robot().lens, plain_robot().camera),
-                       min_length_px=MIN_SEGMENT_LENGTH_PX, settings=DEFAULT.features)
+                       min_length_px=MIN_SEGMENT_LENGTH_PX)
     assert np.array_equal(seen.segments_px, found.segments_px) and np.array_equal(seen.sigma_px, found.sigma_offset_px)
     faint, bright = (seen.sigma_px[np.abs(seen.segments_px[..., 0].mean(axis=1) - at).argmin()] for at in (80.0, 170.0))
     assert bright < faint

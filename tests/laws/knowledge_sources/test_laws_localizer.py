@@ -12,15 +12,14 @@ from hypothesis import strategies as st
 
 from blackboard import Discrepancy, Entry, Level, Post, Posted, Retract
 from generated_boards import HALL, Bench, drive, go, made, motions, plain_robot, poses, reasons, to_world, wakes
-from knowledge_sources.methods.localization import LocalizationStatus, Search
+from knowledge_sources.methods.localization import LOST_AGAIN_ODDS, MAX_FAR_PROBES, P_TOLD, LocalizationStatus, Search
 from knowledge_sources.methods.localization.global_localization import LocalizationResult, PlaceCandidate
 from knowledge_sources.methods.localization.next_view import SensingAction
 from knowledge_sources.methods.localization.refinement import PoseLikelihood
 from knowledge_sources.methods.verification import predict_lines
 from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.reads import find_building
-from knowledge_sources.relocalizer.localizer import MAX_PROBES, Localizer, _follow
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.relocalizer.localizer import MAX_DOUBTED_PICTURES, MAX_PROBES, Localizer, _follow
 from world_models.actuator import ActuatorModel
 from world_models.entries import (
     Certificate,
@@ -51,7 +50,7 @@ def look_round(bench: Bench, turns: tuple[float, ...]) -> Entry[Panorama]:
     """Looks from where the robot is, each so far turned from the last; what should be seen is what is seen."""
     looks, now = [], in_world(TRUTH)
     for turn in turns:
-        lines = predict_lines(ROBOT, now @ Pose2(0.0, 0.0, turn), DEFAULT.verification).segments_px
+        lines = predict_lines(ROBOT, now @ Pose2(0.0, 0.0, turn)).segments_px
         seen = bench.put(Segments("CameraPicture-1", "", lines, np.full(len(lines), 0.4), 40.0, 120.0))
         looks.append(Glimpse(seen.id, Pose2(0.0, 0.0, turn), diagonal(0.0, 1e-3 if turn else 0.0)))
     return bench.put(Panorama(tuple(looks)))
@@ -98,7 +97,7 @@ def test_what_it_has_felt_is_part_of_the_search_and_of_the_reasons(direction: fl
     bench.revise(bench.view["Hypothesis-1"], motion="MotionReport-1")
     touch = bench.put(Contact("bumper", direction, 0.2, 1.0), command)
 
-    def note(robots: Any, what: Search, _: Any) -> tuple[LocalizationResult, int]:
+    def note(robots: Any, what: Search) -> tuple[LocalizationResult, int]:
         asked.append(what)
         return LocalizationResult(LocalizationStatus.PROBE, (), SensingAction(1.0, 0.0, 0.0)), len([*robots]) - 1
 
@@ -126,7 +125,7 @@ def search_says(bench: Bench, panorama: Entry[Panorama], result: LocalizationRes
     """What the localizer makes of a result of the search; and of whom that was asked."""
     asked: list[Any] = []
 
-    def answer(robots: Any, what: Search, _: Any) -> tuple[LocalizationResult, int]:
+    def answer(robots: Any, what: Search) -> tuple[LocalizationResult, int]:
         asked.extend(robots)
         return result, which
 
@@ -136,7 +135,7 @@ def search_says(bench: Bench, panorama: Entry[Panorama], result: LocalizationRes
         return bench.ask(SOURCE, panorama), asked
 
 
-FEW = DEFAULT.localization.max_doubted_pictures
+FEW = MAX_DOUBTED_PICTURES
 
 
 @pytest.mark.parametrize("counted", [0, FEW, FEW + 1])
@@ -175,7 +174,7 @@ def test_what_may_have_been_learnt_at_the_wrong_place_is_tried_as_it_was_told(
 def test_so_many_looks_are_taken(places: int, more: int) -> None:
     """More of them where some place fits."""
     bench = lose()
-    most = DEFAULT.goal.max_far_probes if places else MAX_PROBES
+    most = MAX_FAR_PROBES if places else MAX_PROBES
     one = look_round(bench, (0.0,)).value.glimpses[0]
     panorama = bench.put(Panorama((one,) * (most + more)))
     fits = tuple(candidate(Pose2(1.0 + k, 1.0, 0.0), 9.0) for k in range(places))
@@ -197,7 +196,7 @@ def test_what_is_looked_for_is_all_that_it_knows_of_where_it_may_be(is_hidden: b
     seen = bench.put(Segments("CameraPicture-1", "", np.concatenate([own, other]), np.full(4, 0.4), 40.0, 120.0))
     asked: list[Search] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("knowledge_sources.methods.localization.search", lambda robots, what, _: asked.append(what) or (
+        patch.setattr("knowledge_sources.methods.localization.search", lambda robots, what: asked.append(what) or (
             LocalizationResult(PROBE, (), ACTION), len([*robots]) - 1))
         bench.ask(SOURCE, bench.put(Panorama((Glimpse(seen.id, Pose2(0.0, 0.0, 0.1), diagonal(0.0, 0.0)),))))
     (what,) = asked
@@ -243,8 +242,7 @@ def test_the_odds_by_which_a_place_is_found_are_told_with_it(refuted: int, verif
     result = LocalizationResult(AMBIGUOUS, (there, here), None)
     effects, _ = search_says(bench, look_round(bench, (math.pi / 2, 0.0)), result)
     (odds,) = made(effects, PlaceOdds)
-    s = DEFAULT.localization
-    prior = s.p_told / (1.0 - s.p_told) * s.lost_again_odds**refuted
+    prior = P_TOLD / (1.0 - P_TOLD) * LOST_AGAIN_ODDS**refuted
     assert odds.p_prior == pytest.approx(prior / (1.0 + prior)) and odds.refuted == refuted
     assert odds.probability == pytest.approx(1.0 / (1.0 + math.exp(-4.0) / prior), abs=1e-6)
     assert (odds.locale, odds.source) == (ROOM, "tracked" if verified else "told")

@@ -12,13 +12,20 @@ import pytest
 
 from blackboard import Entry, Posted
 from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
-from knowledge_sources.methods.calibration.camera_state import PRIOR_COVARIANCE_FACTOR, PRIOR_SIGMA_M, PRIOR_SIGMA_RAD
+from knowledge_sources.methods.belief import MAX_CAMERA_CHI2
+from knowledge_sources.methods.calibration.camera_state import (
+    PRIOR_COVARIANCE_FACTOR,
+    PRIOR_SIGMA_M,
+    PRIOR_SIGMA_RAD,
+    SIGMA_ROLL_RAD,
+    SIGMA_TILT_RAD,
+    SIGMA_YAW_RAD,
+)
 from knowledge_sources.methods.localization.camera_matching import CameraMatch
 from knowledge_sources.milestone import matcher
-from knowledge_sources.milestone.matcher import MAX_RIGID_SIGMA_PX, Matcher
+from knowledge_sources.milestone.matcher import MAX_RIGID_SIGMA_PX, MIN_KNOCK_GAIN, MIN_SHARP_PART, Matcher
 from knowledge_sources.milestone.med_r_and_t import MedRAndT
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
-from knowledge_sources.settings import DEFAULT
 from world_models.entries import LineMatch, Milestone, PoseFix, Segments, diagonal
 from world_models.entries.location import Covariance
 from world_models.entries.task import MilestoneStatus
@@ -114,13 +121,10 @@ def test_where_lines_are_missing_or_the_belief_was_bold_no_camera_was_knocked(ke
     assert fix.world_from_robot.distance_to(to_world(BELIEF @ Pose2(0.03, -0.03, 0.01))) < 0.02
 
 
-C = DEFAULT.camera_state
-
-
 @pytest.mark.parametrize(("sharp", "chi2", "gain", "asks", "is_open"), [
-    (C.min_sharp_part, C.max_chi2, 0.4, False, False), (C.min_sharp_part - 1e-9, 0.0, C.min_knock_gain, True, True),
-    (C.min_sharp_part - 1e-9, 0.0, C.min_knock_gain - 1e-6, True, False),
-    (1.0, C.max_chi2 + 1e-6, C.min_knock_gain, True, True), (1.0, C.max_chi2 + 1e-6, -0.1, True, False)])
+    (MIN_SHARP_PART, MAX_CAMERA_CHI2, 0.4, False, False), (MIN_SHARP_PART - 1e-9, 0.0, MIN_KNOCK_GAIN, True, True),
+    (MIN_SHARP_PART - 1e-9, 0.0, MIN_KNOCK_GAIN - 1e-6, True, False),
+    (1.0, MAX_CAMERA_CHI2 + 1e-6, MIN_KNOCK_GAIN, True, True), (1.0, MAX_CAMERA_CHI2 + 1e-6, -0.1, True, False)])
 def test_what_is_asked_before_a_camera_is_taken_for_knocked(
     sharp: float, chi2: float, gain: float, asks: bool, is_open: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -142,7 +146,7 @@ def test_what_is_asked_before_a_camera_is_taken_for_knocked(
     assert asked["rate"][5] == to_world(BELIEF) and np.allclose(
         asked["rate"][6], PRIOR_COVARIANCE_FACTOR * plain + more) and np.allclose(asked["rate"][7], KNOWN)
     if asks:
-        turns = np.square((C.sigma_tilt_rad, C.sigma_roll_rad, C.sigma_yaw_rad))
+        turns = np.square((SIGMA_TILT_RAD, SIGMA_ROLL_RAD, SIGMA_YAW_RAD))
         assert np.allclose(asked["knock"][5], plain + np.diag([0.0, 0.0, turns[2]]))
         assert np.allclose(asked["knock"][6], np.array(KNOWN) + np.diag([*turns, 0.0, 0.0, 0.0, 0.0]))
 

@@ -13,11 +13,17 @@ from hypothesis import strategies as st
 
 from blackboard import Entry, Posted
 from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
-from knowledge_sources.methods.calibration import compute_camera_covariance, loosen, widen
+from knowledge_sources.methods.calibration import (
+    SIGMA_ROLL_RAD,
+    SIGMA_TILT_RAD,
+    SIGMA_YAW_RAD,
+    compute_camera_covariance,
+    loosen,
+    widen,
+)
 from knowledge_sources.milestone import med_r_and_t
 from knowledge_sources.milestone.med_r_and_t import MedRAndT
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
-from knowledge_sources.settings import DEFAULT
 from world_models.entries import LineMatch, Milestone, PoseFix, diagonal
 from world_models.frames import Pose2
 
@@ -127,12 +133,11 @@ def test_the_camera_is_moved_by_a_picture_that_has_not_counted_and_adds_what_is_
     fix = solve(bench, match)
     (given, learnt), (used, planar) = found["estimate_camera_and_pose"], found["planar_from_lines"]
     camera = bench.view["CameraState-1"].value
-    known = compute_camera_covariance(camera, DEFAULT.camera_state)
-    s = DEFAULT.camera_state
-    opened = known + np.diag(np.square((s.sigma_tilt_rad, s.sigma_roll_rad, s.sigma_yaw_rad, 0.0, 0.0, 0.0, 0.0)))
+    known = compute_camera_covariance(camera)
+    opened = known + np.diag(np.square((SIGMA_TILT_RAD, SIGMA_ROLL_RAD, SIGMA_YAW_RAD, 0.0, 0.0, 0.0, 0.0)))
     assert np.allclose(given[6], opened if is_open else known)
     assert given[5][2, 2] - loosen(bench.view["Hypothesis-1"].value.covariance_world(ROBOT.world))[2, 2] == (
-        pytest.approx(s.sigma_yaw_rad**2 if is_open else 0.0))
+        pytest.approx(SIGMA_YAW_RAD**2 if is_open else 0.0))
     moves = is_open or counted != "here"
     assert fix.camera_step == (tuple(learnt.step.tolist()) if moves else ())
     assert (fix.camera_covariance != ()) == moves and fix.camera_chi2 == (learnt.prior_chi2 if moves else 0.0)

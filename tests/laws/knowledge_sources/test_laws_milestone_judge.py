@@ -24,16 +24,41 @@ from experiments.generated.missions import OFFICE
 from generated_boards import effect_on, made, reasons
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
-from knowledge_sources.methods.belief import to_log_odds, update
+from knowledge_sources.methods.belief import (
+    MAX_CAMERA_CHI2,
+    MAX_TOLD_CHI2,
+    MIN_P_BELIEVED,
+    TOLD_SIGMA_M,
+    TOLD_SIGMA_RAD,
+    to_log_odds,
+    update,
+)
 from knowledge_sources.methods.calibration import compute_camera_covariance
+from knowledge_sources.methods.features import MIN_CONTRAST
+from knowledge_sources.methods.localization import MAX_ALIKE_LOG_RATIO
 from knowledge_sources.methods.localization.aliasing import Alias
-from knowledge_sources.methods.verification import POSE_CONFIDENCE, Verdict, Weighed, is_last_look, judge_place
+from knowledge_sources.methods.verification import (
+    MAX_FOLLOWED_PX,
+    MAX_INEXACT_LOOKS,
+    MAX_MILESTONE_LOOKS,
+    MIN_MATCHED_LINES,
+    MOTION_TOLERANCE_SIGMAS,
+    P_WRONG_FOLLOWED,
+    P_WRONG_IN_DOUBT,
+    P_WRONG_UNFOLLOWED,
+    POSE_CONFIDENCE,
+    Verdict,
+    Weighed,
+    is_last_look,
+    judge_place,
+)
+from knowledge_sources.methods.verification import weigh as weigh_method
 from knowledge_sources.methods.verification.pose_confidence import compute_motion_tolerance_px
 from knowledge_sources.methods.verification.weigh import MAX_P_UNMISTAKABLE, _find_tolerance_px, _median_shift
 from knowledge_sources.milestone.milestone_judge import Case, MilestoneJudge
 from knowledge_sources.reads import find_belief, find_camera, find_followed, find_p_not_alias, place_believed
-from knowledge_sources.reads.place_believed import MAX_P_FALSE_CLEAR, MAX_P_FALSE_UNMISTAKABLE
-from knowledge_sources.reads.questions import HELD
+from knowledge_sources.reads.place_believed import MAX_P_FALSE_CLEAR, MAX_P_FALSE_UNMISTAKABLE, MAX_P_RIVAL
+from knowledge_sources.reads.questions import HELD, MIN_FOLLOWED_LANDMARKS
 from knowledge_sources.settings import DEFAULT, Settings
 from rebuilt_board import copy_of
 from sim.scenario import parse_scenario
@@ -53,7 +78,7 @@ from world_models.entries import (
 from world_models.frames import Pose2
 
 T = TypeVar("T")
-PLAN, VERIFICATION = DEFAULT.plan, DEFAULT.verification
+PLAN = DEFAULT.plan
 SMALL = 1e-6
 NO_LINES = np.zeros((0, 2, 2))
 
@@ -75,14 +100,14 @@ def weigh(**changed: Any) -> Any:
 
 
 NO_FACES: Any = SimpleNamespace(is_testable=False, agreeing=0.0, count=0)
-FEW, REFUTE, CHI2 = VERIFICATION.min_matched_lines, POSE_CONFIDENCE.refute, DEFAULT.camera_state.max_chi2
+FEW, REFUTE, CHI2 = MIN_MATCHED_LINES, POSE_CONFIDENCE.refute, MAX_CAMERA_CHI2
 UNSURE = {"p_wrong": POSE_CONFIDENCE.accept + SMALL}
 
 
 @pytest.mark.parametrize(("changed", "verdict"), [
     ({}, "verified"),
-    ({"contrast": PLAN.min_contrast + SMALL}, "verified"),
-    ({"contrast": PLAN.min_contrast - SMALL}, "not testable"),
+    ({"contrast": MIN_CONTRAST + SMALL}, "verified"),
+    ({"contrast": MIN_CONTRAST - SMALL}, "not testable"),
     ({"expected": FEW}, "verified"),
     ({"expected": FEW - 1}, "not testable"),
     ({"matched": FEW}, "verified"),
@@ -100,7 +125,7 @@ UNSURE = {"p_wrong": POSE_CONFIDENCE.accept + SMALL}
     ({"shift_px": 10.0 + SMALL, **UNSURE}, "not testable"),
 ])
 def test_the_verdict_just_below_and_just_above_each_bound(changed: dict[str, Any], verdict: str) -> None:
-    assert judge_place(weigh(**changed), DEFAULT).kind == verdict
+    assert judge_place(weigh(**changed)).kind == verdict
 
 
 @given(st.integers(0, 60), st.floats(1e-9, 1.0), st.floats(1e-9, 1.0), st.sampled_from([POSE_CONFIDENCE.accept, 0.03]),
@@ -111,7 +136,7 @@ def test_a_verdict_says_one_count_of_lines_and_the_bound_that_decided(
 ) -> None:
     """Whatever it is, its reason has the figures of its fields, and no others of their kind."""
     said = judge_place(weigh(matched=matched, p_by_looks=p_by_looks, p_wrong=p_wrong, most_p_wrong=most,
-                             shift_px=shift_px, is_inexact=is_inexact), DEFAULT)
+                             shift_px=shift_px, is_inexact=is_inexact))
     assert re.findall(r"(\d+) of (\d+) lines", said.reason) == [(str(matched), "20")]
     told = re.findall(r"wrong with a probability of ([^ ]+)%; the limit is ([^ ]+)%", said.reason)
     assert "e+" not in said.reason
@@ -125,11 +150,11 @@ def test_a_verdict_says_one_count_of_lines_and_the_bound_that_decided(
         assert said.p_wrong >= said.most_p_wrong
 
 
-@pytest.mark.parametrize(("modes", "most"), [((), PLAN.max_looks), (("wall",), PLAN.max_inexact_looks)])
+@pytest.mark.parametrize(("modes", "most"), [((), MAX_MILESTONE_LOOKS), (("wall",), MAX_INEXACT_LOOKS)])
 def test_it_looks_again_as_often_as_it_may(modes: tuple[str, ...], most: int) -> None:
     for tried in range(most + 2):
         milestone: Any = SimpleNamespace(displacement_modes=modes, tried=(0.0,) * tried)
-        assert is_last_look(milestone, PLAN) is (tried + 1 >= most)
+        assert is_last_look(milestone) is (tried + 1 >= most)
 
 
 @pytest.mark.parametrize("p", [0.001, 0.1, 0.5, 0.9])
@@ -222,7 +247,7 @@ def judged() -> list[Judged]:
 
 def test_each_state_of_the_robot_asks_for_its_own_evidence(judged: list[Judged]) -> None:
     """In doubt, with landmarks followed, and without: on the board of each judgement of a mission."""
-    least, checked = DEFAULT.action.min_followed_landmarks, []
+    least, checked = MIN_FOLLOWED_LANDMARKS, []
     states = {"p_wrong_in_doubt": ((True, least), (True, 0)), "p_wrong_followed": ((False, least), (False, least + 1)),
               "p_wrong_unfollowed": ((False, 0), (False, least - 1))}
 
@@ -235,8 +260,10 @@ def test_each_state_of_the_robot_asks_for_its_own_evidence(judged: list[Judged])
                 bound = find_prior_at_bound(weighed.p_false)
                 for value, enough in ((bound * 0.99, True), (bound + 0.01 * (1.0 - bound), False)):
                     others = {name: (0.999 if enough else 1e-9) for name in states if name != own}
-                    judge = MilestoneJudge(tune(**others, **{own: value}))
-                    weighed = judge.weigh(view, case_on(view, trigger))
+                    with pytest.MonkeyPatch.context() as patch:
+                        for name, p in {**others, own: value}.items():
+                            patch.setattr(weigh_method, name.upper(), p)
+                        weighed = MilestoneJudge().weigh(view, case_on(view, trigger))
                     assert (weighed.p_wrong <= weighed.most_p_wrong) is enough, (own, in_doubt, followed, value)
                 checked.append(own)
 
@@ -247,13 +274,13 @@ def test_each_state_of_the_robot_asks_for_its_own_evidence(judged: list[Judged])
 
 def test_where_no_other_view_is_left_all_looks_together_need_only_be_believed(judged: list[Judged]) -> None:
     """By the standard of the search that would find the same place again; before the last look by the stricter one."""
-    most, believed, checked = PLAN.max_looks, 1.0 - DEFAULT.localization.min_p_believed, set()
+    most, believed, checked = MAX_MILESTONE_LOOKS, 1.0 - MIN_P_BELIEVED, set()
 
     def check(board: Blackboard, trigger: Change) -> None:
         view = StateView(board, True, 0)
         case = case_on(view, trigger)
         plain = case.milestone.value
-        alone = to_log_odds(MilestoneJudge().weigh(view, case).p_false) + to_log_odds(PLAN.p_wrong_in_doubt)
+        alone = to_log_odds(MilestoneJudge().weigh(view, case).p_false) + to_log_odds(P_WRONG_IN_DOUBT)
         for tried in (most - 2, most - 1):
             for wanted in (0.9 * POSE_CONFIDENCE.accept, 0.9 * believed, 1.1 * believed):
                 told = (to_log_odds(wanted) - alone, *(0.0,) * (tried - 1))
@@ -277,15 +304,15 @@ def test_landmarks_that_were_followed_speak_for_no_place_where_the_belief_leaves
 
     Along level lines, which are half of some views, nothing moves as the robot turns: so the uncertainty is large.
     """
-    least, judge, checked = DEFAULT.action.min_followed_landmarks, MilestoneJudge(), []
+    least, judge, checked = MIN_FOLLOWED_LANDMARKS, MilestoneJudge(), []
 
     def check(board: Blackboard, trigger: Change) -> None:
         def weigh_at(sigma_rad: float) -> Weighed:
             view = StateView(board, False, least, sigma_rad)
             return judge.weigh(view, case_on(view, trigger))
 
-        by_pixel = 1.0 / (VERIFICATION.motion_tolerance_sigmas * weigh_at(1e-3).robot.camera.fx)
-        sure, unsure = weigh_at(0.5 * PLAN.max_followed_px * by_pixel), weigh_at(12.0 * PLAN.max_followed_px * by_pixel)
+        by_pixel = 1.0 / (MOTION_TOLERANCE_SIGMAS * weigh_at(1e-3).robot.camera.fx)
+        sure, unsure = weigh_at(0.5 * MAX_FOLLOWED_PX * by_pixel), weigh_at(12.0 * MAX_FOLLOWED_PX * by_pixel)
         wide = weigh_at(16.0 * PLAN.max_deviation_px * by_pixel)
         checked.append((sure.is_weak, unsure.is_weak, wide.p_false <= POSE_CONFIDENCE.accept, wide.tolerance_px))
 
@@ -315,7 +342,7 @@ def test_what_it_writes_follows_from_the_verdict(judged: list[Judged], in_doubt:
             board.apply([Post(Discrepancy(Level.PLAN, "by a law", 9.0, (0.0, 30.0), "px"))], author="test", cycle=10**6)
         case, weighed, effects = judge_on(Judged(board, one.trigger))
         said = effect_on(effects, Certificate)
-        followed = {entry.id for entry in (*find_followed(board.view, DEFAULT.action), *board.view.all(Travel))}
+        followed = {entry.id for entry in (*find_followed(board.view), *board.view.all(Travel))}
         assert reasons(said) == {case.fix.id, case.milestone.id, *followed}
         assert (said.value.milestone, said.value.fix) == (case.milestone.id, case.fix.id)
         off = case.fix.value.world_from_robot.minus(case.belief.value.world_from_robot(weighed.robot.world))
@@ -356,7 +383,7 @@ def test_the_deviation_is_measured_where_the_place_is_known_or_is_beyond_the_win
     view = one.board.view
     case, most_px = case_on(view, one.trigger), max(PLAN.max_deviation_px, tolerance_px)
     weighed = replace(judge.weigh(view, case), tolerance_px=tolerance_px, shift_px=off * most_px)
-    tried = (1.0,) * (PLAN.max_looks - 1 if is_last else 0)
+    tried = (1.0,) * (MAX_MILESTONE_LOOKS - 1 if is_last else 0)
     milestone: Any = case.milestone._replace(value=replace(case.milestone.value, tried=tried, told=(0.0,) * len(tried)))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(judge, "weigh", lambda *_: weighed)
@@ -393,7 +420,7 @@ def test_what_the_wheels_can_do_and_what_the_picture_leaves_open_count_together(
 
     In an unmistakable place it is as much as what a search finds may be off, to be the place where it was tracked to.
     """
-    asked, slipped, place = 0, 0, DEFAULT.localization
+    asked, slipped = 0, 0
     judge = MilestoneJudge(tune(max_deviation_px=0.01))  # so small a window that it decides nothing
     for one in judged:
         view = StateView(one.board, False, 9, 0.02)
@@ -403,13 +430,13 @@ def test_what_the_wheels_can_do_and_what_the_picture_leaves_open_count_together(
             entry: Any = SimpleNamespace(value=fix, id=case.fix.id)
             weighed = judge.weigh(view, case._replace(fix=entry))
             if weighed.p_false <= POSE_CONFIDENCE.accept:
-                slip, sigmas = np.zeros(3), VERIFICATION.motion_tolerance_sigmas
+                slip, sigmas = np.zeros(3), MOTION_TOLERANCE_SIGMAS
                 if weighed.p_wrong <= MAX_P_UNMISTAKABLE:
-                    slip = np.square([place.told_sigma_m, place.told_sigma_m, place.told_sigma_rad])
-                    sigmas = math.sqrt(place.max_told_chi2)
-                open_px = sigmas / VERIFICATION.motion_tolerance_sigmas * compute_motion_tolerance_px(
+                    slip = np.square([TOLD_SIGMA_M, TOLD_SIGMA_M, TOLD_SIGMA_RAD])
+                    sigmas = math.sqrt(MAX_TOLD_CHI2)
+                open_px = sigmas / MOTION_TOLERANCE_SIGMAS * compute_motion_tolerance_px(
                     weighed.robot, np.array(case.milestone.value.expected), weighed.before,
-                    weighed.covariance + fix.covariance + np.diag(slip), VERIFICATION)
+                    weighed.covariance + fix.covariance + np.diag(slip))
                 assert weighed.tolerance_px == pytest.approx(DEFAULT.action.min_tolerance_px + open_px)
                 asked, slipped = asked + 1, slipped + bool(slip.any())
     assert asked > 1 and slipped
@@ -421,7 +448,7 @@ def test_where_the_yaw_of_the_camera_is_open_again_so_is_the_heading(judged: lis
     one = judged[0]
     view = one.board.view
     case = case_on(view, one.trigger)
-    known = compute_camera_covariance(find_camera(view), DEFAULT.camera_state)
+    known = compute_camera_covariance(find_camera(view))
     now = known.copy()
     now[YAW, YAW] *= 1.0 + more
     step = (0.004, -0.003, 0.002, 0.01, 0.0, 0.0, 0.0)
@@ -463,24 +490,24 @@ def test_a_place_that_repeats_itself_is_held_against_it_by_bayes_rule(
     judged: list[Judged], margin: float, is_near: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By how much more agrees here, up to what is chance; and by how much nearer to the belief this place is."""
-    one, most = judged[0], DEFAULT.localization.max_alike_log_ratio
+    one, most = judged[0], MAX_ALIKE_LOG_RATIO
     view = StateView(one.board, True, 0)
     judge, case = MilestoneJudge(), case_on(view, one.trigger)
     weighed = replace(judge.weigh(view, case), p_false=1e-3, is_weak=True)
     near = Pose2(weighed.pose.x_m + 0.05, weighed.pose.y_m, weighed.pose.heading_rad)
     other = near if is_near else Pose2(weighed.pose.x_m + 3.0, weighed.pose.y_m, weighed.pose.heading_rad)
     monkeypatch.setattr(place_believed, "list_aliases", lambda *_, **__: [Alias(other, margin)])
-    verdict = judge._hold_against_others(view, case, weighed, Verdict("verified", "so", 1e-3, PLAN.max_p_rival))
+    verdict = judge._hold_against_others(view, case, weighed, Verdict("verified", "so", 1e-3, MAX_P_RIVAL))
     spread = weighed.covariance + case.fix.value.covariance + 1e-9 * np.eye(3)
     (own, away) = (float(d @ np.linalg.solve(spread, d)) for d in (
         pose.minus(weighed.before) for pose in (weighed.pose, other)))
-    p_there = find_p_not_alias(view, DEFAULT.localization)
+    p_there = find_p_not_alias(view)
     share = 0.5 * (1.0 - p_there)
     against = (p_there * math.exp(-0.5 * max(away - own, 0.0)) + share) * math.exp(min(max(-margin, -most), most))
     p = against / (p_there + share + against)
-    assert verdict.kind == ("verified" if p <= PLAN.max_p_rival else "not testable")
-    assert verdict.p_wrong == pytest.approx(1e-3 if p <= PLAN.max_p_rival else p, rel=1e-3)
-    assert verdict.p_rival == pytest.approx(0.0 if p <= PLAN.max_p_rival else p, rel=1e-3)
+    assert verdict.kind == ("verified" if p <= MAX_P_RIVAL else "not testable")
+    assert verdict.p_wrong == pytest.approx(1e-3 if p <= MAX_P_RIVAL else p, rel=1e-3)
+    assert verdict.p_rival == pytest.approx(0.0 if p <= MAX_P_RIVAL else p, rel=1e-3)
 
 
 @pytest.mark.parametrize(("p_false", "is_weak", "asked"), [
@@ -501,6 +528,6 @@ def test_how_far_it_is_held_against_the_rest_of_the_room(
 
 
 def test_in_doubt_more_is_asked_than_without_landmarks_and_there_more_than_with_them() -> None:
-    assert PLAN.p_wrong_followed < PLAN.p_wrong_unfollowed < PLAN.p_wrong_in_doubt
+    assert P_WRONG_FOLLOWED < P_WRONG_UNFOLLOWED < P_WRONG_IN_DOUBT
 
 

@@ -13,7 +13,7 @@ from blackboard import Blackboard, Change, Discrepancy, Effect, Level, Post, Pos
 from generated_boards import Bench, all_reasons, plain_robot, reasons, wakes
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.reads import has_missed
-from knowledge_sources.reads.sketches import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS
+from knowledge_sources.reads.sketches import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS, MAX_ADJUSTMENTS
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.sketcher.milestone_passer import MilestonePasser
 from sim.scenario import load_scenario
@@ -39,7 +39,7 @@ from world_models.frames import Pose2
 
 HALL = "north-hall"
 FROM, TO = Place(HALL, 2.0, 1.2), Place(HALL, 4.0, 1.2)
-MOST, TOLERANCE_M = DEFAULT.plan.max_adjustments, 0.1
+MOST, TOLERANCE_M = MAX_ADJUSTMENTS, 0.1
 SMALL = 1e-3
 
 

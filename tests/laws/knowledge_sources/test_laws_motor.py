@@ -28,7 +28,7 @@ from generated_boards import (
     wakes,
 )
 from ideal_floor_watcher import scan_floor
-from knowledge_sources.action.motor import Motor
+from knowledge_sources.action.motor import LOOKAHEAD_M, Motor
 from knowledge_sources.methods.floor import find_floor
 from knowledge_sources.methods.motion import MAX_HEADING_ERROR_RAD, count_increment, plan_increment
 from knowledge_sources.methods.motion.pure_pursuit import MAX_START_OFFSET_M
@@ -172,7 +172,7 @@ def test_an_increment_leads_towards_the_line_ahead(pose: Pose2, bend: float | No
     seen = effect_on(effects, Leg).value
     to_go, left = TO.x_m - pose.x_m, pose.y_m - 2.0
     assert (seen.to_go_m, seen.left_m) == (pytest.approx(to_go, abs=1e-9), pytest.approx(left, abs=1e-9))
-    lookahead = DEFAULT.action.lookahead_m
+    lookahead = LOOKAHEAD_M
     aim_x = TO.x_m if to_go < 0.25 else min(TO.x_m, max(FROM.x_m, pose.x_m + lookahead))
     aim = math.remainder(math.atan2(-left, aim_x - pose.x_m) - pose.heading_rad, math.tau)
     assume(abs(abs(aim) - math.pi) > SMALL and abs(abs(aim) - MAX_HEADING_ERROR_RAD) > SMALL)

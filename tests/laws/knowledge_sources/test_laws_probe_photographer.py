@@ -9,7 +9,6 @@ from blackboard import Change, Entry, Level, Posted, Revised
 from generated_boards import Bench, all_reasons, plain_robot, wakes
 from knowledge_sources.reads import is_dark
 from knowledge_sources.relocalizer.probe_photographer import MAX_DARK_FRAMES, ProbePhotographer
-from knowledge_sources.settings import DEFAULT
 from world_models.entries import PictureRequest, Segments
 
 SOURCE = ProbePhotographer()
@@ -37,9 +36,9 @@ def test_a_picture_counts_unless_it_is_dark(contrast: float, brightness: float) 
     """A bare wall in the light has no contrast, and is a picture; the dark is none."""
     bench, doubt = lost()
     seen = bench.put(looked(contrast, brightness))
-    assert is_dark(seen.value, DEFAULT.goal) == (contrast == brightness == 0.0)
+    assert is_dark(seen.value) == (contrast == brightness == 0.0)
     for trigger in (doubt, seen):
-        assert (bench.ask(SOURCE, trigger) is not None) == is_dark(seen.value, DEFAULT.goal)
+        assert (bench.ask(SOURCE, trigger) is not None) == is_dark(seen.value)
 
 
 def test_what_was_seen_before_the_last_motion_or_before_it_was_lost_or_for_a_milestone_does_not_count() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from acting import answer
 from blackboard import Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised
-from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M
+from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, MIN_OBSTACLE_CERTAINTY, MIN_THING_CERTAINTY
 from knowledge_sources.methods.floor.weigh_sight import (
     ALIKE_FREE_ODDS,
     FREE_FLOOR_ODDS,
@@ -84,13 +84,13 @@ def test_it_acts_where_a_sight_may_tell_of_a_thing_and_the_place_is_not_in_doubt
         hall.put(Discrepancy(doubt, "landmarks are elsewhere", 99.0, (4.0, 30.0), "px"))
     thing = replace(carton(p_thing), sigma_m=sigma_m)
     _, effects = ask(hall, hall.look(thing, seen_s=1.0))
-    is_telling = p_thing >= S.min_thing_certainty and sigma_m <= MAX_OBSTACLE_SIGMA_M
+    is_telling = p_thing >= MIN_THING_CERTAINTY and sigma_m <= MAX_OBSTACLE_SIGMA_M
     assert (effects is not None) == (doubt is None and (is_telling or status in ("suspected", "there")))
     if effects and status is None:
         assert is_telling
 
 
-@given(st.floats(S.min_thing_certainty, 0.99))
+@given(st.floats(MIN_THING_CERTAINTY, 0.99))
 @settings(max_examples=20, deadline=None)
 def test_what_was_not_known_is_as_certain_as_its_sight(world: World, p_thing: float) -> None:
     hall = Hall(world, ())
@@ -99,7 +99,7 @@ def test_what_was_not_known_is_as_certain_as_its_sight(world: World, p_thing: fl
     assert isinstance(effect, Post) and tuple(effect.because) == (scan,)
     found: Obstacle = effect.value
     assert found.certainty == min(p_thing, S.max_obstacle_certainty)
-    assert found.status == ("there" if p_thing >= S.min_obstacle_certainty else "suspected")
+    assert found.status == ("there" if p_thing >= MIN_OBSTACLE_CERTAINTY else "suspected")
     assert (found.name, found.seen_s, found.touched_s) == (f"{HALL}/obstacle-1", 7.0, None)
     assert shapely.hausdorff_distance(shapely.Polygon(found.footprint), shapely.Polygon(CARTON)) < 2e-3
 
@@ -115,14 +115,14 @@ def test_it_is_told_by_which_picture_or_reading(world: World, sense: FloorSense,
     assert isinstance(effect, Post) and effect.value.evidence.startswith(told_by)
 
 
-@given(st.floats(0.5, 0.95), st.floats(S.min_thing_certainty, 0.95), st.floats(0.0, 2.0 * FLOOR_VIEW_DISTANCE_M))
+@given(st.floats(0.5, 0.95), st.floats(MIN_THING_CERTAINTY, 0.95), st.floats(0.0, 2.0 * FLOOR_VIEW_DISTANCE_M))
 @settings(max_examples=25, deadline=None)
 def test_odds_multiply_only_where_it_is_seen_from_elsewhere(
     world: World, before: float, p_thing: float, ahead_m: float
 ) -> None:
     hall = Hall(world, ())
     first = hall.put(hall.look(seen_s=1.0))
-    status: ObstacleStatus = "there" if before >= S.min_obstacle_certainty else "suspected"
+    status: ObstacleStatus = "there" if before >= MIN_OBSTACLE_CERTAINTY else "suspected"
     old = hall.put(replace(known(status, before), told_from=(first.value.x_m, first.value.y_m)), first)
     scan, effects = ask(hall, hall.look(carton(p_thing), seen_s=9.0, ahead_m=ahead_m))
     (effect,) = effects or ()
@@ -131,7 +131,7 @@ def test_odds_multiply_only_where_it_is_seen_from_elsewhere(
     assert isinstance(effect, Revise) and effect.entry is old and set(effect.because) == {scan, old}
     assert effect.value.certainty == pytest.approx(min(expected, S.max_obstacle_certainty))
     assert effect.value.status == (
-        "there" if old.value.is_there or effect.value.certainty >= S.min_obstacle_certainty else "suspected")
+        "there" if old.value.is_there or effect.value.certainty >= MIN_OBSTACLE_CERTAINTY else "suspected")
 
 
 @given(st.floats(0.3, 0.999), st.sampled_from((0.0, 0.5 * MIN_WAY_M, 1.1 * MIN_WAY_M, 0.3)), st.booleans(),
@@ -175,7 +175,7 @@ def test_where_a_part_is_seen_free_so_much_of_the_factor_counts(world: World, fa
     assert isinstance(effect, Revise) and effect.entry is old and told == pytest.approx(part, abs=0.02)
 
 
-@given(st.floats(0.3, 0.999), st.floats(S.min_thing_certainty, 0.95))
+@given(st.floats(0.3, 0.999), st.floats(MIN_THING_CERTAINTY, 0.95))
 @settings(max_examples=10, deadline=None)
 def test_what_was_gone_is_as_certain_as_it_is_seen_now(world: World, before: float, p_thing: float) -> None:
     hall = Hall(world, ())
@@ -184,7 +184,7 @@ def test_what_was_gone_is_as_certain_as_it_is_seen_now(world: World, before: flo
     (effect,) = effects or ()
     assert isinstance(effect, Revise) and effect.entry is old
     assert effect.value.certainty == min(p_thing, S.max_obstacle_certainty)
-    assert effect.value.status == ("there" if p_thing >= S.min_obstacle_certainty else "suspected")
+    assert effect.value.status == ("there" if p_thing >= MIN_OBSTACLE_CERTAINTY else "suspected")
 
 
 @pytest.mark.parametrize(("by_x_m", "by_y_m", "is_same"), [(0.0, 0.45, True), (0.55, 0.45, False), (0.0, 0.6, False)])

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from acting import answer
 from blackboard import Blackboard, Post, Posted, Revise, Revised
-from knowledge_sources.methods.floor import move_thing
+from knowledge_sources.methods.floor import MIN_OBSTACLE_CERTAINTY, move_thing
 from knowledge_sources.model.thing_mover import MAX_DRIFT_M, MAX_DRIFT_RAD, ThingMover
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL
@@ -116,4 +116,4 @@ def test_what_was_seen_by_who_was_carried_off_stays_and_is_believed_half(by: Pos
     now = find(by)
     assert (now.footprint == CARTON) is is_carried
     assert now.certainty == (0.45 if is_carried else 0.9)
-    assert now.status == ("there" if now.certainty >= S.min_obstacle_certainty else "suspected")
+    assert now.status == ("there" if now.certainty >= MIN_OBSTACLE_CERTAINTY else "suspected")

@@ -11,15 +11,14 @@ from hypothesis import strategies as st
 from blackboard import Effect, Entry, Level, Posted, Revised
 from generated_boards import Bench, effect_on, mirrored, mirrored_place, plain_robot, poses, reasons, to_world, wakes
 from knowledge_sources.methods.verification import turn_headings
-from knowledge_sources.milestone_selector.view_chooser import ViewChooser
+from knowledge_sources.milestone_selector.view_chooser import LONG_TURN_RAD, ViewChooser
 from knowledge_sources.reads import MAX_LOOK_ERROR_RAD
-from knowledge_sources.settings import DEFAULT
 from world_models.entries import Milestone, Outcome, Place, PlanSketch, Subgoal
 from world_models.entries.task import MilestoneStatus
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, wrap_angle
 
-HALL, LONG_TURN, SMALL = "north-hall", DEFAULT.plan.long_turn_rad, 1e-6
+HALL, LONG_TURN, SMALL = "north-hall", LONG_TURN_RAD, 1e-6
 HERE, LENGTH_M, TOLERANCE_M = Place(HALL, 2.0, 1.2), 1.0, 0.1
 
 
@@ -108,7 +107,7 @@ def test_the_directions_of_the_mirrored_board_are_mirrored(pose: Pose2, wanted: 
                      (mirrored(pose), mirrored_place(Place("hall", 6.0, 1.3, wanted)))):
         _, sketch = due(here, at=1, to=to)
         found = list(SOURCE.list_headings(plain_robot().world, sketch.value, to_world(here)))
-        around = len(turn_headings(to_world(here), DEFAULT))
+        around = len(turn_headings(to_world(here)))
         listed.append([wrap_angle(h - hall) for h in found[:len(found) - around]])
     one, other = listed
     assert one and [wrap_angle(a + b) for a, b in zip(one, other, strict=True)] == pytest.approx([0.0] * len(one))

@@ -13,15 +13,30 @@ from hypothesis import strategies as st
 
 from blackboard import Effect, Entry, Posted, Revised
 from generated_boards import Bench, effect_on, house, made, plain_robot, reasons, wakes
-from knowledge_sources.robot.yaw_calibrator import YawCalibrator
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.methods.calibration import (
+    LEAST_SIGMA_RAD,
+    SIGMA_CENTRE_PX,
+    SIGMA_FOCAL,
+    SIGMA_HEIGHT_M,
+    SIGMA_ROLL_RAD,
+    SIGMA_TILT_RAD,
+    SIGMA_YAW_RAD,
+)
+from knowledge_sources.robot.yaw_calibrator import (
+    HEADING_SIGMA_RAD,
+    MAX_TRAVEL_M,
+    MAX_YAW_SIGMAS,
+    MIN_LEARNT,
+    MIN_STRAIGHTNESS,
+    MIN_TRAVEL_M,
+    YawCalibrator,
+)
 from world_models.camera import CAMERA_UNKNOWNS, YAW
 from world_models.entries import CameraState, Drift, Hypothesis, Travel, covariance_tuple, diagonal
 from world_models.frames import Pose2
 
-S = DEFAULT.camera_state
 SURE = diagonal(0.002, 0.001)
-PRIOR = S.sigma_yaw_rad**2
+PRIOR = SIGMA_YAW_RAD**2
 FORWARD_M = 0.12
 SMALL = 1e-6
 
@@ -67,7 +82,7 @@ def come(
 
 def compute_noise(length_m: float, slip_m2: float) -> float:
     """Variance of the direction of a straight way: both ends aside, slip, heading at its begin, and on it."""
-    return ((2 * 0.002**2 + slip_m2) / length_m**2 + 0.001**2 + S.heading_sigma_rad**2 / length_m)
+    return ((2 * 0.002**2 + slip_m2) / length_m**2 + 0.001**2 + HEADING_SIGMA_RAD**2 / length_m)
 
 
 @settings(max_examples=60)
@@ -78,22 +93,22 @@ def test_the_yaw_is_the_mean_of_what_was_known_and_what_the_way_says(
     way = come(off, length_m, course_rad=course, slip_m2=slip_m2, yaw_rad=yaw)
     noise, camera = compute_noise(length_m, slip_m2), way.camera
     told = -off  # came to the left of where it heads: the heading is too small, the yaw too large
-    if abs(told - yaw) > S.max_yaw_sigmas * math.sqrt(PRIOR + noise):
+    if abs(told - yaw) > MAX_YAW_SIGMAS * math.sqrt(PRIOR + noise):
         assert camera is None
         return
     gain = PRIOR / (PRIOR + noise)
-    if gain < S.min_learnt + SMALL:
+    if gain < MIN_LEARNT + SMALL:
         return
     assert camera is not None
     learnt = (yaw / PRIOR + told / noise) / (1 / PRIOR + 1 / noise)
     assert camera.mount.yaw_rad == pytest.approx(learnt, abs=1e-9)
     covariance = np.array(camera.covariance)
-    assert covariance[YAW, YAW] == pytest.approx(max(1 / (1 / PRIOR + 1 / noise), S.floor_rad**2))
+    assert covariance[YAW, YAW] == pytest.approx(max(1 / (1 / PRIOR + 1 / noise), LEAST_SIGMA_RAD**2))
     assert np.count_nonzero(covariance - np.diag(np.diag(covariance))) == 0
     others = [k for k in range(len(CAMERA_UNKNOWNS)) if k != YAW]
     told_state = CameraState(camera.lens, camera.mount)
-    for k, sigma in zip(others, (S.sigma_tilt_rad, S.sigma_roll_rad, S.sigma_height_m, S.sigma_focal,
-                                 S.sigma_centre_px, S.sigma_centre_px), strict=True):
+    for k, sigma in zip(others, (SIGMA_TILT_RAD, SIGMA_ROLL_RAD, SIGMA_HEIGHT_M, SIGMA_FOCAL,
+                                 SIGMA_CENTRE_PX, SIGMA_CENTRE_PX), strict=True):
         assert covariance[k, k] == pytest.approx(sigma**2)
     assert camera.lens == told_state.lens and camera.told_mount is not None and camera.told_mount.yaw_rad == 0.0
     assert replace(camera.mount, yaw_rad=0.0) == camera.told_mount
@@ -129,7 +144,7 @@ def test_come_as_far_to_the_right_as_to_the_left_it_learns_the_opposite(off: flo
 @settings(max_examples=30)
 @given(st.floats(-0.03, 0.03), st.floats(1.5, 9.0), st.floats(1.0, 4.0))
 def test_the_way_goes_on_by_the_turned_headings_until_it_is_spent(off: float, length_m: float, bent: float) -> None:
-    gone_m = length_m * (1.0 if bent < 2.0 else 1.0 / (S.min_straightness - SMALL))
+    gone_m = length_m * (1.0 if bent < 2.0 else 1.0 / (MIN_STRAIGHTNESS - SMALL))
     way = come(off, length_m, gone_m=gone_m)
     effect = effect_on(way.effects, Travel)
     travel = effect.value
@@ -156,10 +171,10 @@ def test_what_is_told_rests_on_the_way_and_where_it_ended() -> None:
 
 @pytest.mark.parametrize("more", [-SMALL, SMALL])
 def test_the_bounds_of_a_way_that_tells(more: float) -> None:
-    assert (come(0.01, S.min_travel_m + more).camera is not None) == (more > 0.0)
-    straight = come(0.01, 4.0, gone_m=4.0 / (S.min_straightness + more))
+    assert (come(0.01, MIN_TRAVEL_M + more).camera is not None) == (more > 0.0)
+    straight = come(0.01, 4.0, gone_m=4.0 / (MIN_STRAIGHTNESS + more))
     assert (straight.camera is not None) == (more > 0.0)
-    widest = S.max_yaw_sigmas * math.sqrt(PRIOR + compute_noise(4.0, 0.0))
+    widest = MAX_YAW_SIGMAS * math.sqrt(PRIOR + compute_noise(4.0, 0.0))
     for side in (1.0, -1.0):
         assert (come(side * (widest + more)).camera is not None) == (more < 0.0)
 
@@ -168,18 +183,18 @@ def test_the_bounds_of_a_way_that_tells(more: float) -> None:
 def test_it_learns_where_the_variance_shrinks_enough(more: float) -> None:
     noise = compute_noise(4.0, 0.0)
     after = 1 / (1 / PRIOR + 1 / noise)
-    known = after / (1.0 - S.min_learnt) * (1.0 + more)
+    known = after / (1.0 - MIN_LEARNT) * (1.0 + more)
     assert (come(0.01, learnt=known).camera is not None) == (more > 0.0)
 
 
 @pytest.mark.parametrize("more", [-SMALL, SMALL])
 def test_a_way_that_is_too_long_is_measured_for_the_last_time(more: float) -> None:
-    way = come(0.0, S.max_travel_m + more)
+    way = come(0.0, MAX_TRAVEL_M + more)
     (travel,) = made(way.effects, Travel)
     assert way.camera is not None and (travel.gone_m == 0.0) == (more > 0.0)
     if more > 0.0:
         assert travel.yaw_rad == pytest.approx(way.camera.mount.yaw_rad)
-        assert travel.yaw_variance == pytest.approx(1 / (1 / PRIOR + 1 / compute_noise(S.max_travel_m, 0.0)), rel=1e-4)
+        assert travel.yaw_variance == pytest.approx(1 / (1 / PRIOR + 1 / compute_noise(MAX_TRAVEL_M, 0.0)), rel=1e-4)
 
 
 def test_only_what_is_open_aside_of_the_way_leaves_the_yaw_open() -> None:
@@ -195,12 +210,12 @@ def test_only_what_is_open_aside_of_the_way_leaves_the_yaw_open() -> None:
         (camera,) = made(bench.ask(YawCalibrator(), bench.revise(belief)), CameraState)
         variances.append(camera.covariance[YAW][YAW])
     for variance, aside_m in zip(variances, (0.002, 0.05), strict=True):
-        noise = 2 * aside_m**2 / 16.0 + 0.001**2 + S.heading_sigma_rad**2 / 4.0
+        noise = 2 * aside_m**2 / 16.0 + 0.001**2 + HEADING_SIGMA_RAD**2 / 4.0
         assert variance == pytest.approx(1 / (1 / PRIOR + 1 / noise), rel=1e-6)
 
 
 def test_a_way_that_begins_anew_begins_with_the_yaw_as_it_was_learnt() -> None:
-    way = come(0.01, S.max_travel_m + SMALL)
+    way = come(0.01, MAX_TRAVEL_M + SMALL)
     (travel,) = made(way.effects, Travel)
     assert way.camera is not None and way.camera.mount.yaw_rad < -0.005
     assert travel.yaw_rad == pytest.approx(way.camera.mount.yaw_rad) and travel.gone_m == 0.0
@@ -211,8 +226,8 @@ def test_a_way_that_begins_anew_begins_with_the_yaw_as_it_was_learnt() -> None:
 
 
 def test_a_short_bent_way_is_not_spent_yet() -> None:
-    assert come(0.01, 0.5, gone_m=S.min_travel_m - SMALL).effects is None
-    (travel,) = made(come(0.01, 0.5, gone_m=S.min_travel_m + SMALL).effects, Travel)
+    assert come(0.01, 0.5, gone_m=MIN_TRAVEL_M - SMALL).effects is None
+    (travel,) = made(come(0.01, 0.5, gone_m=MIN_TRAVEL_M + SMALL).effects, Travel)
     assert travel.gone_m == 0.0
 
 

@@ -20,7 +20,6 @@ from knowledge_sources.methods.localization.aliasing import (
     score_view,
 )
 from knowledge_sources.methods.verification import compute_coverage, predict_lines
-from knowledge_sources.settings import DEFAULT
 from towers import tower
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
@@ -145,30 +144,19 @@ def test_a_pose_at_a_door_is_repeated_at_each_other_door_of_its_room(room: str, 
                    for other in repeated)
 
 
-def test_settings_are_read_where_they_are_passed() -> None:
-    """Longer lines only: fewer are predicted, and the kept views of other settings are not returned."""
-    here = Pose2(*WORLD.world_from_locale("hallway").apply([7.31, 1.17, 0.0])[:2], 0.013)
-    default = predict_views_on_grid(ROBOT, [here])[0]
-    short = replace(DEFAULT, verification=replace(DEFAULT.verification, min_line_length_px=90.0))
-    assert len(predict_views_on_grid(ROBOT, [here], short)[0]) < len(default)
-    assert np.array_equal(predict_views_on_grid(ROBOT, [here])[0], default)
-
-
 def test_the_same_place_on_another_floor_or_with_another_camera_is_another_view() -> None:
-    """Each question has its own answer, whatever was asked before: floor, lens, and how lines are looked for."""
+    """Each question has its own answer, whatever was asked before: floor, and lens."""
     tall = read_world(Source.parse(tower(2), "tower.toml"))
     robot = RobotModel(tall, Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1), ActuatorModel())
-    longer = replace(DEFAULT, verification=replace(DEFAULT.verification, min_line_length_px=90.0))
     wide = Camera.from_field_of_view(math.radians(80.0))
-    asked = [(robot.on_floor_of("hall-1"), DEFAULT), (robot.on_floor_of("hall-2"), DEFAULT),
-             (RobotModel(tall, wide, robot.mount, ActuatorModel()).on_floor_of("hall-1"), DEFAULT),
-             (robot.on_floor_of("hall-1"), longer)]
+    asked = [robot.on_floor_of("hall-1"), robot.on_floor_of("hall-2"),
+             RobotModel(tall, wide, robot.mount, ActuatorModel()).on_floor_of("hall-1")]
     pose = Pose2(9.0, -0.7, 2.9)
     plain = []
-    for one, tuning in asked:
+    for one in asked:
         fresh = replace(one, world=read_world(Source.parse(tower(2), "tower.toml")))
-        plain.append(predict_views_on_grid(fresh, [pose], tuning)[0])
-    for (one, tuning), wanted in (*zip(asked, plain, strict=True), *zip(asked[::-1], plain[::-1], strict=True)):
-        (found,) = predict_views_on_grid(one, [pose], tuning)
+        plain.append(predict_views_on_grid(fresh, [pose])[0])
+    for one, wanted in (*zip(asked, plain, strict=True), *zip(asked[::-1], plain[::-1], strict=True)):
+        (found,) = predict_views_on_grid(one, [pose])
         assert found.shape == wanted.shape and np.allclose(found, wanted)
     assert all(a.shape != b.shape or not np.allclose(a, b) for k, a in enumerate(plain) for b in plain[:k])

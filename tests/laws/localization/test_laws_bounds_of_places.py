@@ -16,7 +16,26 @@ import pytest
 
 from blackboard import Discrepancy, Level
 from experiments.generated.floors import generated_floor
+from knowledge_sources.methods.belief import MAX_TOLD_CHI2, MIN_P_BELIEVED, TOLD_SIGMA_M, TOLD_SIGMA_RAD
+from knowledge_sources.methods.features import MIN_BRIGHTNESS, MIN_CONTRAST
 from knowledge_sources.methods.localization import (
+    ALIKE_LOG_NOISE,
+    LOST_AGAIN_ODDS,
+    MAX_FAR_PROBES,
+    MAX_HYPOTHESES,
+    MAX_SEARCHED_VIEWS,
+    MIN_EXPLAINED_FRACTION,
+    MIN_FRACTION_SUM,
+    MIN_LOG_LIKELIHOOD,
+    MIN_MATCHED_FRACTION,
+    MIN_P_SURE,
+    MIN_PLACE_LINES,
+    MIN_VIEW_FRACTION,
+    MIN_VIEWS,
+    P_TOLD,
+    REFUTING_LOG_RATIO,
+    SURE_LOG_LIKELIHOOD,
+    SURE_MATCHED_FRACTION,
     LocalizationStatus,
     StatedPlace,
     compute_prior,
@@ -37,7 +56,7 @@ from knowledge_sources.methods.localization.place_odds import LOG_PLACES, comput
 from knowledge_sources.methods.localization.refinement import PoseLikelihood
 from knowledge_sources.reads import count_refuted, find_p_not_alias, find_p_there
 from knowledge_sources.reads import is_dark as is_picture_dark
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.reads.place_believed import MIN_P_TWIN, P_DISPLACED_TO_ALIAS
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries import PlaceOdds, Segments, TwinOdds
@@ -45,10 +64,9 @@ from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
 FOUND, PROBE, AMBIGUOUS = LocalizationStatus.FOUND, LocalizationStatus.PROBE, LocalizationStatus.AMBIGUOUS
-S = DEFAULT.localization
 LOOKS = [Pose2(0.0, 0.0, 0.5 * k) for k in range(8)]
 SMALL = 1e-6
-FAR = S.sure_log_likelihood - LOG_PLACES
+FAR = SURE_LOG_LIKELIHOOD - LOG_PLACES
 ACTION = SensingAction(0.3, 0.6, 1.0)
 ROBOT = RobotModel(generated_floor(11, 4, symmetric=True).world, Camera.from_field_of_view(1.1), CameraMount(1.0, 0.1),
                    ActuatorModel())
@@ -60,48 +78,48 @@ def place(x_m: float = 2.0, log: float = 40.0, accepted: bool = True, room: str 
 
 
 @pytest.mark.parametrize(("places", "looks", "status"), [
-    ((place(),), S.min_views, FOUND),
-    ((place(),), S.min_views + 1, FOUND),
-    ((place(),), S.min_views - 1, PROBE),
+    ((place(),), MIN_VIEWS, FOUND),
+    ((place(),), MIN_VIEWS + 1, FOUND),
+    ((place(),), MIN_VIEWS - 1, PROBE),
     ((place(),), 1, PROBE),
-    ((place(accepted=False),), S.min_views, PROBE),
-    ((place(accepted=False),), S.min_views + 3, PROBE),
-    ((), S.min_views, PROBE),
-    ((place(2.0), place(6.0, accepted=False)), S.min_views, PROBE),
+    ((place(accepted=False),), MIN_VIEWS, PROBE),
+    ((place(accepted=False),), MIN_VIEWS + 3, PROBE),
+    ((), MIN_VIEWS, PROBE),
+    ((place(2.0), place(6.0, accepted=False)), MIN_VIEWS, PROBE),
 ])
 def test_one_accepted_place_is_found_after_enough_looks(
     places: tuple[PlaceCandidate, ...], looks: int, status: LocalizationStatus
 ) -> None:
-    assert S.min_views > 1
+    assert MIN_VIEWS > 1
     assert decide(ROBOT, places, LOOKS[:looks]).status is status
 
 
 def is_like(like: dict[str, Any]) -> bool:
     base = PoseLikelihood(visible=40, matched=36, log_likelihood=20.0, explained=0.9, weakest_view=0.9)
-    return replace(base, **like).is_sufficient(S)
+    return replace(base, **like).is_sufficient()
 
 
 def test_each_part_of_the_evidence_must_be_enough() -> None:
     """Just above and just below each bound, with all else as good as can be."""
     visible = 1000
     for above, below in (
-        ({"visible": S.min_matched_lines, "matched": S.min_matched_lines},
-         {"visible": S.min_matched_lines - 1, "matched": S.min_matched_lines - 1}),
-        ({"visible": visible, "matched": int(np.ceil(S.min_matched_fraction * visible)), "explained": 1.0},
-         {"visible": visible, "matched": int(np.ceil(S.min_matched_fraction * visible)) - 1, "explained": 1.0}),
-        ({"weakest_view": S.min_view_fraction + SMALL}, {"weakest_view": S.min_view_fraction - SMALL}),
-        ({"explained": max(S.min_explained_fraction, S.min_fraction_sum - 0.9) + SMALL},
-         {"explained": max(S.min_explained_fraction, S.min_fraction_sum - 0.9) - SMALL}),
-        ({"explained": 0.0, "log_likelihood": S.sure_log_likelihood + SMALL},
-         {"explained": 0.0, "log_likelihood": S.sure_log_likelihood - SMALL}),
-        *(({"explained": 0.0, "log_likelihood": more * S.sure_log_likelihood, "visible": visible, "matched": least},
-           {"explained": 0.0, "log_likelihood": more * S.sure_log_likelihood, "visible": visible, "matched": least - 1})
+        ({"visible": MIN_PLACE_LINES, "matched": MIN_PLACE_LINES},
+         {"visible": MIN_PLACE_LINES - 1, "matched": MIN_PLACE_LINES - 1}),
+        ({"visible": visible, "matched": int(np.ceil(MIN_MATCHED_FRACTION * visible)), "explained": 1.0},
+         {"visible": visible, "matched": int(np.ceil(MIN_MATCHED_FRACTION * visible)) - 1, "explained": 1.0}),
+        ({"weakest_view": MIN_VIEW_FRACTION + SMALL}, {"weakest_view": MIN_VIEW_FRACTION - SMALL}),
+        ({"explained": max(MIN_EXPLAINED_FRACTION, MIN_FRACTION_SUM - 0.9) + SMALL},
+         {"explained": max(MIN_EXPLAINED_FRACTION, MIN_FRACTION_SUM - 0.9) - SMALL}),
+        ({"explained": 0.0, "log_likelihood": SURE_LOG_LIKELIHOOD + SMALL},
+         {"explained": 0.0, "log_likelihood": SURE_LOG_LIKELIHOOD - SMALL}),
+        *(({"explained": 0.0, "log_likelihood": more * SURE_LOG_LIKELIHOOD, "visible": visible, "matched": least},
+           {"explained": 0.0, "log_likelihood": more * SURE_LOG_LIKELIHOOD, "visible": visible, "matched": least - 1})
           for more in (1.0, 1.1, 1.2)  # the more evidence, the more may be missing
-          for least in (int(np.ceil(S.sure_matched_fraction / more * visible)),)),
+          for least in (int(np.ceil(SURE_MATCHED_FRACTION / more * visible)),)),
         ({"explained": 0.0, "log_likelihood": 1e3, "visible": visible,
-          "matched": int(np.ceil(S.min_matched_fraction * visible))},
+          "matched": int(np.ceil(MIN_MATCHED_FRACTION * visible))},
          {"explained": 0.0, "log_likelihood": 1e3, "visible": visible,
-          "matched": int(np.ceil(S.min_matched_fraction * visible)) - 1}),
+          "matched": int(np.ceil(MIN_MATCHED_FRACTION * visible)) - 1}),
     ):
         assert is_like(above) and not is_like(below), (above, below)
 
@@ -111,16 +129,16 @@ def test_unlikely_places_are_dropped_and_refuted_ones_unless_they_look_alike() -
         found = [place(2.0 + k, log) for k, log in enumerate(logs)]
         return [c.likelihood.log_likelihood for c in rank_candidates(found, lambda one, other: alike, looks)]
 
-    low = S.min_log_likelihood
+    low = MIN_LOG_LIKELIHOOD
     assert rank(low + SMALL) == [low + SMALL] and rank(low - SMALL) == []
-    near, far = 50.0 - S.refuting_log_ratio + SMALL, 50.0 - S.refuting_log_ratio - SMALL
+    near, far = 50.0 - REFUTING_LOG_RATIO + SMALL, 50.0 - REFUTING_LOG_RATIO - SMALL
     assert rank(50.0, near) == [50.0, near] and rank(50.0, far) == [50.0]
     for looks in (1, 2, 7):  # of places that look alike the noise of every look may have pointed one way
-        bound = 50.0 - S.refuting_log_ratio - looks * S.alike_log_noise
+        bound = 50.0 - REFUTING_LOG_RATIO - looks * ALIKE_LOG_NOISE
         assert rank(50.0, bound + SMALL, alike=True, looks=looks) == [50.0, bound + SMALL]
         assert rank(50.0, bound - SMALL, alike=True, looks=looks) == [50.0]
-    many = [50.0 - SMALL * k for k in range(S.max_hypotheses + 3)]
-    assert rank(*many) == many[:S.max_hypotheses]
+    many = [50.0 - SMALL * k for k in range(MAX_HYPOTHESES + 3)]
+    assert rank(*many) == many[:MAX_HYPOTHESES]
 
 
 def test_one_look_of_which_half_is_missing_refutes_where_another_place_shows_it() -> None:
@@ -148,29 +166,29 @@ def find_told_probability(p_told: float, logs: tuple[float, float]) -> float:
     return compute_place_odds(logs, [True, False], [False, False], p_told)[0]
 
 
-@pytest.mark.parametrize(("tied", "bound"), [(True, S.min_p_believed), (False, S.min_p_sure)])
+@pytest.mark.parametrize(("tied", "bound"), [(True, MIN_P_BELIEVED), (False, MIN_P_SURE)])
 def test_the_told_place_is_believed_at_the_stated_odds(tied: bool, bound: float) -> None:
     """By the prior alone, with two places of equal pictures: the posterior is the prior."""
     two = (place(2.0), place(9.0))
     seen = LocalizationResult(AMBIGUOUS if tied else PROBE, two, None if tied else SensingAction(1.0, 0.0, 1.0))
 
-    def weigh(p_told: float, looks: int = S.min_views, result: LocalizationResult = seen) -> LocalizationStatus:
+    def weigh(p_told: float, looks: int = MIN_VIEWS, result: LocalizationResult = seen) -> LocalizationStatus:
         return weigh_told(result, replace(HERE, p_told=p_told), lambda one, other: False, looks).status
 
     above, below = bound + 0.5 * (1.0 - bound), bound - 1e-3
     assert find_told_probability(above, (40.0, 40.0)) == pytest.approx(above)
     assert weigh(above) is FOUND and weigh(below) is seen.status
-    assert weigh(above, S.min_views - 1) is seen.status
+    assert weigh(above, MIN_VIEWS - 1) is seen.status
     doubtful = replace(seen, candidates=(place(2.0, accepted=False), place(9.0)))
     assert weigh(above, result=doubtful) is seen.status
     elsewhere = replace(seen, candidates=(place(9.0), place(12.0)))
     assert weigh(above, result=elsewhere).name == seen.status.name
-    assert S.min_p_believed < S.min_p_sure
+    assert MIN_P_BELIEVED < MIN_P_SURE
 
 
 @pytest.mark.parametrize(("log", "looks", "x_m", "expected"), [
-    (FAR, S.max_searched_views, 2.0, FOUND), (FAR - SMALL, 9, 2.0, PROBE),
-    (FAR, S.max_searched_views - 1, 2.0, PROBE), (S.sure_log_likelihood, 9, 9.0, PROBE)])
+    (FAR, MAX_SEARCHED_VIEWS, 2.0, FOUND), (FAR - SMALL, 9, 2.0, PROBE),
+    (FAR, MAX_SEARCHED_VIEWS - 1, 2.0, PROBE), (SURE_LOG_LIKELIHOOD, 9, 9.0, PROBE)])
 def test_where_it_was_told_to_be_it_need_only_be_far_from_chance(
     log: float, looks: int, x_m: float, expected: LocalizationStatus
 ) -> None:
@@ -181,17 +199,17 @@ def test_where_it_was_told_to_be_it_need_only_be_far_from_chance(
 
 def test_a_place_is_the_told_one_up_to_the_stated_distance() -> None:
     covariance = np.diag([0.02, 0.03, 0.01])
-    beyond = np.diag(np.square([S.told_sigma_m, S.told_sigma_m, S.told_sigma_rad]))
+    beyond = np.diag(np.square([TOLD_SIGMA_M, TOLD_SIGMA_M, TOLD_SIGMA_RAD]))
     sigma_m = float(np.sqrt((2.0 * covariance + beyond)[0, 0]))
     for part, is_there in ((0.999, True), (1.001, False)):
-        pose = Pose2(part * sigma_m * np.sqrt(S.max_told_chi2), 0.0, 0.0)
+        pose = Pose2(part * sigma_m * np.sqrt(MAX_TOLD_CHI2), 0.0, 0.0)
         assert is_within_reach(pose, covariance, Pose2(0.0, 0.0, 0.0), covariance) is is_there
 
 
 def test_each_time_it_was_lost_again_the_told_place_is_less_likely() -> None:
-    odds = [p / (1.0 - p) for p in (compute_prior(times, S) for times in range(4))]
-    assert odds[0] == pytest.approx(S.p_told / (1.0 - S.p_told))
-    assert [b / a for a, b in pairwise(odds)] == pytest.approx([S.lost_again_odds] * 3)
+    odds = [p / (1.0 - p) for p in (compute_prior(times) for times in range(4))]
+    assert odds[0] == pytest.approx(P_TOLD / (1.0 - P_TOLD))
+    assert [b / a for a, b in pairwise(odds)] == pytest.approx([LOST_AGAIN_ODDS] * 3)
 
 
 class Reach:
@@ -222,11 +240,11 @@ def test_the_only_place_within_reach_is_believed_if_it_stands_by_itself(
 
 
 @pytest.mark.parametrize(("accepted", "status", "looks", "has_next", "asks"), [
-    (2, AMBIGUOUS, S.min_views, True, True), (3, AMBIGUOUS, S.min_views, True, True),
-    (1, AMBIGUOUS, S.min_views, True, False), (2, FOUND, S.min_views, True, False),
-    (2, AMBIGUOUS, S.min_views - 1, True, False), (2, PROBE, S.min_views, False, True),
-    (2, PROBE, S.max_searched_views - 1, True, False), (2, PROBE, S.max_searched_views, True, True),
-    (2, PROBE, DEFAULT.goal.max_far_probes - 1, True, True), (2, PROBE, DEFAULT.goal.max_far_probes, True, False)])
+    (2, AMBIGUOUS, MIN_VIEWS, True, True), (3, AMBIGUOUS, MIN_VIEWS, True, True),
+    (1, AMBIGUOUS, MIN_VIEWS, True, False), (2, FOUND, MIN_VIEWS, True, False),
+    (2, AMBIGUOUS, MIN_VIEWS - 1, True, False), (2, PROBE, MIN_VIEWS, False, True),
+    (2, PROBE, MAX_SEARCHED_VIEWS - 1, True, False), (2, PROBE, MAX_SEARCHED_VIEWS, True, True),
+    (2, PROBE, MAX_FAR_PROBES - 1, True, True), (2, PROBE, MAX_FAR_PROBES, True, False)])
 def test_a_far_view_is_looked_for_between_places_that_nothing_near_tells_apart(
     accepted: int, status: LocalizationStatus, looks: int, has_next: bool, asks: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -234,7 +252,7 @@ def test_a_far_view_is_looked_for_between_places_that_nothing_near_tells_apart(
     monkeypatch.setattr(place_search, "choose_far_action", lambda *given: asked.append(given) or ACTION)
     places = (*(place(2.0 + 4.0 * k) for k in range(accepted)), place(20.0, accepted=False))
     result = LocalizationResult(status, places, ACTION if has_next else None)
-    found = find_far_action(ROBOT, result, LOOKS[:1] * looks, ["corridor-0"], DEFAULT)
+    found = find_far_action(ROBOT, result, LOOKS[:1] * looks, ["corridor-0"])
     assert (found is ACTION) == bool(asked) == asks
     if asks:
         assert [h.world_from_robot for h in asked[0][1]] == [c.world_from_robot for c in places]
@@ -251,15 +269,13 @@ def test_what_is_said_of_a_probe_is_what_is_done(degrees: float, move_m: float) 
 
 
 def test_a_dark_frame_is_dark_by_contrast_and_brightness_together() -> None:
-    g = DEFAULT.goal
-
     def is_dark(contrast: float, brightness: float) -> bool:
         empty = np.zeros((0, 2, 2))
-        return is_picture_dark(Segments("CameraPicture-1", "", empty, np.zeros(0), contrast, brightness), g)
+        return is_picture_dark(Segments("CameraPicture-1", "", empty, np.zeros(0), contrast, brightness))
 
-    assert is_dark(g.min_contrast - SMALL, g.min_brightness - SMALL)
-    assert not is_dark(g.min_contrast + SMALL, g.min_brightness - SMALL)
-    assert not is_dark(g.min_contrast - SMALL, g.min_brightness + SMALL)
+    assert is_dark(MIN_CONTRAST - SMALL, MIN_BRIGHTNESS - SMALL)
+    assert not is_dark(MIN_CONTRAST + SMALL, MIN_BRIGHTNESS - SMALL)
+    assert not is_dark(MIN_CONTRAST - SMALL, MIN_BRIGHTNESS + SMALL)
 
 
 def believing(p_twins: float | None = None, refuted: int | None = None, doubt: Any = None) -> Any:
@@ -273,22 +289,22 @@ def believing(p_twins: float | None = None, refuted: int | None = None, doubt: A
 
 def test_the_prior_is_the_smaller_of_what_was_told_and_what_twins_leave() -> None:
     def find(p_twins: float | None, times: int) -> float:
-        return find_p_there(believing(p_twins), times, S)
+        return find_p_there(believing(p_twins), times)
 
-    assert find(None, 0) == pytest.approx(S.p_told)
-    assert find(S.p_told - 0.1, 0) == pytest.approx(S.p_told - 0.1)
-    assert find(min(1.0, S.p_told + 0.01), 0) == pytest.approx(S.p_told)
-    assert find(0.0, 0) == S.min_p_twin
+    assert find(None, 0) == pytest.approx(P_TOLD)
+    assert find(P_TOLD - 0.1, 0) == pytest.approx(P_TOLD - 0.1)
+    assert find(min(1.0, P_TOLD + 0.01), 0) == pytest.approx(P_TOLD)
+    assert find(0.0, 0) == MIN_P_TWIN
     assert find(None, 1) < find(None, 0)
 
 
 def test_against_aliases_all_pictures_count_up_to_what_is_sure() -> None:
-    assert find_p_not_alias(believing(), S) == pytest.approx(S.p_told)
-    assert find_p_not_alias(believing(refuted=1), S) == pytest.approx(compute_prior(1, S))
-    assert find_p_not_alias(believing(0.9), S) == pytest.approx(0.9)
-    assert find_p_not_alias(believing(1.0), S) == pytest.approx(S.min_p_sure)
-    in_doubt = find_p_not_alias(believing(0.9, doubt=object()), S)
-    assert in_doubt == pytest.approx(0.9 * (1.0 - S.p_displaced_to_alias))
+    assert find_p_not_alias(believing()) == pytest.approx(P_TOLD)
+    assert find_p_not_alias(believing(refuted=1)) == pytest.approx(compute_prior(1))
+    assert find_p_not_alias(believing(0.9)) == pytest.approx(0.9)
+    assert find_p_not_alias(believing(1.0)) == pytest.approx(MIN_P_SURE)
+    in_doubt = find_p_not_alias(believing(0.9, doubt=object()))
+    assert in_doubt == pytest.approx(0.9 * (1.0 - P_DISPLACED_TO_ALIAS))
 
 
 @pytest.mark.parametrize(("magnitude", "cycle", "counts"), [

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.generated.floors import Floor, generated_floor
-from knowledge_sources.methods.localization import next_view
+from knowledge_sources.methods.localization import MAX_SEARCHED_VIEWS, next_view
 from knowledge_sources.methods.localization.next_view import (
     PoseHypothesis,
     PredictView,
@@ -21,14 +21,12 @@ from knowledge_sources.methods.localization.next_view import (
     find_common_floor,
     make_view_predictor,
 )
-from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 CAMERA, MOUNT = Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1)
-TUNING = DEFAULT.localization
 HERE = Pose2(0.0, 0.0, 0.0)
 SYMMETRIC = generated_floor(11, 4, symmetric=True)
 
@@ -121,7 +119,7 @@ def test_driving_on_it_comes_to_the_only_view_that_tells(away_m: float) -> None:
     tells_at = Pose2(-away_m, 0.0, 0.0)
     predict = make_far_predictor(robot, places, tells_at)
     moved, looked, driven_m = HERE, [HERE], 0.0
-    for _ in range(TUNING.max_searched_views + 10):
+    for _ in range(MAX_SEARCHED_VIEWS + 10):
         now = [PoseHypothesis(p.room, p.world_from_robot @ moved, 0.5) for p in places]
         views = [predict(h.world_from_robot) for h in now]
         if are_distinguishable([views[0]], [views[1]], clearly=next_view.CLEAR_DIFFERENCE):

@@ -10,11 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.generated.floors import generated_floor
-from knowledge_sources.methods.localization import CameraView, LocalizationStatus, get_visibility_map, pose_candidates
+from knowledge_sources.methods.localization import (
+    MIN_P_TRACKED,
+    CameraView,
+    LocalizationStatus,
+    get_visibility_map,
+    pose_candidates,
+)
 from knowledge_sources.methods.localization.global_localization import LocalizationResult, localize
 from knowledge_sources.methods.localization.pose_candidates import MIN_SIEVED, VisibilityMap, find_pose_candidates
 from knowledge_sources.methods.verification import predict_lines
-from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.building.building import Building
 from world_models.camera import Camera, CameraMount
@@ -24,7 +29,7 @@ from world_models.robot import RobotModel
 FLOOR = generated_floor(23, 16, open_share=1.0)
 ROBOT = RobotModel(FLOOR.world, Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1), ActuatorModel())
 ROOMS = list(FLOOR.world.rooms)
-SURE, DOUBTED = 0.98, 0.5 * DEFAULT.localization.min_p_tracked
+SURE, DOUBTED = 0.98, 0.5 * MIN_P_TRACKED
 LOOKS = (0.0, math.pi, 0.5 * math.pi)
 places = st.tuples(st.sampled_from(FLOOR.rooms), st.integers(0, 10_000))
 

@@ -8,16 +8,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.verification import (
+    LINE_TOLERANCE_PX,
     LINE_TOLERANCE_RAD,
     MIN_COVERED_FRACTION,
     compute_coverage,
     find_distinct,
 )
 from knowledge_sources.methods.verification.line_check import MAX_PATTERN_PART, PATTERN_REACH_PX, PATTERN_STEP_PX
-from knowledge_sources.settings import DEFAULT
 
 Floats = NDArray[np.float64]
-TOLERANCES = DEFAULT.verification.line_tolerance_px, LINE_TOLERANCE_RAD
+TOLERANCES = LINE_TOLERANCE_PX, LINE_TOLERANCE_RAD
 some = settings(max_examples=40, deadline=None)
 angles, places = st.floats(-3.1, 3.1), st.floats(150.0, 350.0)
 

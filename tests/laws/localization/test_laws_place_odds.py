@@ -9,12 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from knowledge_sources.methods.localization import compute_prior
+from knowledge_sources.methods.belief import MIN_P_BELIEVED
+from knowledge_sources.methods.localization import MAX_ALIKE_LOG_RATIO, P_TOLD, compute_prior
 from knowledge_sources.methods.localization.place_odds import compute_place_odds, is_within_reach
-from knowledge_sources.settings import DEFAULT
 from world_models.frames import Pose2
 
-S = DEFAULT.localization
 logs = st.lists(st.floats(-30.0, 30.0), min_size=2, max_size=8)
 shares = st.floats(0.01, 0.99)
 small = st.floats(-0.5, 0.5)
@@ -58,35 +57,35 @@ def test_nothing_is_known_of_places_of_which_none_was_told(values: list[float], 
 
 @given(st.integers(2, 40), st.floats(-30.0, 30.0))
 def test_twins_by_every_picture_are_left_to_the_prior_alone(twins: int, log: float) -> None:
-    odds = compute_place_odds([log] * twins, [True, *[False] * (twins - 1)], [True] * twins, S.p_told)
-    assert math.isclose(odds[0], S.p_told)
-    assert odds[0] >= S.min_p_believed
+    odds = compute_place_odds([log] * twins, [True, *[False] * (twins - 1)], [True] * twins, P_TOLD)
+    assert math.isclose(odds[0], P_TOLD)
+    assert odds[0] >= MIN_P_BELIEVED
 
 
 @given(st.integers(2, 40), st.floats(0.5, 30.0))
 def test_the_prior_alone_is_not_believed_where_the_pictures_speak_for_another(twins: int, log: float) -> None:
     for alike in (True, False):
         odds = compute_place_odds([0.0, log, *[0.0] * (twins - 2)], [True, *[False] * (twins - 1)], [alike] * twins,
-                                  S.p_told)
+                                  P_TOLD)
         bare = math.log(odds[0] / odds[1])
-        even = compute_place_odds([0.0] * twins, [True, *[False] * (twins - 1)], [alike] * twins, S.p_told)
+        even = compute_place_odds([0.0] * twins, [True, *[False] * (twins - 1)], [alike] * twins, P_TOLD)
         assert bare < math.log(even[0] / even[1])
     if twins == 2:
-        assert odds[0] < S.min_p_believed
+        assert odds[0] < MIN_P_BELIEVED
 
 
 @given(st.floats(3.0, 30.0))
 def test_between_places_alike_by_the_model_only_so_much_is_no_chance(log: float) -> None:
-    odds = compute_place_odds([log, 0.0], [True, False], [True, True], S.p_told)
-    most = S.p_told / (1.0 - S.p_told) * math.exp(S.max_alike_log_ratio)
+    odds = compute_place_odds([log, 0.0], [True, False], [True, True], P_TOLD)
+    most = P_TOLD / (1.0 - P_TOLD) * math.exp(MAX_ALIKE_LOG_RATIO)
     assert odds[0] / odds[1] == pytest.approx(most)
 
 
 @given(st.integers(0, 6))
 def test_what_was_believed_and_led_astray_is_believed_less(times: int) -> None:
-    assert math.isclose(compute_prior(0), S.p_told)
+    assert math.isclose(compute_prior(0), P_TOLD)
     assert compute_prior(times + 1) < compute_prior(times)
-    assert compute_prior(1) < S.min_p_believed
+    assert compute_prior(1) < MIN_P_BELIEVED
 
 
 @given(small, small, small, st.floats(0.001, 0.5), st.floats(1.0, 4.0))

@@ -14,6 +14,7 @@ from experiments.generated.floors import generated_floor
 from experiments.perception.milestones_calibrate import fit_weights, remove_colors
 from knowledge_sources.methods.verification import (
     EVIDENCE_NAMES,
+    LINE_TOLERANCE_PX,
     POSE_CONFIDENCE,
     TERMS,
     Agreement,
@@ -31,7 +32,6 @@ from knowledge_sources.methods.verification import (
 )
 from knowledge_sources.methods.verification.color_check import NOT_TESTED, ColorCheck
 from knowledge_sources.methods.verification.pose_confidence import compute_motion_tolerance_px
-from knowledge_sources.settings import DEFAULT
 from sim.render.renderer import Renderer
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
@@ -107,7 +107,7 @@ def test_the_right_pose_is_more_certain_than_those_around_it() -> None:
 
 
 @settings(max_examples=20, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.floats(1.3, 0.9 * DEFAULT.verification.line_tolerance_px))
+@given(st.integers(0, 2**32 - 1), st.floats(1.3, 0.9 * LINE_TOLERANCE_PX))
 def test_only_what_is_found_within_a_pixel_is_evidence(seed: int, off_px: float) -> None:
     """A segment beside its line, within what the matcher allows, covers it; but a right pose has it nearer."""
     rng, lines, segments = np.random.default_rng(seed), _lines(), _segments(_place())

@@ -7,14 +7,14 @@ import math
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from knowledge_sources.action.motor import LOOKAHEAD_M
 from knowledge_sources.methods.motion import compute_bearing, find_aim_point, measure_progress
 from knowledge_sources.methods.motion.pure_pursuit import compute_chord_turn, compute_curvature_to
-from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel, arc
 from world_models.entries import Drift, Leg
 from world_models.frames import Pose2
 
-ACTUATOR, LOOKAHEAD_M = ActuatorModel(), DEFAULT.action.lookahead_m
+ACTUATOR, LOOKAHEAD_M = ActuatorModel(), LOOKAHEAD_M
 STEP_M = ACTUATOR.reach * ACTUATOR.increment_m
 errors = st.lists(st.tuples(*[st.floats(-1.0, 1.0)] * 4), min_size=20, max_size=60)
 """For each increment: of the believed place, heading, the turn and the curvature, as parts of their bounds."""

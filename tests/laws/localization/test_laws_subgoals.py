@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from generated_boards import HALL, HOUSE, LENGTH_M, STUDY, WIDTH_M, Bench, plain_robot, to_world
 from knowledge_sources.methods.floor import find_floor, measure_first_seen_m
 from knowledge_sources.methods.floor.seen_floor import sees
-from knowledge_sources.methods.motion import SubgoalPlanner
+from knowledge_sources.methods.motion import CLEARANCES_M, SubgoalPlanner
 from knowledge_sources.methods.motion.subgoals import (
     LOOKOUT_DIRECTIONS,
     LOOKOUT_DISTANCES_M,
@@ -90,7 +90,7 @@ def test_a_way_is_one_step_after_the_other_through_the_door_and_past_what_stands
         line = shapely.LineString([p.in_world(plain_robot().world).position for p in (
             through.origin, through.destination)])
         least_m = line.distance(shapely.Polygon(bench.view["Obstacle-1"].value.footprint))
-        assert least_m >= plain_robot().radius_m + S.clearances_m[-1] - 1e-3
+        assert least_m >= plain_robot().radius_m + CLEARANCES_M[-1] - 1e-3
 
 
 @settings(max_examples=20, deadline=None)
@@ -145,7 +145,7 @@ def test_a_narrow_door_is_come_to_as_exactly_as_it_leaves_room_beside_the_robot(
     way = plan(Bench(plain_robot(read_world(Source.parse(text, "house.toml"))))).plan_between_locales(
         Place(HALL, 5.0, 2.2), Place(STUDY, 3.0, 2.0), 0.01)
     assert way is not None
-    wanted = WAY_TOLERANCE_M if beside_m >= MIN_DOORWAY_CLEARANCE_M else max(beside_m, S.clearances_m[-1])
+    wanted = WAY_TOLERANCE_M if beside_m >= MIN_DOORWAY_CLEARANCE_M else max(beside_m, CLEARANCES_M[-1])
     assert way[0].tolerance_m == pytest.approx(wanted) and way[-1].tolerance_m == 0.01
 
 
@@ -162,7 +162,7 @@ def test_what_is_free_at_a_door_is_so_whatever_was_asked_before(y_m: float) -> N
     bench = stage()
     robot = find_robot(bench.view)
     things = [bench.view[f"Obstacle-{k}"].value for k in (1, 2)]
-    questions = [(by_cores, door, margin_m, few) for by_cores in (False, True) for margin_m in S.clearances_m
+    questions = [(by_cores, door, margin_m, few) for by_cores in (False, True) for margin_m in CLEARANCES_M
                  for door in ("study-door", "high-door", "low-door") for few in (things, things[:1])]
 
     def ask(robot: object, by_cores: bool, door: str, margin_m: float, few: list[object]) -> shapely.Geometry:
@@ -186,7 +186,7 @@ def test_it_looks_again_from_where_that_is_best_by_way_and_by_side(
     belief = bench.believe(Pose2(x, y, 0.0)).value
     thing = bench.stand(at_x, at_y, 0.1, 0.1).value
     found = plan(bench).plan_look(belief, thing)
-    r = plain_robot().radius_m + S.clearances_m[0]
+    r = plain_robot().radius_m + CLEARANCES_M[0]
     floor = shapely.box(0.0, 0.0, LENGTH_M, WIDTH_M)
     free = floor.buffer(-r, join_style="mitre").difference(shapely.box(
         at_x - 0.1, at_y - 0.1, at_x + 0.1, at_y + 0.1).buffer(r, quad_segs=32))

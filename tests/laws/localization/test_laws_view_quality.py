@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,7 +25,6 @@ from knowledge_sources.methods.verification.view_quality import (
 )
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.milestone_selector.view_updater import ViewUpdater
-from knowledge_sources.settings import DEFAULT
 from towers import tower
 from world_models.entries import Milestone, Obstruction, Place, PlanSketch, Subgoal
 from world_models.files.toml.source import Source
@@ -42,11 +40,13 @@ SMALL = 1e-9
 @pytest.mark.parametrize("heading", [0.4, 1.9, -2.0])
 def test_the_lines_that_are_expected_are_the_clearest(most: int, heading: float) -> None:
     """By length times contrast, both up to what makes a line no clearer; redone one by one."""
-    pose, few = Pose2(HERE.x_m, HERE.y_m, heading), replace(DEFAULT, plan=replace(DEFAULT.plan, max_lines=most))
-    every = predict_lines(ROBOT, pose, DEFAULT.verification)
+    pose = Pose2(HERE.x_m, HERE.y_m, heading)
+    every = predict_lines(ROBOT, pose)
     clear = [min(math.dist(*px), MAX_COUNTED_LENGTH_PX) * min(contrast, MAX_COUNTED_CONTRAST)
              for px, contrast in zip(every.segments_px.tolist(), every.contrast.tolist(), strict=True)]
-    expected = predict_milestone(ROBOT, pose, Milestone("", -1, "", 0.0), settings=few)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(view_quality, "MAX_EXPECTED_LINES", most)
+        expected = predict_milestone(ROBOT, pose, Milestone("", -1, "", 0.0))
     kept = [every.lines_world.tolist().index(np.array(line).tolist()) for line in expected.expected]
     assert len(kept) == min(most, len(clear)) and kept == sorted(kept)
     left = set(range(len(clear))) - set(kept)
@@ -103,7 +103,7 @@ def test_after_a_ride_nothing_is_expected_of_the_car_as_it_looks_the_same_on_eve
     on = Subgoal(IN_CAR, goal.value.destination, primitive=True)
     sketch = bench.put(PlanSketch(goal.id, (), "", (step, on), 1), goal)
     milestone = bench.await_milestone(sketch.id if before != "nothing" else "", 1, look_heading_rad=pose.heading_rad)
-    seen = predict_lines(robot.on_floor_of("car-2"), pose, DEFAULT.verification)
+    seen = predict_lines(robot.on_floor_of("car-2"), pose)
     marks = [seen.marks[int(i)] for i in seen.landmark]
     of_car = np.array(["car-2" in (mark.locale, mark.neighbour) for mark in marks])
     assert of_car.any() and not of_car.all()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from generated_boards import HALL, house, plain_robot, to_world
-from knowledge_sources.methods.motion import meets
+from knowledge_sources.methods.motion import CLEARANCES_M, meets
 from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M
 from knowledge_sources.settings import DEFAULT
 from world_models.entries import Obstacle, ObstacleStatus, Place, PlanSketch, Subgoal
@@ -27,7 +27,7 @@ def thing(away_m: float, side: float, status: ObstacleStatus, *, touched: bool =
 def concerns(obstacle: Obstacle, *, at: int = 0, primitive: bool = False) -> bool:
     step = Subgoal(FROM, TO, primitive)
     here = to_world(Pose2(FROM.x_m, FROM.y_m, 0.0))
-    return meets(PlanSketch("Goal-1", (), HALL, (step,), at), obstacle, here, ROBOT.in_building(house()), PLAN)
+    return meets(PlanSketch("Goal-1", (), HALL, (step,), at), obstacle, here, ROBOT.in_building(house()))
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -36,7 +36,7 @@ def test_what_is_there_concerns_a_way_a_little_nearer_and_what_is_gone_a_little_
     side: float, more: float
 ) -> None:
     """So a way that was drawn round it is neither withdrawn at once, nor kept for nothing."""
-    least, most = PLAN.clearances_m[-1], PLAN.clearances_m[0]
+    least, most = CLEARANCES_M[-1], CLEARANCES_M[0]
     there_m, gone_m = ROBOT.radius_m + least - LEG_SLACK_M, ROBOT.radius_m + most + LEG_SLACK_M
     assert concerns(thing(there_m + more, side, "there")) == (more < 0.0)
     assert concerns(thing(there_m + more, side, "there"), primitive=True) == (more < 0.0)

@@ -14,7 +14,6 @@ from scipy.optimize import minimize
 
 from experiments.paper.paper_matching import PaperSearch, match_as_paper
 from knowledge_sources.methods.matching import Match, Peak, Similarity2, compute_best_fits, match_lines
-from knowledge_sources.settings import MatchingSettings
 
 Array = NDArray[np.float64]
 
@@ -25,10 +24,10 @@ quick = settings(max_examples=12, deadline=None, derandomize=True)
 
 def match(objective: str, model: Array, data: Array, search: PaperSearch | None = None, **more: Any) -> Match:
     """Three starts within 3 px, and steepest descent with exchanges, under the likelihood or the paper's objective."""
-    tuning = MatchingSettings(max_starts=3, max_pair_px=3.0)
+    more = {"max_starts": 3, "pair_px": 3.0, **more}
     if objective == "paper":
-        return match_as_paper(model, data, tuning, search or PaperSearch(first=False, exchange=True), **more)
-    return match_lines(model, data, tuning, **({"search": search} if search else {}), **more)
+        return match_as_paper(model, data, search or PaperSearch(first=False, exchange=True), **more)
+    return match_lines(model, data, **({"search": search} if search else {}), **more)
 
 
 def draw_model(rng: np.random.Generator, count: int) -> Array:

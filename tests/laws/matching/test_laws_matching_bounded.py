@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.perception.matcher_scenes import CAMERA, generate_large
-from knowledge_sources.methods.matching import match_in_space, pose_matching
+from knowledge_sources.methods.matching import MAX_START_PAIRS, match_in_space, pose_matching
 from knowledge_sources.methods.matching.pose_matching import PosePairs, keep_longest
-from knowledge_sources.settings import DEFAULT
 from world_models.frames import Pose
 
 
@@ -59,7 +57,7 @@ def test_300_lines_against_4500_segments_are_within_the_bounds(
     monkeypatch.setattr(pose_matching, "_build_space", build_space)
     lines, data = generate_large(np.random.default_rng(1))
     covariance = np.diag([(0.1 * spread_m) ** 2] * 3 + [spread_m**2] * 3)
-    tuning = replace(DEFAULT.matching, max_near_pairs=800)
-    match_in_space(lines, data, CAMERA, Pose.identity(), covariance, tuning)
-    assert 0 < max(looked["start"]) <= tuning.max_start_pairs
-    assert 0 < max(looked["near"]) <= tuning.max_near_pairs
+    monkeypatch.setattr(pose_matching, "MAX_NEAR_PAIRS", 800)
+    match_in_space(lines, data, CAMERA, Pose.identity(), covariance)
+    assert 0 < max(looked["start"]) <= MAX_START_PAIRS
+    assert 0 < max(looked["near"]) <= 800

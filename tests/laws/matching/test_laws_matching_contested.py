@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from experiments.paper.paper_matching import PaperSearch, PaperTerms, build_paper_terms
-from knowledge_sources.methods.matching import PairSpace, Peak, Terms, match_lines
+from knowledge_sources.methods.matching import MIN_GAIN, PairSpace, Peak, Terms, match_lines
 from knowledge_sources.methods.matching.matching_kernels import RIGID
 from knowledge_sources.methods.matching.search import (
     POSE_STEP,
@@ -24,12 +24,10 @@ from knowledge_sources.methods.matching.search import (
     evaluate_state,
     search_pairs,
 )
-from knowledge_sources.settings import DEFAULT
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 LINES, DATA, CELLS = 4, 6, 12
-TUNING = DEFAULT.matching
 seeds = st.integers(0, 2**32 - 1)
 quick = settings(max_examples=25, deadline=None, derandomize=True)
 
@@ -55,7 +53,7 @@ def draw_space(seed: int, fitting: Fitting, *, as_paper: bool) -> tuple[PairSpac
         anchor[0, 4] = anchor[4, 0] = -0.1
     lengths = rng.uniform(20.0, 120.0, LINES)
     terms = (build_paper_terms(lengths, rng.uniform(10.0, 80.0, DATA)) if as_paper
-             else build_likelihood_terms(lengths, DATA, 1.0, 5.0, TUNING))
+             else build_likelihood_terms(lengths, DATA, 1.0, 5.0))
     return PairSpace(model, data, forms, masks, LINES, anchor, fitting), terms, rng
 
 
@@ -129,9 +127,9 @@ def test_a_search_is_what_brute_force_finds(
     """Each state's error is the definition's, no data line is used twice, and at the end no move is better."""
     space, terms, rng = draw_space(seed, kind, as_paper=as_paper)
     start, search = draw_start(space, rng), PaperSearch(first, exchange)
-    found, error = search(space, terms, start, TUNING), search.trace[-1].evaluation
+    found, error = search(space, terms, start), search.trace[-1].evaluation
     if exchange and not (first or as_paper):  # the compiled search takes the same way
-        compiled = search_pairs(space, terms, start, TUNING)
+        compiled = search_pairs(space, terms, start)
         np.testing.assert_array_equal(compiled.chosen, found.chosen)
         np.testing.assert_allclose(compiled.errors, found.errors, rtol=1e-9, atol=1e-9)
     for step in search.trace:
@@ -147,10 +145,10 @@ def test_a_search_is_what_brute_force_finds(
         assert step.evaluation == pytest.approx(evaluate(chosen), rel=1e-5, abs=1e-6)
     assert error == pytest.approx(evaluate(found.chosen), rel=1e-5, abs=1e-6)
     around = list_moves(space, found.chosen, exchange)
-    assert all(evaluate(state) >= error - TUNING.min_gain - 1e-6 for state in around)
+    assert all(evaluate(state) >= error - MIN_GAIN - 1e-6 for state in around)
     if not first and len(search.trace) > 1 and kind.kind == POSE_STEP.kind:
         best = min(evaluate(state) for state in list_moves(space, start, False))
-        if best < search.trace[0].evaluation - TUNING.min_gain:
+        if best < search.trace[0].evaluation - MIN_GAIN:
             assert search.trace[1].evaluation == pytest.approx(best, rel=1e-5, abs=1e-6)
 
 

@@ -9,12 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import lomax, norm
 
-from knowledge_sources.methods.matching import build_line_table
+from knowledge_sources.methods.matching import (
+    CHANCE_EXPONENT,
+    CHANCE_LENGTH_PX,
+    HOUGH_CELLS,
+    HOUGH_STEP_RAD,
+    HOUGH_WINDOW_PX,
+    build_line_table,
+)
 from knowledge_sources.methods.matching.image_matching import _suppress_non_maxima, find_hough_peaks
 from knowledge_sources.methods.matching.search import build_likelihood_terms
-from knowledge_sources.settings import DEFAULT
 
-TUNING = DEFAULT.matching
 CENTRE = np.array([256.0, 256.0])
 lengths_px = st.lists(st.floats(5.0, 400.0), min_size=1, max_size=10).map(np.array)
 
@@ -25,12 +30,12 @@ def test_terms_are_minus_log_likelihoods(
     lengths: np.ndarray, sigma_px: float, start_px: float, part: float
 ) -> None:
     """Of ends by a normal distribution, of what clutter covers by a Lomax distribution, of a start by its error."""
-    terms = build_likelihood_terms(lengths, 3, sigma_px, start_px, TUNING)
+    terms = build_likelihood_terms(lengths, 3, sigma_px, start_px)
     off = 1.7 * sigma_px
     np.testing.assert_allclose(
         terms.end_weights * off**2, norm.logpdf(0.0, scale=sigma_px) - norm.logpdf(off, scale=sigma_px))
     every = np.arange(len(lengths))
-    clutter = lomax(TUNING.chance_exponent, scale=TUNING.chance_length_px)
+    clutter = lomax(CHANCE_EXPONENT, scale=CHANCE_LENGTH_PX)
     np.testing.assert_allclose(
         terms.compute_omission(np.full(len(lengths), part), every),
         clutter.logsf((1.0 - part) * lengths) - clutter.logsf(lengths), atol=1e-9)
@@ -50,16 +55,16 @@ def test_a_model_moved_within_the_window_is_found_where_it_is(seed: int, u: floa
     middle, half = rng.uniform(-20.0, 20.0, (12, 1, 2)), rng.uniform(40.0, 80.0, 12)
     along = half[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     lines = middle + np.stack([-along, along], axis=1)
-    shift = TUNING.hough_window_px * np.array([u, v])
+    shift = HOUGH_WINDOW_PX * np.array([u, v])
     c, s = math.cos(turn), math.sin(turn)
     moved = lines @ np.array([[c, s], [-s, c]]) + shift
     best = find_hough_peaks(
-        build_line_table(lines + CENTRE, CENTRE), build_line_table(moved + CENTRE, CENTRE), 1, TUNING)[0]
-    cell_px = 2.0 * TUNING.hough_window_px / (TUNING.hough_cells - 1)
+        build_line_table(lines + CENTRE, CENTRE), build_line_table(moved + CENTRE, CENTRE), 1)[0]
+    cell_px = 2.0 * HOUGH_WINDOW_PX / (HOUGH_CELLS - 1)
     assert np.abs(np.array(best.shift_px) - shift).max() <= 2.0 * cell_px
-    assert abs(best.turn_rad - turn) <= 1.5 * TUNING.hough_step_rad
+    assert abs(best.turn_rad - turn) <= 1.5 * HOUGH_STEP_RAD
     normals = build_line_table(moved, np.zeros(2)).normals
-    is_within = np.abs(normals @ shift) <= TUNING.hough_window_px
+    is_within = np.abs(normals @ shift) <= HOUGH_WINDOW_PX
     assert best.votes >= 0.6 * np.sum(2.0 * half[is_within])
 
 

@@ -12,7 +12,6 @@ draws.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,11 @@ from scipy.stats import binom
 from consistency import assert_soon_consistent, compute_error, compute_nees
 from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose import (
+    MARGINAL_SPREAD,
+    OUTLIER_SIGMAS,
+    POINT_OUTLIER_SIGMAS,
     PoseEstimate,
+    displacements,
     estimate_camera_and_pose,
     med_r_and_t,
     planar_from_lines,
@@ -31,7 +34,6 @@ from knowledge_sources.methods.pose import (
     r_and_t_ml,
 )
 from knowledge_sources.methods.pose.estimate import compute_mean_square, compute_spread
-from knowledge_sources.settings import DEFAULT
 from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
@@ -40,8 +42,6 @@ CAMERA = Camera.from_field_of_view(np.radians(65.0))
 MOUNT = CameraMount(1.0, 0.1, 0.05)
 SIGMA_PX = 0.3
 PRIOR = np.diag([0.2, 0.2, 0.05]) ** 2
-ALONE = replace(DEFAULT.pose, shared_px=0.0, marginal_spread=1.0, shared_prior_factor=0.0)
-"""No error that all lines share, and every segment is of its line."""
 NOISES = (1.0, 1.5, 2.0)
 """The true noise over the stated one."""
 ESTIMATED = {1.0: 1.0, 1.5: 1.15, 2.0: 1.15}
@@ -124,7 +124,7 @@ def test_a_camera_pose_is_as_far_off_as_it_says(solve: Callable[..., PoseEstimat
     def draw(seed: int) -> float:
         d = Draw(seed, noise)
         prior = d.camera_from_world.perturbed(d.rng.normal(0.0, 0.01, 3), d.rng.normal(0.0, 0.1, 3))
-        found = solve(d.lines, d.segments, CAMERA, prior, sigma_px=SIGMA_PX, settings=ALONE)
+        found = solve(d.lines, d.segments, CAMERA, prior, sigma_px=SIGMA_PX, shared_px=0.0)
         off = found.camera_from_world @ d.camera_from_world.inverse()
         return compute_nees(np.concatenate([off.rotation_vector, off.translation]), found.covariance)
 
@@ -136,17 +136,19 @@ def test_with_four_times_the_noise_no_pose_is_called_decided(solve: Callable[...
     ok = []
     for seed in range(20):
         d = Draw(seed, 4.0)
-        ok.append(solve(d.lines, d.segments, CAMERA, d.camera_from_world, sigma_px=SIGMA_PX, settings=ALONE).ok)
+        ok.append(solve(d.lines, d.segments, CAMERA, d.camera_from_world, sigma_px=SIGMA_PX, shared_px=0.0).ok)
     assert np.mean(ok) <= 0.1
 
 
 @pytest.mark.parametrize("noise", NOISES)
-def test_a_pose_in_an_inexact_model_is_as_far_off_as_it_says(noise: float) -> None:
+def test_a_pose_in_an_inexact_model_is_as_far_off_as_it_says(noise: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Walls and doors are displaced by what the model says of itself.
 
     The factor for segments of a wrong line, which none is here, covers noise that is larger than stated.
     """
-    tuning = ALONE if noise == 1.0 else DEFAULT.pose
+    if noise == 1.0:  # every segment is of its line, and the prior is independent
+        monkeypatch.setattr(displacements, "MARGINAL_SPREAD", 1.0)
+        monkeypatch.setattr(displacements, "SHARED_PRIOR_FACTOR", 0.0)
 
     def draw(seed: int) -> float:
         d = Draw(seed, noise)
@@ -157,10 +159,10 @@ def test_a_pose_in_an_inexact_model_is_as_far_off_as_it_says(noise: float) -> No
         true = model.displace(d.lines, d.rng.normal(size=6))
         segments = d.add_noise(CAMERA.project_segments(true, d.camera_from_world)[0], noise)
         found = planar_from_lines(d.lines, segments, CAMERA, MOUNT.camera_from_robot, d.prior, prior_covariance=PRIOR,
-                                  sigma_px=SIGMA_PX, errors=model, settings=tuning)
+                                  sigma_px=SIGMA_PX, errors=model)
         return compute_nees(compute_error(found.world_from_robot, d.truth), found.covariance)
 
-    surplus = 1.0 if noise == 1.0 else DEFAULT.pose.marginal_spread**2
+    surplus = 1.0 if noise == 1.0 else MARGINAL_SPREAD**2
     assert_soon_consistent(draw, ON_FLOOR, 3, most_surplus=surplus)
 
 
@@ -180,8 +182,7 @@ def test_a_pose_with_the_camera_is_as_far_off_as_it_says(noise: float) -> None:
 @pytest.mark.parametrize("solve", [on_floor_from_lines, on_floor_from_points])
 def test_as_many_right_ones_are_left_out_as_the_bound_says(solve: Callable[[Draw], Any]) -> None:
     """Of pairs of residuals of the normal law the part exp(-bound / 2) is beyond the bound on their squares."""
-    s = DEFAULT.pose
-    bound = 2.0 * s.outlier_sigmas**2 if solve is on_floor_from_lines else s.point_outlier_sigmas**2
+    bound = 2.0 * OUTLIER_SIGMAS**2 if solve is on_floor_from_lines else POINT_OUTLIER_SIGMAS**2
     for noise in (1.0, 1.5, 2.0):
         kept = np.concatenate([solve(Draw(seed, noise)).inliers for seed in range(ON_FLOOR)])
         out = int(np.count_nonzero(~kept))
@@ -196,7 +197,7 @@ def test_one_line_just_within_and_just_beyond_the_bound(sigmas: float, is_kept: 
     d = Draw(0, 0.0)
     level = np.ptp(d.segments[..., 0], axis=1) < 1.0
     one = int(np.flatnonzero(level)[0])
-    each_px = sigmas * DEFAULT.pose.outlier_sigmas * SIGMA_PX
+    each_px = sigmas * OUTLIER_SIGMAS * SIGMA_PX
     d.segments[one, :, 0] += each_px
     found = planar_from_lines(d.lines, d.segments, CAMERA, MOUNT.camera_from_robot, d.truth,
                               prior_covariance=np.diag([1e-8] * 3), sigma_px=SIGMA_PX)

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from knowledge_sources.methods.pose import fit_displacements
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.methods.pose import displacements, fit_displacements
+from knowledge_sources.methods.pose.displacements import DISPLACED_PAIR_PX, DISPLACED_UNIT_PX, DISPLACED_WIDTHS_PX
 from world_models.building.model_errors import LineErrors
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(np.radians(65.0))
 MOUNT = CameraMount(1.0, 0.1, 0.05).camera_from_robot
-PATIENT = replace(DEFAULT.pose, displaced_steps=60)
-"""So many steps that the fit has come to rest."""
 Array = NDArray[np.float64]
 
 
@@ -54,11 +51,12 @@ def test_the_fit_is_the_minimum_of_its_loss(seed: int, is_pose_known: bool) -> N
     away = np.zeros(3) if covariance is None else rng.multivariate_normal(np.zeros(3), covariance)
     segments = project(errors.displace(lines, rng.uniform(-1.5, 1.5, 3)), away)
     segments += rng.normal(0.0, 0.2, segments.shape)
-    found = fit_displacements(
-        lines, errors, segments, CAMERA, MOUNT, Pose2(0.0, 0.0, 0.0), covariance, settings=PATIENT)
-    width = min(PATIENT.displaced_widths_px)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(displacements, "DISPLACED_STEPS", 60)  # so many that the fit has come to rest
+        found = fit_displacements(lines, errors, segments, CAMERA, MOUNT, Pose2(0.0, 0.0, 0.0), covariance)
+    width = min(DISPLACED_WIDTHS_PX)
     lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
-    weights = np.minimum(1.0, lengths / PATIENT.displaced_unit_px)
+    weights = np.minimum(1.0, lengths / DISPLACED_UNIT_PX)
     assert weights.min() < 1.0
 
     def compute_loss(unknowns: Array) -> float:
@@ -76,4 +74,4 @@ def test_the_fit_is_the_minimum_of_its_loss(seed: int, is_pose_known: bool) -> N
     assert compute_loss(own) - best.fun < 1e-6
     assert np.array_equal(found.lines_world, errors.displace(lines, found.amplitudes))
     near = np.abs(measure_across(segments, project(found.lines_world, found.state))).max(axis=1)
-    assert found.pairs.tolist() == [[i, i] for i in np.flatnonzero(near <= PATIENT.displaced_pair_px)]
+    assert found.pairs.tolist() == [[i, i] for i in np.flatnonzero(near <= DISPLACED_PAIR_PX)]

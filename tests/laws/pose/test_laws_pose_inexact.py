@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.pose import build_line_set, fit_displacements, planar_from_lines
+from knowledge_sources.methods.pose import build_line_set, displacements, fit_displacements, planar_from_lines
 from knowledge_sources.methods.pose.displacements import compute_displaced_jacobian, compute_sigmas_px
-from knowledge_sources.settings import DEFAULT
 from world_models.building.model_errors import LineErrors, exact
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
@@ -20,14 +19,19 @@ from world_models.frames import Pose2, wrap_angle
 CAMERA = Camera.from_field_of_view(np.radians(65.0))
 MOUNT = CameraMount(1.0, 0.1, 0.05).camera_from_robot
 SIGMA_PX = 0.3
-ALONE = replace(DEFAULT.pose, marginal_spread=1.0, shared_prior_factor=0.0)
-"""Every segment is of its line, and the prior is independent."""
 PRIOR = np.diag([0.2, 0.2, 0.05]) ** 2
 TRUTH = Pose2(0.0, 0.0, 0.0)
 STATE = np.zeros(3)
 seeds = st.integers(0, 2**32 - 1)
 quick = settings(max_examples=15, deadline=None)
 Array = NDArray[np.float64]
+
+
+@pytest.fixture(autouse=True)
+def alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every segment is of its line, and the prior is independent."""
+    monkeypatch.setattr(displacements, "MARGINAL_SPREAD", 1.0)
+    monkeypatch.setattr(displacements, "SHARED_PRIOR_FACTOR", 0.0)
 
 
 def build_hall(sigma_m: float = 0.05) -> tuple[Array, LineErrors]:
@@ -64,7 +68,7 @@ def solve(seed: int, sigma_m: float = 0.05) -> tuple[Array, Array]:
     away = rng.multivariate_normal(np.zeros(3), PRIOR)
     found = planar_from_lines(
         model[visible], segments[visible], CAMERA, MOUNT, Pose2(*away), prior_covariance=PRIOR, sigma_px=SIGMA_PX,
-        errors=errors.take(np.flatnonzero(visible)), settings=ALONE)
+        errors=errors.take(np.flatnonzero(visible)))
     pose = found.world_from_robot
     return np.array([pose.x_m, pose.y_m, wrap_angle(pose.heading_rad)]), found.covariance
 

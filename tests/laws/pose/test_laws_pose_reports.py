@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,10 @@ from hypothesis import strategies as st
 from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
 from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose import (
+    MAX_BESIDE_PX,
+    MAX_CHI2_SIGMAS,
+    MAX_RESIDUAL_SIGMAS,
+    SHARED_PX,
     PoseEstimate,
     build_line_set,
     compute_image_jacobian,
@@ -22,7 +25,6 @@ from knowledge_sources.methods.pose import (
     r_and_t_ml,
 )
 from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, NO_LENGTH, NO_OVERLAP
-from knowledge_sources.settings import DEFAULT
 
 SOLVERS = [r_then_t, r_and_t, r_and_t_ml, med_r_and_t, trunc_r_and_t]
 ROBUST = [med_r_and_t, trunc_r_and_t]
@@ -69,7 +71,7 @@ def test_each_rejected_line_has_a_reason_that_is_true(solver: Solver, scene: Pos
     segments[1] += 3.0 * along
     found = solve(solver, scene, segments, rng)
     lines, pose = build_line_set(scene.lines_world, segments, scene.camera, SIGMA_PX), found.camera_from_world
-    _, front, over = measure_lines(lines, pose.rotation, pose.translation, DEFAULT.pose.max_beside_px)
+    _, front, over = measure_lines(lines, pose.rotation, pose.translation, MAX_BESIDE_PX)
     far = np.sum((found.residuals_px / SIGMA_PX) ** 2, axis=1)
     assert found.rejected[0] == NO_LENGTH and found.rejected[1] is not None
     for i, reason in enumerate(found.rejected):
@@ -111,7 +113,7 @@ def test_the_covariance_scales_with_the_variance_of_the_lines(
     prior = draw_prior(scene.camera_from_world, 0.1, 0.01, rng)
     first, second = (
         solver(scene.lines_world, scene.segments_px, scene.camera, prior, landmark_ids=scene.landmark_ids,
-               sigma_px=by * SIGMA_PX, settings=replace(DEFAULT.pose, shared_px=by * DEFAULT.pose.shared_px))
+               sigma_px=by * SIGMA_PX, shared_px=by * SHARED_PX)
         for by in (1.0, factor)
     )
     np.testing.assert_allclose(second.covariance, factor**2 * first.covariance, rtol=1e-3, atol=1e-12)
@@ -128,7 +130,7 @@ def test_the_error_that_all_lines_share_is_a_floor_of_the_covariance(
     prior = draw_prior(scene.camera_from_world, 0.1, 0.01, rng)
     data = scene.lines_world, scene.segments_px, scene.camera, prior
     none, some, small = (
-        solver(*data, sigma_px=sigma, landmark_ids=scene.landmark_ids, settings=replace(DEFAULT.pose, shared_px=shared))
+        solver(*data, sigma_px=sigma, landmark_ids=scene.landmark_ids, shared_px=shared)
         for sigma, shared in ((SIGMA_PX, 0.0), (SIGMA_PX, 0.5), (0.01 * SIGMA_PX, 0.5))
     )
     floor = some.covariance - none.covariance
@@ -171,5 +173,5 @@ def test_ok_is_earned(solver: Solver, scene: PoseScene, seed: int, part: float) 
     mean_square = float(np.sum((found.residuals_px[found.inliers] / SIGMA_PX) ** 2)) / max(2 * kept, 1)
     if found.ok:
         assert kept >= 3 and 2 * kept >= count
-        limit = DEFAULT.pose.max_residual_sigmas**2 * (1.0 + DEFAULT.pose.max_chi2_sigmas * (2.0 / (2.0 * kept)) ** 0.5)
+        limit = MAX_RESIDUAL_SIGMAS**2 * (1.0 + MAX_CHI2_SIGMAS * (2.0 / (2.0 * kept)) ** 0.5)
         assert mean_square <= limit * 1.001

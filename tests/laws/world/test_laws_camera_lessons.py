@@ -12,22 +12,28 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harvey.runner.run import build_camera_text
-from knowledge_sources.methods.calibration import compute_camera_covariance, has_counted, learn
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.methods.calibration import (
+    LEAST_SIGMA_CENTRE_PX,
+    LEAST_SIGMA_FOCAL,
+    LEAST_SIGMA_M,
+    LEAST_SIGMA_RAD,
+    compute_camera_covariance,
+    has_counted,
+    learn,
+)
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount
 from world_models.entries import CameraState, find_camera_lessons
 from world_models.files.toml.camera_file import load_camera
 from world_models.frames import Pose2
 
 TOLD = CameraState(Camera(400.0, 400.0, 255.5, 255.5, 512, 512), CameraMount(1.0, 0.1))
-SETTINGS = DEFAULT.camera_state
 SIGMAS = np.array([1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 0.3, 0.3])
 HERE = Pose2(1.0, 2.0, 0.3)
 steps = st.tuples(*(st.floats(-20.0 * sigma, 20.0 * sigma) for sigma in SIGMAS))
 
 
 def learnt(step: tuple[float, ...]) -> CameraState:
-    return learn(TOLD, step, np.diag(SIGMAS**2), HERE, SETTINGS)
+    return learn(TOLD, step, np.diag(SIGMAS**2), HERE)
 
 
 @given(steps)
@@ -59,20 +65,20 @@ def test_the_next_mission_begins_with_what_was_learnt(step: tuple[float, ...]) -
         assert getattr(read.mount, name) == pytest.approx(getattr(state.mount, name), abs=1e-12)
     d = read.deviation
     again = CameraState(read.camera, read.mount, d.tilt_rad, d.height_m, d.forward_m, d.focal, d.roll_rad, d.yaw_rad)
-    known = np.diag(compute_camera_covariance(again, SETTINGS))[:5]
+    known = np.diag(compute_camera_covariance(again))[:5]
     assert np.allclose(known, np.diag(np.array(state.covariance))[:5], rtol=1e-6)
 
 
 @given(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(-0.17, 0.17))
 def test_a_picture_from_the_same_place_does_not_count_again(x: float, y: float, turn: float) -> None:
     state = learnt((0.0,) * 7)
-    assert has_counted(state, Pose2(HERE.x_m + x, HERE.y_m + y, HERE.heading_rad + turn), SETTINGS)
-    assert not has_counted(state, Pose2(HERE.x_m + 0.4, HERE.y_m, HERE.heading_rad), SETTINGS)
-    assert not has_counted(state, Pose2(HERE.x_m, HERE.y_m, HERE.heading_rad + 0.3), SETTINGS)
+    assert has_counted(state, Pose2(HERE.x_m + x, HERE.y_m + y, HERE.heading_rad + turn))
+    assert not has_counted(state, Pose2(HERE.x_m + 0.4, HERE.y_m, HERE.heading_rad))
+    assert not has_counted(state, Pose2(HERE.x_m, HERE.y_m, HERE.heading_rad + 0.3))
 
 
 @given(steps)
 def test_nothing_is_known_better_than_what_lines_have_in_common(step: tuple[float, ...]) -> None:
-    state = learn(TOLD, step, np.diag(np.full(7, 1e-20)), HERE, SETTINGS)
-    floors = [SETTINGS.floor_rad] * 3 + [SETTINGS.floor_m, SETTINGS.floor_focal] + [SETTINGS.floor_centre_px] * 2
+    state = learn(TOLD, step, np.diag(np.full(7, 1e-20)), HERE)
+    floors = [LEAST_SIGMA_RAD] * 3 + [LEAST_SIGMA_M, LEAST_SIGMA_FOCAL] + [LEAST_SIGMA_CENTRE_PX] * 2
     assert np.all(np.sqrt(np.diag(np.array(state.covariance))) >= np.array(floors) * (1.0 - 1e-9))

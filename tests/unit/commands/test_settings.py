@@ -14,6 +14,8 @@ from harvey.agent_settings import build_settings, list_robot_rows, names
 from harvey.cli import main
 from harvey.commands.listing import format_value
 from harvey.errors import BadInput
+from knowledge_sources.action.fault_handler import MAX_BROKEN_MOTIONS
+from knowledge_sources.milestone.obstruction_finder import MAX_OBSTRUCTION_LOOKS
 from knowledge_sources.settings import DEFAULT, Row, Settings, list_rows, replace_value
 from sim.scenario import load_scenario, with_settings
 from world_models.entries.body import LAST_REQUESTS
@@ -36,17 +38,11 @@ def numbers(settings: Settings) -> dict[str, Any]:
 def another(row: Row) -> Any:
     """Another value of the same kind."""
     value: Any = row.value
-    if isinstance(value, bool):
-        return not value
-    if isinstance(value, tuple):
-        return (*value[:-1], value[-1] + 1.0)
-    if value + 1 <= row.most:
-        return value + 1
-    return value - 1 if isinstance(value, int) else 0.5 * value
+    return not value if isinstance(value, bool) else value + 1
 
 
 def test_the_table_has_every_field_of_every_room() -> None:
-    assert len(ROWS) > 80
+    assert len(ROWS) > 20
     assert {row.name: row.value for row in ROWS} == numbers(DEFAULT)
     assert all(is_dataclass(getattr(DEFAULT, f.name)) for f in fields(DEFAULT))
 
@@ -57,7 +53,7 @@ def test_each_has_a_unit_a_meaning_and_a_source(row: Row) -> None:
     assert len(row.what.split()) >= 3 and row.what.endswith(".") and row.what[0].isupper()
     assert row.source
     kind = next(f.type for f in fields(getattr(DEFAULT, row.room)) if f.name == row.field)
-    assert kind == {tuple: "tuple[float, ...]"}.get(type(row.value), type(row.value).__name__)
+    assert kind == type(row.value).__name__
 
 
 @each_row
@@ -71,8 +67,7 @@ def test_setting_one_changes_it_and_nothing_else(row: Row) -> None:
     changed = replace_value(DEFAULT, row.name, value)
     assert numbers(changed) == {**numbers(DEFAULT), row.name: value}
     assert type(numbers(changed)[row.name]) is type(row.value)
-    written = list(value) if isinstance(value, tuple) else str(value).lower()
-    assert build_settings([(row.name, str(written))]) == changed
+    assert build_settings([(row.name, str(value).lower())]) == changed
 
 
 @pytest.mark.parametrize("word", ["on", "yes", "true", "True", "off", "no", "false"])
@@ -86,9 +81,7 @@ def test_a_switch_takes_any_word_for_on_and_off(word: str) -> None:
 
 
 def test_no_more_is_asked_of_the_board_than_it_keeps() -> None:
-    most = {row.name: row.most for row in ROWS}
-    assert most["plan.max_obstruction_looks"] == LAST_SEGMENTS
-    assert most["action.max_broken_motions"] == LAST_REQUESTS
+    assert MAX_OBSTRUCTION_LOOKS <= LAST_SEGMENTS and MAX_BROKEN_MOTIONS <= LAST_REQUESTS
 
 
 def test_nothing_set_is_the_default() -> None:
@@ -101,12 +94,9 @@ def test_nothing_set_is_the_default() -> None:
     ("action.min_tolerance_px", "off", "expected a number as 4, got 'off'"),
     ("action.min_tolerance_px", "nan", "expected a number"),
     ("action.min_tolerance_px", "inf", "expected a number"),
-    ("action.max_misses", "2.5", "expected a whole number as 2, got '2.5'"),
-    ("action.max_misses", "-1", "expected a whole number"),
-    ("plan.clearances_m", "0.1", r"expected a list of numbers as \[0.12, 0.06, 0.03\]"),
-    ("plan.max_obstruction_looks", "9", "expected 8 at most, got '9'"),
+    ("action.max_looks", "2.5", "expected a whole number as 4, got '2.5'"),
+    ("action.max_looks", "-1", "expected a whole number"),
     ("floor.use_ranges", "1", "expected on or off"),
-    ("plan.clearances_m", "[]", "expected a list of numbers"),
 ])
 def test_mistakes_are_named(key: str, value: str, word: str) -> None:
     with pytest.raises(BadInput, match=word):
@@ -131,8 +121,7 @@ def test_harvey_settings_prints_it(row: Row, capsys: pytest.CaptureFixture[str])
         assert " ".join(format_value(row).split()) in told
     assert main(["settings", row.name, "--json"]) == 0
     (record,) = json.loads(capsys.readouterr().out)
-    value = list(row.value) if isinstance(row.value, tuple) else row.value
-    assert record == {"name": row.name, "value": value, "unit": row.unit, "meaning": row.what, "source": row.source}
+    assert record == {"name": row.name, "value": row.value, "unit": row.unit, "meaning": row.what, "source": row.source}
 
 
 def test_harvey_settings_prints_all_within_the_terminals_width(
@@ -148,5 +137,5 @@ def test_harvey_settings_prints_all_within_the_terminals_width(
 
 
 def test_harvey_settings_names_near_rooms(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["settings", "matchin"]) == 2
-    assert "matching" in capsys.readouterr().err
+    assert main(["settings", "actio"]) == 2
+    assert "action" in capsys.readouterr().err

@@ -15,7 +15,7 @@ from harvey.dry_run import dry_run
 from harvey.hardware.hardware_body import BASE_WORDS, CAMERA_WORDS
 from harvey.hardware.hardware_mission import load_mission
 from harvey.simulation.simulated_run import build_robot_model
-from knowledge_sources.settings import DEFAULT
+from knowledge_sources.action.fault_handler import MAX_BROKEN_MOTIONS, MAX_FAULT_S, MAX_RETRY_WAIT_S, MIN_RETRY_WAIT_S
 from sim.scenario import load_scenario
 from world_models.actuator import ActuatorModel
 from world_models.files.toml.mission import Safety
@@ -72,7 +72,6 @@ def test_every_fault_has_advice(word: str) -> None:
 
 
 def test_its_figures_are_those_of_the_sources() -> None:
-    s = DEFAULT.action
-    assert (s.min_retry_wait_s, s.max_retry_wait_s, s.max_fault_s, s.max_broken_motions) == (0.25, 2.0, 30.0, 5)
+    assert (MIN_RETRY_WAIT_S, MAX_RETRY_WAIT_S, MAX_FAULT_S, MAX_BROKEN_MOTIONS) == (0.25, 2.0, 30.0, 5)
     assert "after 0.25, 0.5, 1, 2, 2, ... s, and after 30 s" in TEXT and "after five motions in a row" in TEXT
     assert f"the default of {ActuatorModel().reach:.3f}" in TEXT

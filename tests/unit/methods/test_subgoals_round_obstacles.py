@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from experiments.generated.floors import generated_floor
-from knowledge_sources.methods.motion import SubgoalPlanner
+from knowledge_sources.methods.motion import CLEARANCES_M, SubgoalPlanner
 from knowledge_sources.methods.motion.routes import list_obstacles
 from knowledge_sources.settings import DEFAULT
 from two_doors import two_doors
@@ -96,7 +96,7 @@ def test_where_there_is_room_the_way_keeps_away_from_what_the_model_lacks(world:
     assert way is not None
     radius_m = RobotModel(world, Camera.from_field_of_view(1.1), CameraMount(1.0), ActuatorModel()).radius_m
     away_m = shapely.LineString(way).distance(shapely.Polygon(thing.footprint))
-    assert away_m > radius_m + DEFAULT.plan.clearances_m[0] + DEFAULT.plan.overhang_m - 0.01
+    assert away_m > radius_m + CLEARANCES_M[0] + DEFAULT.plan.overhang_m - 0.01
 
 
 @pytest.mark.parametrize("seed", [2, 1_000_005])
