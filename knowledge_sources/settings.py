@@ -406,7 +406,7 @@ class PlanSettings:
         20, "count", "So often the action level may ask the plan level on the way to one subgoal; then it is blocked.")
     max_lost_per_mission: int = setting(12, "count", "So often the robot may be lost in one mission.")
 
-    # Milestone selector
+    # Milestones to come
     max_lines: int = setting(60, "count", "Most lines that one milestone expects.")
     long_turn_rad: float = setting(
         math.radians(100.0), "rad",
@@ -446,7 +446,7 @@ class PlanSettings:
 class GoalSettings:
     """The numbers of the knowledge sources of the goal level (§2)."""
 
-    # Relocalizer
+    # Relocalization
     max_far_probes: int = setting(
         20, "count",
         "So many looks are taken when lost and places fit: it turns, and drives to views that tell them apart.")

@@ -69,7 +69,7 @@ class ViewPredictor(RobotKnowledgeSource):
         here = replace(milestone.value, look_heading_rad=pose.heading_rad)
         expected = predict_milestone(robot, pose, here, find_car_of(view, here), self._settings)
         if not find_followed(view, self._settings.action) or open_discrepancy(view, Level.PLAN) is not None:
-            precompute_views(robot, belief.value.locale, pose, self._settings)  # the judge asks: another door?
+            precompute_views(robot, belief.value.locale, pose, self._settings)  # for the milestone judge
         frames = find_frames(view, list_seen_locales(robot, pose, belief.value.locale, self._settings))
         wish = Revise(milestone, expected, (milestone, belief, *hidden, *frames))
         yield wish

@@ -1,4 +1,4 @@
-"""Twin watcher (§4): is the robot where it believes, or in a place that looked the same until now?"""
+"""Alias monitor (§4): is the robot where it believes, or in a place that looked the same until now?"""
 
 from __future__ import annotations
 
