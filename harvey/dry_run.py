@@ -86,7 +86,7 @@ class MilestonePreview:
         look_heading_rad: in which direction [rad, world].
         landmarks: how many; lines: how many of their lines.
         sigma_m, sigma_rad: predicted standard deviations of the pose that they fix.
-        p_false: probability of a false pose that the judge would state if all lines were seen where expected.
+        p_false: probability of a false pose that the milestone judge would state if all were seen where expected.
         alike: another place of the same locale that looks like it, in words, or "".
         verdict: clear; weak (the pose would be uncertain, or p_false too high); ambiguous (another place looks like
             it); or not testable (too few lines are visible from the path).

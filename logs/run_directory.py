@@ -25,8 +25,8 @@ RUNS = Path("runs")
 FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json", "camera.toml")
 MOST_JSON_BYTES = 20_000_000
 """Of the files of a run that are read as a whole."""
-JOURNAL_VERSION = 2
-"""Of the names in journals; one that is older calls kinds, fields and knowledge sources otherwise (CHANGELOG.md)."""
+JOURNAL_VERSION = 3
+"""Of the names in journals; one that is older has other names of kinds and fields (CHANGELOG.md)."""
 RESULT: Mapping[str, tuple[Any, str]] = {
     "scenario": (str, "a text"),
     "outcome": (str, "a text"),

@@ -83,7 +83,7 @@ def run(quick: bool, seed: int) -> Report:
             ("total planning, least [ms]", PAPER_MS, best.total_ms),
             ("total planning, median [ms]", None, float(np.median(totals)))]
     rows += [(f"of it: {name} [ms]", None, best.ms[name]) for name in PLANNERS]
-    rows.append(("beside it: views for the judge [ms]", None, best.rivals_ms))
+    rows.append(("beside it: views for the milestone judge [ms]", None, best.rivals_ms))
     return Report(
         "Planning Figure 17's mission", ("what", "paper", "ours"), tuple(rows),
         notes=(

@@ -35,7 +35,7 @@ class DeadReckoner(RobotKnowledgeSource):
     """Moves the belief by the odometry's report, corrected for drift, and asks for a picture to check it.
 
     Of a motion that was broken off, the unreported rest may have been driven in part or whole: it is added to the
-    covariance; and so is that the camera may look aside of where the robot heads by its picture.
+    covariance. So is the error of the heading that comes from the camera's own unknown yaw.
     """
 
     level, priority = Level.ACTION, Priority.ENTER

@@ -25,8 +25,8 @@ def find_asked(view: View, _trigger: Change) -> Asked | None:
 def goal_changer(view: View, case: Asked) -> Iterable[Effect]:
     """Abandons the goal for the one that somebody asks for, from where the robot believes to be.
 
-    A milestone that waits to be judged is withdrawn; the goal sketcher supersedes the sketches of the old goal. A robot
-    that is lost keeps its goal, with the new destination, until it knows from where to go. What cannot be understood is
+    A milestone that waits to be judged is withdrawn; the goal sketcher supersedes the old goal's sketches. A robot that
+    is lost keeps its goal, with the new destination, until it knows from where to go. What cannot be understood is
     answered, and the robot goes on as before. It acts at once, before the next increment; where there is no goal yet,
     when there is one. Of what was asked meanwhile the last counts.
     """

@@ -58,7 +58,7 @@ class ViewPredictor(RobotKnowledgeSource):
         here = replace(milestone.value, look_heading_rad=pose.heading_rad)
         expected = predict_milestone(robot, pose, here, find_car_of(view, here))
         if not find_followed(view) or open_discrepancy(view, Level.PLAN) is not None:
-            precompute_views(robot, belief.locale, pose)  # the judge asks: another door?
+            precompute_views(robot, belief.locale, pose)  # for the milestone judge
         frames = find_frames(view, list_seen_locales(robot, pose, belief.locale))
         wish = Revise(milestone, expected, (milestone, belief.entry, *hidden, *frames))
         yield wish

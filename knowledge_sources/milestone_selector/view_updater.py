@@ -1,4 +1,4 @@
-"""View updater (§4: models are incomplete): what stands before the camera hides what is behind it."""
+"""View updater (§4: models are incomplete): lines that something before the camera hides are not expected."""
 
 from __future__ import annotations
 

@@ -30,8 +30,8 @@ class DependencyWithdrawer(RobotKnowledgeSource):
 
     A milestone that waits to be judged is withdrawn where its prediction rested on the frame; one that was verified,
     where a landmark of it is gone: its place in the sketch must be verified anew. A sketch that led through a door that
-    is now shut, or round a thing that is now gone, is superseded; the sketcher draws it anew. So is one whose way an
-    obstacle blocks: it stands within the robot's radius and the least clearance of what is left of a leg.
+    is now shut, or round a thing that is now gone, is superseded; the goal sketcher draws another. So is one whose way
+    an obstacle blocks: it stands within the robot's radius and the least clearance of what is left of a leg.
     """
 
     level, priority = Level.ACTION, Priority.ENTER

@@ -33,8 +33,8 @@ class DoorWatcher(RobotKnowledgeSource):
 
     It looks at pictures as long as the belief is trusted: at those that track landmarks, and at those by which a
     milestone was verified. An opening shows what the model has beyond, or a leaf. That adds to the log odds of the
-    door; at stated odds, by pictures from two places at least, the door is shut, and the sketcher draws another way.
-    One that is believed to be shut and shows what is beyond is open again. A dark picture tells nothing of doors.
+    door; at stated odds, by pictures from two places at least, it is shut, and the goal sketcher draws another way. One
+    that is believed to be shut and shows what is beyond is open again. A dark picture tells nothing of doors.
     """
 
     level, priority = Level.ACTION, Priority.SEE

@@ -20,8 +20,8 @@ MAX_EARLIER_READINGS = 4  # readings that the newest is compared with
 class RangeWatcher(RobotKnowledgeSource):
     """Concludes from a reading of range sensors where the floor is free, and what ends it.
 
-    It acts after the tracker has corrected the belief by the picture of the same moment, and only while the robot knows
-    where it is: as long as its place is in doubt, an echo may be of a wall.
+    It acts after the correlator tracker has corrected the belief by the picture of the same moment, and only while the
+    robot knows where it is: as long as its place is in doubt, an echo may be of a wall.
     """
 
     level, priority = Level.ACTION, Priority.ADVANCE

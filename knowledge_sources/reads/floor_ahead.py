@@ -275,7 +275,7 @@ def _list_taken(thing: Thing, overhang_m: float) -> Floats:
 
 def _list_what_may_stand(view: View, world: Building) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
     """What the robot does not creep into: all that what is suspected may take; of what is there what was seen of it,
-    as the sketcher leads through the rest only where nothing else is left. It does creep to what may be a jamb.
+    as the goal sketcher leads through the rest only where nothing else is left. It does creep to what may be a jamb.
     """
     found = [(entry, entry.value) for entry in view.where(Obstacle, lambda o: o.status != "gone")]
     taken = [(entry, o, take_as_jamb(world, o)) for entry, o in found]

@@ -1,6 +1,6 @@
 """How likely the robot is where it believes, and not at a place that looks the same: what the board says of that.
 
-One number for all that ask: the judge of milestones, the search of a lost robot, and the monitor of aliases.
+One number for all that ask: the milestone judge, the search of a lost robot, and the alias monitor.
 """
 
 from __future__ import annotations

@@ -116,8 +116,8 @@ def find_frames(view: View, locales: Iterable[str]) -> tuple[Entry[LocaleFrame],
 def find_followed(view: View) -> tuple[Entry[Tracks], ...]:
     """The landmarks that are followed, if enough of them were in sight in the last tracked frame; else ().
 
-    With so many landmarks in sight the robot is at no other door: the tracker drops all of them when they are not where
-    they should be.
+    With so many landmarks in sight the robot is at no other door: the correlator tracker drops all of them when
+    they are not where they should be.
     """
     tracks = view.latest(Tracks)
     if tracks is None:

@@ -57,8 +57,8 @@ def find_same(
 def find_before(
     known: Mapping[str, Obstacle], seen: shapely.Geometry, eye: tuple[float, float], overhang_m: float
 ) -> str | None:
-    """Which obstacle a sight without feet is one of: known well, nearer than the picture's border, and in most of its
-    directions, where its top may be wider than its feet.
+    """The obstacle that something without a visible foot belongs to: well known, nearer than the picture's border,
+    and in most of its directions, as its top may be wider than its foot.
     """
     at = np.array(eye)
     reach_m = float(np.linalg.norm(shapely.get_coordinates(seen) - at, axis=1).max())

@@ -68,7 +68,7 @@ class SeenFloor:
     taken: tuple[Floats, ...] = ()
 
     def ask(self, points: Floats) -> tuple[Mask, Mask, Mask]:
-        """Which of the points (n, 2) are seen free; and which scans, and which discs, tell that or the contrary."""
+        """Which points (n, 2) are seen free; the scans, and the discs, that say so of any point, or deny it."""
         free, open_ = np.zeros(len(points), bool), np.ones(len(points), bool)
         scans, discs = np.zeros(len(self.scans), bool), np.zeros(len(self.discs), bool)
         for k in range(len(self.scans) - 1, -1, -1):

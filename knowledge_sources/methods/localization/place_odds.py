@@ -1,8 +1,7 @@
-"""The odds of the place where the robot was told to be, or was tracked to: prior odds times the pictures' ratio.
+"""The odds of the stated place, where the robot was put down or tracked to: prior odds times the pictures' ratio.
 
-The alternative is that it stands in another place just so as it was told for the first: so neither the distance from
-where it was told, nor how rarely a robot would stand just there by chance, speaks for the place that was told. What
-speaks for it is the probability ``p_told`` alone; and it is excluded where it is farther away than it can have moved.
+Only its prior probability supports it, not how near a candidate is: a robot that is elsewhere may stand there in just
+the same way. A candidate that is farther away than the robot can have moved is another place.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ LOG_PLACES = 12.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StatedPlace:
-    """Where the robot was told to be, or was tracked to, before it was lost.
+    """Where the robot was put down by what is known, or was tracked to, before it was lost.
 
     Attributes:
         world_from_robot, covariance: the pose, and (3, 3) over (x, y, heading), world.
@@ -64,13 +63,12 @@ class StatedPlace:
 def weigh_told(
     result: LocalizationResult, told: StatedPlace, look_alike: LookAlike, looks: int,
 ) -> LocalizationResult:
-    """Weigh the candidates by what was told and by the pictures, the likeliest first.
+    """Weigh the candidates by the stated place and by the pictures, the likeliest first.
 
-    Found is the told place if it is accepted and so likely that it is believed: ``min_p_sure``, or ``min_p_believed``
-    where no look within reach tells more, after ``min_views`` of ``looks``. After ``max_searched_views`` of them it
-    need not be accepted by the shares of lines that are found, if that many are not found by chance: where it was
-    told to be, no strange place has to be ruled out. Where the pictures alone have found a place, or none of the
-    candidates is the told place, nothing is changed.
+    The stated place is found if it is accepted and so likely that it is believed: ``min_p_sure``, or ``min_p_believed``
+    where no look within reach tells more, after ``min_views`` of ``looks``. After ``max_searched_views`` it need not be
+    accepted by its share of lines, if that many are not found by chance. Nothing changes where the pictures alone have
+    found a place, or where no candidate is the stated place.
     """
     is_told = [told.includes(c) for c in result.candidates]
     if result.status is LocalizationStatus.FOUND or not any(is_told):
@@ -102,16 +100,13 @@ def _is_far_from_chance(candidate: PlaceCandidate) -> bool:
 def compute_place_odds(
     log_likelihoods: Sequence[float], is_told: Sequence[bool], is_alike: Sequence[bool], p_told: float,
 ) -> tuple[float, ...]:
-    """Compute the posterior probabilities of places, which sum to one.
-
-    Bayes' rule: places that were told share the prior probability ``p_told``, all others what is left. Where none was
-    told, or nothing else is left, the prior says nothing.
+    """Compute the posterior probabilities of places by Bayes' rule; they sum to one.
 
     Args:
         log_likelihoods: of the pictures, of each place.
-        is_told: whether the robot was told to be there, or was tracked there.
-        is_alike: whether the place looks like the likeliest that was told, by the model. Between such places a ratio
-            of the pictures that is larger than ``max_alike_log_ratio`` is chance, and counts as that.
+        is_told: whether a place is stated. These share the prior ``p_told``, the others what is left of it.
+        is_alike: whether a place looks like the likeliest stated one, by the model. Between such places a ratio of the
+            pictures that is larger than ``max_alike_log_ratio`` is chance, and counts as that.
     """
     told = [i for i, here in enumerate(is_told) if here]
     if not log_likelihoods:
@@ -143,13 +138,13 @@ def compute_twin_odds(log_ratios: Sequence[float], p_prior: float) -> tuple[floa
 
 
 def compute_prior(times_refuted: int) -> float:
-    """Compute the prior probability of the told place after it was believed by it so often, and then refuted."""
+    """Compute the prior probability of the stated place after it was believed and refuted so often."""
     return update(P_TOLD, times_refuted * math.log(LOST_AGAIN_ODDS))
 
 
 def is_within_reach(
     pose: Pose2, covariance: Floats, told: Pose2, told_covariance: Floats,
 ) -> bool:
-    """Whether a pose may be where the robot was told to be, or was tracked to, by both covariances (3, 3)."""
+    """Whether a pose may be the stated one, by both covariances (3, 3)."""
     beyond = np.diag(np.square([TOLD_SIGMA_M, TOLD_SIGMA_M, TOLD_SIGMA_RAD]))
     return compute_chi2(pose, told, covariance + told_covariance + beyond) <= MAX_TOLD_CHI2

@@ -344,7 +344,7 @@ def test_a_damaged_world_never_ends_in_a_traceback(data: st.DataObject, tmp_path
     ["diff", "RUN", "RUN"], ["report", "RUN"], ["report", "RUN", "RUN"], ["view", "RUN"], ["view", "RUN", "RUN"],
     ["export", "RUN", "--csv", "OUT"],
 ])
-@pytest.mark.parametrize("older", [1, 3, "2", None])
+@pytest.mark.parametrize("older", [1, 2, 4, "3", None])
 def test_a_journal_of_another_version_is_refused_by_all_who_read_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], argv: list[str], older: object
 ) -> None:

@@ -13,6 +13,7 @@ from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds
 from world_models.plugins import EXTRAS, list_absent
 
 ROOT = Path(__file__).parents[3]
+ROOMS = ("blackboard", "world_models", "knowledge_sources", "logs", "harvey")
 DOCUMENTS = sorted(path.relative_to(ROOT) for path in (
     *ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("tests/*.md"), *ROOT.glob("blackboard/*.md"),
     *ROOT.glob("extras/*/*.md"),
@@ -39,6 +40,22 @@ def test_what_is_generated_in_a_page_is_what_its_generator_makes_now(page: Path)
     text = page.read_text(encoding="utf-8")
     assert fill(text) == text
     assert [name for name, made in MARKED.findall(text) if not made.strip()] == []
+
+
+def test_prose_names_only_sources_and_entries_that_exist() -> None:
+    """``the ... watcher`` is a knowledge source by its whole name; ``Kind-1.0`` a kind, or a class of that page."""
+    names = {name_of(source) for source in KNOWLEDGE_SOURCES}
+    last = "|".join(sorted({name.split()[-1] for name in names}))
+    called = re.compile(rf"\b[Tt]he\s+((?:[a-z]+\s+)?(?:{last}|selector|relocalizer))\b(?![-_/.]\w)")
+    code = [path.relative_to(ROOT) for room in ROOMS for path in (ROOT / room).rglob("*.py")]
+    unknown = []
+    for page in (*(page for page in DOCUMENTS if page.name != "CHANGELOG.md"), *code):
+        text = (ROOT / page).read_text(encoding="utf-8")
+        found = [name.split() for name in called.findall(text)]
+        unknown += [(str(page), " ".join(name)) for name in found if not {" ".join(name), name[-1]} & names]
+        kinds = set(re.findall(r"\b([A-Z][a-z]\w+)-\d+\.\d+\b", text)) if page.suffix == ".md" else set()
+        unknown += [(str(page), kind) for kind in kinds - set(load_kinds()) if f"class {kind}" not in text]
+    assert unknown == []
 
 
 def test_no_generated_part_is_without_its_page() -> None:
