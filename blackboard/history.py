@@ -1,4 +1,4 @@
-"""History: the decisions of a board, kept. It tells why, it is saved and read, decided again, and held against another.
+"""History: the decisions of a board, kept. It tells why, it is saved and read, decided again, compared with another.
 
 A line of a history is a line of the journal (:mod:`blackboard.journal`): the same decisions give the same bytes.
 """
@@ -62,7 +62,7 @@ class History:
         return "\n".join(self._tell(ref, 0, set()))
 
     def replay(self, scheduler: Scheduler) -> int | None:
-        """Decide it again, from what came from outside alone; the first cycle that comes out otherwise, or None.
+        """Decide it again, from what came from outside alone; the first cycle that comes out differently, or None.
 
         Args:
             scheduler: a new one, with the same sources and without ports: what they answered is in the history.
@@ -98,7 +98,7 @@ class History:
                               for record in decision[key] if record["change"] != "Retracted"}
         self.lines.append(line)
 
-    def _tell(self, ref: str, depth: int, told: set[str]) -> Iterator[str]:
+    def _tell(self, ref: str, depth: int, seen: set[str]) -> Iterator[str]:
         record, indent = self._changes.get(ref), "  " * depth
         if record is None:
             yield f"{indent}{ref}"
@@ -106,11 +106,11 @@ class History:
         whence = f"{record['whence']} {record['author']}, cycle {record['cycle']}"
         yield f"{indent}{ref}: {_brief(record['value'])} ({whence})"
         for below in record["because"]:
-            if below in told:
+            if below in seen:
                 yield f"{indent}  {below}: see above"
             else:
-                told.add(below)
-                yield from self._tell(below, depth + 1, told)
+                seen.add(below)
+                yield from self._tell(below, depth + 1, seen)
 
 
 def _effect_of(record: Record, scheduler: Scheduler) -> Effect:

@@ -1,7 +1,7 @@
 """Perceptual servoing (§2, Figure 2) as the choice rule, and the ladder that discrepancies climb.
 
 A discrepancy within its level's bound is corrected where it arose. Beyond it, it is passed one level up, action ->
-plan -> goal, and measured anew by that level's own means. The highest level with an open discrepancy is in focus; while
+plan -> goal, and measured again by that level's means. The highest level with an open discrepancy is in focus; while
 there is none, action work comes first, because a move may be under way.
 
 Laws (tests/laws/board/test_laws_servoing.py): no level is skipped; every escalation exceeds its stated bound; nothing
@@ -107,7 +107,7 @@ class Discrepancy:
 
 
 def open_or_measure(view: View, found: Discrepancy, because: tuple[Any, ...]) -> Post | Revise:
-    """Opens a discrepancy at its level; where one is open there, that is measured anew."""
+    """Opens a discrepancy at its level; where one is open there, that is measured again."""
     last = view.newest(OPEN, found.level)
     return Post(found, because) if last is None else Revise(last, found, because)
 

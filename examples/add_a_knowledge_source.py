@@ -43,4 +43,4 @@ result = harvey.run("forty-foot-hallway", seed=1, out=OUT, knowledge_sources=[Do
 run = harvey.open_run(OUT, knowledge_sources=[DoubtKeeper])
 last = list(run.entries(LargestDoubt))[-1]
 print(f"{result.outcome}; {last.value.sentence()}, in cycle {last.cycle} (because of {last.because[0]})")
-print("replayed the same" if run.replay() is None else "replayed otherwise")
+print("replayed the same" if run.replay() is None else "replayed differently")

@@ -20,4 +20,4 @@ for story in run.stories(50):
         print(f"  {step.label}: from {', '.join(step.refs)}")
 
 first = run.replay()
-print("replayed: every decision is the same" if first is None else f"replayed: cycle {first} is decided otherwise")
+print("replayed: every decision is the same" if first is None else f"replayed: cycle {first} is decided differently")

@@ -79,4 +79,4 @@ history.save(OUT)
 print(history.why("Draft-1"))
 
 parted = History.read(OUT).replay(Scheduler(AGENTS))
-print(f"decided again without the model: {'the same' if parted is None else f'otherwise from cycle {parted} on'}")
+print(f"decided again without the model: {'the same' if parted is None else f'different from cycle {parted} on'}")

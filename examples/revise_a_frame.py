@@ -45,4 +45,4 @@ for entry in (*run.entries(LocaleFrame), *run.entries(PlanSketch)):
     if entry.author in ("timetable", "dependency_withdrawer"):
         print(f"cycle {entry.cycle}: {entry.value.sentence()}")
         print(f"  [{entry.ref} by {entry.author}, because of {', '.join(map(str, entry.because))}]")
-print(f"{result.outcome}; replayed {'the same' if run.replay() is None else 'otherwise'}")
+print(f"{result.outcome}; replayed {'the same' if run.replay() is None else 'differently'}")

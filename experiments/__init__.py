@@ -26,7 +26,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "doors": "1,000 missions with doors otherwise than the model says",
         "inexact": "1,000 missions with models wrong by 2, 5 and 10 cm",
         "light": "1,000 missions under lamps, sun and reflections",
-        "miscalibrated": "1,000 missions with a camera mounted otherwise",
+        "miscalibrated": "1,000 missions with a camera mounted differently",
         "obstacles": "1,000 missions among things that the model lacks",
         "twins": "3,000 missions on floors of identical rooms",
     },

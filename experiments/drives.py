@@ -41,7 +41,7 @@ class DoorBeliefs:
     A door that was shut before counts as open no more: the robot cannot know when it was opened.
 
     Attributes:
-        doors: that are otherwise than the model says.
+        doors: that differ from the model.
     """
 
     doors: Sequence[TrueDoor]

@@ -258,7 +258,7 @@ class RecordedRun:
             return list(stories_of(history, what, WorldFile(self._files)))
 
     def replay(self) -> int | None:
-        """Decide it again from what it observed: the first cycle that is decided otherwise, or None where none is.
+        """Decide it again from what it observed: the first cycle that is decided differently, or None where none is.
 
         Raises:
             BadInput: an observation cannot be read.

@@ -58,7 +58,7 @@ class ActionSettings:
         0.99, "1", "No obstacle is more certain than this, so that what is gone is soon forgotten.")
     min_gone_certainty: float = setting(0.5, "1", "An obstacle that is less certain is gone.")
     min_footprint_change_m: float = setting(
-        0.1, "m", "A frame is revised when an obstacle's footprint turns out otherwise by so much.")
+        0.1, "m", "A frame is revised when an obstacle's footprint turns out differently by so much.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,7 +91,7 @@ def _batches(path: Path, entity: str) -> list[Any]:
         return [chunk.to_record_batch() for chunk in chunks]
     except Exception as error:  # as above
         raise RecordingError(f"{path}: expected a whole Rerun recording, got: {error} (harvey repair {path.parent} "
-                             "draws it anew)") from None
+                             "draws it again)") from None
 
 
 def _complete(batch: Any, components: tuple[str, ...], timeline: str) -> Iterator[tuple[bytes, dict[str, Any]]]:

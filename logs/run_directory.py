@@ -1,7 +1,7 @@
 """A run directory.
 
 ``run.json`` tells how the run began, ``journal.jsonl`` what was decided, ``camera.mjpeg`` what the camera delivered:
-from these three a run is decided again, goes on after a crash, and is drawn anew. ``recording.rrd`` is the drawing, and
+from these three a run is decided again, goes on after a crash, is drawn again. ``recording.rrd`` is the drawing, and
 ``result.json`` tells how it ended.
 """
 
@@ -76,7 +76,7 @@ class RunDirectory:
         return data
 
     def write_camera(self, text: str) -> None:
-        """Write ``camera.toml``: the camera at the end, where it is otherwise than told. Raises OSError."""
+        """Write ``camera.toml``: the camera at the end, where it differs from what was told. Raises OSError."""
         write_whole(self.path / "camera.toml", text)
 
     def write_result(self, record: Mapping[str, Any]) -> None:

@@ -111,7 +111,7 @@ class Timeline:
         for line in range(len(self._ends)):
             self._decision(line)
 
-    def lines_alike(self, other: Timeline) -> int:
+    def count_common_lines(self, other: Timeline) -> int:
         """How many of the first lines are the same to the byte."""
         start = 0
         for line, (end, there) in enumerate(zip(self._ends, other._ends, strict=False)):
@@ -182,8 +182,8 @@ class Timeline:
     def time_at(self, cycle: int) -> float | None:
         """The newest time that anything from outside had told by a cycle [s]; None where nothing had lately."""
         for one in reversed(self.cycles[: bisect_right(self.cycles, cycle)][-TIMED_WITHIN:]):
-            told = [time_told(record.field) for record in self.decision(one).observed]
-            if known := [time_s for time_s in told if time_s is not None]:
+            times = [read_time_s(record.field) for record in self.decision(one).observed]
+            if known := [time_s for time_s in times if time_s is not None]:
                 return max(known)
         return None
 
@@ -341,7 +341,7 @@ def ranked(candidates: Iterable[Candidate], chosen: Candidate | None) -> tuple[C
     return tuple(sorted(candidates, key=lambda c: (c.number != first, -c.rating, c.number)))
 
 
-def time_told(get: Callable[[str], Any]) -> float | None:
+def read_time_s(get: Callable[[str], Any]) -> float | None:
     """When an observation was made, by the body's clock [s], by its fields; None where they do not tell."""
     since, waited = get("since_s"), get("waited_s")
     value = get("when_s") if get("sim_time_s") is None else get("sim_time_s")

@@ -120,7 +120,7 @@ class Scenario(Mission):
         faults: what goes wrong, in the order of the file.
         moved: things that stand elsewhere than in the robot's model.
         rides: who presses the buttons of elevators.
-        truth: what is otherwise than the robot's model says.
+        truth: what differs from the robot's model.
         light: lamps, daylight and how the camera adapts; None: light that is the same everywhere.
     """
 

@@ -28,7 +28,7 @@ from world_models.units import FOOT_M
 
 def find_named_locales(scenario: Scenario, world: World) -> list[str]:
     """The locales that a scenario's faults name, and those where it is asked to go on the way."""
-    asked = [parse_destination(told.goal, world).locale for told in scenario.told if told.goal not in ("", GO_ON)]
+    asked = [parse_destination(one.goal, world).locale for one in scenario.told if one.goal not in ("", GO_ON)]
     return [*(name for fault in scenario.faults for _, name in _locale_keys(fault)), *asked]
 
 
@@ -118,7 +118,7 @@ def load_true_world(scenario: Scenario, opened: tuple[str, ...] = ()) -> World:
 
 
 def find_changed_locales(scenario: Scenario, world: World) -> list[str]:
-    """The locales whose doors or things are otherwise. Raises ScenarioError for an unknown one."""
+    """The locales whose doors or things differ. Raises ScenarioError for an unknown one."""
     rooms = [extra.locale for extra in scenario.truth.extra]
     for i, name in enumerate(rooms):
         if name not in world.frames or not world.is_room(name):

@@ -11,7 +11,7 @@ import numpy as np
 
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import Elevators, SimulatedBuilding
-from sim.ground_truth.table import AS_TOLD
+from sim.ground_truth.table import START_AS_STATED
 from sim.ground_truth.true_changes import ChangingFaces, State
 from sim.render.lights import Lights, Room, check_light
 from sim.render.optics import check_lens
@@ -167,7 +167,7 @@ def _ends(scenario: Scenario, world: World) -> tuple[Place, Place]:
 def _put_down(scenario: Scenario, world: World, start: Place) -> Place:
     """Where the robot is put down. Raises ScenarioError where the world has no such place."""
     true = scenario.truth.start
-    if true == AS_TOLD:
+    if true == START_AS_STATED:
         return replace(start, heading_rad=scenario.start.heading_rad)
     if true.locale not in world.frames:
         raise scenario.refused(("truth", "start", "locale"), f"expected a room of the world, got {true.locale!r}")

@@ -59,7 +59,7 @@ def scan_floor(
         ends.append("thing" if by_thing < by_model else "model" if by_model < FAR_M - 1e-6 else "sight")
     return FreeFloor("camera", locale, x, y, tuple(map(float, bearings)), tuple(
         float(near_m / math.cos(b - pose.heading_rad)) for b in bearings), tuple(far), tuple(ends),
-        tuple(0.02 for _ in bearings), (), seen_s, told_m=tuple(far))
+        tuple(0.02 for _ in bearings), (), seen_s, confirmed_m=tuple(far))
 
 
 def _cut(ray: shapely.LineString, floor: shapely.Geometry, x: float, y: float) -> float:

@@ -75,7 +75,7 @@ class RebuiltBoard:
     """A board as a journal tells it.
 
     Attributes:
-        originals: what the journal names only by reference: pictures, and frames of a world that was read anew.
+        originals: what the journal names only by reference: pictures, and frames of a world that was read again.
         board: the board itself; entries: every revision that was ever on it.
     """
 
@@ -122,7 +122,7 @@ def recorded_act(decision: DecisionRecord) -> Act:
 
 
 def open_board(run: RunDirectory) -> RebuiltBoard:
-    """An empty board for a run, with its world read anew."""
+    """An empty board for a run, with its world read again."""
     return RebuiltBoard(open_originals(run, build_agent(RunHead.read(run.path)).store))
 
 

@@ -64,7 +64,7 @@ RECIPES: Mapping[str, Recipe] = {
     "box": Recipe(lambda _folder: Task("box-in-the-way", (("limits.max_cycles", "200"),), 0).stage(), 0, "failed"),
     "shut door": Recipe(lambda _folder: Task("shut-door", (("limits.max_cycles", "300"),), 0).stage(), 0, "failed"),
 }
-"""In the hallway it is unplugged, pushed aside and carried off; bumped hard it is lost, and asks for every room."""
+"""In the hallway it is unplugged, pushed aside and kidnapped; bumped hard it is lost, and asks for every room."""
 
 Recorded = Callable[[str], RunDirectory]
 

@@ -31,6 +31,6 @@ def decisions() -> list[Decision]:
     act(Revise(board.view["Hypothesis-1"], there))
     fault = BodyFault("camera", "camera unplugged", "no such device", "PictureRequest-1", 7.0)
     act(Post(fault))
-    act(Post(Recovery("BodyFault-1", "PictureRequest-1", 7.0, 2.0, tries=9, waited_s=30.0, status="in vain")))
+    act(Post(Recovery("BodyFault-1", "PictureRequest-1", 7.0, 2.0, tries=9, waited_s=30.0, status="still failing")))
     act(Post(Outcome("failed", "camera unplugged")))
     return made

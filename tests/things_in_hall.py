@@ -74,7 +74,7 @@ class Hall:
             hit = (bearings >= angles.min() - 0.02) & (bearings <= angles.max() + 0.02)
             far[hit] = np.minimum(far[hit], np.linalg.norm(corners, axis=1).min())
         return FreeFloor("camera", HALL, HERE.x_m + ahead_m, HERE.y_m, tuple(bearings.tolist()), (1.5,) * 41,
-                         tuple(far.tolist()), ("sight",) * 41, (0.02,) * 41, things, seen_s, told_m=(far_m,) * 41)
+                         tuple(far.tolist()), ("sight",) * 41, (0.02,) * 41, things, seen_s, confirmed_m=(far_m,) * 41)
 
     def see(self, *things: FloorThing, seen_s: float, far_m: float = 4.0, ahead_m: float = 0.0) -> None:
         """One sight of the floor: free up to ``far_m``, with some things on it."""

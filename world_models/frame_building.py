@@ -32,7 +32,7 @@ class FrameBuilding(Building):
     frames: BoardFrames
 
     def __init__(self, view: View, instead: Iterable[LocaleFrame] = (), variant: str = "") -> None:
-        """``instead``: of the frames on the board, to ask what would be if they were otherwise.
+        """``instead``: of the frames on the board, to ask what would be if they were different.
 
         Results of one ``variant`` do not take the place of those of another.
         """

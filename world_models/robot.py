@@ -54,7 +54,7 @@ class RobotModel:
         return camera, Wheels(self.actuator, self.continuous), Footprint(self.radius_m)
 
     def in_building(self, building: Building) -> RobotModel:
-        """The same robot in another building, or in the same one as known otherwise."""
+        """The same robot in another building, or in the same one as known differently."""
         return self._with(world=building)
 
     def on_floor_of(self, locale: str) -> RobotModel:

@@ -1,6 +1,6 @@
 """What documents take from the code and from files of results: written between two markers of a page.
 
-``python -m docs.tools.fill`` writes all of it anew, with the schema of the journal and the picture of the architecture.
+``python -m docs.tools.fill`` writes it all again, with the schema of the journal and the picture of the architecture.
 A page has ``<!-- generate: NAME -->``, what the generator of that name makes, and ``<!-- /generate -->``. A test
 compares, so that no page tells of older code.
 """

@@ -278,7 +278,7 @@ def draw_replay(path: Path, run: Run) -> None:
     made = [(decision.cycle, words.source(decision.chosen.source)) for decision in run.history.decisions()
             if decision.chosen is not None]
     names = list(dict.fromkeys(name for _, name in made))
-    said = "all the same, byte for byte" if other is None else f"otherwise from cycle {other} on"
+    said = "all the same, byte for byte" if other is None else f"different from cycle {other} on"
     figure = Figure(figsize=(WIDE_IN, HIGH_IN), dpi=DOTS, facecolor="white")
     axes = figure.add_axes((0.24, 0.13, 0.74, 0.77))
     axes.plot([cycle for cycle, _ in made], [names.index(name) for _, name in made], "|", markersize=4, color="#1f6fb4")
@@ -293,7 +293,7 @@ def draw_replay(path: Path, run: Run) -> None:
 
 
 def draw_rescue(run: Run) -> None:
-    """The moving picture: carried off, refuted, lost, found."""
+    """The moving picture: kidnapped, refuted, lost, found."""
     lost = run.turn("lost")
     found = run.turn("found", lost)
     cycles = range(lost - BEFORE, found + AFTER + 1)

@@ -1,7 +1,7 @@
-"""Missions on floors whose doors are otherwise than the model says: does the robot see it, and find another way?
+"""Missions on floors whose doors differ from the model: does the robot see it, and find another way?
 
 A door on the way is shut, with another way or with none; it opens or shuts during the mission; a door that the model
-has closed stands open; there is a door that the model lacks; and nothing is otherwise.
+has closed stands open; there is a door that the model lacks; and nothing differs.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class DoorEnd(End):
     """How a mission ended.
 
     Attributes:
-        door: the door that is otherwise; "" where none is.
+        door: the door that differs; "" where none is.
         is_found: whether that was ever held to be shut.
         false_states: what was held of doors and is not so.
     """
@@ -93,7 +93,7 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
     trials = drives.spread(shares, drives.first_seed(seed), None if quick else missions or MISSIONS)
     driven = drives.drive_all("doors", drive, trials, DoorEnd, quick=quick, seed=seed, missions=missions)
     return driven.report(
-        "Missions on floors whose doors are otherwise", "doors", FIGURES,
+        "Missions on floors whose doors differ", "doors", FIGURES,
         notes=(
             "as it should end: reached; with no way left blocked, and the outcome names that door. door found: it was"
             " held to be shut at some time; a way need not lead past it. false states: a door that is held to"

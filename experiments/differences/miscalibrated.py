@@ -1,4 +1,4 @@
-"""Missions with a camera that is mounted otherwise than told, or knocked on the way: is it found, and is it survived?
+"""Missions with a camera that is mounted differently than told, or knocked on the way: is it found, and is it survived?
 
 Tilt, roll and yaw are up to 3 degrees off, the height up to 8 cm, the focal length up to 4 %, all at once.
 """

@@ -20,7 +20,7 @@ from experiments.generated.missions import write_twin_mission
 from experiments.report import Cell, Claim, Report
 from experiments.trials import at_least, at_most, judge_rare
 from harvey.campaign.campaign import Task
-from world_models.entries import Outcome, PlaceOdds, TwinOdds
+from world_models.entries import AliasOdds, Outcome, PlaceOdds
 
 RIGHT, WRONG = "right", "wrong"
 MISSIONS, QUICK_MISSIONS = 3_000, 4
@@ -70,7 +70,7 @@ def drive(trial: Trial) -> TwinEnd:
                 doubts.add(change.entry.id)
             elif isinstance(value, PlaceOdds):
                 odds.append(value)
-            elif isinstance(value, TwinOdds):
+            elif isinstance(value, AliasOdds):
                 twins[change.entry.ref] = value.probability
             elif isinstance(value, Outcome):
                 said[:] = [twins[ref] for ref in change.entry.because if ref in twins]

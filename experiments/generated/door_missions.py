@@ -1,4 +1,4 @@
-"""Missions on generated floors whose doors are otherwise than the model says, as files for campaigns."""
+"""Missions on generated floors whose doors differ from the model, as files for campaigns."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from world_models.building.locales import Doorway
 from world_models.building.world import World
 
 CASES = ("another way", "no way", "extra door", "stands open", "opens", "shuts", "ajar", "as filed")
-"""What is otherwise about the doors: shut, with another way or with none; a door that the model lacks; one that stands
+"""What differs about the doors: shut, with another way or with none; a door that the model lacks; one that stands
 open and is closed in the model; one that opens or shuts during the mission; one that is ajar, with another way."""
 WAY_MARGIN_M = 0.12
 """Free floor beside the robot on a way that counts as one."""
@@ -37,11 +37,11 @@ MAX_FLOORS, FLOORS_APART = 20, 100_000_000
 
 @dataclass(frozen=True)
 class DoorMission:
-    """A mission and what is otherwise.
+    """A mission and what differs.
 
     Attributes:
         path: the scenario's file.
-        door: the door that is otherwise; "" where none is.
+        door: the door that differs; "" where none is.
     """
 
     path: Path
@@ -89,7 +89,7 @@ def _write_on_floor(folder: Path, seed: int, floor_seed: int, case: str) -> Door
 
 
 def _draw_doors(stage: Stage, floor: Floor, case: str, rng: np.random.Generator) -> tuple[str, str] | None:
-    """The door that is otherwise, and its part of the scenario's file; None where this mission does not fit."""
+    """The door that differs, and its part of the scenario's file; None where this mission does not fit."""
     start, goal = stage.start_world, stage.goal_world
     obstacles = stage.building.obstacles
     if min(obstacles.clearance_m(start), obstacles.clearance_m(goal)) < ROOM_M:
@@ -123,7 +123,7 @@ def _draw_doors(stage: Stage, floor: Floor, case: str, rng: np.random.Generator)
 
 
 def _list_on_way(stage: Stage, free: shapely.Geometry) -> list[Doorway]:
-    """The doorways that the shortest way leads through."""
+    """The doorways that the shortest way passes through."""
     way = find_shortest_way(free, stage.start_world, stage.goal_world)
     if way is None:
         return []

@@ -1,6 +1,6 @@
 """Missions as files for campaigns, the same for the same arguments; and scenario texts of missions that take seconds.
 
-On generated floors, from room to room: with a model that is wrong by centimetres, with a camera mounted otherwise, on
+On generated floors, from room to room: with a model that is wrong by centimetres, with a camera mounted differently, on
 floors of identical rooms, and with clutter on or beside the way.
 """
 
@@ -99,7 +99,7 @@ def draw_rooms(floor: Floor, rng: np.random.Generator) -> list[str]:
 
 
 def format_mission(description: str, files: tuple[Path, Path], ends: Sequence[End], heading_deg: float) -> str:
-    """The text of a scenario on a floor whose two files were written, without what is otherwise there."""
+    """The text of a scenario on a floor whose two files were written, without what differs there."""
     world, details = files
     return (f'description = "{description}"\nworld = "{world.name}"\ndetails = ["{details.name}"]\n'
             f'goal = "(ptrans {" ".join(map(str, ends))})"\n\n[start]\nheading_deg = {heading_deg:.1f}\n'
@@ -164,7 +164,7 @@ def write_inexact_mission(
     raise ValueError(f"expected a mission on floor {seed}, got none in {MAX_DRAWS} draws")
 
 
-# -- cameras mounted otherwise -----------------------------------------------------------------------------------------
+# -- cameras mounted differently ---------------------------------------------------------------------------------------
 
 CAMERA_CASES = ("as told", "miscalibrated", "knocked")
 MAX_TURN_RAD, MAX_HEIGHT_M, MAX_FOCAL = math.radians(3.0), 0.08, 0.04

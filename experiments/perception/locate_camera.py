@@ -69,7 +69,7 @@ class PoseVerdict(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rival:
+class AliasRisk:
     """Another pose.
 
     Attributes:
@@ -106,7 +106,7 @@ class CameraFix:
     coverage: float
     verdict: PoseVerdict
     reason: str = ""
-    rival: Rival | None = None
+    rival: AliasRisk | None = None
 
     @property
     def camera_from_world(self) -> Pose:
@@ -178,7 +178,7 @@ class CameraSearch:
     rng: np.random.Generator
 
     def look_elsewhere(self, best: CameraFix | None) -> tuple[CameraFix | None, bool]:
-        """A better pose, from here or where the model repeats itself; else the same, held against its rivals."""
+        """A better pose, from here or where the model repeats itself; else the same, compared with its rivals."""
         if best is None:
             return None, False
         pose = best.camera_from_world
@@ -206,7 +206,7 @@ class CameraSearch:
             break
         return best, False
 
-    def find_rivals(self, pose: Pose, chance: float, others: Sequence[Pose], spread: Floats) -> list[Rival]:
+    def find_rivals(self, pose: Pose, chance: float, others: Sequence[Pose], spread: Floats) -> list[AliasRisk]:
         """Which of ``others``, with covariance ``spread`` (6, 6), explain the picture too, the likeliest first.
 
         ``chance`` is the probability that a line is found at a wrong pose.
@@ -219,7 +219,7 @@ class CameraSearch:
                 self.segments_px, other, spread, (CAMERA_COARSE_PAIR_PX, CAMERA_COARSE_SIGMA_PX), trunc_r_and_t)
             refined = other if near is None else near[0].camera_from_world
             if not self.is_same(other, pose) and not self.is_same(refined, pose):
-                rivals += [Rival(at, own.log_likelihood - self._score(at, chance).log_likelihood, needed)
+                rivals += [AliasRisk(at, own.log_likelihood - self._score(at, chance).log_likelihood, needed)
                            for at in (other, refined)]
         return sorted(rivals, key=lambda rival: rival.lead)
 
@@ -232,7 +232,7 @@ class CameraSearch:
         return other if two > one else best
 
     def _score(self, at: Pose, chance: float) -> PoseScore:
-        """How much picture and prior speak for a pose."""
+        """How much picture and prior support a pose."""
         found = compute_pose_score(project_leaders(self.model, self.camera, at), self.segments_px, chance)
         step = self.prior.compute_step(at)
         far = min(0.5 * float(step @ self.prior.information @ step), RIVAL_MAX_PRIOR)

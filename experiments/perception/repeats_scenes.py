@@ -1,6 +1,6 @@
 """Structures that repeat themselves, seen by a camera: stairs, shelves, colonnades, window fronts, tiles, doors.
 
-Flights are as in photographs: seen in part, from the front and aslant, some steps hidden, many edges missed; the model
+Flights are as in photographs: seen in part, from the front or diagonally, steps hidden, many edges missed; the model
 has a part of the flight, or more than is seen, and is a little wrong. Boxes do not repeat, but have only nine edges.
 """
 
@@ -126,8 +126,8 @@ def build_flight(rng: Rng) -> Structure:
     else:
         beside = []
     middle = np.array([wide, count * run, count * rise]) / 2.0
-    aslant = rng.uniform(-1.5, 1.5) if rng.uniform() < 0.5 else 0.0
-    eye = np.array([wide * rng.uniform(0.2, 0.8) + aslant * wide, -rng.uniform(1.0, 4.0), rng.uniform(1.0, 1.8)])
+    diagonal = rng.uniform(-1.5, 1.5) if rng.uniform() < 0.5 else 0.0
+    eye = np.array([wide * rng.uniform(0.2, 0.8) + diagonal * wide, -rng.uniform(1.0, 4.0), rng.uniform(1.0, 1.8)])
     pitch = math.hypot(rise, run)
     along, stairs = np.array([0.0, run, rise]), rng.choice([0.0, 1.0, 2.0]) * rng.choice([-1.0, 1.0])
     sigma = rng.uniform(0.1, max(0.11, 1.5 * pitch))

@@ -41,7 +41,7 @@ MIN_SELF_SIMILARITY = 0.3  # part of the model's length that a motion takes onto
 
 @dataclass(frozen=True, slots=True)
 class PoseScore:
-    """How much a picture speaks for a pose.
+    """How much a picture supports a pose.
 
     Attributes:
         log_likelihood: against a picture of anything else; comparable between poses, given the same chance.

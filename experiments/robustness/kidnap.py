@@ -220,7 +220,7 @@ def format_scenario(trial: Kidnap) -> str:
     place = Place.of_world(floor.world, room, there.x_m, there.y_m, there.heading_rad)
     goal, spot = _draw_pose(floor.world, (belief.locale,), np.random.default_rng([trial.floor, trial.number, 1]))
     end = Place.of_world(floor.world, goal, spot.x_m, spot.y_m)
-    return f'''description = "Carried off to {room} at once. Written by harvey experiment kidnap."
+    return f'''description = "Kidnapped to {room} at once. Written by harvey experiment kidnap."
 world = "floor-{floor.seed}.toml"
 details = ["floor-{floor.seed}-details.toml"]
 goal = "(ptrans ({belief.locale} ({_ft(belief.x_m)},{_ft(belief.y_m)},0)) ({goal} ({_ft(end.x_m)},{_ft(end.y_m)},0)))"

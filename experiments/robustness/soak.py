@@ -1,7 +1,7 @@
 """A soak: errands in one building day after day, as the light changes and the camera sags. What breaks first?
 
 A mission is some minutes of errands: the robot is sent elsewhere before it arrives. A day has ``A_DAY`` missions under
-one light; each is put down anew, and told nothing of the days before.
+one light; each is put down again, and told nothing of the days before.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
             f" {MOST_SAG_DEG:g}.",
             f"The memory of a process grows by at most {growth:.2f} MB a mission." if math.isfinite(growth) else
             "No process ran enough missions to tell how its memory grows.",
-            f"Ended otherwise than reached: {', '.join(f'{n} {kind}' for kind, n in otherwise) or 'none'}",
+            f"Ended differently than reached: {', '.join(f'{n} {kind}' for kind, n in otherwise) or 'none'}",
             "The paper drove for minutes, not days; peers publish no such figures.",
         ),
         claims=_claims(ends, growth, quick=quick), is_flawed=lambda e: not e.is_reached or e.false_accepts > 0,

@@ -175,7 +175,7 @@ def find_finished(task: Task, stage: Stage) -> MissionResult | None:
 
     run = RunDirectory(task.out)
     if not RunHead.read(run.path).is_like(build_head(stage, task.seed, task.body, task.agent_settings)):
-        raise BadInput(f"{run.path}: expected a run of {task.label}, got one that began otherwise")
+        raise BadInput(f"{run.path}: expected a run of {task.label}, got one that began differently")
     remains, record = find_remains(run), run.read_result()
     if remains.outcome is None or record.get("outcome") != remains.outcome.kind:
         return None
@@ -203,7 +203,7 @@ def drive_missions(
 ) -> Iterator[tuple[Task, MissionResult | Killed]]:
     """Drive one scenario with several seeds; results are kept in ``folder`` and come as they are known.
 
-    Where the tasks are to go on, missions with a result are not driven again. One that was cut off is driven anew, not
+    Where the tasks are to go on, missions with a result are not driven again. One that was cut off is driven again, not
     resumed: so its journal and result are those of a mission that nobody disturbed.
 
     Raises:

@@ -33,7 +33,7 @@ from logs.decided_by import arithmetic, digest_of, files_in
 PACKAGES = ("blackboard", "world_models", "knowledge_sources", "sim", "logs", "harvey")
 MOST_KILLS = 3
 """So often may a worker end while it works on a case; then the case is given up."""
-TOLD_TO_STOP = 143
+STOPPED_BY_SIGNAL = 143
 """The exit code of a process that SIGTERM ended."""
 
 
@@ -204,7 +204,7 @@ def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
-        os._exit(TOLD_TO_STOP)
+        os._exit(STOPPED_BY_SIGNAL)
 
 
 def _work_in_worker(work: Callable[[Any], Any], case: Any) -> CaseAnswer:
@@ -212,8 +212,8 @@ def _work_in_worker(work: Callable[[Any], Any], case: Any) -> CaseAnswer:
     try:
         return answer_case(work, case)
     except SystemExit:
-        os._exit(TOLD_TO_STOP)
+        os._exit(STOPPED_BY_SIGNAL)
 
 
 def _exit(_number: int, _frame: FrameType | None) -> None:
-    sys.exit(TOLD_TO_STOP)
+    sys.exit(STOPPED_BY_SIGNAL)

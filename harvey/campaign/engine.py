@@ -99,7 +99,7 @@ class ResultsFile:
 
 @contextmanager
 def open_results(folder: Path, head: Mapping[str, Any]) -> Iterator[ResultsFile]:
-    """The results in a folder, begun anew where they are of another head. Raises BadInput, OSError."""
+    """The results in a folder, begun again where they are of another head. Raises BadInput, OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     results = ResultsFile(folder, head)
     try:

@@ -40,7 +40,7 @@ class Tally:
         self.to_go_m = self.way_m = stage.start_world.distance_to(stage.goal_world)
 
     def __call__(self, decision: Decision) -> None:
-        self.turns = tuple(point for point in self._finder.find(decision) if point.is_told)
+        self.turns = tuple(point for point in self._finder.find(decision) if point.is_main)
         for point in self.turns:
             if point.kind in ("lost", "found"):
                 self.is_lost = point.kind == "lost"
@@ -65,9 +65,9 @@ class Bar:
     def __call__(self, decision: Decision) -> None:
         tally = self._tally
         self._bar.n = min(max(0.0, tally.way_m - tally.to_go_m), tally.way_m)
-        told = f"{tally.to_go_m:.1f} m to go, {count(tally.verified, 'milestone')} verified, cycle {decision.cycle}"
-        told += ", lost" * tally.is_lost
-        self._bar.set_description_str(told, refresh=False)
+        line = f"{tally.to_go_m:.1f} m to go, {count(tally.verified, 'milestone')} verified, cycle {decision.cycle}"
+        line += ", lost" * tally.is_lost
+        self._bar.set_description_str(line, refresh=False)
         self._bar.update(0)
 
     def close(self) -> None:
@@ -78,14 +78,14 @@ class Lines:
     """A line whenever a milestone is verified, and at each turning point that must not be left out."""
 
     def __init__(self, tally: Tally, out: TextIO) -> None:
-        self._tally, self._out, self._told = tally, out, 0
+        self._tally, self._out, self._counted = tally, out, 0
 
     def __call__(self, decision: Decision) -> None:
         for point in self._tally.turns:
             print(f"cycle {point.cycle}: {point.kind}: {point.text}", file=self._out, flush=True)
-        if self._tally.verified > self._told:
-            self._told = self._tally.verified
-            verified = f"{count(self._told, 'milestone')} verified"
+        if self._tally.verified > self._counted:
+            self._counted = self._tally.verified
+            verified = f"{count(self._counted, 'milestone')} verified"
             print(f"cycle {decision.cycle}: {verified}, {self._tally.to_go_m:.1f} m to go", file=self._out, flush=True)
 
     def close(self) -> None:

@@ -1,9 +1,9 @@
 """How far a campaign is, told from its files while it runs or afterwards; and is one better than another?
 
 Two campaigns are compared by the same cases of both, in pairs. Where both went alike, a pair says nothing of the
-difference. Of the others, were the two campaigns alike, half would speak for each: McNemar's exact test (McNemar 1947,
+difference. Of the others, were the two campaigns alike, half would support each: McNemar's exact test (McNemar 1947,
 Psychometrika 12; the binomial test on the discordant pairs). The difference of the rates is the rate of the pairs that
-speak for the second less that of those that speak for the first; each has its exact interval (Clopper and Pearson 1934,
+support the second less that of those that support the first; each has its exact interval (Clopper and Pearson 1934,
 Biometrika 26) at half the risk, so that both hold together (Bonferroni). That is a little wide, and no pair that went
 otherwise is no proof that there is no difference.
 """
@@ -170,7 +170,7 @@ def draw_progress(progress: CampaignProgress) -> Path:
 
 CONFIDENCE = 0.95
 SHOWN = 10
-"""Cases that went otherwise and are named."""
+"""Cases that went differently and are named."""
 
 Results = Mapping[int, Mapping[str, Any]]
 
@@ -195,7 +195,7 @@ class Comparison:
 
     @property
     def discordant(self) -> int:
-        """How many went otherwise."""
+        """How many went differently."""
         return len(self.lost) + len(self.gained)
 
     @property
@@ -284,7 +284,7 @@ def format_comparison(c: Comparison, success: str, names: tuple[str, str]) -> st
     lines = [
         table(("campaign", "cases", success, "%", "95 %", "alone"), rows), "",
         f"second less first: {100 * c.difference:+.2f} points, 95 % from {100 * low:+.2f} to {100 * high:+.2f};"
-        f" {c.discordant} of {c.cases} went otherwise, p = {c.p_value:.3g} (McNemar, exact)",
+        f" {c.discordant} of {c.cases} went differently, p = {c.p_value:.3g} (McNemar, exact)",
         f"the second is {verdict}",
     ]
     for what, cases in (("only the first succeeds in", c.lost), ("only the second succeeds in", c.gained)):

@@ -1,4 +1,4 @@
-"""``harvey replay``, ``resume`` and ``repair``: decide a run again, go on with it, draw its recording anew."""
+"""``harvey replay``, ``resume`` and ``repair``: decide a run again, go on with it, draw its recording again."""
 
 from __future__ import annotations
 
@@ -226,8 +226,8 @@ def _print_start(run: RunDirectory, remains: Remains, head: RunHead) -> None:
         print(f"note: the run {elsewhere}; it goes on only if it is decided again as it was", file=sys.stderr)
     for what in remains.dropped:
         print(f"dropped: {what}", file=sys.stderr)
-    told = count(remains.decisions, "decision")
-    print(f"{run.path}: {told} replayed, then it goes on", file=sys.stderr, flush=True)
+    done = count(remains.decisions, "decision")
+    print(f"{run.path}: {done} replayed, then it goes on", file=sys.stderr, flush=True)
 
 
 RESUME = CliCommand(
@@ -259,12 +259,12 @@ def _run_repair(args: Namespace) -> int:
     expect_unwritten(run.path)
     with tqdm(unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
         decisions = redraw(run, (lambda _decision: bar.update(),))
-    print(f"{run.recording} was drawn anew from {count(decisions, 'decision')} of the journal")
+    print(f"{run.recording} was drawn again from {count(decisions, 'decision')} of the journal")
     return 0
 
 
 REPAIR = CliCommand(
-    "repair", "draw the recording of a run anew, where it is damaged or missing",
+    "repair", "draw the recording of a run again, where it is damaged or missing",
     (("harvey repair runs/lab-to-allens-office-0", "from its journal and its camera's pictures"),),
     _add_repair_arguments, _run_repair,
     "The run is decided again from what was observed; nothing else of it is touched. A run that was cut off is\n"

@@ -1,4 +1,4 @@
-"""``harvey demo``: carried off, refuted, lost, found, in a minute, with a page that opens."""
+"""``harvey demo``: kidnapped, refuted, lost, found, in a minute, with a page that opens."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from logs.run_directory import RUNS, RunDirectory, check_vacant
 
 SCENARIO = "hallway-kidnap"
 BEFORE = """\
-The robot drives to an office that it knows from a model only. In the hallway somebody carries it off by a metre and
+The robot drives to an office that it knows from a model only. In the hallway somebody moves it by a metre and
 turns it by 20 degrees. Nobody tells it. See it refute what it believed, be lost, look round, and know where it is."""
 
 
@@ -44,7 +44,7 @@ def _run(args: Namespace) -> int:
 
 
 DEMO = CliCommand(
-    "demo", "see it carried off, lost and found, in a minute; a page opens at the end",
+    "demo", "see it kidnapped, lost and found, in a minute; a page opens at the end",
     (
         ("harvey demo", "drive, tell what happened, and open the page"),
         ("harvey demo --no-page", "without opening it, as on a machine without a screen"),

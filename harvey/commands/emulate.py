@@ -134,7 +134,7 @@ class _Trace:
 
     def __init__(self, is_text: bool, ground: IdealGround | SimulatedBody) -> None:
         self._text, self._ground = is_text, ground
-        self._told_s, self._place = 0.0, ""
+        self._printed_s, self._place = 0.0, ""
 
     def __call__(self, direction: str, data: bytes) -> None:
         lines = data.decode("ascii", "backslashreplace").splitlines() if self._text else [data.hex(" ")]
@@ -144,8 +144,8 @@ class _Trace:
     def tell_place(self) -> bool:
         """Where it is, if that has changed; never the end."""
         now_s = self._ground.time_s
-        if now_s - self._told_s >= TELL_S and (place := self._describe_place()) != self._place:
-            self._told_s, self._place = now_s, place
+        if now_s - self._printed_s >= TELL_S and (place := self._describe_place()) != self._place:
+            self._printed_s, self._place = now_s, place
             print(f"{now_s:9.3f} = {place}", flush=True)
         return False
 

@@ -212,7 +212,7 @@ def _run_diff(args: Namespace) -> int:
     set_differently = tuple(settings(*heads))
     if set_differently:
         print(f"set differently: {'; '.join(set_differently)}")
-    alike = ours.lines_alike(theirs)
+    alike = ours.count_common_lines(theirs)
     more, one, other = first_difference(*(islice(h.decisions(), alike, None) for h in (ours, theirs)))
     agreed = alike + more
     if one is None or other is None or args.fields:

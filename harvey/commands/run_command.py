@@ -32,7 +32,7 @@ def _add_run_arguments(parser: ArgumentParser) -> None:
                              " serial:denning; with harvey-bases serial:p2os or serial:create2 (simulated)")
     parser.add_argument("--go-on", action="store_true",
                         help="keep the runs that are there already; one that was cut off is resumed, of several seeds"
-                             " it is driven anew, so that the results are as if nothing had been")
+                             " it is driven again, so that the results are as if nothing had been")
     add_worker_arguments(parser)
     parser.add_argument("--keep", choices=("all", "failures", "none"), default="all",
                         help="of several seeds: whose run directories stay, all, those that do not reach the goal, or"
@@ -94,8 +94,8 @@ def _check(task: Task) -> int:
     pairs = task.agent_settings
     ahead, outcome = dry_run(world, robot, scenario.command, build_settings(pairs), WhatIf(pairs=pairs))
     print(format_previews(ahead))
-    told, bodes_well = summarize_dry_run(ahead, outcome)
-    print(f"\nthe dry run of {scenario.name} {told}")
+    said, bodes_well = summarize_dry_run(ahead, outcome)
+    print(f"\nthe dry run of {scenario.name} {said}")
     return 0 if bodes_well else 1
 
 

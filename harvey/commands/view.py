@@ -88,7 +88,7 @@ def _whole(run: RunDirectory) -> Path:
     from logs.reader import damage_of
 
     if (damage := damage_of(run.recording)) is not None:
-        print(f"{run.recording} is damaged: {damage}; harvey repair {run.path} draws it anew", file=sys.stderr)
+        print(f"{run.recording} is damaged: {damage}; harvey repair {run.path} draws it again", file=sys.stderr)
     return run.recording
 
 

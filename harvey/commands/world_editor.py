@@ -26,10 +26,10 @@ LOOPBACK = ("--bind", "127.0.0.1")
 PAGE = """\
 <!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta http-equiv="refresh" content="1"><title>{name}</title></head>
-<body><pre>{told}</pre>
+<body><pre>{summary}</pre>
 {plan}</body></html>
 """
-"""It loads itself anew each second."""
+"""It loads itself again each second."""
 
 
 class WorldEditor:
@@ -89,9 +89,9 @@ class WorldEditor:
             self._say(line)
         self._write("\n".join([*faults, summary]))
 
-    def _write(self, told: str) -> None:
+    def _write(self, summary: str) -> None:
         """Write the page at once as a whole: a browser may read it at any time."""
-        text = PAGE.format(name=escape(self._path.name), told=escape(told), plan=self._plan)
+        text = PAGE.format(name=escape(self._path.name), summary=escape(summary), plan=self._plan)
         half = self._page.with_name(f".{self._page.name}.part")
         half.write_text(text, encoding="utf-8")
         half.replace(self._page)
@@ -101,7 +101,7 @@ class BuildingViewer:
     """The building in the rerun viewer: each world is a recording; the viewer that is open takes it."""
 
     def __init__(self, viewer: str, recording: Path) -> None:
-        """``recording``: the .rrd file that is written anew for each world."""
+        """``recording``: the .rrd file that is written again for each world."""
         self._viewer, self._recording = viewer, recording
         self._running: list[subprocess.Popen[bytes]] = []
         self._shown = 0

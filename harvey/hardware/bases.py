@@ -15,7 +15,7 @@ from world_models.plugins import list_absent, load_plugins
 
 WHY: Mapping[int, str] = {
     errno.ENOENT: "there is no such port",
-    errno.EACCES: "you may not use it: sudo usermod -aG dialout $USER, then log in anew",
+    errno.EACCES: "you may not use it: sudo usermod -aG dialout $USER, then log in again",
     errno.EBUSY: "another program has it",
     errno.ENODEV: "nothing is plugged in there",
     errno.ENXIO: "nothing is plugged in there",

@@ -113,7 +113,7 @@ def find_boards(
     useless: list[tuple[str, str]] = []
     shown: Grey | None = None
     size: tuple[int, int] | None = None
-    apart, told = SAME_PX if wanted is None else NEW_PX, ""
+    apart, message = SAME_PX if wanted is None else NEW_PX, ""
     for name, grey in pictures:
         here = grey.shape[1], grey.shape[0]
         size = size or here
@@ -129,8 +129,8 @@ def find_boards(
         elif wanted is None:
             useless.append((name, found))
             tell(f"{name}: {found}")
-        elif found != told:
-            told = found
+        elif found != message:
+            message = found
             tell(f"{len(views)} of {wanted} views; {name}: {found}")
         if len(views) == wanted:
             break
@@ -164,8 +164,8 @@ def calibrate_camera(boards: Boards, pattern: Pattern, *, with_k3: bool) -> Cali
             f"{found.values[worst]:.0f} +- {found.deviations[worst]:.2g} px: take the board from more sides, tilted up "
             "to 45 degrees, near and far, into every corner of the picture")
     except ValueError as error:
-        told = "".join(f"; {name}: {why}" for name, why in boards.useless[:1])
-        raise BadInput(f"calibration: {error}{told}") from None
+        message = "".join(f"; {name}: {why}" for name, why in boards.useless[:1])
+        raise BadInput(f"calibration: {error}{message}") from None
 
 
 def find_mounting(

@@ -71,8 +71,8 @@ def drive(
     files = RunDirectory(out)
     eye = WatchedCamera(camera, clock, mission.camera.rate_hz)
     if isinstance(base, AccompaniedBase):
-        sink, told = base.accompany(head.load_world(), robot)
-        sinks, tell = (*sinks, sink), tell_each(tell, told)
+        sink, listener = base.accompany(head.load_world(), robot)
+        sinks, tell = (*sinks, sink), tell_each(tell, listener)
 
     with _hardware_run(mission, head, base, eye, clock, files, sinks, live, around=around, tell=tell) as run:
         return run.drive(files)

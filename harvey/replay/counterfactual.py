@@ -102,23 +102,23 @@ def what_if(
         make_room(out.path, head.name, head.seed)
     recorder = RunRecorder(out, head, agent.world, agent.robot)
     if head.kind != SIMULATOR:
-        ports, told = (WorldPort(agent.store),), Retelling(player.records, (USER, PAGE), player.originals)
+        ports, retold = (WorldPort(agent.store),), Retelling(player.records, (USER, PAGE), player.originals)
         scheduler = agent.scheduler(ports=ports, sinks=(*recorder.sinks, player.compare))
         try:
-            outcome = player.play(scheduler, agent, head, recorder, before=lambda: _ask(scheduler, agent, told))
+            outcome = player.play(scheduler, agent, head, recorder, before=lambda: _ask(scheduler, agent, retold))
             return player.answer(outcome, None)
         finally:
             recorder.close()
-    told = Retelling(player.records, (PAGE,), player.originals)
-    with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.compare,), tell=told.tell) as simulated:
+    retold = Retelling(player.records, (PAGE,), player.originals)
+    with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.compare,), tell=retold.tell) as simulated:
         result = simulated.drive(out, lambda: _run_changed(simulated, agent, player, go_on))
     return player.answer(Outcome(result.outcome, result.reason), result)
 
 
-def _ask(scheduler: Scheduler, agent: Agent, told: Retelling) -> None:
+def _ask(scheduler: Scheduler, agent: Agent, retold: Retelling) -> None:
     """What comes before each cycle of a run on hardware that is decided again."""
     agent.what_if(scheduler)
-    told.tell(scheduler)
+    retold.tell(scheduler)
 
 
 def _run_changed(run: SimulatedRun, agent: Agent, player: _Player, go_on: bool) -> Outcome:
@@ -249,12 +249,12 @@ class AsRecorded:
 
     def __call__(self, decision: DecisionRecord) -> DecisionRecord:
         """The decision as it would stand in the journal."""
-        told = [entry for entry in decision.observed if entry.author == WHAT_IF]
-        for entry in told:
+        retold = [entry for entry in decision.observed if entry.author == WHAT_IF]
+        for entry in retold:
             id, _, revision = entry.ref.rpartition(".")
             self._undone.setdefault(id, []).append(int(revision))
-        refs = {entry.ref for entry in told}
-        self.revised += tuple(entry.ref for entry in told)
+        refs = {entry.ref for entry in retold}
+        self.revised += tuple(entry.ref for entry in retold)
         if not self._undone:
             return decision
         data = {**decision.data,
@@ -278,7 +278,7 @@ def _undo_changes(record: dict[str, Any]) -> dict[str, Any]:
 
 TIMED: tuple[type[Any], ...] = (CameraPicture, MotionReport, RideReport)
 """Kinds of observations that have the body's time."""
-TOLD: tuple[type[Any], ...] = (UserReport, Redirection)
+FROM_USER: tuple[type[Any], ...] = (UserReport, Redirection)
 
 
 class Retelling:
@@ -294,7 +294,7 @@ class Retelling:
         for record in records:
             for entry in record.observed:
                 now_s = entry.fields["sim_time_s"] if entry.kind in TIMED else now_s
-                if entry.author in authors and entry.kind in TOLD:
+                if entry.author in authors and entry.kind in FROM_USER:
                     self._left.append((record.cycle - 1, now_s, entry))
 
     def tell(self, scheduler: Scheduler) -> None:

@@ -40,7 +40,7 @@ class WhatIf:
     """
 
     def __init__(self, removed: Sequence[str] = (), pairs: Iterable[tuple[str, str]] = ()) -> None:
-        """What is to be otherwise.
+        """What is to be different.
 
         Args:
             removed: names of landmarks, whose lines go, and of faces.

@@ -289,8 +289,8 @@ def _tell_why_not_triggered(source: KnowledgeSource, seen: Sequence[Change], cyc
         for change in held_back:
             yield f"  {change.entry.ref}: {sentence(change.entry.value)}"
             watches = [watch for watch in source.on if watch.is_for(type(change), type(change.entry.value))]
-            yield from (f"    it needs: {told}." for watch in watches
-                        if (told := tell_predicate(watch.where, change.entry.value)))
+            yield from (f"    it needs: {condition}." for watch in watches
+                        if (condition := tell_predicate(watch.where, change.entry.value)))
         return
     watched = ", ".join(dict.fromkeys(f"{w.value_type.__name__} {_kinds(w.kinds)}" for w in source.on))
     came = ", ".join(f"{change.entry.ref} {change.kind.lower()}" for change in seen) or "nothing"

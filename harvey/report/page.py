@@ -44,7 +44,7 @@ def build_page(run: RunDirectory, history: Timeline) -> str:
         "errors": [asdict(error) for error in errors],
         "plans": [{key: value for key, value in plan.items() if key != "svg"} for plan in plans],
         "pictures": list(read_pictures(history, open_pictures(run), camera)),
-        "turns": [asdict(point) for point in story.turning_points if point.is_told],
+        "turns": [asdict(point) for point in story.turning_points if point.is_main],
     }
     title = run_name(run)
     parts = {

@@ -202,12 +202,12 @@ class BodyPort:
         tried = replace(asked, tries=asked.tries + 1, waited_s=now_s - asked.since_s)
         request = self._unanswered.get(asked.request)
         if request is None:  # the process that it was asked of is gone
-            yield Revise(recovery, replace(tried, status="in vain", what="the request is gone"), (recovery,))
+            yield Revise(recovery, replace(tried, status="still failing", what="the request is gone"), (recovery,))
             return
         found = self._answer_again(request)
         if isinstance(found, BodyFault):
-            vain = replace(tried, status="in vain", what=found.what, detail=found.detail)
-            yield Revise(recovery, vain, (recovery,))
+            failing = replace(tried, status="still failing", what=found.what, detail=found.detail)
+            yield Revise(recovery, failing, (recovery,))
             return
         del self._unanswered[asked.request]
         yield Revise(recovery, replace(tried, status="over", what="", detail=""), (recovery,))

@@ -49,7 +49,7 @@ class MissionResult:
         max_cross_track_m: how far the robot truly strayed from the line of the leg it was driving.
         contacts: each of the collisions.
         turning_points: what changed the course of the run, as the robot itself knew it.
-        camera: what has turned out to be otherwise about the camera than the robot was told.
+        camera: how the camera turned out to differ from what the robot was told.
         amiss: which of the scenario's faults did not happen, or not as they were asked for, in words.
         probes: pictures that it asked for to find out where it is; None in the results of older versions.
         happened: what the simulator did to the robot and its building; None on hardware, and in the results of older
@@ -112,8 +112,8 @@ class MissionResult:
         contacts = tuple(Collision(**one) for one in record.get("contacts", ()))
         turning_points = tuple(TurningPoint(**one) for one in record.get("turning_points", ()))
         camera = tuple(CameraLesson(**one) for one in record.get("camera", ()))
-        told = record.get("happened")
-        happened = None if told is None else tuple(Happening(**one) for one in told)
+        listed = record.get("happened")
+        happened = None if listed is None else tuple(Happening(**one) for one in listed)
         return MissionResult(**{**record, "contacts": contacts, "turning_points": turning_points, "camera": camera,
                                 "happened": happened})
 
@@ -161,7 +161,7 @@ class RunCounts:
         self.path_m = self.time_s = 0.0
         self.turning_points: list[TurningPoint] = []
         self.turns = TurnCounts()
-        self.told_camera: CameraState | None = None
+        self.nominal_camera: CameraState | None = None
         self.camera: CameraState | None = None
         self._finder = TurningPointFinder()
 
@@ -169,7 +169,7 @@ class RunCounts:
         self.decisions += 1
         self.turns(decision)
         self.waits += bool(decision.made) and all(isinstance(c.entry.value, FrameRequest) for c in decision.made)
-        self.turning_points += [point for point in self._finder.find(decision) if point.is_told]
+        self.turning_points += [point for point in self._finder.find(decision) if point.is_main]
         for change in decision.observed:
             value = change.entry.value
             if isinstance(value, MotionReport):
@@ -177,7 +177,7 @@ class RunCounts:
                 self.time_s = value.sim_time_s
             self.frames += isinstance(value, CameraPicture)
             if isinstance(value, CameraState):
-                self.told_camera = self.camera = value
+                self.nominal_camera = self.camera = value
         for change in decision.made:
             value, revision = change.entry.value, change.entry.revision
             if isinstance(value, CameraState):
@@ -196,10 +196,10 @@ class RunCounts:
                 self.relocalizations += value.basis == "relocalization"
 
     def camera_lessons(self) -> tuple[CameraLesson, ...]:
-        """What has turned out to be otherwise about the camera than told."""
-        if self.told_camera is None or self.camera is None:
+        """How the camera turned out to differ from what was told."""
+        if self.nominal_camera is None or self.camera is None:
             return ()
-        return find_camera_lessons(self.told_camera, self.camera)
+        return find_camera_lessons(self.nominal_camera, self.camera)
 
     def result(self, name: str, seed: int, goal: str, outcome: Outcome, wall_time_s: float) -> MissionResult:
         """How it went, without the truth."""

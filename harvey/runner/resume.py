@@ -69,8 +69,8 @@ def _check_not_lost(run: RunDirectory, pictures: int) -> None:
     A picture is asked for by a decision that is written by then; so where nothing was lost, there is none.
     """
     lost = [f"{run.camera.name} has {pictures} bytes of pictures"] * (pictures > 0)
-    if told := run.read_result().get("decisions"):
-        lost.append(f"{run.result.name} tells of {told} decisions")
+    if counted := run.read_result().get("decisions"):
+        lost.append(f"{run.result.name} tells of {counted} decisions")
     if lost:
         raise BadInput(f"{run.journal}: expected the decisions of the run, got none, although {' and '.join(lost)}; "
                        "nothing was touched")

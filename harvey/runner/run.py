@@ -153,7 +153,7 @@ class Run:
                 self.recorder.draw_end(outcome.kind, self._result(outcome).final_error_m)
             self.recorder.close()
         except RecordingError:
-            return "; the last part of its recording is not written (harvey repair draws it anew)"
+            return "; the last part of its recording is not written (harvey repair draws it again)"
         return ""
 
     def _result(self, outcome: Outcome) -> MissionResult:

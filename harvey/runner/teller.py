@@ -32,11 +32,11 @@ class Teller:
 
     def __init__(self, told: Sequence[Telling], clock: Callable[[], float]) -> None:
         """``told``: in any order; ``clock``: the body's time [s]."""
-        self._told, self._clock = sorted(told, key=lambda telling: telling.at_s), clock
+        self._tellings, self._clock = sorted(told, key=lambda telling: telling.at_s), clock
 
     def tell(self, scheduler: Scheduler) -> None:
         """Tell what is due and was not told yet."""
-        for telling in self._told[_count_told(scheduler):]:
+        for telling in self._tellings[_count_tellings(scheduler):]:
             if telling.at_s > self._clock():
                 return
             scheduler.post([Post(telling.entry)], USER)
@@ -62,6 +62,6 @@ class LiveTeller:
             scheduler.post([Post(said)], PAGE)
 
 
-def _count_told(scheduler: Scheduler) -> int:
+def _count_tellings(scheduler: Scheduler) -> int:
     """How much of a mission's file the board was told."""
     return len(scheduler.view.all(UserReport)) + len(scheduler.view.where(Redirection, lambda asked: asked.by == USER))

@@ -43,7 +43,7 @@ class BodyReplay:
         return self.answer(Posted(request), True)
 
     def __call__(self, made: Sequence[Change], observed: Sequence[EntryRecord[Any]]) -> None:
-        """Let the body do what the changes asked for. Raises BadInput where it answers otherwise than ``observed``."""
+        """Let the body do what the changes asked for. Raises BadInput where its answer differs from ``observed``."""
         broken_off = find_interrupted(observed)
         answers = [effect for change in made for effect in self.answer(change, str(change.entry.ref) in broken_off)]
         now = [as_line(plain(effect.value)) for effect in answers if not isinstance(effect, Retract)]
@@ -86,5 +86,5 @@ def part_of(command: MotorCommand, part: float, actuator: ActuatorParameters) ->
 
 def find_interrupted(observed: Sequence[EntryRecord[Any]]) -> frozenset[str]:
     """The refs of the commands that a run, when it went on, was told not to have been answered."""
-    told = (record.fields for record in observed if record.kind is Resumed and isinstance(record.fields, dict))
-    return frozenset(str(ref) for value in told for ref in value.get("interrupted", ()))
+    resumed = (record.fields for record in observed if record.kind is Resumed and isinstance(record.fields, dict))
+    return frozenset(str(ref) for value in resumed for ref in value.get("interrupted", ()))

@@ -16,15 +16,15 @@ class HappeningWatch:
     """Finds what happened since it was asked last; first how the building differs from the robot's model."""
 
     def __init__(self, body: SimulatedBody, moved: Iterable[MovedThing] = ()) -> None:
-        self._body, self._told = body, 0
+        self._body, self._reported = body, 0
         self._moved = tuple(f"the thing {one.thing} stands elsewhere than in the model" for one in moved)
         self._added, self._gone = frozenset[str](), frozenset[str]()
 
     def new_happenings(self) -> tuple[str, ...]:
         """Each in words, oldest first."""
         moved, self._moved = self._moved, ()
-        happened = self._body.happened[self._told:]
-        self._told += len(happened)
+        happened = self._body.happened[self._reported:]
+        self._reported += len(happened)
         return (*moved, *self._find_changes(), *happened)
 
     def _find_changes(self) -> Iterator[str]:

@@ -84,7 +84,7 @@ def resume_mission(
     files: RunDirectory, remains: Remains, *, sinks: Sequence[Sink] = (), live: bool = False,
     around: Around = unchanged, stage: Stage | None = None, sync: bool = False,
 ) -> MissionResult:
-    """Go on with a run to its outcome; its recording is drawn anew from the start.
+    """Go on with a run to its outcome; its recording is drawn again from the start.
 
     Args:
         remains: what is whole of it; the rest of its files is dropped.
@@ -104,7 +104,7 @@ def resume_mission(
 
 
 def redraw(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
-    """Draw a run's recording anew; the old one stays until the new one is whole. Returns how many decisions it shows.
+    """Draw a run's recording again; the old one stays until the new one is whole. Returns how many decisions it shows.
 
     Raises:
         BadInput: the run cannot be replayed as it was.
@@ -142,7 +142,7 @@ def build_head(stage: Stage, seed: int, body: str = IN_PROCESS, settings: Pairs 
 def rebuild_stage(head: RunHead) -> Stage:
     """The building of a simulator's run. Raises BadInput."""
     if head.kind == HARDWARE:
-        raise BadInput(f"expected a run of the simulator, got one on hardware: harvey drive {head.name} begins it anew")
+        raise BadInput(f"expected a run of the simulator, got one on hardware: harvey drive {head.name} repeats it")
     try:
         return build_stage(scenario_from_tables(head.scenario, head.name, ROOT / head.folder))
     except ScenarioError as error:

@@ -91,7 +91,7 @@ class CorrelatorTracker(RobotKnowledgeSource):
             yield post_or_revise(old, Tracks(frame.id, TEMPLATE_HALF_PX, ()), because)
             return
         if agreeing < MIN_AGREEING_LANDMARKS:
-            corrected = None  # nothing bears out that it is not something else that looks the same
+            corrected = None  # nothing confirms that it is not something else that looks the same
         renewed = self._renew(case, image, followed, corrected or belief.value)
         tracked = post_or_revise(old, replace(renewed.tracks, unseen=unseen), because)
         yield tracked

@@ -48,13 +48,13 @@ class DeadReckoner(RobotKnowledgeSource):
         return None if HELD.of(view).value.motion == trigger.entry.id else trigger.entry
 
     def act(self, view: View, case: Entry[MotionReport]) -> Iterable[Effect]:
-        told, held = case, HELD.of(view)
-        belief, report = held.entry, told.value
+        reported, held = case, HELD.of(view)
+        belief, report = held.entry, reported.value
         robot, before = held.robot, held.pose
         world, actuator = robot.world, robot.actuator
         known = view.latest(Drift)
         drift = Drift.unknown(actuator, before.heading_rad) if known is None else known.value
-        request = view.get(told.because[0].id)
+        request = view.get(reported.because[0].id)
         on_the_move = request is not None and isinstance(request.value, Course)
         pose, covariance = (actuator.propagate_course if on_the_move else actuator.propagate_move)(
             before, held.covariance, report.turn_rad, report.move_m, drift.curvature_per_m
@@ -68,11 +68,11 @@ class DeadReckoner(RobotKnowledgeSource):
         if request is not None and fault is not None:
             missing = _compute_missing_motion(request.value, report, actuator)
             covariance = covariance + _compute_partial_covariance(pose, *missing)
-        moved = held.moved_to(pose, covariance, "odometry", locale=str(locale), motion=told.id)
-        step = Revise(belief, moved, (told, belief) if fault is None else (told, belief, fault))
+        moved = held.moved_to(pose, covariance, "odometry", locale=str(locale), motion=reported.id)
+        step = Revise(belief, moved, (reported, belief) if fault is None else (reported, belief, fault))
         yield step
         rolled = drift.after_motion(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)
-        yield Post(rolled, (told,)) if known is None else Revise(known, rolled, (told, known))
+        yield Post(rolled, (reported,)) if known is None else Revise(known, rolled, (reported, known))
         travel = view.latest(Travel)
         if travel is None or belief.value.basis in PLACED_BY:
             way = begin_travel(before, held.covariance, camera.mount.yaw_rad, yaw_variance)
@@ -80,7 +80,7 @@ class DeadReckoner(RobotKnowledgeSource):
             way = travel.value
         slip_m = actuator.skitter_m * min(1.0, abs(report.turn_rad) / (math.pi / 2.0))
         way = way.after_motion(before, pose, slip_m)
-        yield Post(way, (told,)) if travel is None else Revise(travel, way, (told, travel))
+        yield Post(way, (reported,)) if travel is None else Revise(travel, way, (reported, travel))
         if not on_the_move or fault is not None:  # on the move a picture was taken
             yield Post(PictureRequest("track"), (step,))
         if request is None or fault is not None:
@@ -92,7 +92,7 @@ class DeadReckoner(RobotKnowledgeSource):
         if contact is not None or is_short:
             bound_px = self._settings.plan.max_deviation_px
             stopped = Discrepancy(Level.ACTION, what, math.inf, (bound_px, bound_px), "px")
-            yield Post(stopped, (told,) if contact is None else (told, contact))
+            yield Post(stopped, (reported,) if contact is None else (reported, contact))
 
 
 def _compute_aside_covariance(before: Pose2, after: Pose2, yaw_variance: float) -> NDArray[np.float64]:

@@ -32,7 +32,7 @@ WORD_WAIT_S = 1.0  # so long it waits before it looks again whether somebody has
 
 
 class Case(NamedTuple):
-    """A fault, a stop, or the word to go on after it; and the recovery in vain so far, or that has ended it, if any."""
+    """A fault, a stop, or the word to go on after it; and the recovery that has failed so far, or has ended it."""
 
     fault: Entry[Any]
     recovery: Entry[Recovery] | None
@@ -63,9 +63,9 @@ class FaultHandler(RobotKnowledgeSource):
         asked = {entry.value.fault: entry for entry in view.all(Recovery)}
         waiting = {id for id, entry in asked.items() if entry.value.status == "asked"}
         fault = next((entry for entry in view.having(OPEN_FAULT, True) if entry.id not in waiting), None)
-        stop, told = fault or find_stop(view), view.latest(Redirection, lambda asked: asked.text == GO_ON)
-        if stop is None and told is not None and told is trigger.entry:
-            return Case(told, None)
+        stop, word = fault or find_stop(view), view.latest(Redirection, lambda asked: asked.text == GO_ON)
+        if stop is None and word is not None and word is trigger.entry:
+            return Case(word, None)
         return None if stop is None or stop.id in waiting else Case(stop, asked.get(stop.id))
 
     def rate(self, case: Case) -> float:

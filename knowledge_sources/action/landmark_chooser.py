@@ -1,4 +1,4 @@
-"""Landmark chooser (§5): once the robot knows anew where it is, it follows other landmarks."""
+"""Landmark chooser (§5): once the robot knows again where it is, it follows other landmarks."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from world_models.entries import Drift, Hypothesis, Tracks
 
 
 class LandmarkChooser(RobotKnowledgeSource):
-    """Takes all landmarks anew after a milestone or a relocalization.
+    """Takes all landmarks again after a milestone or a relocalization.
 
     The belief is aligned with the model's edges by a newer picture only: what a picture tells of the pose counts once.
     """

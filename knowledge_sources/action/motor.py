@@ -112,16 +112,16 @@ class Motor(RobotKnowledgeSource):
         curvature_per_m = 0.0 if drift is None else drift.value.curvature_per_m
         lookahead_m = LOOKAHEAD_M
         seen = update_leg(leg.value, here, find_aim(leg.value, here, lookahead_m))
-        told: tuple[Entry[Any], ...] = ()
+        reasons: tuple[Entry[Any], ...] = ()
         command = plan_turn(seen.looking_rad, here, robot.actuator, MAX_LOOK_ERROR_RAD)
         if command is None:
             seen = replace(seen, looking_rad=None)
             command = plan_increment(robot.actuator, seen, here, curvature_per_m, lookahead_m)
             if command is not None and command.move_m > 0.0 and self._settings.action.keeps_to_seen_floor:
                 floor = FloorAhead(view, seen, belief, self._settings)
-                (seen, command), told = floor.keep_to_seen(command), floor.because
+                (seen, command), reasons = floor.keep_to_seen(command), floor.because
                 if command is None:
-                    yield Revise(leg, replace(seen, status="halted"), (leg, belief, *told))
+                    yield Revise(leg, replace(seen, status="halted"), (leg, belief, *reasons))
                     return
         corrected = correct(view, Level.ACTION, (belief,))
         yield from corrected
@@ -130,7 +130,7 @@ class Motor(RobotKnowledgeSource):
             return
         step = Revise(leg, count_increment(seen, command), (leg, belief, *corrected))
         yield step
-        yield Post(command, (step, belief, *(() if drift is None else (drift,)), *told))
+        yield Post(command, (step, belief, *(() if drift is None else (drift,)), *reasons))
 
 
 def _ends_doubt(view: View, milestone: Entry[Milestone]) -> bool:

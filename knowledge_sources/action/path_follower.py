@@ -134,7 +134,7 @@ class PathFollower(RobotKnowledgeSource):
             return Ahead(most_m, full, ())
         floor = FloorAhead(view, leg, belief.entry, self._settings)
         free_m = floor.measure_free_m(most_m)
-        return Ahead(free_m, full if floor.is_told(free_m) else floor.wary_m_per_s, floor.because)
+        return Ahead(free_m, full if floor.is_confirmed(free_m) else floor.wary_m_per_s, floor.because)
 
 
 def _is_on_line(leg: Leg, belief: Belief, most_rad: float) -> bool:

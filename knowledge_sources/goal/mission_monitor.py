@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Quiescence, Revised, View, Watch, rule
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import NOT_ENDED, find_camera, open_discrepancy, open_impasse, open_milestone
-from world_models.entries import Goal, Hypothesis, Impasse, Obstruction, Outcome, Place, TwinOdds
+from world_models.entries import AliasOdds, Goal, Hypothesis, Impasse, Obstruction, Outcome, Place
 
 SURE_PLACE = 0.999
 """Where the place is less probable than this against those that look like it, the end says so."""
@@ -27,10 +27,10 @@ def find_end(view: View, trigger: Change) -> Case:
     reached, impasse = view.latest(Goal, lambda goal: goal.status == "reached"), open_impasse(view)
     if reached is not None:
         why = f"every milestone on the way to {reached.value.destination} was verified"
-        twins = view.latest(TwinOdds, lambda odds: bool(odds.twins) and odds.probability < SURE_PLACE)
-        if twins is None:
+        aliases = view.latest(AliasOdds, lambda odds: bool(odds.aliases) and odds.probability < SURE_PLACE)
+        if aliases is None:
             return Case(Outcome("reached", why), (reached,))
-        return Case(Outcome("reached", f"{why}, but {twins.value.sentence()}"), (reached, twins))
+        return Case(Outcome("reached", f"{why}, but {aliases.value.sentence()}"), (reached, aliases))
     if impasse is not None:
         return Case(Outcome(impasse.value.kind, impasse.value.reason), (impasse,))
     return _find_what_is_left(view, trigger.entry)

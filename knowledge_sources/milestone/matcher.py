@@ -60,15 +60,15 @@ class Matcher(RobotKnowledgeSource):
         m, data_px = milestone.value, segments.value.segments_px
         lines_world = np.array(m.expected, float).reshape(-1, 2, 3)
         expected_px = np.array(m.expected_px, float).reshape(-1, 2, 2)
-        asked = np.flatnonzero(find_distinct(expected_px, data_px))
-        if not len(asked):
+        tested = np.flatnonzero(find_distinct(expected_px, data_px))
+        if not len(tested):
             none = np.zeros((0, 2), np.int64)
             yield Post(LineMatch(milestone.id, segments.id, none, frozen(lines_world[:0]), frozen(data_px[:0]), 0.0,
                                  frozen(np.zeros(len(lines_world)))), (segments, milestone, belief.entry))
             return
-        found, is_open = self._match(view, expected_px[asked], lines_world[asked], data_px, belief)
+        found, is_open = self._match(view, expected_px[tested], lines_world[tested], data_px, belief)
         pairs, coverage = np.asarray(found.pairs, np.int64).reshape(-1, 2).copy(), np.zeros(len(lines_world))
-        pairs[:, 0], coverage[asked] = asked[pairs[:, 0]], found.coverage
+        pairs[:, 0], coverage[tested] = tested[pairs[:, 0]], found.coverage
         yield Post(
             LineMatch(
                 milestone.id, segments.id, pairs, frozen(lines_world[pairs[:, 0]]), frozen(data_px[pairs[:, 1]]),

@@ -25,9 +25,9 @@ from knowledge_sources.methods.verification import (
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
     HELD,
+    find_alias,
     find_camera,
     find_followed,
-    find_rival,
     find_robot_in,
     find_search_here,
     has_only_turned,
@@ -117,9 +117,9 @@ class MilestoneJudge(RobotKnowledgeSource):
 
     def _hold_against_others(self, view: View, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:
         """What would be verified is not testable where the picture may have been taken elsewhere."""
-        rival = find_rival(view, case.fix, case.belief, weighed) if verdict.kind == "verified" else None
-        if rival is None or rival.p <= MAX_P_RIVAL:
+        alias = find_alias(view, case.fix, case.belief, weighed) if verdict.kind == "verified" else None
+        if alias is None or alias.p <= MAX_P_RIVAL:
             return verdict
-        odds = rival.p, MAX_P_RIVAL
-        reason = f"{verdict.reason}; but {rival.said}: {tell_odds(*odds)}"
-        return Verdict("not testable", reason, *odds, p_rival=rival.p)
+        odds = alias.p, MAX_P_RIVAL
+        reason = f"{verdict.reason}; but {alias.said}: {tell_odds(*odds)}"
+        return Verdict("not testable", reason, *odds, p_alias=alias.p)

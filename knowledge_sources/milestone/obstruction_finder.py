@@ -83,13 +83,13 @@ def _find_fixed_box(view: View, now: Entry[FreeFloor]) -> Effect | None:
 
 def _take_back(view: View, found: Entry[Obstruction]) -> Iterable[Effect]:
     """Things that rest on nothing but sights within an obstruction are gone."""
-    told = f"all that was seen of it is {found.ref}, which is before the camera"
+    evidence = f"all that was seen of it is {found.ref}, which is before the camera"
     for entry in view.where(Obstacle, lambda o: may_be_there(o) and o.by == "camera" and o.touched_s is None):
         polygon = build_polygon(entry.value.footprint)
         sights = [(look, thing.box_px) for look in view.all(FreeFloor) for thing in look.value.things
                   if build_polygon(thing.footprint).intersects(polygon)]
         if sights and all(is_behind(box, found.value) for _, box in sights):
-            gone = replace(entry.value, status="gone", certainty=0.0, evidence=told)
+            gone = replace(entry.value, status="gone", certainty=0.0, evidence=evidence)
             yield Revise(entry, gone, (found, entry, *dict.fromkeys(look for look, _ in sights)))
 
 

@@ -16,7 +16,7 @@ from knowledge_sources.reads import (
     NOT_LOST,
     STANDING,
     find_tried,
-    list_told,
+    list_log_odds,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Hypothesis, Milestone
@@ -46,4 +46,4 @@ class BeliefChecker(RobotKnowledgeSource):
             heading = choose_heading(robot, pose, headings, CHECK_TOLERANCE_M)
         what = f"the place where it believes to be, because {doubt.value.what}"
         check = Milestone("", -1, what, heading, tried=tried)
-        yield Post(replace(check, told=list_told(view, check)), (doubt, belief.entry))
+        yield Post(replace(check, log_odds_so_far=list_log_odds(view, check)), (doubt, belief.entry))

@@ -20,7 +20,7 @@ from knowledge_sources.reads import (
     STANDING,
     find_car,
     find_tried,
-    list_told,
+    list_log_odds,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.building import Building
@@ -65,7 +65,7 @@ class ViewChooser(RobotKnowledgeSource):
         is_ahead = abs(wrap_angle(pose.heading_rad - heading)) <= MAX_LOOK_ERROR_RAD
         chosen = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}",
                            pose.heading_rad if is_ahead else heading, tried=tried)
-        yield Post(replace(chosen, told=list_told(view, chosen)), (sketch, belief.entry))
+        yield Post(replace(chosen, log_odds_so_far=list_log_odds(view, chosen)), (sketch, belief.entry))
 
     def list_headings(self, building: Building, sketch: PlanSketch, pose: Pose2) -> Iterator[float]:
         """The headings that come into question [rad, world], the first good one is taken."""

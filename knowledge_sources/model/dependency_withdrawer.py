@@ -29,7 +29,7 @@ class DependencyWithdrawer(RobotKnowledgeSource):
     """Withdraws milestones, plan sketches and tracks that rested on what a frame no longer says.
 
     A milestone that waits to be judged is withdrawn where its prediction rested on the frame; one that was verified,
-    where a landmark of it is gone: its place in the sketch must be verified anew. A sketch that led through a door that
+    where a landmark of it is gone: its place must be verified again. A sketch that led through a door that
     is now shut, or round a thing that is now gone, is superseded; the goal sketcher draws another. So is one whose way
     an obstacle blocks: it stands within the robot's radius and the least clearance of what is left of a leg.
     """
@@ -65,7 +65,7 @@ class DependencyWithdrawer(RobotKnowledgeSource):
 
 
 def _is_overtaken(entry: Entry[Milestone], frame: Entry[LocaleFrame], misled: Collection[str]) -> bool:
-    """Whether a milestone that is awaited was predicted by what is otherwise, or a verified one has lost a landmark."""
+    """Whether a milestone that is awaited was predicted by what differs, or a verified one has lost a landmark."""
     m = entry.value
     if m.is_open and (_rests_on(entry, frame) or m.sketch in misled):
         return True
@@ -98,7 +98,7 @@ def _holds(view: View, milestone: Milestone) -> bool:
 
 
 def _find_misled(view: View, frame: Entry[LocaleFrame]) -> tuple[Entry[PlanSketch], ...]:
-    """The active sketches, all of them, where one leads through what has changed."""
+    """The active sketches, all of them, where one passes through what has changed."""
     if active_goal(view) is None:
         return ()
     active, belief = view.where(PlanSketch, lambda sketch: sketch.is_active), HELD.find(view)
@@ -109,6 +109,6 @@ def _find_misled(view: View, frame: Entry[LocaleFrame]) -> tuple[Entry[PlanSketc
         robot = find_robot(view)
         is_misled = any(meets(sketch.value, obstacle, belief.pose, robot)
                         for sketch in active for obstacle in changed)
-    if len(changed) < len(found) or not changed:  # something else is otherwise too: a door, or what the file has
+    if len(changed) < len(found) or not changed:  # something else differs too: a door, or what the file has
         is_misled = is_misled or any(leads_through(sketch.value, frame.value) for sketch in active)
     return active if is_misled else ()

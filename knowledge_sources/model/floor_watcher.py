@@ -38,7 +38,7 @@ class FloorWatcher(RobotKnowledgeSource):
 
     It says how far the floor is free in each direction, and what ends it: something of the model, or a thing that the
     model lacks. What the floor of a locale looks like it learns from where the robot has just driven. Some pictures are
-    kept to compare later ones with: what stands up from the floor moves otherwise than the floor. While the robot's
+    kept to compare later ones with: what stands up from the floor moves differently than the floor. While the robot's
     place is in doubt, or not known well, it does not look: it could not tell a wall from a thing. In the dark it sees
     none of the floor, and no thing.
     """
@@ -70,7 +70,7 @@ class FloorWatcher(RobotKnowledgeSource):
         apart_m = FLOOR_VIEW_DISTANCE_M
         earlier = [entry for entry in kept if _measure_way_m(entry.value, pose) >= apart_m]
         motions = [find_motion_between(view, entry.value, held) for entry in earlier]
-        wheels = {entry.id: entry for _, told in motions for entry in told}
+        wheels = {entry.id: entry for _, reports in motions for entry in reports}
         lit = _find_lit(view, frame.value.sim_time_s)
         seen, learnt = see_free_floor(
             robot, locale, pose, held.covariance, frame.value.jpeg,

@@ -22,14 +22,14 @@ class Statement(NamedTuple):
     Attributes:
         locales: whose frames it concerns.
         revise: a frame as it is known by it; raises ValueError where the frame has nothing that could be so.
-        is_told: whether somebody told it, who is answered.
+        is_from_user: whether somebody told it, who is answered.
         error: why it concerns none, in words.
     """
 
     entry: Entry[Any]
     locales: tuple[str, ...]
     revise: Callable[[LocaleFrame], LocaleFrame]
-    is_told: bool = False
+    is_from_user: bool = False
     error: str = ""
 
 
@@ -54,9 +54,9 @@ class ModelReviser(RobotKnowledgeSource):
     writes = (LocaleFrame, UserReport)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
-        """The frames that are otherwise by what is new, and all that was told and is not answered yet."""
+        """The frames that differ by what is new, and all that was told and is not answered yet."""
         statements = sorted(self._list_statements(view), key=lambda said: said.entry.cycle)
-        new = [said for said in statements if said.is_told or said.entry is trigger.entry]
+        new = [said for said in statements if said.is_from_user or said.entry is trigger.entry]
         frames, taken, errors = [], set[str](), {s.entry.id: s.error for s in statements if s.error}
         for frame in find_frames(view, {name for said in new for name in said.locales}):
             value, reasons = frame.value, list[Entry[Any]]()
@@ -75,8 +75,8 @@ class ModelReviser(RobotKnowledgeSource):
             if reasons:
                 frames.append((frame, value, tuple(reasons)))
                 taken.update(entry.id for entry in reasons)
-        told = [said.entry for said in statements if said.is_told]
-        answers = tuple((entry, _answer(entry.id in taken, errors.get(entry.id))) for entry in told)
+        from_user = [said.entry for said in statements if said.is_from_user]
+        answers = tuple((entry, _answer(entry.id in taken, errors.get(entry.id))) for entry in from_user)
         return Case(tuple(frames), answers) if frames or answers else None
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
@@ -93,14 +93,14 @@ class ModelReviser(RobotKnowledgeSource):
             yield Statement(entry, (entry.value.locale,), revise)
         for door in view.all(DoorState):
             yield Statement(door, door.value.between, partial(revise_by_door, door=door.value, by=door.author))
-        for told in view.where(UserReport, lambda report: not report.answer):
-            by_report = partial(revise_by_report, report=told.value, by=told.author)
+        for from_user in view.where(UserReport, lambda report: not report.answer):
+            by_report = partial(revise_by_report, report=from_user.value, by=from_user.author)
             try:
-                locales = tuple(find_building(view).find_elements(told.value.what))
+                locales = tuple(find_building(view).find_elements(from_user.value.what))
             except ValueError as error:
-                yield Statement(told, (), by_report, is_told=True, error=str(error))
+                yield Statement(from_user, (), by_report, is_from_user=True, error=str(error))
             else:
-                yield Statement(told, locales, by_report, is_told=True)
+                yield Statement(from_user, locales, by_report, is_from_user=True)
 
 
 def _answer(is_taken: bool, error: str | None) -> str:

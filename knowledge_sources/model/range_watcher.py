@@ -32,8 +32,8 @@ class RangeWatcher(RobotKnowledgeSource):
     def bind(self, view: View, trigger: Change) -> Entry[Ranges] | None:
         """The newest reading, where a belief is held that is sharp enough to tell whether an echo is of a wall."""
         is_newest = view.latest(Ranges) is trigger.entry
-        is_told = self._settings.floor.use_ranges and is_newest and HELD.of(view).value.sigma_m <= MAX_BELIEF_SIGMA_M
-        return trigger.entry if is_told else None
+        is_usable = self._settings.floor.use_ranges and is_newest and HELD.of(view).value.sigma_m <= MAX_BELIEF_SIGMA_M
+        return trigger.entry if is_usable else None
 
     def act(self, view: View, case: Entry[Ranges]) -> Iterable[Effect]:
         reading, belief = case, HELD.of(view)

@@ -116,10 +116,10 @@ class ShutDoorExplainer(RobotKnowledgeSource):
         odds = min(ratio - PRIOR_LOG_ODDS + REFUTED_LOG_RATIO, MAX_LOG_ODDS)
         if odds < SHUT_LOG_ODDS:
             return None
-        told = f"with it shut {shut.matched} of {shut.expected} lines are where they should be"
-        told = told if shut.matched >= MIN_FEW_LINES else "in its frame"
+        agreement = f"with it shut {shut.matched} of {shut.expected} lines are where they should be"
+        agreement = agreement if shut.matched >= MIN_FEW_LINES else "in its frame"
         what = milestone.value.what.partition(", because")[0]
-        shows = f"{describe(evidence, ratio)}, {told}, while {what} is {milestone.value.status}"
+        shows = f"{describe(evidence, ratio)}, {agreement}, while {what} is {milestone.value.status}"
         picture = DoorPicture(frame.id, opening.box_px, pose.x_m, pose.y_m, pose.heading_rad, ratio, shows)
         known = find_door_state(view, door.name)
         count = 1 if known is None else known.value.pictures + 1

@@ -35,8 +35,8 @@ class ThingMapper(RobotKnowledgeSource):
         """A sight with a thing in it that is certain enough, or of floor on which something may be there."""
         scan: Entry[FreeFloor] = trigger.entry
         is_thing = any(is_telling(thing) for thing in scan.value.things)
-        is_told = is_thing or view.latest(Obstacle, may_be_there) is not None
-        return scan if is_told else None
+        is_usable = is_thing or view.latest(Obstacle, may_be_there) is not None
+        return scan if is_usable else None
 
     def act(self, view: View, case: Entry[FreeFloor]) -> Iterable[Effect]:
         scan, belief = case, HELD.of(view)
@@ -57,5 +57,5 @@ class ThingMapper(RobotKnowledgeSource):
         ahead = shapely.Polygon() if driving is None else find_swept_next(belief, driving[0].value, s.action)
         pictures = (found.id for ref in scan.because
                     if (found := view.get(ref.id)) is not None and isinstance(found.value, CameraPicture))
-        told_by = next(pictures, scan.id) if scan.value.sense == "camera" else scan.id
-        return Sight(scan.value, told_by, belief.world, belief.robot.radius_m + SEEN_MARGIN_M, known_free, ahead)
+        seen_by = next(pictures, scan.id) if scan.value.sense == "camera" else scan.id
+        return Sight(scan.value, seen_by, belief.world, belief.robot.radius_m + SEEN_MARGIN_M, known_free, ahead)

@@ -13,7 +13,7 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Certificate, Hypothesis, Obstacle
 from world_models.frames import Pose2, wrap_angle
 
-MAX_DRIFT_M = 0.5  # a belief that was further off was not worn out on the way: the robot was carried off
+MAX_DRIFT_M = 0.5  # a belief that was further off was not worn out on the way: the robot was kidnapped
 MAX_DRIFT_RAD = 0.35  # the same of its heading
 
 
@@ -34,7 +34,7 @@ class ThingMover(RobotKnowledgeSource):
     """Moves what was seen on the floor since a milestone was last verified, where the robot was found a little beside.
 
     It was seen from the robot, so it stands where it stood as seen from there, less surely by what the belief was off.
-    Was the robot carried off, what it saw on the way was seen before or after that: it stays where it is, and is
+    Was the robot kidnapped, what it saw on the way was seen before or after that: it stays where it is, and is
     believed less. A thing leaves only when its floor is seen free. What was touched stays: a contact was weighed at a
     milestone.
     """
@@ -58,9 +58,9 @@ class ThingMover(RobotKnowledgeSource):
         moved_m, turned_rad = by.distance_to(Pose2(0.0, 0.0, 0.0)), abs(wrap_angle(by.heading_rad))
         for entry in things:
             if moved_m > MAX_DRIFT_M or turned_rad > MAX_DRIFT_RAD:
-                told = f"seen before or after the robot was carried off, as {belief.ref} tells"
-                now = doubt_thing(entry.value, told)
+                evidence = f"seen before or after the robot was kidnapped, as {belief.ref} tells"
+                now = doubt_thing(entry.value, evidence)
             else:
-                told = f"moved with the belief, which {belief.ref} corrected"
-                now = move_thing(held.world, entry.value, here @ by @ here.inverse(), moved_m, told)
+                evidence = f"moved with the belief, which {belief.ref} corrected"
+                now = move_thing(held.world, entry.value, here @ by @ here.inverse(), moved_m, evidence)
             yield Revise(entry, now, (belief, entry, *sure))

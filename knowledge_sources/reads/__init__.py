@@ -6,7 +6,7 @@ Read ``conditions`` (needs, and what they bind) and ``questions`` first; the oth
 """
 
 from knowledge_sources.reads.place_believed import (
-    PLACED_BY, count_refuted, find_p_not_alias, find_p_there, find_rival, find_search_here, has_only_turned,
+    PLACED_BY, count_refuted, find_p_not_alias, find_p_there, find_alias, find_search_here, has_only_turned,
 )
 from knowledge_sources.reads.conditions import (
     Belief, CAMERA, DOUBTED, GOAL, GOING_ON, HELD, LOST, MEASURED, MILESTONE, NOT_ENDED, NOT_GIVEN_UP, NOT_LOST,
@@ -20,7 +20,7 @@ from knowledge_sources.reads.followed_landmarks import (
     Following, Renewed, find_missing_floors, find_near_frames, post_or_revise, rectify, take_new, tell_worst,
     with_anchors,
 )
-from knowledge_sources.reads.looks import MAX_LOOK_ERROR_RAD, find_car, find_car_of, find_tried, list_told
+from knowledge_sources.reads.looks import MAX_LOOK_ERROR_RAD, find_car, find_car_of, find_tried, list_log_odds
 from knowledge_sources.reads.lost import (
     WHILE_LOST, declare_lost, find_panorama, is_dark, list_contacts, list_views, locate_contact,
 )
@@ -37,19 +37,18 @@ from knowledge_sources.reads.sketches import (
 )
 
 __all__ = [
-    "ACTIVE_SKETCH", "CAMERA", "DOUBTED", "EMERGENCY_STOPS", "GOAL", "GOING_ON", "HELD", "LOST",
-    "MAX_LOOK_ERROR_RAD", "MAX_SIGMA_M", "MAX_SIGMA_RAD", "MEASURED", "MILESTONE", "NOT_ENDED", "NOT_GIVEN_UP",
-    "NOT_LOST", "NO_DOUBT_ABOVE", "NO_MILESTONE", "OPEN_FAULT", "PICTURE", "PLACED_BY", "PLAN_DOUBT",
-    "SEEN_MARGIN_M", "SKETCH", "SOUND", "STANDING", "SURE", "UP_TO_DATE", "WAY", "WHILE_LOST", "Belief",
-    "FloorAhead", "Following", "Renewed", "Watched", "Way", "active_goal", "count_refuted", "current_leg",
-    "declare_lost", "deepest_sketch", "find_belief", "find_building", "find_building_as_filed", "find_camera",
-    "find_car", "find_car_of", "find_contact", "find_door_state", "find_first_level", "find_followed",
-    "find_frames", "find_known_free", "find_missing_floors", "find_motion_between", "find_near_frames",
-    "find_obstacles", "find_p_not_alias", "find_p_there", "find_panorama", "find_rival", "find_robot",
-    "find_robot_in", "find_search_here", "find_stop", "find_swept_next", "find_tried", "find_way",
+    "ACTIVE_SKETCH", "CAMERA", "DOUBTED", "EMERGENCY_STOPS", "GOAL", "GOING_ON", "HELD", "LOST", "MAX_LOOK_ERROR_RAD",
+    "MAX_SIGMA_M", "MAX_SIGMA_RAD", "MEASURED", "MILESTONE", "NOT_ENDED", "NOT_GIVEN_UP", "NOT_LOST", "NO_DOUBT_ABOVE",
+    "NO_MILESTONE", "OPEN_FAULT", "PICTURE", "PLACED_BY", "PLAN_DOUBT", "SEEN_MARGIN_M", "SKETCH", "SOUND", "STANDING",
+    "SURE", "UP_TO_DATE", "WAY", "WHILE_LOST", "Belief", "FloorAhead", "Following", "Renewed", "Watched", "Way",
+    "active_goal", "count_refuted", "current_leg", "declare_lost", "deepest_sketch", "find_alias", "find_belief",
+    "find_building", "find_building_as_filed", "find_camera", "find_car", "find_car_of", "find_contact",
+    "find_door_state", "find_first_level", "find_followed", "find_frames", "find_known_free", "find_missing_floors",
+    "find_motion_between", "find_near_frames", "find_obstacles", "find_p_not_alias", "find_p_there", "find_panorama",
+    "find_robot", "find_robot_in", "find_search_here", "find_stop", "find_swept_next", "find_tried", "find_way",
     "find_way_to_goal", "has_missed", "has_only_turned", "is_dark", "is_in_doubt", "is_just_found", "is_over",
     "is_standing", "is_up_to_date", "last_motion", "list_contacts", "list_doors_in_view", "list_locales",
-    "list_planners", "list_told", "list_views", "locate_contact", "name_obstacles", "open_discrepancies",
+    "list_log_odds", "list_planners", "list_views", "locate_contact", "name_obstacles", "open_discrepancies",
     "open_discrepancy", "open_impasse", "open_milestone", "place_of", "post_or_revise", "rectify", "rests_on",
     "rolling_course", "supersede", "take_new", "tell_missed", "tell_worst", "unmeasured_doubt", "with_anchors",
     "with_door_open", "with_door_shut",

@@ -80,12 +80,12 @@ class Caution(NamedTuple):
     Attributes:
         move_m: at most so far [m, true]; 0 where something may stand in what is not seen.
         creeps: whether that leads into floor that was not seen to be free.
-        is_told: whether it is seen free by more than looks.
+        is_confirmed: whether it is seen free by more than looks.
     """
 
     move_m: float
     creeps: bool
-    is_told: bool = False
+    is_confirmed: bool = False
 
 
 class FloorAhead:
@@ -102,13 +102,13 @@ class FloorAhead:
         self._floor = find_floor(self._robot.world, self._locales)
         found = [shapely.Polygon(thing.footprint_world) for name in self._locales
                  for thing in self._robot.world.things_of(name) if thing.kind == EXTRA_KIND]
-        self._asked = shapely.buffer(shapely.union_all([self._floor, *found]), -NEAR_MODEL_M)
+        self._tested = shapely.buffer(shapely.union_all([self._floor, *found]), -NEAR_MODEL_M)
         self._suspected = _list_what_may_stand(view, self._robot.world)
         self._touches = _list_touches(view, self._here)
         self._scans = _find_scans(view, belief, settings)
         self._discs = list_free_discs(view, self._robot, self._here, self._scans)
         search = _find_last_search(view)  # what was seen before it was found does not count
-        self._told: dict[str, Entry[Any]] = {} if search is None else {search.id: search}
+        self._reasons: dict[str, Entry[Any]] = {} if search is None else {search.id: search}
         self._seen = SeenFloor(
             tuple(entry.value for entry in self._scans), np.array([disc.circle for disc in self._discs]),
             tuple(_list_taken(thing, whole.plan.overhang_m) for name in self._locales
@@ -118,7 +118,7 @@ class FloorAhead:
     def because(self) -> tuple[Entry[Any], ...]:
         """What has told something in the answers so far: looks at the floor, what may stand on it, and since when.
         """
-        return tuple(sorted(self._told.values(), key=lambda entry: (entry.cycle, entry.id)))
+        return tuple(sorted(self._reasons.values(), key=lambda entry: (entry.cycle, entry.id)))
 
     def limit_move(self, move_m: float) -> Caution:
         """How far, of a move to the leg's end, the robot may go at once; a move of any other kind is no longer."""
@@ -129,7 +129,7 @@ class FloorAhead:
         if not caution.creeps:
             sure_m = self._measure_to_things_m(caution.move_m, UNSURE_GAP_M)
             if sure_m >= min(caution.move_m, MIN_INCREMENT_M):
-                return caution._replace(move_m=sure_m, is_told=self.is_told(sure_m))
+                return caution._replace(move_m=sure_m, is_confirmed=self.is_confirmed(sure_m))
             caution = Caution(min(caution.move_m, self._settings.max_creep_m), True)
         return caution._replace(move_m=min(caution.move_m, self._measure_to_things_m(move_m)))
 
@@ -153,7 +153,7 @@ class FloorAhead:
             return leg, self._lead_away() if self._touches else None
         move_m = min(command.move_m, actuator.compute_command_m(caution.move_m))
         s = self._settings
-        slowly = s.creep_speed_m_per_s if caution.creeps else None if caution.is_told else self.wary_m_per_s
+        slowly = s.creep_speed_m_per_s if caution.creeps else None if caution.is_confirmed else self.wary_m_per_s
         return leg, MotorCommand(command.turn_rad, move_m, slowly)
 
     def _lead_away(self) -> MotorCommand | None:
@@ -181,11 +181,11 @@ class FloorAhead:
         """The highest speed into floor that only looks free."""
         return min(self._settings.wary_speed_m_per_s, self._robot.actuator.speed_m_per_s)
 
-    def is_told(self, move_m: float) -> bool:
+    def is_confirmed(self, move_m: float) -> bool:
         """Whether the floor of a move is seen free by more than looks, but for what is next to the model's walls."""
-        asked = self._ask(self._sweep(self._way, move_m))
-        untold = asked.only(~self._seen.ask_told(asked.points))
-        return measure_free_m(untold, move_m) >= move_m - SPACING_M  # the free floor itself ends between two points
+        tested = self._ask(self._sweep(self._way, move_m))
+        unconfirmed = tested.only(~self._seen.ask_confirmed(tested.points))
+        return measure_free_m(unconfirmed, move_m) >= move_m - SPACING_M  # it ends between two points
 
     def _measure_to_things_m(self, most_m: float, gap_m: float = 0.0, *, touched: bool = False) -> float:
         """How far the robot can go towards the leg's end before it comes nearer to what may stand there; 0..most.
@@ -206,7 +206,7 @@ class FloorAhead:
             met = np.flatnonzero((gaps[1:] < self._robot.radius_m + near_m) & (gaps[1:] < gaps[:-1] + away_m))
             if len(met):
                 free_m = min(free_m, float(along[met[0]]))
-                self._told[entry.id] = entry
+                self._reasons[entry.id] = entry
         return free_m
 
     def measure_free_m(self, most_m: float) -> float:
@@ -252,17 +252,17 @@ class FloorAhead:
         return sample_sweep(way, self._robot.radius_m + SEEN_MARGIN_M, most_m)
 
     def _ask(self, sweep: Sweep) -> Sweep:
-        """The part of a sweep that is not hard by something that the model has."""
-        return sweep.only(shapely.contains_xy(self._asked, sweep.points[:, 0], sweep.points[:, 1]))
+        """The part of a sweep that is not next to something that the model has."""
+        return sweep.only(shapely.contains_xy(self._tested, sweep.points[:, 0], sweep.points[:, 1]))
 
     def _find_unseen(self, sweep: Sweep) -> Sweep:
-        """The part of a sweep that is not seen free, and not hard by something that the model has."""
-        asked = self._ask(sweep)
-        free, scans, discs = self._seen.ask(asked.points)
+        """The part of a sweep that is not seen free, and not next to something that the model has."""
+        tested = self._ask(sweep)
+        free, scans, discs = self._seen.ask(tested.points)
         reasons = [self._scans[k] for k in np.flatnonzero(scans)]
         reasons += [entry for k in np.flatnonzero(discs) for entry in self._discs[k].because]
-        self._told.update((entry.id, entry) for entry in reasons)
-        return asked.only(~free)
+        self._reasons.update((entry.id, entry) for entry in reasons)
+        return tested.only(~free)
 
 
 def _list_taken(thing: Thing, overhang_m: float) -> Floats:
@@ -275,7 +275,7 @@ def _list_taken(thing: Thing, overhang_m: float) -> Floats:
 
 def _list_what_may_stand(view: View, world: Building) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
     """What the robot does not creep into: all that what is suspected may take; of what is there what was seen of it,
-    as the goal sketcher leads through the rest only where nothing else is left. It does creep to what may be a jamb.
+    as the goal sketcher passes through the rest only where nothing else is left. It does creep to what may be a jamb.
     """
     found = [(entry, entry.value) for entry in view.where(Obstacle, lambda o: o.status != "gone")]
     taken = [(entry, o, take_as_jamb(world, o)) for entry, o in found]

@@ -34,11 +34,11 @@ def find_car_of(view: View, milestone: Milestone) -> str:
     return "" if sketch is None else find_car(sketch.value, milestone.index)
 
 
-def list_told(view: View, milestone: Milestone) -> tuple[float, ...]:
+def list_log_odds(view: View, milestone: Milestone) -> tuple[float, ...]:
     """The log odds of a wrong place by each of the looks that were tried for a milestone; 0 where one told nothing."""
     last, certificate = view.latest(Milestone), view.latest(Certificate)
     if not milestone.tried or last is None or certificate is None or certificate.value.milestone != last.id:
         return (0.0,) * len(milestone.tried)
     c, most = certificate.value, MAX_LOOK_LOG_ODDS
     tells = c.matched >= MIN_MATCHED_LINES
-    return (*last.value.told, min(max(to_log_odds(c.p_false), -most), most) if tells else 0.0)
+    return (*last.value.log_odds_so_far, min(max(to_log_odds(c.p_false), -most), most) if tells else 0.0)

@@ -27,7 +27,7 @@ from world_models.frames import Pose2
 
 
 def declare_lost(what: str, because: tuple[object, ...]) -> Post:
-    """The robot may be elsewhere: the goal level measures that anew, by a look round."""
+    """The robot may be elsewhere: the goal level measures that again, by a look round."""
     return Post(Discrepancy(Level.GOAL, what, None, (0.0, 0.0), "px"), because)
 
 

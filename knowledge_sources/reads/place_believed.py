@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 from blackboard import Discrepancy, Entry, Level, View
-from knowledge_sources.methods.belief import BelievedPlace, bound_p_rivals, compute_p_rivals
+from knowledge_sources.methods.belief import BelievedPlace, bound_p_aliases, compute_p_aliases
 from knowledge_sources.methods.localization import (
     DISTINCT,
     MAX_ALIKE_LOG_RATIO,
@@ -21,6 +21,7 @@ from knowledge_sources.methods.localization import (
 from knowledge_sources.methods.verification import P_WRONG_STANDING, Weighed, compute_coverage_elsewhere
 from knowledge_sources.reads.questions import find_building, find_camera, find_robot_in, open_discrepancy
 from world_models.entries import (
+    AliasOdds,
     Hypothesis,
     MotionReport,
     PlaceOdds,
@@ -29,7 +30,6 @@ from world_models.entries import (
     Ride,
     RideReport,
     Travel,
-    TwinOdds,
 )
 from world_models.frames import Pose2
 
@@ -39,7 +39,7 @@ localization.min_p_believed has it)."""
 P_DISPLACED_TO_ALIAS = 0.001
 """Probability that a robot that was displaced stands just where everything looks as it should (a window of 0.6 m and
 20 degrees round one place of a room of 20 m2)."""
-MIN_P_TWIN = 1e-6  # smallest probability of a place that looks alike and is kept in mind
+MIN_P_ALIAS = 1e-6  # smallest probability of a place that looks alike and is kept in mind
 PLACED_BY = ("command", "relocalization")
 """Bases of a belief that no motion has followed yet."""
 MAX_STANDING_M = 0.1
@@ -55,8 +55,8 @@ def find_p_there(view: View, refuted: int) -> float:
 
     ``refuted``: how often a place that was believed by such odds was refuted.
     """
-    known, p_told = view.latest(TwinOdds), compute_prior(refuted)
-    return p_told if known is None else max(MIN_P_TWIN, min(known.value.probability, p_told))
+    known, p_prior = view.latest(AliasOdds), compute_prior(refuted)
+    return p_prior if known is None else max(MIN_P_ALIAS, min(known.value.probability, p_prior))
 
 
 def find_p_not_alias(view: View) -> float:
@@ -64,7 +64,7 @@ def find_p_not_alias(view: View) -> float:
 
     By the pictures since it was told or found. A robot in doubt may have been displaced, but hardly to such a place.
     """
-    known = view.latest(TwinOdds)
+    known = view.latest(AliasOdds)
     p = compute_prior(count_refuted(view)) if known is None else known.value.probability
     p = min(p, MIN_P_SURE)
     return p * (1.0 - P_DISPLACED_TO_ALIAS) if open_discrepancy(view, Level.PLAN) is not None else p
@@ -111,22 +111,22 @@ def has_only_turned(view: View, belief: Hypothesis) -> bool:
         way is not None and not way.value.is_broken and way.value.gone_m <= MAX_STANDING_M)
 
 
-class Rival(NamedTuple):
+class AliasRisk(NamedTuple):
     """Where else a picture may have been taken, in words, and how likely that is."""
 
     said: str
     p: float
 
 
-def find_rival(
+def find_alias(
     view: View, fix: Entry[PoseFix], belief: Entry[Hypothesis], weighed: Weighed
-) -> Rival | None:
+) -> AliasRisk | None:
     """Where else a picture that agrees with the believed place is most likely taken; None where nowhere."""
     least, room = MIN_ALIAS_PART * weighed.lines.coverage, belief.value.locale
     for other in view.where(Hypothesis, lambda h: h.status == "candidate"):
         there = other.value.world_from_robot(weighed.robot.world)
         if compute_coverage_elsewhere(weighed, there) >= least:
-            return Rival(f"as much agrees at {other.id}", 0.5)
+            return AliasRisk(f"as much agrees at {other.id}", 0.5)
     if weighed.p_false <= MAX_P_FALSE_UNMISTAKABLE:
         return None
     storey = _find_storey(view, fix, weighed)
@@ -134,19 +134,19 @@ def find_rival(
         return storey
     p_there, most = find_p_not_alias(view), MAX_ALIKE_LOG_RATIO
     believed = BelievedPlace(weighed.before, weighed.covariance + fix.value.covariance, p_there)
-    if bound_p_rivals(believed, weighed.pose, DISTINCT, most) <= MAX_P_RIVAL:
+    if bound_p_aliases(believed, weighed.pose, DISTINCT, most) <= MAX_P_RIVAL:
         return None
-    rivals = list_aliases(weighed.robot, weighed.segments.segments_px, room, weighed.pose,
+    aliases = list_aliases(weighed.robot, weighed.segments.segments_px, room, weighed.pose,
                           search=weighed.p_false > MAX_P_FALSE_CLEAR)
-    p = compute_p_rivals(believed, weighed.pose, [
-        (alias.world_from_robot, min(max(-alias.margin, -most), most)) for alias in rivals])
-    return Rival(f"it may be another door of {room}, or its other side", p)
+    p = compute_p_aliases(believed, weighed.pose, [
+        (alias.world_from_robot, min(max(-alias.margin, -most), most)) for alias in aliases])
+    return AliasRisk(f"it may be another door of {room}, or its other side", p)
 
 
-def _find_storey(view: View, fix: Entry[PoseFix], weighed: Weighed) -> Rival | None:
+def _find_storey(view: View, fix: Entry[PoseFix], weighed: Weighed) -> AliasRisk | None:
     """The storey, of those where the last ride may have ended, that is likeliest but for the believed one.
 
-    What was reported of the ride speaks for the believed one, as what is told of any place where the robot stands.
+    What was reported of the ride supports the believed one, as what is told of any place where the robot stands.
     """
     ride = view.latest(Ride)
     if ride is None or view.latest(RideReport) is None:
@@ -162,5 +162,5 @@ def _find_storey(view: View, fix: Entry[PoseFix], weighed: Weighed) -> Rival | N
                                 weighed.segments.segments_px)
         odds[other] = P_WRONG_STANDING / len(stops) * math.exp(min(-margin, most))
     likeliest = max(odds, key=odds.__getitem__, default=None)
-    return None if likeliest is None else Rival(
+    return None if likeliest is None else AliasRisk(
         f"the doors may have opened at {likeliest}", odds[likeliest] / (1.0 + math.fsum(odds.values())))

@@ -220,9 +220,9 @@ def find_stop(view: View) -> Entry[Contact] | Entry[BodyFault] | None:
     fault, command = view.newest(OPEN_FAULT, True), view.latest(Command)
     if fault is not None or command is None or not command.value.asks_to_restart:
         return fault
-    told = view.latest(Redirection, lambda asked: asked.text == GO_ON)
+    word = view.latest(Redirection, lambda asked: asked.text == GO_ON)
     stops = view.latest(Contact), view.latest(BodyFault, lambda fault: fault.what in EMERGENCY_STOPS)
-    return next((stop for stop in stops if stop is not None and (told is None or stop.cycle > told.cycle)), None)
+    return next((stop for stop in stops if stop is not None and (word is None or stop.cycle > word.cycle)), None)
 
 
 def is_over(view: View) -> bool:

@@ -114,7 +114,7 @@ def _is_of_look(view: View, sketch: PlanSketch) -> bool:
 def tell_missed(
     view: View, belief: Hypothesis, sketch: PlanSketch
 ) -> tuple[str, tuple[Entry[Obstacle], ...]]:
-    """What was tried so often in vain, how far from it the last try ended, and what may stand there; and that itself.
+    """What was tried so often, how far from it the last try ended, and what may stand there; and that itself.
     """
     there, then = sketch.subgoals[sketch.at - 1].destination, sketch.current
     building, robot = find_building(view), find_robot(view)
@@ -127,4 +127,4 @@ def tell_missed(
     taking = view.where(Obstacle, lambda o: o.status != "gone" and build_polygon(o.footprint).intersects(rim))
     occupied = f"; it is occupied by {' and '.join(o.value.words() for o in taking)}" if taking else ""
     tries, last = words.count(sketch.adjustments + 1, "try", "tries"), f"the last ended {words.metres(off_m)} from it"
-    return f"{what} at {there} was not come to in {tries}: {last}{occupied}", taking
+    return f"{what} at {there} was not reached in {tries}: {last}{occupied}", taking

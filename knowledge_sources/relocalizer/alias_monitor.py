@@ -21,15 +21,15 @@ from knowledge_sources.methods.localization import (
     are_distinct,
     compute_pose_likelihood,
     compute_prior,
-    compute_twin_odds,
     find_repetitions,
     make_alias_test,
+    weigh_alias_odds,
 )
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import GOING_ON, HELD, NOT_LOST, Belief, count_refuted, declare_lost
-from knowledge_sources.reads.place_believed import MIN_P_TWIN
+from knowledge_sources.reads.place_believed import MIN_P_ALIAS
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Certificate, PoseFix, Segments, Twin, TwinOdds
+from world_models.entries import Alias, AliasOdds, Certificate, PoseFix, Segments
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
@@ -40,13 +40,13 @@ class Case(NamedTuple):
     certificate: Entry[Certificate]
     fix: Entry[PoseFix]
     looked: Entry[Segments]
-    known: Entry[TwinOdds] | None
+    known: Entry[AliasOdds] | None
 
 
 class AliasMonitor(RobotKnowledgeSource):
     """Keeps the odds of the believed place against the places that look like it, by every verified milestone.
 
-    The first milestone is verified in each of many identical rooms. What the robot was told speaks for one of them;
+    The first milestone is verified in each of many identical rooms. What the robot was told supports one of them;
     the others are kept in mind, and go with it wherever it drives: each as it would be if the robot had begun there.
     Every further picture, from another view, is weighed at all of them, once. Where another one is likelier, the robot
     doubts its place at the goal level, and looks round.
@@ -55,15 +55,15 @@ class AliasMonitor(RobotKnowledgeSource):
     level, priority = Level.PLAN, Priority.REVISE
     on = (Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"),)
     needs = (GOING_ON, HELD, NOT_LOST)
-    writes = (TwinOdds, Discrepancy)
+    writes = (AliasOdds, Discrepancy)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         fix = view.get(trigger.entry.value.fix)
         if fix is None:
             return None
-        known, match = view.latest(TwinOdds), view.get(fix.value.match)
+        known, match = view.latest(AliasOdds), view.get(fix.value.match)
         looked = None if match is None else view.get(match.value.segments)
-        is_new = known is None or (known.value.twins and self._is_new(known.value, fix.value))
+        is_new = known is None or (known.value.aliases and self._is_new(known.value, fix.value))
         return Case(trigger.entry, fix, looked, known) if is_new and looked is not None else None
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
@@ -71,27 +71,27 @@ class AliasMonitor(RobotKnowledgeSource):
         robot, here = belief.seeing, fix.value.world_from_robot
         if known is None:
             p_prior = compute_prior(count_refuted(view))
-            twins = self._find_twins(belief, robot, here)
+            aliases = self._find_aliases(belief, robot, here)
         else:
-            p_prior, twins = known.value.p_prior, known.value.twins
-        weighed = self._weigh(robot, looked.value, here, twins)
-        odds = compute_twin_odds([twin.log_ratio for twin in weighed], p_prior)
-        kept = tuple(twin for twin, p in zip(weighed, odds[1:], strict=True) if p >= MIN_P_TWIN)
+            p_prior, aliases = known.value.p_prior, known.value.aliases
+        weighed = self._weigh(robot, looked.value, here, aliases)
+        odds = weigh_alias_odds([alias.log_ratio for alias in weighed], p_prior)
+        kept = tuple(alias for alias, p in zip(weighed, odds[1:], strict=True) if p >= MIN_P_ALIAS)
         counted = (*(() if known is None else known.value.counted), certificate.id)
-        found = TwinOdds(p_prior, odds[0], kept, counted, here)
+        found = AliasOdds(p_prior, odds[0], kept, counted, here)
         because = (certificate, fix, looked, belief.entry)
         change = Post(found, because) if known is None else Revise(known, found, (*because, known))
         yield change
         if odds[0] < MIN_P_TRACKED:
             yield declare_lost(f"it may be elsewhere: {found.sentence()}", (change,))
 
-    def _is_new(self, known: TwinOdds, fix: PoseFix) -> bool:
+    def _is_new(self, known: AliasOdds, fix: PoseFix) -> bool:
         """Whether a picture shows something else than the last that was counted."""
         pose = fix.world_from_robot
         turn = abs(wrap_angle(pose.heading_rad - known.last.heading_rad))
         return pose.distance_to(known.last) >= 0.5 * MOVE_M or turn >= MIN_NEW_VIEW_RAD
 
-    def _find_twins(self, belief: Belief, robot: RobotModel, here: Pose2) -> tuple[Twin, ...]:
+    def _find_aliases(self, belief: Belief, robot: RobotModel, here: Pose2) -> tuple[Alias, ...]:
         """The places of the floor that look like the believed one by walls and doors."""
         building = belief.world
         container, level_m = building.locale(belief.locale).parent or belief.locale, building.floor_m(belief.locale)
@@ -105,19 +105,19 @@ class AliasMonitor(RobotKnowledgeSource):
         for room, there in find_repetitions(robot.world, belief.locale, here, nearest):
             if all(are_distinct(there, other) for other in (here, *found)):
                 found[there] = room
-        return tuple(Twin(room, there @ back, 0.0) for there, room in found.items())
+        return tuple(Alias(room, there @ back, 0.0) for there, room in found.items())
 
-    def _weigh(self, robot: RobotModel, looked: Segments, here: Pose2, twins: tuple[Twin, ...]) -> tuple[Twin, ...]:
+    def _weigh(self, robot: RobotModel, looked: Segments, here: Pose2, aliases: tuple[Alias, ...]) -> tuple[Alias, ...]:
         """The twins with what this picture says of them: less what is noise for those that look the same from here."""
         unmoved = Pose2(0.0, 0.0, 0.0)
         seen = [CameraView(looked.segments_px, unmoved, np.zeros((3, 3)))]
-        look_alike = make_alias_test(robot, [unmoved])
+        are_aliases = make_alias_test(robot, [unmoved])
         own = compute_pose_likelihood(robot, seen, here).log_likelihood
         weighed = []
-        for twin in twins:
-            there = twin.there_from_here @ here
+        for alias in aliases:
+            there = alias.there_from_here @ here
             ratio = compute_pose_likelihood(robot, seen, there).log_likelihood - own
-            if look_alike(here, there):
+            if are_aliases(here, there):
                 ratio = math.copysign(max(0.0, abs(ratio) - ALIKE_LOG_NOISE), ratio)
-            weighed.append(replace(twin, log_ratio=twin.log_ratio + ratio))
+            weighed.append(replace(alias, log_ratio=alias.log_ratio + ratio))
         return tuple(weighed)

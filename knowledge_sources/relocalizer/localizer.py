@@ -64,7 +64,7 @@ class Localizer(RobotKnowledgeSource):
         building, locale, here = held.world, held.locale, held.pose
         refuted = count_refuted(view, doubt)
         p_there = find_p_there(view, refuted)
-        told = localization.StatedPlace(here, held.covariance, p_there)
+        stated = localization.StatedPlace(here, held.covariance, p_there)
         looked = [glimpse.now_from_then for glimpse in panorama.value.glimpses]
         looks, obstruction = list_views(view, panorama.value.glimpses), None if hidden is None else hidden.value
         if obstruction is not None:
@@ -76,14 +76,14 @@ class Localizer(RobotKnowledgeSource):
         cameras, buildings = self._list_cameras(view), self._list_buildings(view)
         robots = [find_robot(view, camera).in_building(among).with_obstruction(obstruction).on_floor_of(locale)
                   for camera in cameras for among in buildings]
-        what = localization.Search(looks, rooms, (locale, here), followed, touched, told.p_told)
+        what = localization.Search(looks, rooms, (locale, here), followed, touched, stated.p_prior)
         seen, which = localization.search(robots, what)
         is_last = len(looks) >= (MAX_FAR_PROBES if seen.candidates else MAX_PROBES)
         seen = replace(seen, next_action=None) if is_last else seen
-        look_alike = localization.make_alias_test(robots[which], looked)
-        result = localization.weigh_told(seen, told, look_alike, len(looks))
+        are_aliases = localization.make_alias_test(robots[which], looked)
+        result = localization.weigh_prior(seen, stated, are_aliases, len(looks))
         verified = view.latest(Certificate, lambda c: c.verdict == "verified")
-        odds = localization.find_odds_used(seen, result, told, was_tracked=verified is not None, refuted=refuted)
+        odds = localization.find_odds_used(seen, result, stated, was_tracked=verified is not None, refuted=refuted)
         if result.status is localization.LocalizationStatus.AMBIGUOUS or result.next_action is None or is_last:
             result = localization.prefer_reachable(building, result, locale)
         far = localization.find_far_action(robots[which], result, looked, rooms, touched)
@@ -105,12 +105,12 @@ class Localizer(RobotKnowledgeSource):
             yield Post(place, (found, panorama, held.entry))
 
     def _list_cameras(self, view: View) -> tuple[CameraState, ...]:
-        """The camera as it was learnt; also as it was told, where few pictures taught otherwise: if the place was not
+        """The camera as it was learnt; also as it was told, where few pictures taught differently: if the place was not
         where it was believed, they made the camera fit the wrong place.
         """
         camera = find_camera(view)
-        is_sure = camera.told_lens is None or len(camera.counted) > MAX_DOUBTED_PICTURES
-        return (camera,) if is_sure else (camera, camera.as_told())
+        is_sure = camera.nominal_lens is None or len(camera.counted) > MAX_DOUBTED_PICTURES
+        return (camera,) if is_sure else (camera, camera.as_nominal())
 
     def _list_buildings(self, view: View) -> tuple[FrameBuilding, ...]:
         """The building as it is known; also without the things that it was found to have besides: if the place was not

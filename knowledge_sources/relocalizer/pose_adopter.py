@@ -9,7 +9,7 @@ from blackboard import Change, Effect, Entry, Level, Posted, Retract, Revise, Vi
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import CAMERA, HELD, LOST, WHILE_LOST
 from world_models.building.locale_frame import FrameRequest
-from world_models.entries import CameraState, Hypothesis, PlaceSearch, TwinOdds
+from world_models.entries import AliasOdds, CameraState, Hypothesis, PlaceSearch
 
 Found = tuple[Entry[PlaceSearch], Entry[Hypothesis]]
 
@@ -21,7 +21,7 @@ def find_place(view: View, trigger: Change) -> Found | None:
 
 
 @rule(on=Watch(PlaceSearch, (Posted,), lambda search: search.status == "found"),
-      writes=(Hypothesis, CameraState, TwinOdds, FrameRequest), needs=(*WHILE_LOST, CAMERA), bind=find_place,
+      writes=(Hypothesis, CameraState, AliasOdds, FrameRequest), needs=(*WHILE_LOST, CAMERA), bind=find_place,
       level=Level.GOAL, closes=Level.GOAL, priority=Priority.CORRECT)
 def pose_adopter(view: View, case: Found) -> Iterable[Effect]:
     """Takes the place that was found for the belief, and the camera with which it was found.
@@ -34,7 +34,7 @@ def pose_adopter(view: View, case: Found) -> Iterable[Effect]:
                    correction=before.inverse() @ now)
     yield Revise(belief.entry, held, (search, place, LOST.of(view), belief.entry))
     yield Retract(place, (search,))
-    yield from (Retract(odds, (search,)) for odds in view.all(TwinOdds))
-    found_with = camera.value.as_told() if search.value.is_camera_as_told else camera.value
+    yield from (Retract(odds, (search,)) for odds in view.all(AliasOdds))
+    found_with = camera.value.as_nominal() if search.value.is_camera_nominal else camera.value
     if found_with != camera.value:
         yield Revise(camera, found_with, (search, camera))

@@ -55,8 +55,8 @@ class YawCalibrator(RobotKnowledgeSource):
             return None
         measured = self._measure(camera.value, travel.value, HELD.of(view))
         known = compute_camera_covariance(camera.value)[YAW, YAW]
-        is_told = measured.variance is not None and measured.variance < (1.0 - MIN_LEARNT) * known
-        return measured if is_told or self._is_spent(travel.value) else None
+        is_measured = measured.variance is not None and measured.variance < (1.0 - MIN_LEARNT) * known
+        return measured if is_measured or self._is_spent(travel.value) else None
 
     def act(self, view: View, case: Measured) -> Iterable[Effect]:
         travel, camera, held, (step_rad, told) = WAY.of(view), CAMERA.of(view), HELD.of(view), case

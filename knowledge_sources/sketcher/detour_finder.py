@@ -25,7 +25,7 @@ Halted = tuple[Entry[Leg], Entry[PlanSketch]]
 
 
 class DetourFinder(RobotKnowledgeSource):
-    """Has the sketch drawn anew when a leg was halted before what may stand in floor that is not seen.
+    """Has the sketch drawn again when a leg was halted before what may stand in floor that is not seen.
 
     So it does as often in a row as a subgoal may be repeated, and as long as a way leads to the goal round all that may
     stand there.

@@ -33,7 +33,7 @@ Ended = tuple[Entry[PlanSketch], ...]
 class GoalSketcher(RobotKnowledgeSource):
     """Draws (M0 (ptrans a b) M1 ... Mg) from locale to locale for a goal that has no sketch (Figure 9).
 
-    So it does for a new goal, and anew from where the robot is when the last sketch was withdrawn, was halted, or led
+    So it does for a new goal, and again from where the robot is when the last sketch was withdrawn, was halted, or led
     only to where something could be looked at again. Sketches for earlier goals are superseded (§2).
     """
 

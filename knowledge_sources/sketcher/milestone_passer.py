@@ -28,7 +28,7 @@ class MilestonePasser(RobotKnowledgeSource):
     """Lets the next subgoal begin once the milestone before it is verified; after the last one the sketch is done.
 
     A subgoal whose end was missed is repeated from where the robot turned out to be: plan-level servoing (§6). Where
-    that is in vain for the first goal, the robot may be elsewhere, and the goal level looks; a later goal, which began
+    that fails for the first goal, the robot may be elsewhere, and the goal level looks; a later goal, which began
     at a place that was just found, is given up. One that is not testable where a search has just found the robot holds
     by the looks of the search; but not the last one, which is what arriving means.
     """
@@ -54,8 +54,8 @@ class MilestonePasser(RobotKnowledgeSource):
         (milestone, sketch, goal, found), belief = case, HELD.of(view).entry
         s = sketch.value
         if found and s.at_end:
-            untold = f"{milestone.value.what} is not testable, where a search has found it"
-            yield Post(Impasse("blocked", untold, goal.id), (milestone, sketch, *found))
+            reason = f"{milestone.value.what} is not testable, where a search has found it"
+            yield Post(Impasse("blocked", reason, goal.id), (milestone, sketch, *found))
             return
         if not has_missed(view, belief.value, s, is_inexact=bool(milestone.value.displacement_modes)):
             passed = replace(s, status="done") if s.at_end else replace(s, adjustments=0)
@@ -64,11 +64,11 @@ class MilestonePasser(RobotKnowledgeSource):
         if s.adjustments < MAX_ADJUSTMENTS:
             yield Revise(sketch, _repeat(view, s, belief.value), (milestone, belief, *found))
             return
-        (in_vain, taking), is_first = tell_missed(view, belief.value, s), len(view.all(Goal)) == 1
+        (has_failed, taking), is_first = tell_missed(view, belief.value, s), len(view.all(Goal)) == 1
         if is_first:
-            yield declare_lost(in_vain, (milestone, goal, *taking))
+            yield declare_lost(has_failed, (milestone, goal, *taking))
         else:
-            yield Post(Impasse("blocked", in_vain, goal.id), (milestone, sketch, *taking))
+            yield Post(Impasse("blocked", has_failed, goal.id), (milestone, sketch, *taking))
 
 
 def _repeat(view: View, sketch: PlanSketch, belief: Hypothesis) -> PlanSketch:

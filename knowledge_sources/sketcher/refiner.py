@@ -40,7 +40,7 @@ class Case(NamedTuple):
 class Refiner(RobotKnowledgeSource):
     """Draws a sketch for the next subgoal of another, once its milestone holds, until that is primitive.
 
-    Only then its locale is entered. Where no way leads through it but another one to the goal, the sketch is superseded
+    Only then its locale is entered. Where no way passes through it but another to the goal, the sketch is superseded
     for that one.
     """
 
@@ -67,7 +67,7 @@ class Refiner(RobotKnowledgeSource):
             yield Post(PlanSketch(s.goal, (*s.path, s.at), locale, way, verified=found), (sketch, belief, *frames))
             return
         obstacles = find_obstacles(view, (locale,)) or find_obstacles(view)
-        if obstacles and _leads_otherwise(view, find_way_to_goal(planners, belief.value, goal.value)):
+        if obstacles and _takes_another_way(view, find_way_to_goal(planners, belief.value, goal.value)):
             yield from supersede(view, sketch)
             return
         reason = f"no way through {locale} to {subgoal.destination}{name_obstacles(obstacles)}"
@@ -81,7 +81,7 @@ def _plan(planner: SubgoalPlanner, subgoal: Subgoal, belief: Hypothesis) -> Way 
     return planner.plan_between_locales(place_of(belief), subgoal.destination, subgoal.tolerance_m)
 
 
-def _leads_otherwise(view: View, way: Way | None) -> bool:
+def _takes_another_way(view: View, way: Way | None) -> bool:
     """Whether a way leads to the goal by other passages than those of the sketch that is being carried out."""
     if way is None:
         return False

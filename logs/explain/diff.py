@@ -235,11 +235,11 @@ def settings(first: RunHead, second: RunHead) -> Iterator[str]:
     if first.arithmetic and second.arithmetic and first.arithmetic != second.arithmetic:
         yield f"calculated on different processors: {first.arithmetic} against {second.arithmetic}"
     ours, theirs = (json.loads(json.dumps(asdict(head))) for head in (first, second))
-    told = [_against(*leaf) for key in {**ours, **theirs} if key not in IGNORED
+    parted = [_against(*leaf) for key in {**ours, **theirs} if key not in IGNORED
             for leaf in differing_leaves({key: ours.get(key)}, {key: theirs.get(key)})]
-    yield from told[:MOST_SETTINGS]
-    if len(told) > MOST_SETTINGS:
-        yield f"and {len(told) - MOST_SETTINGS} more"
+    yield from parted[:MOST_SETTINGS]
+    if len(parted) > MOST_SETTINGS:
+        yield f"and {len(parted) - MOST_SETTINGS} more"
 
 
 def because(ours: Timeline, theirs: Timeline, agreed: int, settings: tuple[str, ...]) -> Iterator[str]:

@@ -56,10 +56,10 @@ def tell_used(history: Timeline, record: EntryRecord[Any]) -> Iterator[Sentence]
 
 def tell_changes(history: Timeline, record: EntryRecord[Any]) -> Iterator[Sentence]:
     """What the frames that an entry rests on hold otherwise than the world's file; of equal ones the first."""
-    told = [(listed(_changes([frame]), MAX_LISTED), frame) for frame in find_frames(history, record.because).values()]
-    for number, (text, frame) in enumerate(told):
-        if text and text not in (before for before, _ in told[:number]):
-            yield said(f"It was known otherwise than in the world's file: {text}.", frame, label="changed")
+    texts = [(listed(_changes([frame]), MAX_LISTED), frame) for frame in find_frames(history, record.because).values()]
+    for number, (text, frame) in enumerate(texts):
+        if text and text not in (before for before, _ in texts[:number]):
+            yield said(f"It was known differently than in the world's file: {text}.", frame, label="changed")
 
 
 def _changes(frames: Iterable[EntryRecord[FrameReference]]) -> list[str]:

@@ -48,7 +48,7 @@ WIDTH = 120
 """Of a line of text [characters]."""
 SLIGHT_RAD = math.radians(0.05)
 CORRECTED_BY: Mapping[Level, str] = {
-    Level.ACTION: "on the move", Level.PLAN: "at a milestone", Level.GOAL: "by finding out anew where it is",
+    Level.ACTION: "on the move", Level.PLAN: "at a milestone", Level.GOAL: "by finding out again where it is",
 }
 Find = Callable[[type[Any]], Any]
 """Gives the value of the first entry of a kind that something rests on; None where there is none."""

@@ -126,12 +126,12 @@ def _part(title: str, nothing: str) -> Answer:
     """A question for a part of the run's story; ``nothing`` is so where it has nothing up to a cycle."""
     def answer(asked: Asked) -> Iterator[Story]:
         part = tell_part(asked.history, title, {} if asked.run is None else asked.run.read_result())
-        told = [one for one in part.steps if asked.at is None or (one.cycle is not None and one.cycle <= asked.at)]
-        for one in told:
+        kept = [one for one in part.steps if asked.at is None or (one.cycle is not None and one.cycle <= asked.at)]
+        for one in kept:
             time = "" if one.time_s is None else f", {one.time_s:.1f} s into the run"
             when = "" if one.cycle is None else f"In cycle {one.cycle}{time}: "
             yield Story(f"{when}{one.text}", ref=one.refs[0] if one.refs else "")
-        if not told:
+        if not kept:
             yield Story(nothing)
     return answer
 
@@ -145,7 +145,7 @@ def _tell_error(asked: Asked) -> Iterator[Story]:
         asked.history.decision(asked.at)
     errors = read_errors(asked.run, asked.history, asked.at)
     if not errors:
-        text = "It had no belief that could be held against the truth." if asked.at is None else (
+        text = "It had no belief that could be compared with the truth." if asked.at is None else (
             f"In cycle {asked.at} it had no belief, or had not moved yet.")
         yield Story(text, decided=source)
         return
@@ -182,10 +182,10 @@ def _tell_things(asked: Asked, records: list[Record]) -> Iterator[Story]:
 
 def _tell_sights(history: Timeline, revisions: list[Record]) -> Iterator[Sentence]:
     """When it was seen, and by which pixels; of equal evidence the first."""
-    told: dict[tuple[str, str], Record] = {}
+    kept: dict[tuple[str, str], Record] = {}
     for record in revisions:
-        told.setdefault((record.value.status, record.value.evidence), record)
-    for (status, evidence), record in [*told.items()][-MOST_SIGHTS:]:
+        kept.setdefault((record.value.status, record.value.evidence), record)
+    for (status, evidence), record in [*kept.items()][-MOST_SIGHTS:]:
         by = history.nearest(record, CameraPicture, Ranges, Contact)
         text = (f"In cycle {record.cycle} it was {status}, certainty {record.value.certainty:.2f}"
                 f"{': ' * bool(evidence)}{evidence}.")
@@ -241,7 +241,7 @@ def _tell_reasons(history: Timeline, record: Record) -> Iterator[Sentence]:
 
 
 def _is_changed_plan(record: Record) -> bool:
-    """Whether a plan was withdrawn because the building is otherwise."""
+    """Whether a plan was withdrawn because the building differs."""
     heads = tuple(f"{kind.__name__}-" for kind in CHANGED)
     return record.field("status") == "superseded" and any(ref.startswith(heads) for ref in record.because)
 
@@ -293,9 +293,9 @@ def _tell_doors(asked: Asked, records: list[Record]) -> Iterator[Story]:
     for revisions in named or doors:
         last = revisions[-1]
         yield _story(asked, last, headline(last), map(_tell_door, revisions[-MOST_SIGHTS:]))
-    told = [] if doors else [record for record in asked.history.frames(until=asked.at)
+    kept = [] if doors else [record for record in asked.history.frames(until=asked.at)
                              if any(change.what == "shut" for change in record.value.changes)]
-    yield from (_story(asked, record, headline(record)) for record in told[-1:])
+    yield from (_story(asked, record, headline(record)) for record in kept[-1:])
 
 
 def _tell_door(record: EntryRecord[DoorState]) -> Sentence:

@@ -186,9 +186,9 @@ def tell_run(run: RunDirectory, history: Timeline) -> RunStory:
 def tell_part(history: Timeline, title: str, result: Mapping[str, Any]) -> Story:
     """A part of the story, by its title in PARTS; ``result``: ``result.json``, or nothing."""
     tell, nothing = PARTS[title]
-    told = list(tell(history, result)) or [Sentence(nothing)] * bool(nothing)
+    sentences = list(tell(history, result)) or [Sentence(nothing)] * bool(nothing)
     return Story(title, tuple(
-        one if one.cycle is None else replace(one, time_s=history.time_at(one.cycle)) for one in told))
+        one if one.cycle is None else replace(one, time_s=history.time_at(one.cycle)) for one in sentences))
 
 
 def _tell_errand(history: Timeline, _: Mapping[str, Any]) -> Iterator[Sentence]:
@@ -301,7 +301,7 @@ def _apart(before: Hypothesis, now: Hypothesis) -> str:
 
 def _tell_contacts(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
     """What it felt; and, where the simulator says so, what it truly touched."""
-    yield from _points(read_turning_points(history, told=True), "contact") or [Sentence("It felt no contact.")]
+    yield from _points(read_turning_points(history, main=True), "contact") or [Sentence("It felt no contact.")]
     truly = [point for point in read_truth(history, result) if point.kind == COLLISION]
     yield from (Sentence(f"It truly touched something at {point.text}.", cycle=point.cycle) for point in truly)
     if result.get("collisions") is None:
@@ -312,7 +312,7 @@ def _tell_contacts(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sen
 
 def _tell_things(history: Timeline, _: Mapping[str, Any]) -> list[Sentence]:
     """Doors found shut, things in the way, and what became of them; faults of its body."""
-    return _points(read_turning_points(history, told=True), "door", "thing", "fault", "resumed")
+    return _points(read_turning_points(history, main=True), "door", "thing", "fault", "resumed")
 
 
 def _points(turns: Iterable[TurningPoint], *kinds: str) -> list[Sentence]:
@@ -321,7 +321,7 @@ def _points(turns: Iterable[TurningPoint], *kinds: str) -> list[Sentence]:
 
 
 def _tell_camera(history: Timeline, _: Mapping[str, Any]) -> Iterator[Sentence]:
-    """What has turned out to be otherwise about the camera than told: each since when it was so to the end."""
+    """How the camera turned out to differ from what was told: each since when it was so to the end."""
     records = list(history.of_kind(CameraState))
     lessons = [find_camera_lessons(records[0].value, record.value) for record in records]
     for lesson in lessons[-1] if lessons else ():
@@ -361,7 +361,7 @@ def _truth(result: Mapping[str, Any]) -> Iterator[str]:
 def _tell_trouble(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
     """What a short account of the run does not leave out."""
     truly = (point for point in read_truth(history, result) if point.kind != COLLISION)
-    points = sorted([*truly, *read_turning_points(history, told=True)], key=lambda point: point.cycle)
+    points = sorted([*truly, *read_turning_points(history, main=True)], key=lambda point: point.cycle)
     yield from (Sentence(f"{point.kind}: {point.text}.", cycle=point.cycle) for point in points)
     if not points:
         yield Sentence("Nothing went wrong." if history.last(Outcome) is not None else

@@ -185,7 +185,7 @@ def _tell_milestones(expecting: Sequence[EntryRecord[Milestone]], name: str) -> 
 
 
 def _tell_plans(history: Timeline, name: str) -> Iterator[Sentence]:
-    """The plan sketches that lead through it."""
+    """The plan sketches that pass through it."""
     for id in history.ids_of(PlanSketch):
         first = history.entry(f"{id}.0")
         subgoals = () if first is None else first.field("subgoals", ())

@@ -14,7 +14,7 @@ from blackboard import Decision, Discrepancy, Level, Posted, Retracted
 from logs.explain.phrases import milestone_of, wrap
 from logs.records import EntryRecord, Opaque
 from logs.run_errors import BadInput
-from logs.timeline import Mirror, Timeline, find_belief, time_told
+from logs.timeline import Mirror, Timeline, find_belief, read_time_s
 from world_models import words
 from world_models.entries import (
     BodyFault,
@@ -34,14 +34,14 @@ from world_models.entries import (
 )
 from world_models.words import count
 
-TOLD = ("refuted", "not testable", "lost", "found", "fault", "contact", "door", "thing", "resumed", "told")
+MAIN = ("refuted", "not testable", "lost", "found", "fault", "contact", "door", "thing", "resumed", "told")
 """Kinds that a short account of a run must not leave out."""
 REMEMBERED = 8
 """The newest entries of a type that are looked back for."""
 MARKS, NOT_VERIFIED = ("escalated", "relocalization"), ("refuted", "not testable")
 """A turning point has one of these words in its line of the journal, or is of one of these kinds."""
-TOLD_KINDS: tuple[type[Any], ...] = (BodyFault, Contact, DoorState, Obstacle, Resumed, UserReport, Redirection)
-KINDS: tuple[type[Any], ...] = (*TOLD_KINDS, Goal, PlanSketch, Certificate, Outcome)
+MAIN_KINDS: tuple[type[Any], ...] = (BodyFault, Contact, DoorState, Obstacle, Resumed, UserReport, Redirection)
+KINDS: tuple[type[Any], ...] = (*MAIN_KINDS, Goal, PlanSketch, Certificate, Outcome)
 NOTHING = "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
 ENDED_EARLY = "Nothing had gone wrong when the run was cut off: what would have come of it nobody knows."
 SIMULATOR, COLLISION = "simulator", "collision"
@@ -72,9 +72,9 @@ class TurningPoint:
     time_s: float | None = None
 
     @property
-    def is_told(self) -> bool:
+    def is_main(self) -> bool:
         """Whether a short account of the run must not leave it out."""
-        return self.kind in TOLD
+        return self.kind in MAIN
 
 
 def at(cycle: int, time_s: float | None) -> str:
@@ -130,7 +130,7 @@ class TurningPointFinder:
         before, changes = find_belief(self._mirror), (*decision.observed, *decision.made)
         self._mirror.take(*changes)
         belief = find_belief(self._mirror) or before
-        times = [time_told(partial(_get, change.entry.value)) for change in decision.observed]
+        times = [read_time_s(partial(_get, change.entry.value)) for change in decision.observed]
         self._time_s = max((time_s for time_s in times if time_s is not None), default=self._time_s)
         revisions = [(change.entry.id, change.entry.value, isinstance(change, Posted)) for change in changes
                      if not isinstance(change, Retracted)]
@@ -207,15 +207,15 @@ def _turn(
         yield TurningPoint(cycle, "the end", f"{value.kind}: {value.reason}")
 
 
-def read_turning_points(history: Timeline, *, told: bool = False) -> Iterator[TurningPoint]:
+def read_turning_points(history: Timeline, *, main: bool = False) -> Iterator[TurningPoint]:
     """What :class:`TurningPointFinder` finds, from those entries only that may be one.
 
     Entries of another version are passed over.
 
     Args:
-        told: only those that a short account must not leave out; of a long run they are read much faster.
+        main: only those that a short account must not leave out; of a long run they are read much faster.
     """
-    marks, kinds = ((*MARKS, *NOT_VERIFIED), TOLD_KINDS) if told else (MARKS, KINDS)
+    marks, kinds = ((*MARKS, *NOT_VERIFIED), MAIN_KINDS) if main else (MARKS, KINDS)
     cycles = {decision.cycle for mark in marks for decision in history.naming(mark)}
     cycles |= {record.cycle for record in history.of_kind(*kinds)}
     states: dict[str, str] = {}
@@ -228,7 +228,7 @@ def read_turning_points(history: Timeline, *, told: bool = False) -> Iterator[Tu
         records = filter(may_turn, history.decision(cycle).changes)
         revisions = [(one.id, value, one.is_new) for one in records if (value := _value(one)) is not None]
         found = _turns(revisions, cycle, name_of, lambda then: _value(history.held(then)), states)
-        yield from (replace(point, time_s=history.time_at(cycle)) for point in found if point.is_told or not told)
+        yield from (replace(point, time_s=history.time_at(cycle)) for point in found if point.is_main or not main)
 
 
 def may_turn(record: EntryRecord[Any]) -> bool:
@@ -271,8 +271,8 @@ def turn_lines(history: Timeline, result: Mapping[str, Any], *, is_whole: bool =
 
     ``is_whole``: the run has an outcome.
     """
-    told = read_turning_points(history, told=True)
-    points = sorted([*read_truth(history, result), *told], key=lambda point: point.cycle)
+    main = read_turning_points(history, main=True)
+    points = sorted([*read_truth(history, result), *main], key=lambda point: point.cycle)
     unplaced = (result.get("collisions") or 0) - sum(point.kind == COLLISION for point in points)
     if not points and unplaced <= 0:
         yield NOTHING if is_whole else ENDED_EARLY

@@ -125,17 +125,17 @@ def walk(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Iterator
     Returns:
         steps down, ref, sentence; of an earlier revision of what rests on it only what little was different.
     """
-    told, nearest = set[str](), _distances(history, refs, depth)
+    shown, nearest = set[str](), _distances(history, refs, depth)
     stack: list[tuple[int, str, EntryRecord[Any] | None]] = [(0, ref, None) for ref in reversed(refs)]
     while stack:
         level, name, after = stack.pop()
         record = history.entry(name)
-        if name in told or nearest[name] < level:
-            yield level, name, f"{name}, as {'above' if name in told else 'below'}"
+        if name in shown or nearest[name] < level:
+            yield level, name, f"{name}, as {'above' if name in shown else 'below'}"
         elif record is None:
             yield level, name, f"{name}, of which the journal says nothing"
         else:
-            told.add(name)
+            shown.add(name)
             is_revised = after is not None and after.id == record.id
             before = list(differing_leaves(record.fields, after.fields)) if after is not None and is_revised else []
             text = f"{name}: {sentence(record)}" if not 0 < len(before) <= FEW else (

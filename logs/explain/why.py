@@ -73,7 +73,7 @@ from world_models.entries import (
 )
 
 MOST, MOST_PLAIN, MOST_MET = 24, 12, 200
-"""So many things are told at the most, of a run of another version, and so many entries come to."""
+"""So many things are told at the most, of a run of another version, and so many entries reached."""
 LEGEND = """\
 Places are in metres in each room's own frame, headings counter-clockwise from its x axis; pixels count right and
 down from the top left. Model lines are edges that the map of the building says can be seen. Names in brackets are
@@ -111,15 +111,15 @@ def story(history: Timeline, record: EntryRecord[Any], world: WorldFile | None =
 
 def label_of(record: EntryRecord[Any]) -> str:
     """What an entry is about, in a word or two."""
-    return TOLD.get(record.kind, OTHERS)[0] or record.type
+    return LABELS.get(record.kind, OTHERS)[0] or record.type
 
 
 class _Teller:
-    """Tells steps; ``told`` are the keys of those that were told already, ``met`` the entries that were come to."""
+    """Tells steps; ``shown`` are the keys of those that were shown already, ``met`` the entries that were reached."""
 
     def __init__(self, history: Timeline, world: WorldFile | None) -> None:
         self.history, self.world = history, world
-        self.told, self.met = set[str](), set[str]()
+        self.shown, self.met = set[str](), set[str]()
 
     def reasons(self, record: EntryRecord[Any]) -> Iterator[Sentence]:
         """What an entry rests on, below the entry itself."""
@@ -129,7 +129,7 @@ class _Teller:
             yield from self._certificate(record)
         elif record.kind is PoseFix:
             yield from self._match(record)
-        if (kinds := TOLD.get(record.kind, OTHERS)[1]) is not None:
+        if (kinds := LABELS.get(record.kind, OTHERS)[1]) is not None:
             below = [one for kind in kinds for one in self._below(record, kind)]
         else:
             order = [ref.rpartition("-")[0] for ref in record.because]
@@ -149,7 +149,7 @@ class _Teller:
             found = self.history.nearest(record, kind)
             if found is not None and found.id != record.id:
                 key = found.id if kind in SEVERAL else found.type
-                yield from self._one(key, TOLD[kind][0], phrase(self.history, found), found)
+                yield from self._one(key, LABELS[kind][0], phrase(self.history, found), found)
 
     def _below(self, record: EntryRecord[Any], kind: type[Any] | None = None) -> Iterator[EntryRecord[Any]]:
         """What an entry rests on beside itself, of a kind or of any."""
@@ -163,7 +163,7 @@ class _Teller:
         """An entry that something rests on, then what it rests on itself."""
         perhaps = is_a(record, Hypothesis) and record.value.status == "candidate"
         key = record.id if record.kind in SEVERAL or perhaps else record.type
-        if key in self.told or record.ref in self.met or len(self.told) > MOST or len(self.met) > MOST_MET:
+        if key in self.shown or record.ref in self.met or len(self.shown) > MOST or len(self.met) > MOST_MET:
             return
         self.met.add(record.ref)
         label, frame = label_of(record), None
@@ -182,8 +182,8 @@ class _Teller:
             yield from self.reasons(record)
 
     def _one(self, key: str, label: str, text: str, *records: EntryRecord[Any] | None) -> Iterator[Sentence]:
-        if text and key not in self.told:
-            self.told.add(key)
+        if text and key not in self.shown:
+            self.shown.add(key)
             yield said(text, *records, label=label)
 
     def _belief(self, record: EntryRecord[Hypothesis]) -> Iterator[Sentence]:
@@ -203,7 +203,7 @@ class _Teller:
         yield from self._anchor(record)
 
     def _anchor(self, record: EntryRecord[Hypothesis]) -> Iterator[Sentence]:
-        """What the belief began with: a milestone, finding itself anew, or what the user told."""
+        """What the belief began with: a milestone, finding itself again, or what the user told."""
         anchor = self.history.anchor_of(record)
         if anchor is None:
             return
@@ -213,7 +213,7 @@ class _Teller:
             lost = self.history.reason(anchor, Discrepancy)
             found = f"; {anchor.value.evidence}" if anchor.value.evidence else ""
             picture = frame.id if frame is not None else "a picture"
-            text = f"It found out anew where it was, in cycle {anchor.cycle}, from {picture}: at {begun}{found}."
+            text = f"It found out again where it was, in cycle {anchor.cycle}, from {picture}: at {begun}{found}."
             yield from self._one("recognized", "recognized", text, anchor, segments, frame)
             if lost is not None:
                 yield from self._tell(lost, anchor)
@@ -235,13 +235,13 @@ class _Teller:
         match, segments = self.history.chain(fix, LineMatch, Segments)
         yield from self._one(fix.id, "matched", phrases.describe_line_match(self.history, fix), fix, match, segments)
         for one in model.tell_model_lines(self.history, fix, self.world):
-            if one.text not in self.told:
-                self.told.add(one.text)
+            if one.text not in self.shown:
+                self.shown.add(one.text)
                 yield one
 
 
 OTHERS: tuple[str, None] = ("", None)
-TOLD: Mapping[type[Any], tuple[str, tuple[type[Any], ...] | None]] = {
+LABELS: Mapping[type[Any], tuple[str, tuple[type[Any], ...] | None]] = {
     BodyFault: ("fault", None),
     CameraPicture: ("picture", (PictureRequest, Course)),
     CameraState: ("camera", None),
@@ -296,10 +296,10 @@ SEVERAL = frozenset({Discrepancy, Goal, PlanSketch, BodyFault})
 """Of these a story may tell more than one."""
 
 
-def lines_of(told: Story) -> Iterator[str]:
+def lines_of(shown: Story) -> Iterator[str]:
     """A story as paragraphs: label, sentences and the entries that say so."""
-    yield wrap(named(told.headline, [told.ref] * bool(told.ref)))
-    if told.decided:
-        yield wrap(told.decided)
-    width = max((len(one.label) for one in told.steps), default=0)
-    yield from (wrap(named(one.text, one.refs), f"  {one.label.ljust(width)}  ") for one in told.steps)
+    yield wrap(named(shown.headline, [shown.ref] * bool(shown.ref)))
+    if shown.decided:
+        yield wrap(shown.decided)
+    width = max((len(one.label) for one in shown.steps), default=0)
+    yield from (wrap(named(one.text, one.refs), f"  {one.label.ljust(width)}  ") for one in shown.steps)

@@ -147,7 +147,7 @@ class Bump(Displacement):
 
 @dataclass(frozen=True, slots=True)
 class Kidnap(Displacement):
-    """Somebody carries the robot off: by a displacement, or to a place in any locale.
+    """Somebody kidnaps the robot: by a displacement, or to a place in any locale.
 
     Attributes:
         to_locale: the place's locale; "" for a displacement instead.
@@ -177,7 +177,7 @@ class Kidnap(Displacement):
 
     @property
     def words(self) -> str:
-        return "somebody carries the robot off"
+        return "somebody kidnaps the robot"
 
     @property
     def destination(self) -> Place | None:

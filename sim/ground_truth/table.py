@@ -1,4 +1,4 @@
-"""The ``[truth]`` of a scenario: what is otherwise than the robot's model says, from when to when."""
+"""The ``[truth]`` of a scenario: what differs from the robot's model, from when to when."""
 
 from __future__ import annotations
 
@@ -179,19 +179,19 @@ class TrueStart(Bounded):
     heading_rad: float = bounded(0.0, -TURN, TURN)
 
 
-AS_TOLD = TrueStart()
+START_AS_STATED = TrueStart()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TruthTable:
-    """All that is otherwise; of several entries about the same door, thing or wall, the last one that is due holds."""
+    """All that differs; of several entries about the same door, thing or wall, the last one that is due holds."""
 
     doors: tuple[TrueDoor, ...] = ()
     things: tuple[TrueThing, ...] = ()
     walls: tuple[TrueWall, ...] = ()
     extra: tuple[ExtraThing, ...] = ()
     camera: TrueCamera = AS_BELIEVED
-    start: TrueStart = AS_TOLD
+    start: TrueStart = START_AS_STATED
     inexact: TrueInexact = EXACT
 
 

@@ -1,4 +1,4 @@
-"""A mission with a camera that is mounted otherwise than believed: it is reached, and the camera is known better."""
+"""A mission with a camera that is mounted differently than believed: it is reached, and the camera is known better."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_the_camera_is_learnt_on_the_way(settings: dict[str, str], tmp_path: Pat
 
 
 def test_a_knock_in_mid_mission_is_noticed_and_survived() -> None:
-    """The robot is not taken for carried off: the camera is believed otherwise, and the mission is reached."""
+    """The robot is not taken for kidnapped: the camera is believed differently, and the mission is reached."""
     knock = CameraKnocked(after_m=4.0, tilt_rad=math.radians(2.0), roll_rad=math.radians(-1.0),
                           yaw_rad=math.radians(-2.0))
     scenario = replace(load_scenario("forty-foot-hallway"), faults=(knock,))

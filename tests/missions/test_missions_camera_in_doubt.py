@@ -28,9 +28,9 @@ def test_a_camera_that_few_pictures_taught_wrongly_is_as_told_again(pictures: in
     body = SimulatedBody(scene.building, there, scene.robot.camera, scene.robot.mount, seed=trial.number)
     scheduler = _build_lost_agent(scene, FaultyBody(body), belief)
     told = scheduler.view.latest(CameraState)
-    assert told is not None and told.value.told_lens is None
+    assert told is not None and told.value.nominal_lens is None
     taught = replace(told.value.moved(WRONGLY), counted=tuple((0.1 * k, 0.0, 0.0) for k in range(pictures)))
-    assert taught.lens != told.value.lens and taught.as_told() == told.value
+    assert taught.lens != told.value.lens and taught.as_nominal() == told.value
     scheduler.post([Revise(told, taught)], "user")
     run_to_outcome(scheduler, over=lambda s: "found" if _is_found(s) else None)
     camera, held = scheduler.view.latest(CameraState), scheduler.view.latest(Hypothesis, lambda h: h.is_held)

@@ -1,4 +1,4 @@
-"""``harvey demo``: it tells of being carried off, lost and found, and leaves a page that needs nothing else."""
+"""``harvey demo``: it tells of being kidnapped, lost and found, and leaves a page that needs nothing else."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def test_it_is_carried_off_refuted_lost_and_found(
     monkeypatch.setattr(webbrowser, "open", opened.append)
     assert main(["demo", "--out", str(tmp_path / "demo"), *([] if opens else ["--no-page"])]) == 0
     told = capsys.readouterr().out
-    for words in ("carries the robot off", "refuted", "lost", "found", "harvey why", "harvey view"):
+    for words in ("kidnaps the robot", "refuted", "lost", "found", "harvey why", "harvey view"):
         assert words in told
     page = tmp_path / "demo" / "report.html"
     assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>") and opened == [page.as_uri()] * opens

@@ -43,7 +43,7 @@ NOT_NEEDED = {
     "floor_changer", "travel_breaker", "refiner"}
 """Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
 the move, ride in elevators, find what is before the camera or in the way, take up what somebody tells, learn of the
-camera, or refine what leads through more than one room."""
+camera, or refine what passes through more than one room."""
 
 
 @pytest.mark.parametrize("missing", NAMES)

@@ -1,4 +1,4 @@
-"""Robots that are carried off: they find out where they are, or say that the building cannot tell."""
+"""Robots that are kidnapped: they find out where they are, or say that the building cannot tell."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def main() -> int:
         folder.mkdir(exist_ok=True)
         _write_config(config, home, asked.room, python)
         if not session.exists():
-            begun = session.with_suffix(".begun")  # drawn as a whole, or anew: an interruption leaves no half of it
+            begun = session.with_suffix(".begun")  # drawn as a whole, or again: an interruption leaves no half of it
             begun.unlink(missing_ok=True)
             _call("init", config, begun, tree)
             _skip_all_but(begun, tree, asked.sample, asked.seed)
@@ -71,7 +71,7 @@ def main() -> int:
 
 
 def _prepare(home: Path, room: str, python: Path) -> None:
-    """A copy of the project without mutants, and which tests of a room run which line; anew when a file has changed.
+    """A copy of the project without mutants, and which tests of a room run which line; again when a file has changed.
 
     Measured where the mutants are put: numba keeps what it compiled by the place of the file.
     """

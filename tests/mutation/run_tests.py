@@ -74,7 +74,7 @@ def _run(python: str, tests: list[str], tree: Path, cache: Path) -> int:
 def _find_change(tree: Path, pristine: Path, files: list[str]) -> tuple[str, set[int]]:
     """The file that has a mutant, and its lines in the file without it.
 
-    All others get back the time of their last change, or numba would compile anew what had a mutant before.
+    All others get back the time of their last change, or numba would compile again what had a mutant before.
     """
     found: tuple[str, set[int]] | None = None
     for part in files:

@@ -4,7 +4,7 @@ In reading order:
 
 * :mod:`.geometry`: faces with regions, landmarks, solids and outlines: shapes and colors.
 * :mod:`.locales`: locales, what stands in them, doorways, links (elevators and stairs), and where locales lie.
-* :mod:`.changes`: what is believed otherwise than the world file says: a door found shut, a thing gone.
+* :mod:`.changes`: what is believed differently than the world file says: a door found shut, a thing gone.
 * :mod:`.passages`: passage graphs at every level of the hierarchy, and routes.
 * :mod:`.locale_frame`: all that is known of one locale: the unit in which a building is asked, told and changed.
 * :mod:`.building`: the queries, one locale at a time; :mod:`.world`: the whole, as files and the simulator have it.

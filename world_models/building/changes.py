@@ -1,4 +1,4 @@
-"""What is believed otherwise than the world file says: pure functions on the geometry and the things of a locale.
+"""What is believed differently than the world file says: pure functions on the geometry and the things of a locale.
 
 A doorway found shut; a thing, a landmark or a face that is gone; something that stands there and the file lacks. A
 landmark that is gone keeps its number and its name, but has no lines any more: what was seen of it has a name still.

@@ -63,7 +63,7 @@ class FrameReference:
     Attributes:
         world: fingerprint of the file that it comes from.
         locale: its name.
-        changes: what is believed otherwise than that file says.
+        changes: what is believed differently than that file says.
     """
 
     world: str
@@ -123,7 +123,7 @@ class LocaleFrame:
         things: furniture and the like.
         edges: of the passage graph between the locales that it contains directly (Figure 8).
         components: for each component of it the component of its container.
-        changes: what is believed otherwise than the file says.
+        changes: what is believed differently than the file says.
         memo: results that were computed from this frame and others; no part of what is known.
     """
 
@@ -152,7 +152,7 @@ class LocaleFrame:
         return tuple(doorway for doorway in (self.filed or self).doorways if doorway.name in shut)
 
     def changed(self, change: FrameChange) -> LocaleFrame:
-        """The frame with one thing believed otherwise. Raises ValueError where it has nothing of that name."""
+        """The frame with one thing believed differently. Raises ValueError where it has nothing of that name."""
         filed, changes = self.filed or self, (*self.changes, change)
         if change.what == "shut":
             door = next((d for d in self.doorways if d.name == change.name), None)

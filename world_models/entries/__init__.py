@@ -18,7 +18,7 @@ from world_models.entries.floor import (
     FloorAppearance, FloorEnd, FloorThing, FloorView, FreeFloor, LAST_VIEWS, Light, Point,
 )
 from world_models.entries.location import (
-    Hypothesis, LocalePoses, Place, PlaceOdds, PlaceSearch, Travel, Twin, TwinOdds, begin_travel, covariance_tuple,
+    Hypothesis, LocalePoses, Place, PlaceOdds, PlaceSearch, Travel, Alias, AliasOdds, begin_travel, covariance_tuple,
     diagonal, turn_about_camera,
 )
 from world_models.entries.obstacle import (
@@ -34,13 +34,13 @@ from world_models.obstruction import Obstruction
 from world_models.entries.user_reports import DOOR_STATES, GO_ON, Redirection, UserReport
 
 __all__ = [
-    "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "LAST_VIEWS", "STOP_KEY", "Anchor", "BodyFault",
+    "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "LAST_VIEWS", "STOP_KEY", "Alias", "AliasOdds", "Anchor", "BodyFault",
     "CameraLesson", "CameraPicture", "CameraState", "Certificate", "Command", "Contact", "Corners", "Course",
     "DoorCondition", "DoorPicture", "DoorState", "Drift", "FloorAppearance", "FloorEnd", "FloorThing", "FloorView",
     "Footprint", "FreeFloor", "Glimpse", "Goal", "Hypothesis", "Impasse", "Leg", "Light", "LineMatch", "LocalePoses",
     "Milestone", "MilestoneVerdict", "MotionReport", "MotorCommand", "Obstacle", "ObstacleStatus", "Obstruction",
     "Odometry", "Outcome", "Panorama", "PictureRequest", "Place", "PlaceOdds", "PlaceSearch", "PlanSketch", "Point",
     "PoseFix", "Ranges", "Recovery", "Redirection", "Resumed", "Ride", "RideReport", "Segments", "Sense",
-    "SketchStatus", "Subgoal", "Track", "Tracks", "Travel", "Twin", "TwinOdds", "UserReport", "Wheels",
-    "begin_travel", "covariance_tuple", "diagonal", "find_camera_lessons", "turn_about_camera",
+    "SketchStatus", "Subgoal", "Track", "Tracks", "Travel", "UserReport", "Wheels", "begin_travel", "covariance_tuple",
+    "diagonal", "find_camera_lessons", "turn_about_camera",
 ]

@@ -9,7 +9,7 @@ from blackboard import Entry, View, observation, request
 from world_models import words
 
 FaultStatus = Literal["open", "over"]
-RecoveryStatus = Literal["asked", "in vain", "over"]
+RecoveryStatus = Literal["asked", "still failing", "over"]
 
 LAST_REQUESTS = 8
 """The newest requests and faults that stay on the board: the fault handler looks back over a few of them."""
@@ -252,8 +252,8 @@ class Recovery:
         wait_s: how long to wait before the next try.
         tries: how many there were.
         waited_s: time from when the fault was noticed to the last try, by the body's clock.
-        status: asked, in vain (try again, or give up) or over (the request is answered).
-        what, detail: the fault as the last try found it, where it was in vain.
+        status: asked, still failing (try again, or give up) or over (the request is answered).
+        what, detail: the fault as the last try found it, where it failed.
     """
 
     fault: str
@@ -272,5 +272,5 @@ class Recovery:
         if self.status == "asked":
             tries = words.count(self.tries, "try", "tries")
             return f"waits {self.wait_s:.2f} s and tries again; to have {self.request} answered, {tries} so far"
-        ended = "it worked" if self.status == "over" else f"in vain: {self.what} ({self.detail})"
+        ended = "it worked" if self.status == "over" else f"still failing: {self.what} ({self.detail})"
         return f"tried again: {ended}; to have {self.request} answered after {self.fault}, {self.waited_s:.1f} s in all"

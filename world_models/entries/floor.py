@@ -33,7 +33,7 @@ class FloorThing:
         box_px: (left, top, right, bottom) of it in the rectified picture; of ranges (0, 0, 0, 0).
         evidence: what tells that it is there, in words.
         is_cut: whether the picture's lower border cuts its feet off: it may reach from there to the robot's rim.
-        is_alike: whether it looks like the floor: an earlier picture alone tells that it stands there.
+        is_camouflaged: whether it looks like the floor: an earlier picture alone tells that it stands there.
     """
 
     footprint: tuple[Point, ...]
@@ -44,7 +44,7 @@ class FloorThing:
     box_px: tuple[float, float, float, float]
     evidence: str
     is_cut: bool = False
-    is_alike: bool = False
+    is_camouflaged: bool = False
 
 
 @inference(keep=LAST_FLOORS)
@@ -64,7 +64,7 @@ class FreeFloor:
         things: what ends it and is not in the model.
         seen_s: when, by the body's clock.
         light: of the picture; None where the floor's looks are not known in it.
-        told_m: (n,) up to here an earlier picture would tell what stands there and looks like the floor; empty without.
+        confirmed_m: (n,) up to here an earlier picture would show what is camouflaged; empty without.
     """
 
     sense: FloorSense
@@ -79,7 +79,7 @@ class FreeFloor:
     things: tuple[FloorThing, ...]
     seen_s: float
     light: Light | None = None
-    told_m: tuple[float, ...] = ()
+    confirmed_m: tuple[float, ...] = ()
 
     @property
     def is_missing(self) -> bool:
@@ -129,7 +129,7 @@ def picture_of(view: FloorView) -> Iterable[str]:
 @inference(keep=LAST_VIEWS, needs=picture_of)
 @dataclass(frozen=True, slots=True)
 class FloorView:
-    """A picture that later ones are compared with: what stands up from the floor moves otherwise than the floor.
+    """A picture that later ones are compared with: what stands up from the floor moves differently than the floor.
 
     Attributes:
         frame: id of the frame entry; belief: that of the hypothesis by which the place is known.

@@ -82,7 +82,7 @@ class Hypothesis:
         status: held (the one that is acted on) or candidate.
         weight: relative belief among candidates.
         motion: id of the last motion report that is taken into account, or "".
-        evidence: what speaks for it, in words, where no other entry says it.
+        evidence: what supports it, in words, where no other entry says it.
         correction: where it is, as seen from where it was believed to be, of one that a search has found.
     """
 
@@ -155,23 +155,23 @@ class PlaceOdds:
 
     Attributes:
         locale: where it is believed to be.
-        alike: number of the places between which the pictures did not tell, this one included.
-        source: ``told`` at the start, or ``tracked`` by milestones since.
+        alias_count: number of the places between which the pictures did not tell, this one included.
+        source: ``stated`` at the start, or ``tracked`` by milestones since.
         p_prior: probability that it is there, before any picture since it was lost.
         probability: with the pictures.
         refuted: how often a place that was believed by such odds was refuted before.
     """
 
     locale: str
-    alike: int
-    source: Literal["told", "tracked"]
+    alias_count: int
+    source: Literal["stated", "tracked"]
     p_prior: float
     probability: float
     refuted: int = 0
 
     def sentence(self) -> str:
-        how = "this one was told at the start" if self.source == "told" else "to this one it was tracked"
-        return (f"{words.count(self.alike, 'place')} look alike from here; {how} ({self.p_prior:.0%} before any"
+        how = "this one was told at the start" if self.source == "stated" else "to this one it was tracked"
+        return (f"{words.count(self.alias_count, 'place')} look alike from here; {how} ({self.p_prior:.0%} before any"
                 f" picture): {self.locale}, {self.probability:.1%}")
 
 
@@ -184,20 +184,20 @@ class PlaceSearch:
         status: found; probe, where another look may tell more; or ambiguous, where none does.
         said: in words.
         probe: the turn [rad] and then the move [m] before the next look; None where no further one is worth it.
-        is_camera_as_told: whether the pictures fit the camera as it was told, and not as it was learnt.
+        is_camera_nominal: whether the pictures fit the camera as it was set up, and not as it was learnt.
     """
 
     status: Literal["found", "probe", "ambiguous"]
     said: str
     probe: tuple[float, float] | None = None
-    is_camera_as_told: bool = False
+    is_camera_nominal: bool = False
 
     def sentence(self) -> str:
         return f"search of the floor: {self.said}"
 
 
 @dataclass(frozen=True, slots=True)
-class Twin:
+class Alias:
     """A place that looks like where the robot believes that it is.
 
     Attributes:
@@ -213,28 +213,28 @@ class Twin:
 
 @inference(keep=2)
 @dataclass(frozen=True, slots=True)
-class TwinOdds:
+class AliasOdds:
     """How likely the robot is where it believes, against the places that looked the same since it was sure of it.
 
     Attributes:
         p_prior: probability of the believed place before any picture.
         probability: with the pictures that are counted.
-        twins: the other places that are not refuted yet.
+        aliases: the other places that are not refuted yet.
         counted: certificates of the pictures that are counted, each once.
         last: the pose, in the world frame, of the last of them.
     """
 
     p_prior: float
     probability: float
-    twins: tuple[Twin, ...]
+    aliases: tuple[Alias, ...]
     counted: tuple[str, ...]
     last: Pose2
 
     def sentence(self) -> str:
-        if not self.twins:
+        if not self.aliases:
             return f"no other place looks like where it is, after {words.count(len(self.counted), 'picture')}"
-        best = max(self.twins, key=lambda twin: twin.log_ratio)
-        return (f"{words.count(1 + len(self.twins), 'place')} agree with {words.count(len(self.counted), 'picture')};"
+        best = max(self.aliases, key=lambda alias: alias.log_ratio)
+        return (f"{words.count(1 + len(self.aliases), 'place')} agree with {words.count(len(self.counted), 'picture')};"
                 f" it is where it believes at {self.probability:.1%}, or else most likely as if it had begun in"
                 f" {best.locale}")
 

@@ -123,9 +123,9 @@ class Obstacle:
         by: what told of it first.
         evidence: what tells of it, in words: which pixels of which picture.
         status: suspected (not certain enough to act on), there, or gone.
-        is_alike: whether it looks like the floor: that it is not seen tells little.
+        is_camouflaged: whether it looks like the floor: that it is not seen tells little.
         seen_from_m: from how near its shape was seen; infinite where its feet were not.
-        told_from: (2,) where the eye was when something was told last of it [m, world]; None where no picture told.
+        judged_from: (2,) where the eye was when it was last judged [m, world]; None where no picture judged it.
     """
 
     name: str
@@ -144,9 +144,9 @@ class Obstacle:
     evidence: str = ""
     status: ObstacleStatus = "there"
     core: Corners = ()
-    is_alike: bool = False
+    is_camouflaged: bool = False
     seen_from_m: float = math.inf
-    told_from: tuple[float, float] | None = None
+    judged_from: tuple[float, float] | None = None
 
     @property
     def is_there(self) -> bool:

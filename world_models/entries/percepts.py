@@ -166,7 +166,7 @@ class LineMatch:
         lines_world: (p, 2, 3), segments_px: (p, 2, 2): the pairs themselves.
         error: value of the objective function (§6.1.3).
         coverage: (m,) part of each expected line that is accounted for.
-        is_camera_open: whether the camera may be mounted otherwise than was learnt of it, as after a knock.
+        is_camera_open: whether the camera may be mounted differently than was learnt of it, as after a knock.
     """
 
     milestone: str
@@ -196,7 +196,7 @@ class PoseFix:
         inliers: (p,) which pairs agree with it.
         residuals_px: (p, 2) distances of both segment ends from the projected model line.
         rejected: (p,) why a pair was rejected, "" for inliers.
-        camera_step: (7,) by how much the camera is otherwise than believed, as the lines say; () for as believed.
+        camera_step: (7,) by how much the camera differs from what is believed, as the lines say; () for as believed.
         camera_covariance: (7, 7) of the camera then. camera_chi2: squared distance from what was believed.
     """
 

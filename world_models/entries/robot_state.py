@@ -26,7 +26,7 @@ class CameraState:
             of it, of the focal length; 0 where nobody has stated any. sigma_roll_rad, sigma_yaw_rad: the same.
         covariance: (7, 7) over :data:`~world_models.camera.CAMERA_UNKNOWNS`, once it is learnt from milestones, or ().
         counted: the poses (x [m], y [m], heading [rad], world) of the pictures by which it was learnt, the newest last.
-        told_lens, told_mount: both as they were told, once they were learnt otherwise.
+        nominal_lens, nominal_mount: both as they were set up, once they were learnt to be different.
     """
 
     lens: Camera
@@ -39,19 +39,19 @@ class CameraState:
     sigma_yaw_rad: float = 0.0
     covariance: tuple[tuple[float, ...], ...] = ()
     counted: tuple[tuple[float, ...], ...] = ()
-    told_lens: Camera | None = None
-    told_mount: CameraMount | None = None
+    nominal_lens: Camera | None = None
+    nominal_mount: CameraMount | None = None
 
     def moved(self, step: Sequence[float]) -> CameraState:
         """The state with its camera after a step (7,) of :data:`~world_models.camera.CAMERA_UNKNOWNS`."""
         lens, mount = move_camera(self.lens, self.mount, step)
-        return replace(self, lens=lens, mount=mount, told_lens=self.told_lens or self.lens,
-                       told_mount=self.told_mount or self.mount)
+        return replace(self, lens=lens, mount=mount, nominal_lens=self.nominal_lens or self.lens,
+                       nominal_mount=self.nominal_mount or self.mount)
 
-    def as_told(self) -> CameraState:
+    def as_nominal(self) -> CameraState:
         """The state before anything was learnt."""
-        return replace(self, lens=self.told_lens or self.lens, mount=self.told_mount or self.mount, covariance=(),
-                       counted=(), told_lens=None, told_mount=None)
+        return replace(self, lens=self.nominal_lens or self.lens, mount=self.nominal_mount or self.mount, covariance=(),
+                       counted=(), nominal_lens=None, nominal_mount=None)
 
     @cached_property
     def pinhole(self) -> Camera:
@@ -196,7 +196,7 @@ SCALES = (*[math.degrees(1.0)] * 3, 1000.0, 100.0, 1.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class CameraLesson:
-    """One thing about the camera that is otherwise than told.
+    """One way in which the camera differs from the nominal one.
 
     Attributes:
         what: which of :data:`~world_models.camera.CAMERA_UNKNOWNS`.
@@ -216,11 +216,11 @@ class CameraLesson:
         return f"camera {verb} {abs(self.off) * SCALES[i]:.2f} {unit} than told (+-{self.sigma * SCALES[i]:.2f})"
 
 
-def find_camera_lessons(told: CameraState, learnt: CameraState) -> tuple[CameraLesson, ...]:
-    """What is otherwise than told, surely and by enough to be worth telling; empty where nothing was learnt."""
+def find_camera_lessons(nominal: CameraState, learnt: CameraState) -> tuple[CameraLesson, ...]:
+    """What surely differs from the nominal camera, by enough to be worth telling; empty where nothing was learnt."""
     if not learnt.covariance:
         return ()
-    off = subtract_cameras(learnt.lens, learnt.mount, told.lens, told.mount)
+    off = subtract_cameras(learnt.lens, learnt.mount, nominal.lens, nominal.mount)
     sigmas = [math.sqrt(row[i]) for i, row in enumerate(learnt.covariance)]
     return tuple(
         CameraLesson(name, by, sigma)

@@ -116,7 +116,7 @@ class PlanSketch:
         verified: whether milestone ``at`` holds.
         status: active, done, halted before floor that is not seen, or superseded.
         is_look: whether it leads to where something that left no way can be looked at again, and not to the goal.
-        halts: so often in a row a leg was halted and the sketch drawn anew for it.
+        halts: so often in a row a leg was halted and the sketch drawn again for it.
         adjustments: how often plan-level servoing changed it.
     """
 
@@ -251,7 +251,7 @@ class Milestone:
         tried: headings from which it was looked for before, and could not be told [rad, world].
         displacement_modes: what of the model may be displaced as one: walls, doors, things; none where it is exact.
         displacements: by how much a standard deviation of a mode displaces a line: (mode, line, x, y, z [m, world]).
-        told: of each of these looks, the log odds of a wrong place; 0 where it told nothing.
+        log_odds_so_far: of a wrong place, by each of these looks; 0 where one said nothing.
         status: turning (not yet looking there), expected, verified, refuted, not testable, or withdrawn (what is
             known of the building has changed, and it rested on that).
     """
@@ -268,7 +268,7 @@ class Milestone:
     tried: tuple[float, ...] = ()
     displacement_modes: tuple[str, ...] = ()
     displacements: tuple[tuple[float, ...], ...] = ()
-    told: tuple[float, ...] = ()
+    log_odds_so_far: tuple[float, ...] = ()
     status: MilestoneStatus = "turning"
 
     @property
@@ -314,7 +314,7 @@ class Certificate:
         p_wrong: the probability of a wrong place by which the verdict was decided, with what was believed before.
         most_p_wrong: the bound on it that decided: up to it a place is verified; of what agrees too little for any
             place, from it on it is refuted.
-        faces, faces_alike: how many faces' colours were compared, and the part of them that is as the model says.
+        faces, faces_agreeing: how many faces' colours were compared, and the part of them that is as the model says.
     """
 
     milestone: str
@@ -334,7 +334,7 @@ class Certificate:
     p_wrong: float
     most_p_wrong: float
     faces: int = 0
-    faces_alike: float = 0.0
+    faces_agreeing: float = 0.0
 
     def sentence(self) -> str:
         shift = (f"{words.quantity(self.deviation_px, 'px')} of the {words.quantity(self.tolerance_px, 'px')} that may"

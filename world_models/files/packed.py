@@ -173,7 +173,7 @@ class PackedFrames(Mapping[str, LocaleFrame]):
         except (sqlite3.Error, ValueError) as error:
             raise WorldError(f"{path.name}: expected a compiled world, got: {error}") from None
         if (written := found[0][0] if found else None) != FORMAT:
-            raise WorldError(f"{path.name}: expected {FORMAT!r}, got {written!r}: compile it anew")
+            raise WorldError(f"{path.name}: expected {FORMAT!r}, got {written!r}: compile it again")
         with self.world_errors():
             self.sha256, self.about = str(found[0][1]), json.loads(_decompress(found[0][2]))
             self._names = dict.fromkeys(self.about["names"])

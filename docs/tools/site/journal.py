@@ -1,6 +1,6 @@
 """The reference of ``journal.jsonl``, and its JSON Schema, from the kinds of entries.
 
-``python -m docs.tools.fill`` writes both anew. Where a reader of the old journal would fail on the new
+``python -m docs.tools.fill`` writes both again. Where a reader of the old journal would fail on the new
 one, raise :data:`logs.run_directory.JOURNAL_VERSION` first.
 """
 

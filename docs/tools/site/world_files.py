@@ -41,7 +41,7 @@ LOCALES: Mapping[str, str] = {
     "height": "of its walls",
     "wall_heights": "a table: walls that are lower than the locale",
     "sky": "true: no ceiling",
-    "like": "another locale of this file, whose keys hold here unless given anew",
+    "like": "another locale of this file, whose keys hold here unless given again",
     "things": "a list of things; see below",
     "properties": "texts, numbers and flags of your own",
     "survey": "`{ sigma = ..., sigma_deg = ... }`: how well its frame's place and direction are known",

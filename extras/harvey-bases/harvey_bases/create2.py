@@ -514,7 +514,7 @@ class Create2Base(Driver):
 
         A jump that no wheel makes is doubted until it is told three times; then the report before it was the wrong one,
         which the weak checksum had let through, and going back there counts too, unless it is so far that the base must
-        have begun to count anew.
+        have begun to count again.
         """
         last, now_s = self._last, self._link.now()
         if last is not None:

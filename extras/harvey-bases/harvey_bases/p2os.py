@@ -502,7 +502,7 @@ class P2osBase(Driver):
                 self._give_up()
 
     def _give_up(self) -> None:
-        """Nothing is heard: say stop, in case that we still are, and greet it anew the next time."""
+        """Nothing is heard: say stop, in case that we still are, and greet it again the next time."""
         self._link.write(3 * encode(ESTOP))
         self._heard_s = -math.inf
         raise self._fault("silent", f"nothing heard for {PATIENCE_S:g} s")

@@ -59,7 +59,7 @@ def test_the_way_is_the_sum_of_what_the_wheels_count(
 def test_a_jump_is_doubted_until_there_was_time_for_it_or_it_is_told_three_times(
     jump_m: float, reports: int, counted: bool, side: str
 ) -> None:
-    """0.03 m and 0.6 m/s for each wheel; a jump of a metre is a base that counts anew."""
+    """0.03 m and 0.6 m/s for each wheel; a jump of a metre is a base that counts again."""
     base = HandMadeCreate()
     driver = connect(base)
     setattr(base, side, jump_m)

@@ -94,5 +94,5 @@ EXPORT = CliCommand(
      ("harvey world export campus --to campus.glb", "for Blender, or a viewer in a browser")),
     _export_arguments, _export,
     "Coordinates are metres in the building's frame, x to the east and y to the north; in glTF y is up.\n"
-    "An OUT that exists is written anew.",
+    "An OUT that exists is written again.",
 )

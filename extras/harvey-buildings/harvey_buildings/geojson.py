@@ -349,7 +349,7 @@ class _Reader:
             self._plan.report.left_out.append(f"{flat} things that hang flat on walls, or are in no room")
 
     def add_links(self) -> None:
-        """Elevators and stairs; their stops are chosen anew."""
+        """Elevators and stairs; their stops are chosen again."""
         for feature in self._of("link"):
             rooms = [self._rooms[room] for room in feature.names("between") if room in self._rooms]
             if len(rooms) == 2:

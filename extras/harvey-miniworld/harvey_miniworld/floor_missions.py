@@ -1,4 +1,4 @@
-"""Missions on generated floors: where from and where to, put down a little off, carried off, or with things in the way.
+"""Missions on generated floors: where from and where to, put down a little off, kidnapped, or with things in the way.
 
 ``python -m harvey_miniworld.floor_missions SEED [--row plain|kidnap|things] [--out RUN]`` drives one.
 """

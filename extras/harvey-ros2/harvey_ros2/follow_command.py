@@ -311,7 +311,7 @@ COMMAND = CliCommand(
     _arguments, _run,
     "Odometry and pictures of the bag come to the same board as in a mission; what drives is left out. A pose is\n"
     "certain only where a certificate vouches for it. A robot that goes on gets the transform from map to odometry as\n"
-    "long as that is so; rviz's 2D Pose Estimate begins anew; Ctrl-C ends it. The run is kept, with its journal:\n"
+    "long as that is so; rviz's 2D Pose Estimate begins again; Ctrl-C ends it. The run is kept, with its journal:\n"
     "harvey replay, why and story work as for a mission. A video has no odometry: from one picture to the next the\n"
     "robot may have gone anywhere at about half a metre a second; once lost it is seldom found. Exit code 0: in the\n"
     "end it knows where the robot is, by pictures; 1: it does not, or is lost; 2: bad input.",

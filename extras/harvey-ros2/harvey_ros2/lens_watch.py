@@ -63,7 +63,7 @@ class LensWatch:
         sigma = max(statistics.median(sigma for _, sigma in self.offs), spread)
         if abs(off) <= MOST_DEVIATIONS * sigma:
             return ""
-        return (f"the lens bends otherwise than is told: by the lines of {len(self.offs)} pictures its first term, k1, "
+        return (f"the lens bends differently than told: by the lines of {len(self.offs)} pictures its first term, k1, "
                 f"is off by {off:+.3f} +- {sigma:.3f}: no certificate counts")
 
 

@@ -55,7 +55,7 @@ def follow_robot(
             last: Pose2 | None = None
             for time_s, counted, jpeg in pair_with_odometry(stream.items()):
                 if company.first_pose is not None:
-                    onlooker.close("somebody said where it is, and it begins anew")
+                    onlooker.close("somebody said where it is, and it begins again")
                     there, company.first_pose = company.first_pose, None
                     out = _next(out)
                     onlooker = _begin(company, world, robot, _to_guess(known, there), out, hear)
@@ -97,7 +97,7 @@ def _to_guess(world: World, there: Pose2) -> FirstGuess:
 
 
 def _next(out: Path) -> Path:
-    """A directory for the run that begins anew."""
+    """A directory for the run that begins again."""
     number = 2
     while (there := out.with_name(f"{out.name}-{number}")).exists():
         number += 1

@@ -49,7 +49,7 @@ MIN_P_WRONG, MIN_EXPECTED = 0.95, 8
 MOST_SIGMA_M, MOST_SIGMA_RAD = 0.8, 0.3
 """A belief that is less sure is none."""
 MOST_GLIMPSES = 8
-"""After so many looks that did not tell the place, the search begins anew: the robot has gone on meanwhile."""
+"""After so many looks that did not tell the place, the search begins again: the robot has gone on meanwhile."""
 
 
 UNCOUNTED_M_PER_S, UNCOUNTED_RAD_PER_S = 0.5, 0.8
@@ -169,7 +169,7 @@ class ClaimReckoner(RobotKnowledgeSource):
     """Moves the belief by what the wheels of a robot report that somebody else drives, and keeps the way it came.
 
     The heading is the camera's less a yaw that is not exactly known: by that, too, the robot may have come aside.
-    What pictures correct of it is summed, and held against what wheels can err.
+    What pictures correct of it is summed, and compared with what wheels can err.
     """
 
     level, priority = Level.ACTION, Priority.ENTER
@@ -237,7 +237,7 @@ class LossDeclarer(RobotKnowledgeSource):
     """Declares a robot lost that somebody else drives: contradicted twice, or hardly known any more where it is.
 
     One picture that contradicts the place may be of somebody who walks by: what it leaves open at the plan level ends
-    with the next one. Where a search has not told the place in so many looks, it begins anew: after one where nothing
+    with the next one. Where a search has not told the place in so many looks, it begins again: after one where nothing
     is known of the way from one look to the next.
     """
 

@@ -50,7 +50,7 @@ class LeastDelay:
 
 
 class OdometryFault(Exception):
-    """What could mislead, in words. The next message begins anew."""
+    """What could mislead, in words. The next message begins again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,7 @@ class OdometryReader:
         return self._delay.above_s > self._late_s
 
     def forget(self) -> None:
-        """Begin anew with the next message."""
+        """Begin again with the next message."""
         self._last = None
 
     def _compare(self, last: Counted, found: Counted) -> Counted | None:

@@ -1,4 +1,4 @@
-"""How late pictures are: what they say of a motion is held against the odometry of a while before.
+"""How late pictures are: what they say of a motion is compared with the odometry of a while before.
 
 Stamps that are given on arrival, or by another clock, are late by what nobody says. At a constant speed that moves
 every place by the same; where the robot starts, turns and stops, pictures and odometry disagree for that while.

@@ -54,7 +54,7 @@ class PipeMessages:
         return self._link.now()
 
     def picture_age_s(self) -> float | None:
-        """Pictures come otherwise."""
+        """Pictures come differently."""
         return None
 
     def reopen(self) -> None:

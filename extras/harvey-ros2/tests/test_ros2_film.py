@@ -1,4 +1,4 @@
-"""Pictures without odometry: followed from one to the next, certain only where that is right, lost when carried off."""
+"""Pictures without odometry: followed from one to the next, certain only where that is right, lost when kidnapped."""
 
 from __future__ import annotations
 

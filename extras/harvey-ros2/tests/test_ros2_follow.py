@@ -1,4 +1,4 @@
-"""Localizer mode on recordings that another controller drove: certain only where it is right, lost when carried off."""
+"""Localizer mode on recordings that another controller drove: certain only where it is right, lost when kidnapped."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def list_states(told: list[TimedMessage]) -> list[tuple[float, str]]:
 
 @pytest.fixture(scope="module")
 def carried_off(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Truth]:
-    """A recording in which somebody carries the robot off and turns it."""
+    """A recording in which somebody kidnaps the robot and turns it."""
     folder = tmp_path_factory.mktemp("bags") / "carried"
     kidnap = Kidnap(after_m=2.0, forward_m=2.0, left_m=0.3, turn_rad=math.radians(50.0))
     return folder, drive_bag(folder, WAY, faults=(kidnap,))
@@ -68,7 +68,7 @@ def test_carried_off_it_is_lost_within_three_seconds_and_finds_itself(
     assert check_poses([item for item in told if not jumps[0] - began_s <= item.time_s < found_s], truth, began_s) > 25
     inside = [item for item in told if lost_s <= item.time_s < found_s]
     assert not any(item.topic == "/tf" for item in inside)
-    # Between the moment when it is carried off and the first picture after it nobody can know.
+    # Between the moment when it is kidnapped and the first picture after it nobody can know.
     wrong = [item for item in told if item.topic == "harvey/pose" and item.message.pose.covariance[0] < 1e6
              and jumps[0] - began_s <= item.time_s < found_s]
     assert wrong == []
@@ -106,7 +106,7 @@ def test_a_camera_that_is_mounted_otherwise_than_the_recording_says_is_learnt_on
 
 
 def repeat(change: bool) -> Callable[[float, bytes], tuple[float, bytes]]:
-    """From 5 s on one picture again and again with new stamps; or changed, by noise and compressed anew."""
+    """From 5 s on one picture again and again with new stamps; or changed, by noise and compressed again."""
     kept: list[bytes] = []
 
     def seen(time_s: float, jpeg: bytes) -> tuple[float, bytes]:

@@ -272,7 +272,7 @@ class DenningBase(Driver):
         why = " ".join(answer.words)
         if answer.words[:1] == ("session",):
             self._token, self._unresolved = NOBODY, False
-            raise self._fault("disconnected", "the base has begun anew and knows nothing of us", stopped=True)
+            raise self._fault("disconnected", "the base has begun again and knows nothing of us", stopped=True)
         if answer.words[:1] == ("range",):
             self._unresolved = False
             self._seq -= 1
@@ -287,8 +287,8 @@ class DenningBase(Driver):
     def _report(self, answer: Packet) -> MotionReport:
         self._unresolved = False
         if self._so_far is None or not answer.words:
-            told = " ".join(answer.words)
-            raise self._fault("nonsense", f"expected DONE with five words, got {told!r}", stopped=True)
+            received = " ".join(answer.words)
+            raise self._fault("nonsense", f"expected DONE with five words, got {received!r}", stopped=True)
         if answer.words[0] == "watchdog":
             raise self._fault("watchdog", "it heard too little of us and stopped by itself", stopped=True)
         if answer.words[0] == "stalled":

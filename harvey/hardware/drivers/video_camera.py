@@ -59,7 +59,7 @@ class Health:
 
 
 class _Pace:
-    """When pictures come; a camera that is opened anew counts its time anew."""
+    """When pictures come; a camera that is opened again counts its time again."""
 
     def __init__(self) -> None:
         self._intervals: deque[float] = deque(maxlen=INTERVALS)

@@ -8,14 +8,14 @@ from knowledge_sources.methods.belief.odds import (
     Alike, Look, add_looks, measure_common, to_log_odds, to_probability, update,
 )
 from knowledge_sources.methods.belief.places import (
-    BelievedPlace, MAX_CAMERA_CHI2, MAX_TOLD_CHI2, MIN_P_BELIEVED, TOLD_SIGMA_M, TOLD_SIGMA_RAD, bound_p_rivals,
+    BelievedPlace, MAX_CAMERA_CHI2, MAX_SLIP_CHI2, MIN_P_BELIEVED, SLIP_SIGMA_M, SLIP_SIGMA_RAD, bound_p_aliases,
     compute_chi2,
-    compute_p_rivals,
+    compute_p_aliases,
 )
 
 __all__ = [
-    "MAX_CAMERA_CHI2", "MAX_TOLD_CHI2", "MIN_P_BELIEVED", "TOLD_SIGMA_M", "TOLD_SIGMA_RAD", "Alike", "BelievedPlace",
+    "MAX_CAMERA_CHI2", "MAX_SLIP_CHI2", "MIN_P_BELIEVED", "SLIP_SIGMA_M", "SLIP_SIGMA_RAD", "Alike", "BelievedPlace",
     "Look",
-    "add_looks", "bound_p_rivals", "compute_chi2", "compute_p_rivals", "measure_common", "to_log_odds",
+    "add_looks", "bound_p_aliases", "compute_chi2", "compute_p_aliases", "measure_common", "to_log_odds",
     "to_probability", "update",
 ]

@@ -254,12 +254,12 @@ class LeafEvidence:
         """What the log odds of a leaf are a sum of, each with its weight of :data:`WEIGHTS`."""
         foot = 0.0 if math.isnan(self.foot) else self.foot
         is_expected = not math.isnan(self.foot + self.expected_foot)
-        told = min(1.0, self.expected_foot / FULL_FOOT) if is_expected else 0.0
+        confirmed = min(1.0, self.expected_foot / FULL_FOOT) if is_expected else 0.0
         alike = max(0.0, 1.0 - foot / ALIKE_FOOT)
         one = max(0.0, (self.uniform - LEAST_UNIFORM) / (1.0 - LEAST_UNIFORM))
         return (
             one, one * (1.0 - self.expected_uniform), 1.0 - self.uniform, self.agreeing,
-            self.agreeing * (1.0 - self.expected_uniform), told * alike, min(1.0, foot / FULL_FOOT), 1.0)
+            self.agreeing * (1.0 - self.expected_uniform), confirmed * alike, min(1.0, foot / FULL_FOOT), 1.0)
 
 
 FULL_FOOT, ALIKE_FOOT, LEAST_UNIFORM = 0.3, 0.2, 0.7
@@ -341,7 +341,7 @@ def weigh_leaf(evidence: LeafEvidence) -> float:
     """The log likelihood ratio of a leaf against an open doorway, as much as one picture may say.
 
     A leaf stands in its frame: where what is round the opening is not as the model has it, or has the color of the
-    opening, something may stand before it. And nothing speaks for a leaf seen aslant: an open doorway shows little but
+    opening, something may stand before it. And nothing supports a leaf seen diagonally: an open doorway shows but
     its jamb and a bare wall from there. What a rival explains better says nothing: what is beyond, in other colors than
     the model has; or a leaf that is ajar, which is neither shut nor open.
     """

@@ -33,11 +33,11 @@ TRIM = 9.0
 ROUNDS = 4
 
 
-def compute_looks(colours: Floats | NDArray[np.float32]) -> Floats:
+def compute_appearance(colours: Floats | NDArray[np.float32]) -> Floats:
     """Logarithm of the brightness, and red and blue as parts of it, (..., 3), of colours (..., 3) of 0..255."""
     total = colours[..., 0].astype(float) + colours[..., 1] + colours[..., 2] + DARK
-    looks = np.stack([np.log(total), (colours[..., 0] + DARK / 3.0) / total, (colours[..., 2] + DARK / 3.0) / total])
-    return np.moveaxis(looks, 0, -1)  # each of the three lies together in memory: they are asked one by one
+    parts = np.stack([np.log(total), (colours[..., 0] + DARK / 3.0) / total, (colours[..., 2] + DARK / 3.0) / total])
+    return np.moveaxis(parts, 0, -1)  # each of the three lies together in memory: they are asked one by one
 
 
 def default_covariance() -> Floats:
@@ -45,8 +45,8 @@ def default_covariance() -> Floats:
     return np.diag([MIN_BRIGHTNESS_SIGMA**2, MIN_CHROMA_SIGMA**2, MIN_CHROMA_SIGMA**2])
 
 
-def fit_looks(
-    looks: Floats, expected: Floats, is_learnt: bool, max_chroma_error: float | None = None
+def fit_appearance(
+    appearance: Floats, expected: Floats, is_learnt: bool, max_chroma_error: float | None = None
 ) -> tuple[Floats, Floats] | None:
     """Mean (3,) and covariance (3, 3) of the looks (n, 3) of a floor in one picture; None where it is not to be seen.
 
@@ -59,7 +59,7 @@ def fit_looks(
         max_chroma_error: in place of that of the settings.
     """
     limit = MAX_CHROMA_ERROR if max_chroma_error is None else max_chroma_error
-    near = np.ascontiguousarray(looks.compress(_has_hue(looks, expected, limit), axis=0).T)  # (3, n): far faster
+    near = np.ascontiguousarray(appearance.compress(_has_hue(appearance, expected, limit), axis=0).T)  # (3, n), faster
     if near.shape[1] < MIN_FLOOR_PIXELS:
         return None
     least = default_covariance()
@@ -74,18 +74,18 @@ def fit_looks(
     return mean, covariance
 
 
-def measure_unlike(looks: Floats, mean: Floats, covariance: Floats) -> Floats:
+def measure_unlike(appearance: Floats, mean: Floats, covariance: Floats) -> Floats:
     """Squared Mahalanobis distance (...) of looks (..., 3) from the floor's."""
     information = np.linalg.inv(covariance)
-    off = [looks[..., part] - mean[part] for part in range(3)]
-    squares = np.zeros(looks.shape[:-1])
+    off = [appearance[..., part] - mean[part] for part in range(3)]
+    squares = np.zeros(appearance.shape[:-1])
     for i, j in np.argwhere(information):  # 3 of 9 where the parts are independent; ten times as fast as einsum
         squares += off[i] * information[i, j] * off[j]
     return squares
 
 
 def find_floor_in_shade(
-    looks: Floats, here: NDArray[np.bool_], mean: Floats, covariance: Floats
+    appearance: Floats, here: NDArray[np.bool_], mean: Floats, covariance: Floats
 ) -> NDArray[np.bool_]:
     """Which pixels (rows, columns) of ``here`` look like the floor, or like it in other light.
 
@@ -94,13 +94,13 @@ def find_floor_in_shade(
     thing they do.
 
     Args:
-        looks: (rows, columns, 3); mean, covariance: the floor's.
+        appearance: (rows, columns, 3); mean, covariance: the floor's.
     """
     alike = np.zeros(here.shape, bool)
-    alike[here] = measure_unlike(looks[here], mean, covariance) <= MAX_UNLIKE**2
-    may_be = here & _has_hue(looks, mean, MAX_SHADE_CHROMA)
+    alike[here] = measure_unlike(appearance[here], mean, covariance) <= MAX_UNLIKE**2
+    may_be = here & _has_hue(appearance, mean, MAX_SHADE_CHROMA)
     around, sigmas = np.ones((3, 3), np.uint8), np.sqrt(np.diag(covariance))
-    for part, sigma in zip(np.moveaxis(looks.astype(np.float32), -1, 0), sigmas, strict=True):
+    for part, sigma in zip(np.moveaxis(appearance.astype(np.float32), -1, 0), sigmas, strict=True):
         may_be &= cv2.dilate(part, around) - cv2.erode(part, around) <= MAX_SHADE_STEP * sigma
     _, parts = cv2.connectedComponents(((here & alike) | may_be).astype(np.uint8), connectivity=4)
     reached = np.zeros(int(parts.max()) + 1, bool)
@@ -118,10 +118,10 @@ def learn_appearance(
     """
     if len(colours) < MIN_FLOOR_PIXELS:
         return known
-    looks = compute_looks(colours)
+    appearance = compute_appearance(colours)
     mean = np.median(colours, axis=0)
     least = default_covariance()
-    spread = np.percentile(np.abs(looks - np.median(looks, axis=0)), 68.0, axis=0)
+    spread = np.percentile(np.abs(appearance - np.median(appearance, axis=0)), 68.0, axis=0)
     covariance = np.maximum(np.diag(spread**2), least)
     weight, before = float(len(colours)), 0.0
     if known is not None and known.samples > 0.0:
@@ -135,16 +135,16 @@ def learn_appearance(
         min(before + weight, MAX_SAMPLES))
 
 
-def _has_hue(looks: Floats, expected: Floats, limit: float) -> NDArray[np.bool_]:
+def _has_hue(appearance: Floats, expected: Floats, limit: float) -> NDArray[np.bool_]:
     """Which of the looks (..., 3) have the red and the blue of the expected ones (3,), within the limit."""
-    red, blue = (np.abs(looks[..., part] - expected[part]) <= limit for part in (1, 2))
+    red, blue = (np.abs(appearance[..., part] - expected[part]) <= limit for part in (1, 2))
     return np.asarray(red & blue)
 
 
-def _find_mode(looks: Floats, expected: Floats | None, least: Floats) -> Floats:
+def _find_mode(appearance: Floats, expected: Floats | None, least: Floats) -> Floats:
     """The most frequent brightness of looks (n, 3) and the median hue there; near what was learnt, if anything was."""
     sigma = math.sqrt(least[0, 0])
-    values = looks[:, 0]
+    values = appearance[:, 0]
     if expected is not None:
         near = np.abs(values - expected[0]) <= 6.0 * sigma
         values = values[near] if np.count_nonzero(near) > len(values) // 4 else values
@@ -152,5 +152,5 @@ def _find_mode(looks: Floats, expected: Floats | None, least: Floats) -> Floats:
     wide = np.convolve(counts, np.ones(3), "same")
     best = int(np.argmax(wide))
     middle = 0.5 * (edges[best] + edges[best + 1])
-    there = np.abs(looks[:, 0] - middle) <= 2.0 * sigma
-    return np.median(looks[there], axis=0) if there.any() else np.median(looks, axis=0)
+    there = np.abs(appearance[:, 0] - middle) <= 2.0 * sigma
+    return np.median(appearance[there], axis=0) if there.any() else np.median(appearance, axis=0)

@@ -83,7 +83,7 @@ def place(world: Building, obstacle: Obstacle, shape: shapely.Geometry) -> Obsta
                    width_m=round(measure_width_m(obstacle.footprint), 3))
 
 
-def move_thing(world: Building, thing: Obstacle, by: Pose2, off_m: float, told: str) -> Obstacle:
+def move_thing(world: Building, thing: Obstacle, by: Pose2, off_m: float, evidence: str) -> Obstacle:
     """A thing that is moved on the floor: ``by``, in the world; it was seen by a belief that was ``off_m`` wrong.
 
     How much of that the belief was wrong already when it was seen, is not known: half of it is added to its deviation.
@@ -91,15 +91,15 @@ def move_thing(world: Building, thing: Obstacle, by: Pose2, off_m: float, told: 
     def move(corners: Corners) -> Corners:
         return tuple((round(float(x), 3), round(float(y), 3)) for x, y in by.apply(corners)) if corners else ()
 
-    moved = replace(thing, footprint=move(thing.footprint), core=move(thing.core), evidence=told,
+    moved = replace(thing, footprint=move(thing.footprint), core=move(thing.core), evidence=evidence,
                     sigma_m=round(math.hypot(thing.sigma_m, 0.5 * off_m), 4))
     return place(world, moved, build_polygon(moved.footprint))
 
 
-def doubt_thing(thing: Obstacle, told: str) -> Obstacle:
+def doubt_thing(thing: Obstacle, evidence: str) -> Obstacle:
     """A thing that was seen there, or elsewhere, one as likely as the other."""
     certainty = 0.5 * thing.certainty
-    return replace(thing, certainty=certainty, evidence=told, status=tell_status(certainty))
+    return replace(thing, certainty=certainty, evidence=evidence, status=tell_status(certainty))
 
 
 def find_room(world: Building, shape: shapely.Polygon, near: str) -> str:

@@ -22,7 +22,7 @@ from world_models.camera import NEAR_PLANE_M, Camera, CameraMount
 from world_models.frames import Pose2
 
 Grey = NDArray[np.float32]
-UNTOLD, FLAT, STANDING = range(3)
+UNCONFIRMED, FLAT, STANDING = range(3)
 
 HALF = 3
 """Patches are squares of 2 HALF + 1 pixels of the reduced picture."""
@@ -30,10 +30,10 @@ REACH = 2 * HALF + 3
 """Side of the square round a pixel that its patch shows, and a little more."""
 MIN_DEVIATION = 3.0
 """A patch with less contrast than this [grey levels] tells nothing."""
-MIN_ALIKE = 0.6
+MIN_LIKENESS = 0.6
 """Least correlation of two patches by which anything is told."""
 MIN_LEAD = 0.25
-"""Least lead over the correlations of all that it may be otherwise."""
+"""Least lead over the correlations of all that it may be different."""
 MIN_APART_PX = 2.5
 """What stands is told from what lies flat where it was at least so far from there, in the reduced earlier picture."""
 PARTS = (0.93, 0.86, 0.79, 0.72, 0.65, 0.57, 0.49, 0.41)
@@ -149,7 +149,7 @@ class Relief:
     """What an earlier picture tells of the pixels of a grid.
 
     Attributes:
-        kinds: (rows, columns) UNTOLD, FLAT (on the floor, or mirrored in it, or of the model), or STANDING.
+        kinds: (rows, columns) UNCONFIRMED, FLAT (on the floor, or mirrored in it, or of the model), or STANDING.
         parts: (rows, columns) how far what stands is, as a part of the distance of the floor that it hides; above 1
             what is mirrored in the floor; else 1.
         gains_px: (rows, columns) what is at a part p of that distance was ``gain * (1 / p - 1)`` from where the floor
@@ -163,21 +163,21 @@ class Relief:
     def beside(self, model: NDArray[np.bool_]) -> Relief:
         """The same without what stands where a patch shows a part of the model (rows, columns) that is no floor."""
         near = cv2.dilate(model.astype(np.uint8), np.ones((REACH, REACH), np.uint8)) > 0
-        kinds = np.where((self.kinds == STANDING) & near, UNTOLD, self.kinds).astype(np.uint8)
+        kinds = np.where((self.kinds == STANDING) & near, UNCONFIRMED, self.kinds).astype(np.uint8)
         return replace(self, kinds=kinds)
 
-    def agreeing(self, other: Relief | None, asked: NDArray[np.bool_]) -> Relief:
+    def agreeing(self, other: Relief | None, tested: NDArray[np.bool_]) -> Relief:
         """The same without what stands, where that is asked (rows, columns), unless another relief of the same picture
         tells it to stand about there and about as far away: by chance a texture is like itself. None: there is none.
         """
         if other is None:
-            return replace(self, kinds=np.where((self.kinds == STANDING) & asked, UNTOLD, self.kinds))
+            return replace(self, kinds=np.where((self.kinds == STANDING) & tested, UNCONFIRMED, self.kinds))
         around = np.ones((REACH - 2 * HALF + 2, REACH - 2 * HALF + 2), np.uint8)
         agreed = np.zeros(self.kinds.shape, bool)
         for near, part, far in zip((1.0, *PARTS), PARTS, (*PARTS[1:], 0.0), strict=False):
             there = (other.kinds == STANDING) & (other.parts <= np.float32(near)) & (other.parts >= np.float32(far))
             agreed |= (self.parts == np.float32(part)) & (cv2.dilate(there.astype(np.uint8), around) > 0)
-        return replace(self, kinds=np.where((self.kinds == STANDING) & asked & ~agreed, UNTOLD, self.kinds))
+        return replace(self, kinds=np.where((self.kinds == STANDING) & tested & ~agreed, UNCONFIRMED, self.kinds))
 
     def tells_of(self, parts: Floats) -> NDArray[np.bool_]:
         """Where what is at such parts (rows, columns) of the distance is told from the floor, if there is texture; and
@@ -216,31 +216,31 @@ def find_relief(
         plane = both.find_map(depth)
         if plane is None:
             continue
-        alike = sweep.compare(plane)
-        alike[gains * abs(1.0 / depth - 1.0) < MIN_APART_PX] = -1.0
+        likeness = sweep.compare(plane)
+        likeness[gains * abs(1.0 / depth - 1.0) < MIN_APART_PX] = -1.0
         if depth > 1.0:
-            depths[alike > lying] = depth
-            lying = np.maximum(lying, alike)
+            depths[likeness > lying] = depth
+            lying = np.maximum(lying, likeness)
         else:
             if modelled is not None:
                 is_modelled = depth * both.grid.ranges_m >= modelled.standing_m - MODEL_GAP_M
-                lying = np.where(is_modelled, np.maximum(lying, alike), lying)
-                alike[is_modelled] = -1.0
-            is_best = alike > standing
-            standing[is_best], parts[is_best] = alike[is_best], depth
-    asked = sweep.tells & is_floor & (lying > -1.0)
-    agreeing, least = np.count_nonzero(lying[asked] >= MIN_ALIKE), MIN_AGREEING * np.count_nonzero(asked)
+                lying = np.where(is_modelled, np.maximum(lying, likeness), lying)
+                likeness[is_modelled] = -1.0
+            is_best = likeness > standing
+            standing[is_best], parts[is_best] = likeness[is_best], depth
+    tested = sweep.tells & is_floor & (lying > -1.0)
+    agreeing, least = np.count_nonzero(lying[tested] >= MIN_LIKENESS), MIN_AGREEING * np.count_nonzero(tested)
     if modelled is not None:  # things are not known by their looks, and may fill most of the picture
-        stands = (standing >= MIN_ALIKE) & (standing - lying >= MIN_LEAD)
-        least = max(MIN_AGREEING * np.count_nonzero(asked & ~stands), MIN_BESIDE_THINGS * np.count_nonzero(asked))
+        stands = (standing >= MIN_LIKENESS) & (standing - lying >= MIN_LEAD)
+        least = max(MIN_AGREEING * np.count_nonzero(tested & ~stands), MIN_BESIDE_THINGS * np.count_nonzero(tested))
     if agreeing < least:
         return None
     kinds = np.zeros(sweep.shape, np.uint8)
     for kind, own, other in ((FLAT, lying, standing), (STANDING, standing, lying)):
-        kinds[sweep.tells & (own >= MIN_ALIKE) & (own - other >= MIN_LEAD)] = kind
-    kinds[(kinds == STANDING) & (sweep.measure_texture_along(away) < MIN_ALONG)] = UNTOLD
+        kinds[sweep.tells & (own >= MIN_LIKENESS) & (own - other >= MIN_LEAD)] = kind
+    kinds[(kinds == STANDING) & (sweep.measure_texture_along(away) < MIN_ALONG)] = UNCONFIRMED
     if modelled is not None:
-        kinds[(kinds == STANDING) & modelled.was_hidden(both)] = UNTOLD
+        kinds[(kinds == STANDING) & modelled.was_hidden(both)] = UNCONFIRMED
     is_mirrored = (kinds == FLAT) & (lying - on_floor >= MIN_LEAD)
     parts = np.where(kinds == STANDING, parts, np.where(is_mirrored, depths, np.float32(1.0)))
     return Relief(kinds, parts, gains)
@@ -262,20 +262,20 @@ def _align(both: TwoPictures, is_floor: NDArray[np.bool_], sigmas: Floats) -> Tw
     """
     now, earlier = (np.asarray(cv2.pyrDown(grey), np.float32) for grey in (both.picture[both.grid.top:], both.earlier))
     sweep = _Sweep(now, earlier)
-    asked = sweep.tells & is_floor[::2, ::2]
-    contrast = _measure_contrast(now)[asked]
+    tested = sweep.tells & is_floor[::2, ::2]
+    contrast = _measure_contrast(now)[tested]
 
     def see(change: Floats) -> Floats:
-        """The contrast of the earlier picture where it is asked, if the motion was otherwise; NaN beside it."""
+        """The contrast of the earlier picture where it is asked, if the motion was different; NaN beside it."""
         floor = both._replace(earlier_from_now=_changed(both.earlier_from_now, change)).find_map(1.0)
         if floor is None:
             return np.full(len(contrast), np.nan)
         seen = sweep.warp(np.diag([0.5, 0.5, 1.0]) @ floor @ np.diag([2.0, 2.0, 1.0]))
-        return np.where(_blur(seen)[asked] < 0.0, np.nan, _measure_contrast(seen)[asked])
+        return np.where(_blur(seen)[tested] < 0.0, np.nan, _measure_contrast(seen)[tested])
 
     change, prior = np.zeros(3), np.diag(1.0 / np.square(np.maximum(sigmas, LEAST_SIGMAS)))
     information = prior
-    for _ in range(ALIGN_ROUNDS if asked.any() else 0):
+    for _ in range(ALIGN_ROUNDS if tested.any() else 0):
         base, *others = (see(change + step) for step in (np.zeros(3), *np.diag(ALIGN_STEPS)))
         slopes = np.stack([(other - base) / step for other, step in zip(others, ALIGN_STEPS, strict=True)], axis=1)
         seen = np.isfinite(slopes).all(axis=1)
@@ -347,9 +347,9 @@ class _Sweep:
         seen = self.warp(plane)
         mean = _blur(seen)
         deviation = np.sqrt(np.maximum(_blur(seen * seen) - mean * mean, 0.0))
-        alike = (_blur(self._now * seen) - self._mean * mean) / np.maximum(self._deviation * deviation, 1.0)
-        alike[mean < 0.0] = -1.0
-        return np.asarray(alike, np.float32)
+        likeness = (_blur(self._now * seen) - self._mean * mean) / np.maximum(self._deviation * deviation, 1.0)
+        likeness[mean < 0.0] = -1.0
+        return np.asarray(likeness, np.float32)
 
 
 @lru_cache(maxsize=4)

@@ -15,10 +15,10 @@ from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.methods.features import compute_mean_and_deviation, is_dark, read_picture
 from knowledge_sources.methods.floor.appearance import (
     MAX_CHROMA_ERROR,
-    compute_looks,
+    compute_appearance,
     default_covariance,
     find_floor_in_shade,
-    fit_looks,
+    fit_appearance,
     learn_appearance,
 )
 from knowledge_sources.methods.floor.model_floor import (
@@ -62,7 +62,7 @@ P_SEEN_ONCE = 0.7  # probability that what does not look like the floor stands o
 MAX_P_SEEN_ONCE = 0.95  # no picture alone makes a thing more certain, whatever it shows
 P_LIKE_FLOOR = 0.015  # the same of what looks like the floor, and seems to stand up from it
 MIN_UNLIKE_SHARE = 0.2  # of a region of which less than that does not look like the floor, all is said to look like it
-TOLD_HEIGHT_M = 0.3  # what looks like the floor is said to be told where something so high would be
+CONFIRMED_HEIGHT_M = 0.3  # what looks like the floor is said to be told where something so high would be
 DOUBT_MARGIN_M = 0.15  # floor so near beside what one earlier picture alone tells to stand is not seen to be free
 MIN_DOUBTFUL_ROWS = 10  # of a column of the picture at half its size, from which that is so
 PART_SIGMA = 0.05  # of the part of the floor's distance at which the earlier picture shows a thing
@@ -140,18 +140,18 @@ def see_free_floor(
     compare = _Comparison(robot, grid, model, unlike, picture, floor_m)
     alike = [seen for seen in earlier if abs(wrap_angle(seen.since.moved.heading_rad)) <= MAX_TURNED_RAD]
     relief = compare(alike[0]) if s.use_parallax and alike else None
-    asked = tells
+    tested = tells
     if relief is not None and model.is_unknown.any():  # the motion alone tells what stands there
         by_motion = model.is_unknown | ~model.is_plain
         elsewhere = [seen for seen in alike if seen.pose.distance_to(alike[0].pose) >= FLOOR_VIEW_DISTANCE_M]
         again = compare(elsewhere[0]) if elsewhere and (by_motion & (relief.kinds == STANDING)).any() else None
-        told = model.is_unknown & relief.tells_of(np.full(grid.shape, _told_part(grid)))
+        confirmed = model.is_unknown & relief.tells_of(np.full(grid.shape, _find_confirmed_part(grid)))
         sure = relief.agreeing(again, by_motion)
         doubtful = drop_specks((relief.kinds == STANDING) & (sure.kinds != STANDING))
-        told &= grid.ranges_m < _keep_off(np.where(doubtful, relief.parts * grid.ranges_m, np.inf), robot)
+        confirmed &= grid.ranges_m < _keep_off(np.where(doubtful, relief.parts * grid.ranges_m, np.inf), robot)
         relief = sure
-        asked, tells = tells | by_motion, tells | told
-    regions = find_regions(unlike, asked, grid, relief)
+        tested, tells = tells | by_motion, tells | confirmed
+    regions = find_regions(unlike, tested, grid, relief)
     reliefs = [] if relief is None else [relief]
     if reliefs and len(alike) > 1 and any(not (region.mask & unlike).any() for region in regions):
         again = compare(alike[1])  # what looks like the floor is compared with one more picture
@@ -165,7 +165,7 @@ def see_free_floor(
         bearings_rad=tuple(round(math.remainder(pose.heading_rad + b, math.tau), 5) for b in scan.bearings_rad),
         near_m=scan.near_m, far_m=scan.far_m, ends=scan.ends, sigma_m=scan.sigma_m,
         things=tuple(thing for _, thing in things), seen_s=seen_s, light=light,
-        told_m=_measure_told_m(grid, relief)), learnt
+        confirmed_m=_measure_confirmed_m(grid, relief)), learnt
 
 
 def _keep_off(doubtful_m: Floats, robot: RobotModel) -> Floats:
@@ -218,7 +218,7 @@ def find_unlike(
 
     The floor with most pixels tells how bright the picture is; a floor of which little is seen is compared by that.
     """
-    looks = compute_looks(cv2.GaussianBlur(np.asarray(picture), (3, 3), 0.6).astype(np.float32))
+    appearance = compute_appearance(cv2.GaussianBlur(np.asarray(picture), (3, 3), 0.6).astype(np.float32))
     unlike, tells = np.zeros(model.kinds.shape, bool), np.zeros(model.kinds.shape, bool)
     light: Light | None = None
     shift: Floats | None = None  # of this picture's looks from the model's: its exposure, and a tint where it has one
@@ -227,14 +227,14 @@ def find_unlike(
         if np.isnan(model.colours[kind]).any():
             continue
         here = model.is_plain & (model.kinds == kind)
-        by_model = compute_looks(255.0 * model.colours[kind])
+        by_model = compute_appearance(255.0 * model.colours[kind])
         if shift is None:
-            guesses = [(compute_looks(np.array(known.mean)), True)] if known and known.samples > 0.0 else []
+            guesses = [(compute_appearance(np.array(known.mean)), True)] if known and known.samples > 0.0 else []
             if last_light is None:
                 guesses += [(by_model, False)]
             else:
                 guesses += [(by_model + last_light, True), (by_model + last_light, False)]
-            fitted = _fit_most(looks, here, guesses, may_be_tinted=last_light is None)
+            fitted = _fit_most(appearance, here, guesses, may_be_tinted=last_light is None)
             if fitted is None:
                 continue
             mean, covariance = fitted
@@ -244,37 +244,37 @@ def find_unlike(
                 shift[1:] = 0.0
         else:
             expected = by_model + shift
-            mean, covariance = fit_looks(looks[here], expected, True) or (
+            mean, covariance = fit_appearance(appearance[here], expected, True) or (
                 expected, 4.0 * default_covariance())
-        unlike |= here & ~find_floor_in_shade(looks, here, mean, covariance)
+        unlike |= here & ~find_floor_in_shade(appearance, here, mean, covariance)
         tells |= here
     return unlike, tells, light
 
 
 def _fit_most(
-    looks: Floats, here: NDArray[np.bool_], guesses: Sequence[tuple[Floats, bool]], *,
+    appearance: Floats, here: NDArray[np.bool_], guesses: Sequence[tuple[Floats, bool]], *,
     may_be_tinted: bool
 ) -> tuple[Floats, Floats] | None:
     """Mean and covariance of the looks of the floor ``here``, by the first of the guesses (as ``expected`` and
-    ``is_learnt`` of :func:`fit_looks`) that some of it agrees with; None where its looks are not known.
+    ``is_learnt`` of :func:`fit_appearance`) that some of it agrees with; None where its looks are not known.
 
     Where hardly any of it agrees, the camera's white balance may differ from the model's: what most of it looks like
     then is the floor, if it has about the floor's hue. That is so only where no picture was taken shortly before: white
     balance follows the light little by little, and what fills the picture all at once is a thing.
     """
-    seen, size = looks[here], np.count_nonzero(here)
+    seen, size = appearance[here], np.count_nonzero(here)
     first: tuple[Floats, Floats] | None = None
 
     def agrees(fit: tuple[Floats, Floats], share: float) -> bool:
-        return bool(np.count_nonzero(find_floor_in_shade(looks, here, *fit)) >= share * size)
+        return bool(np.count_nonzero(find_floor_in_shade(appearance, here, *fit)) >= share * size)
 
     for expected, is_learnt in guesses:
-        fit = fit_looks(seen, expected, is_learnt)
+        fit = fit_appearance(seen, expected, is_learnt)
         if fit is not None and agrees(fit, MIN_FLOOR_SHARE):
             return fit
         first = first or fit
     for expected, _ in guesses if may_be_tinted else ():
-        fit = fit_looks(seen, expected, False, MAX_TINT)
+        fit = fit_appearance(seen, expected, False, MAX_TINT)
         if fit is not None and agrees(fit, MIN_TINTED_SHARE):
             return fit
     return first
@@ -318,14 +318,14 @@ def _scan(
         return groups.least(grid.ranges_m[rows - 1 - groups.spread(rows_up), column_of])
 
     range_m = np.where(stop >= rows, SIGHT_M, find_range_m(np.minimum(stop, rows - 1)))
-    told = groups.any(tells[::-1]) & (np.arange(rows)[:, None] < np.maximum(stop, 1))
-    is_told, last_told = told.any(axis=0), rows - 1 - np.argmax(told[::-1], axis=0)
+    confirmed = groups.any(tells[::-1]) & (np.arange(rows)[:, None] < np.maximum(stop, 1))
+    is_confirmed, last_confirmed = confirmed.any(axis=0), rows - 1 - np.argmax(confirmed[::-1], axis=0)
     # Next to the model's own parts the looks tell nothing, and something may stand there.
-    range_m = np.where(is_told, np.minimum(range_m, find_range_m(last_told) + settings.max_untold_m), range_m)
+    range_m = np.where(is_confirmed, np.minimum(range_m, find_range_m(last_confirmed) + settings.max_untold_m), range_m)
     at_thing_m = groups.least(thing_m)
     is_thing, is_sight = at_thing_m <= np.minimum(range_m, SIGHT_M), range_m >= SIGHT_M
     range_m = np.minimum(range_m, at_thing_m)
-    is_blind = (stop == 0) | ~is_told  # nothing of the floor is seen, or its looks are not known
+    is_blind = (stop == 0) | ~is_confirmed  # nothing of the floor is seen, or its looks are not known
     range_m[is_blind | (at_thing_m <= groups.least(lowest_m))] = 0.0
     sigma_m = 0.01 + STEP_PX * range_m**2 / (grid.camera_height_m * fy)
     kinds = np.where(is_blind & (stop != 0), SIGHT, np.where(is_thing, THING, np.where(is_sight, SIGHT, MODEL)))
@@ -366,18 +366,18 @@ def _round(values: Floats) -> tuple[float, ...]:
     return tuple(round(value, 3) for value in values.tolist())
 
 
-def _measure_told_m(grid: FloorGrid, relief: Relief | None) -> tuple[float, ...]:
+def _measure_confirmed_m(grid: FloorGrid, relief: Relief | None) -> tuple[float, ...]:
     """Up to where the earlier picture tells, in each direction, of something of that height."""
     if relief is None:
         return ()
-    part = _told_part(grid)
+    part = _find_confirmed_part(grid)
     tells_m = np.where(relief.tells_of(np.full(grid.shape, part)), part * grid.ranges_m, 0.0).max(axis=0)
     return _round(np.minimum(SIGHT_M, _Groups(grid.shape[1]).least(tells_m)))
 
 
-def _told_part(grid: FloorGrid) -> float:
-    """How far what is TOLD_HEIGHT_M high is, as a part of the distance of the floor that it hides."""
-    return max(0.0, 1.0 - TOLD_HEIGHT_M / grid.camera_height_m)
+def _find_confirmed_part(grid: FloorGrid) -> float:
+    """How far what is CONFIRMED_HEIGHT_M high is, as a part of the distance of the floor that it hides."""
+    return max(0.0, 1.0 - CONFIRMED_HEIGHT_M / grid.camera_height_m)
 
 
 def _first(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
@@ -399,12 +399,12 @@ def _build_thing(
     odds = p_before / (1.0 - p_before)
     how = "it looks like the floor" if looks_like_floor else "it does not look like the floor"
     if reliefs:
-        asked = reliefs if looks_like_floor else reliefs[:1]
-        told = math.prod(compute_parallax_odds(region, relief, grid) for relief in asked)
-        odds *= told
-        if told != 1.0:
-            stands = "stands up from it" if told > 1.0 else "lies flat on it"
-            how += f"{' and' if (told > 1.0) != looks_like_floor else ', but'} {stands}"
+        tested = reliefs if looks_like_floor else reliefs[:1]
+        parallax_odds = math.prod(compute_parallax_odds(region, relief, grid) for relief in tested)
+        odds *= parallax_odds
+        if parallax_odds != 1.0:
+            stands = "stands up from it" if parallax_odds > 1.0 else "lies flat on it"
+            how += f"{' and' if (parallax_odds > 1.0) != looks_like_floor else ', but'} {stands}"
     elif not settings.use_parallax:
         odds = 1e6
     corners = find_footprint(region, grid)
@@ -423,7 +423,7 @@ def _build_thing(
         height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3),
         p_thing=min(MAX_P_SEEN_ONCE, round(odds / (1.0 + odds), 4)),
         box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut,
-        is_alike=looks_like_floor)
+        is_camouflaged=looks_like_floor)
 
 
 def _learn(

@@ -39,17 +39,17 @@ class _Scan(NamedTuple):
     bearings_rad: Floats
     near_m: Floats
     far_m: Floats
-    told_m: Floats
+    confirmed_m: Floats
     is_thing: Mask
 
 
 @lru_cache(maxsize=256)
 def _read_scan(scan: FreeFloor) -> _Scan:
-    told_m = scan.told_m or scan.far_m  # what is ranged is no matter of looks
+    confirmed_m = scan.confirmed_m or scan.far_m  # what is ranged is no matter of looks
     bearings = np.unwrap(np.asarray(scan.bearings_rad, float)) if scan.bearings_rad else np.zeros(0)
     first = float(bearings[0]) if len(bearings) else 0.0
     return _Scan(np.array([scan.x_m, scan.y_m]), first, bearings - first, np.asarray(scan.near_m, float),
-                 np.asarray(scan.far_m, float), np.asarray(told_m, float),
+                 np.asarray(scan.far_m, float), np.asarray(confirmed_m, float),
                  np.array([end == "thing" for end in scan.ends], bool))
 
 
@@ -88,24 +88,24 @@ class SeenFloor:
             free &= ~shapely.intersects_xy(shapely.Polygon(corners), points[:, 0], points[:, 1])
         return free, scans, discs
 
-    def ask_told(self, points: Floats) -> Mask:
+    def ask_confirmed(self, points: Floats) -> Mask:
         """Which of the points (n, 2) are seen free by more than looks: an earlier picture would tell what stands there,
         if it has an edge or a pattern; or the robot was there.
         """
         away = np.linalg.norm(points[:, None] - self.discs[None, :, :2], axis=2)
-        told = np.asarray((away <= self.discs[:, 2]).any(axis=1))
+        confirmed = np.asarray((away <= self.discs[:, 2]).any(axis=1))
         for scan in reversed(self.scans):
-            rest = np.flatnonzero(~told)
+            rest = np.flatnonzero(~confirmed)
             if not len(rest):
                 break
-            if scan.told_m or scan.sense != "camera":
-                told[rest] = _is_told(_read_scan(scan), points[rest])
-        return told
+            if scan.confirmed_m or scan.sense != "camera":
+                confirmed[rest] = _is_confirmed(_read_scan(scan), points[rest])
+        return confirmed
 
 
-def _is_told(scan: _Scan, points: Floats) -> Mask:
+def _is_confirmed(scan: _Scan, points: Floats) -> Mask:
     """Which points (n, 2) a scan shows free by an earlier picture too."""
-    return _ask_scan(scan._replace(far_m=np.minimum(scan.far_m, scan.told_m)), points)[0]
+    return _ask_scan(scan._replace(far_m=np.minimum(scan.far_m, scan.confirmed_m)), points)[0]
 
 
 def _ask_scan(scan: _Scan, points: Floats) -> tuple[Mask, Mask]:

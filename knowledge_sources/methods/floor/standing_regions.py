@@ -1,6 +1,6 @@
 """Regions of a picture that do not look like the floor: where they stand, and do they stand up from it?
 
-An earlier picture tells the latter (``relief``): what lies flat moves as the floor does, what stands moves otherwise.
+An earlier picture tells the latter (``relief``): what lies flat moves as the floor does, what stands moves differently.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.methods.floor.model_floor import SIGHT_M, FloorGrid
-from knowledge_sources.methods.floor.relief import FLAT, STANDING, UNTOLD, Relief
+from knowledge_sources.methods.floor.relief import FLAT, STANDING, UNCONFIRMED, Relief
 
 MIN_THING_PIXELS = 10  # smallest region, in pixels of half the picture's size
 SEEN_DEPTH_M = 0.05  # depth of a foot
@@ -65,7 +65,7 @@ def find_regions(
         relief: by an earlier picture, if there is one.
     """
     seen = _drop_slivers(unlike & tells, tells)
-    parts, kinds = np.ones(grid.shape, np.float32), np.full(grid.shape, UNTOLD)
+    parts, kinds = np.ones(grid.shape, np.float32), np.full(grid.shape, UNCONFIRMED)
     if relief is not None:
         kinds = relief.kinds
         parts = np.where(drop_specks((relief.kinds == STANDING) & tells), relief.parts, parts)
@@ -98,10 +98,10 @@ def _describe_region(
     part = _find_border_part(lowest, columns, parts, kinds)
     ranges = np.minimum(part * seeming, _measure_standing_m(mask[:, columns], (grid.ranges_m * parts)[:, columns],
                                                      parts[:, columns]))
-    is_told = ranges < seeming
-    cut = (lowest >= last - 1) & ~is_told
+    is_confirmed = ranges < seeming
+    cut = (lowest >= last - 1) & ~is_confirmed
     # below a foot there is floor; where the model's own parts begin there, it is no foot
-    stands = is_told | cut | tells[np.minimum(lowest + 2, last), columns]
+    stands = is_confirmed | cut | tells[np.minimum(lowest + 2, last), columns]
     if not stands.any():
         return None
     nearest = float(ranges[stands].min())
@@ -128,8 +128,8 @@ def _find_border_part(
     rows = np.clip(lowest[:, None] + np.arange(-2, 3), 0, kinds.shape[0] - 1)
     seen, at = kinds[rows, columns[:, None]], parts[rows, columns[:, None]]
     standing = (seen == STANDING) & (at < 1.0)
-    told = np.count_nonzero(standing.any(axis=1))
-    if told < MIN_BORDER_COLUMNS or told <= np.count_nonzero((seen == FLAT).any(axis=1)):
+    counted = np.count_nonzero(standing.any(axis=1))
+    if counted < MIN_BORDER_COLUMNS or counted <= np.count_nonzero((seen == FLAT).any(axis=1)):
         return 1.0
     return float(np.median(at[standing]))
 
@@ -220,7 +220,7 @@ def measure_height(region: StandingRegion, grid: FloorGrid) -> tuple[float, floa
     return height, 0.03 + 0.05 * foot_m * height
 
 
-P_TOLD = 0.98
+P_CONFIRMED = 0.98
 """Probability that what clearly stands, or clearly lies flat, by another picture, does so."""
 CLEAR, FEW, MOST_CLEAR = 20, 6, 1.5
 """So many pixels that tell are clear; fewer tell less, few nothing, and many as much as half as many again."""
@@ -240,13 +240,13 @@ def compute_parallax_odds(region: StandingRegion, relief: Relief, grid: FloorGri
     foot_m[region.feet[:, 1]] = grid.ranges_m[region.feet[:, 0], region.feet[:, 1]] * region.parts
     foot_m[np.isinf(foot_m)] = foot_m.min()
     low = 1.0 - LOW_TOP_M / grid.camera_height_m
-    asked = near & relief.tells_of(np.clip(foot_m / grid.ranges_m, low, 1.0))
+    tested = near & relief.tells_of(np.clip(foot_m / grid.ranges_m, low, 1.0))
     stand = np.count_nonzero(near & (relief.kinds == STANDING))
-    flat = np.count_nonzero(region.mask & asked & (relief.kinds == FLAT))
-    told = max(stand, flat)
-    if told < FEW or told < (MIN_STANDING_SHARE if stand > flat else MIN_FLAT_SHARE) * (stand + flat):
+    flat = np.count_nonzero(region.mask & tested & (relief.kinds == FLAT))
+    counted = max(stand, flat)
+    if counted < FEW or counted < (MIN_STANDING_SHARE if stand > flat else MIN_FLAT_SHARE) * (stand + flat):
         return 1.0
-    odds = (P_TOLD / (1.0 - P_TOLD)) ** min(MOST_CLEAR, told / CLEAR)
+    odds = (P_CONFIRMED / (1.0 - P_CONFIRMED)) ** min(MOST_CLEAR, counted / CLEAR)
     return float(odds if stand > flat else 1.0 / odds)
 
 

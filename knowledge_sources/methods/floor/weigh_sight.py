@@ -41,7 +41,7 @@ MAX_SHARED_PART = 0.25  # where a thing that is seen takes more of the footprint
 FREE_FLOOR_ODDS = (1.0 - MAX_P_SEEN_ONCE) / MAX_P_SEEN_ONCE
 """Odds of an obstacle that is there while all of its footprint is seen free: a picture unsays what a picture said."""
 LOOKS_FREE_ODDS = 0.2  # the same where the floor there looks free, and nothing else tells
-ALIKE_FREE_ODDS = 0.3  # the same of one that looks like the floor
+CAMOUFLAGED_FREE_ODDS = 0.3  # the same of one that looks like the floor
 MIN_WAY_M = FLOOR_VIEW_DISTANCE_M / 2.0  # what is seen, or missed, from nearer by is no further evidence
 MAX_OBSTACLE_SIGMA_M = 0.25
 """What is seen on the floor with a larger standard deviation is waited for until it is nearer."""
@@ -56,7 +56,7 @@ class Sight(NamedTuple):
 
     Attributes:
         floor: the sight.
-        told_by: id of the picture or of the reading.
+        seen_by: id of the picture or of the reading.
         world: the building as it is known.
         rim_m: to here from the eye a thing may reach whose feet are not seen.
         known_free: the floor that was known to be free before [m, world].
@@ -64,7 +64,7 @@ class Sight(NamedTuple):
     """
 
     floor: FreeFloor
-    told_by: str
+    seen_by: str
     world: Building
     rim_m: float
     known_free: shapely.Geometry
@@ -76,7 +76,7 @@ class Sight(NamedTuple):
 
     def is_from_elsewhere(self, known: Obstacle) -> bool:
         """Whether the eye is not where it was when something was told last of an obstacle: this is further evidence."""
-        return known.told_from is None or math.dist(self.eye, known.told_from) >= MIN_WAY_M
+        return known.judged_from is None or math.dist(self.eye, known.judged_from) >= MIN_WAY_M
 
 
 class Sighted(NamedTuple):
@@ -107,10 +107,10 @@ def weigh_sight(
     """
     f, s = sight.floor, settings.action
     free = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
-    told = free if f.sense == "ranges" else shapely.Polygon()  # where what looks like the floor would be seen to stand
-    if f.told_m:
-        told = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m,
-                                np.minimum(f.told_m, np.subtract(f.far_m, f.sigma_m)).tolist())
+    confirmed = free if f.sense == "ranges" else shapely.Polygon()  # where a camouflaged thing would be seen
+    if f.confirmed_m:
+        confirmed = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m,
+                                np.minimum(f.confirmed_m, np.subtract(f.far_m, f.sigma_m)).tolist())
     drafts: dict[str, Sighted] = {}
     fresh = 0
     for thing in f.things:
@@ -148,7 +148,7 @@ def weigh_sight(
         if id in drafts or not may_be_there(obstacle):
             continue
         if sight.is_from_elsewhere(obstacle) and measure_free_part(obstacle.footprint, seen) <= MAX_SHARED_PART:
-            gone = miss(sight, obstacle, told if obstacle.is_alike else free, told, s)
+            gone = miss(sight, obstacle, confirmed if obstacle.is_camouflaged else free, confirmed, s)
             if gone is not None:
                 yield Sighted(id, gone)
 
@@ -195,7 +195,7 @@ def see_first(
     found = Obstacle(
         f"{locale}/obstacle-{number}", locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m,
         thing.sigma_height_m, min(thing.p_thing, settings.max_obstacle_certainty), f.seen_s, None, f.sense,
-        _tell(thing, sight), tell_status(thing.p_thing), core, thing.is_alike, shape.from_m,
+        _tell(thing, sight), tell_status(thing.p_thing), core, thing.is_camouflaged, shape.from_m,
         sight.eye)
     return place(world, found, own)
 
@@ -228,7 +228,7 @@ def see_again(
     status: ObstacleStatus = "there" if known.is_there else tell_status(certainty)
     new = replace(known, certainty=certainty, seen_s=f.seen_s, status=status, height_m=height,
                   sigma_height_m=sigma, sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight),
-                  is_alike=known.is_alike and thing.is_alike, told_from=sight.eye)
+                  is_camouflaged=known.is_camouflaged and thing.is_camouflaged, judged_from=sight.eye)
     if not moved or not footprint:
         return new
     return place(world, replace(new, footprint=footprint, core=core, seen_from_m=joined.from_m), joined.whole)
@@ -250,33 +250,33 @@ def _join_sight(sight: Sight, known: Obstacle, new: ThingShape, free: shapely.Ge
 
 
 def miss(
-    sight: Sight, known: Obstacle, free: shapely.Geometry, told: shapely.Geometry, settings: ActionSettings
+    sight: Sight, known: Obstacle, free: shapely.Geometry, confirmed: shapely.Geometry, settings: ActionSettings
 ) -> Obstacle | None:
     """A known obstacle after its floor, or some of it, was seen free; None where that tells nothing.
 
     Args:
-        told: where it would be seen to stand, whatever it looks like.
+        confirmed: where it would be seen to stand, whatever it looks like.
     """
     free_part = measure_free_part(known.footprint, free)
     if free_part >= MIN_FREE_PART:
-        told_part = measure_free_part(known.footprint, told)
-        odds = ALIKE_FREE_ODDS if known.is_alike else LOOKS_FREE_ODDS
-        if not known.is_alike and told_part >= MIN_FREE_PART:
+        confirmed_part = measure_free_part(known.footprint, confirmed)
+        odds = CAMOUFLAGED_FREE_ODDS if known.is_camouflaged else LOOKS_FREE_ODDS
+        if not known.is_camouflaged and confirmed_part >= MIN_FREE_PART:
             odds = FREE_FLOOR_ODDS
         certainty = update(known.certainty, free_part * math.log(odds))
         status: ObstacleStatus = "gone" if certainty < settings.min_gone_certainty else known.status
-        return replace(known, certainty=certainty, status=status, told_from=sight.eye)
+        return replace(known, certainty=certainty, status=status, judged_from=sight.eye)
     left = leave_free(ThingShape.of(known), free)
     footprint, core = left.list_corners()
     if not footprint or measure_change_m(known.footprint, footprint) < settings.min_footprint_change_m:
         return None
-    new = replace(known, footprint=footprint, core=core, told_from=sight.eye)
+    new = replace(known, footprint=footprint, core=core, judged_from=sight.eye)
     return place(sight.world, new, left.whole)
 
 
 def _tell(thing: FloorThing, sight: Sight) -> str:
     """Which pixels of which picture tell of a thing."""
     if sight.floor.sense != "camera":
-        return f"{sight.told_by}: {thing.evidence}"
+        return f"{sight.seen_by}: {thing.evidence}"
     left, top, right, bottom = thing.box_px
-    return f"{sight.told_by}, pixels ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}): {thing.evidence}"
+    return f"{sight.seen_by}, pixels ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}): {thing.evidence}"

@@ -32,7 +32,8 @@ from knowledge_sources.methods.localization.global_localization import (
 )
 from knowledge_sources.methods.localization.next_view import MIN_NEW_VIEW_RAD, MOVE_M
 from knowledge_sources.methods.localization.place_odds import (
-    LOST_AGAIN_ODDS, MAX_ALIKE_LOG_RATIO, MIN_P_SURE, P_TOLD, StatedPlace, compute_prior, compute_twin_odds, weigh_told,
+    LOST_AGAIN_ODDS, MAX_ALIKE_LOG_RATIO, MIN_P_SURE, P_STATED, StatedPlace, compute_prior, weigh_alias_odds,
+    weigh_prior,
 )
 from knowledge_sources.methods.localization.place_search import (
     MAX_FAR_PROBES, MAX_FLOOR_DIFFERENCE_M, MAX_ROOMS, Search, describe, find_far_action, find_odds_used,
@@ -46,13 +47,13 @@ from knowledge_sources.methods.localization.refinement import (
 from knowledge_sources.methods.localization.views import CameraView, propagate_pose, update_obstruction
 
 __all__ = [
-    "ALIKE_LOG_NOISE", "CAMERA_LINE_SIGMA_PX", "DISTINCT", "LOST_AGAIN_ODDS", "MAX_ALIKE_LOG_RATIO",
-    "MAX_FAR_PROBES", "MAX_FLOOR_DIFFERENCE_M", "MAX_HYPOTHESES", "MAX_ROOMS", "MAX_SEARCHED_VIEWS",
-    "MIN_CAMERA_LINES", "MIN_EXPLAINED_FRACTION", "MIN_FRACTION_SUM", "MIN_LOG_LIKELIHOOD", "MIN_MATCHED_FRACTION",
-    "MIN_NEW_VIEW_RAD", "MIN_PLACE_LINES", "MIN_P_SURE", "MIN_P_TRACKED", "MIN_VIEWS", "MIN_VIEW_FRACTION",
-    "MOVE_M", "P_TOLD", "REFUTING_LOG_RATIO", "SURE_LOG_LIKELIHOOD", "SURE_MATCHED_FRACTION", "CameraView",
-    "LocalizationStatus", "Search", "StatedPlace", "are_distinct", "compare_places", "compute_pose_likelihood",
-    "compute_prior", "compute_twin_odds", "describe", "find_far_action", "find_odds_used", "find_repetitions",
-    "get_visibility_map", "list_aliases", "list_rooms", "make_alias_test", "match_with_camera", "precompute_views",
-    "prefer_reachable", "propagate_pose", "rate_match", "search", "update_obstruction", "weigh_told",
+    "ALIKE_LOG_NOISE", "CAMERA_LINE_SIGMA_PX", "DISTINCT", "LOST_AGAIN_ODDS", "MAX_ALIKE_LOG_RATIO", "MAX_FAR_PROBES",
+    "MAX_FLOOR_DIFFERENCE_M", "MAX_HYPOTHESES", "MAX_ROOMS", "MAX_SEARCHED_VIEWS", "MIN_CAMERA_LINES",
+    "MIN_EXPLAINED_FRACTION", "MIN_FRACTION_SUM", "MIN_LOG_LIKELIHOOD", "MIN_MATCHED_FRACTION", "MIN_NEW_VIEW_RAD",
+    "MIN_PLACE_LINES", "MIN_P_SURE", "MIN_P_TRACKED", "MIN_VIEWS", "MIN_VIEW_FRACTION", "MOVE_M", "P_STATED",
+    "REFUTING_LOG_RATIO", "SURE_LOG_LIKELIHOOD", "SURE_MATCHED_FRACTION", "CameraView", "LocalizationStatus", "Search",
+    "StatedPlace", "are_distinct", "compare_places", "compute_pose_likelihood", "compute_prior", "describe",
+    "find_far_action", "find_odds_used", "find_repetitions", "get_visibility_map", "list_aliases", "list_rooms",
+    "make_alias_test", "match_with_camera", "precompute_views", "prefer_reachable", "propagate_pose", "rate_match",
+    "search", "update_obstruction", "weigh_alias_odds", "weigh_prior",
 ]

@@ -72,7 +72,7 @@ def _find_box(building: Building, room: str) -> tuple[Floats, Floats]:
     return 0.5 * (low + high), high - low
 
 
-class Alias(NamedTuple):
+class AliasView(NamedTuple):
     """The pose that is hardest to tell from the believed one, and the lines by which the picture tells them apart."""
 
     world_from_robot: Pose2
@@ -81,7 +81,7 @@ class Alias(NamedTuple):
 
 def list_aliases(
     robot: RobotModel, segments_px: Floats, room: str, pose: Pose2, *, search: bool = False,
-) -> list[Alias]:
+) -> list[AliasView]:
     """List the other poses of a room at which segments (k, 2, 2) may have been seen, each with its margin.
 
     Tried are the poses at which the room repeats itself and, with ``search``, wherever else in it the segments fit:
@@ -93,7 +93,7 @@ def list_aliases(
         return []
     views = predict_views_on_grid(robot, (pose, *others), segments_px)
     own, *there = (score_view(lines_px, segments_px) for lines_px in views)
-    return [Alias(other, compute_margin(own, view)) for other, view in zip(others, there, strict=True)]
+    return [AliasView(other, compute_margin(own, view)) for other, view in zip(others, there, strict=True)]
 
 
 def compare_places(
@@ -142,7 +142,7 @@ def predict_views_on_grid(
 
 
 class ScoredView(NamedTuple):
-    """Lines (n, 2, 2) of a view, and by how much (n,) each speaks for the view, or if negative against it [lines]."""
+    """Lines (n, 2, 2) of a view, and by how much (n,) each supports the view, or if negative contradicts it [lines]."""
 
     lines_px: Floats
     scores: Floats

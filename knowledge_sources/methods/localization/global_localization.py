@@ -53,10 +53,10 @@ MAX_HYPOTHESES = 6  # most hypotheses that are kept
 MIN_P_TRACKED = 0.8  # smallest probability, against all places that look alike, of a place that is not doubted
 MAX_VIEWS_OF_SEARCH = 8  # most views, the last, by which the floor is searched; what is found is refined by all
 MAX_CANDIDATES = 14  # most candidates of a floor that are refined
-BUMP_REACH_M = 2.0  # so far from where it was believed a robot may be that nobody carried off
+BUMP_REACH_M = 2.0  # so far from where it was believed a robot may be that nobody kidnapped
 MIN_ALIAS_SCORE = 0.6  # another place shows at least this part of what agrees at the one that is kept
 
-LookAlike = Callable[[Pose2, Pose2], bool]
+AliasTest = Callable[[Pose2, Pose2], bool]
 """Whether two poses would look the same in all views."""
 
 
@@ -137,13 +137,13 @@ def find_candidates(
     are followed and not searched for, while two of them are accepted. If one accepted place is left, its aliases on the
     whole floor are weighed too.
     """
-    look_alike = make_alias_test(robot, [view.now_from_then for view in views])
+    are_aliases = make_alias_test(robot, [view.now_from_then for view in views])
     found = _build_distinct(robot, views, [] if guess is None else [guess])
     known: list[PlaceCandidate] = []
     if len(views) > MAX_SEARCHED_VIEWS:
         known = _build_distinct(robot, views, followed, found)
     if sum(bool(c.is_accepted) for c in (*found, *known)) >= 2:
-        return rank_candidates([*found, *known], look_alike, len(views), found[0] if found else None)
+        return rank_candidates([*found, *known], are_aliases, len(views), found[0] if found else None)
     pictures = PictureSearch.from_views(robot, views[-MAX_VIEWS_OF_SEARCH:])
     searched, likely = [*found], choose_rooms(robot, rooms, guess, found, p_guess, len(views))
     for candidate in _find_refined(robot, views, likely, pictures):
@@ -153,7 +153,7 @@ def find_candidates(
         first = min(searched, key=lambda c: c.world_from_robot.distance_to(found[0].world_from_robot))
     for candidate in known or _build_distinct(robot, views, followed):
         _keep_likelier(searched, candidate)
-    kept = rank_candidates(searched, look_alike, len(views), first)
+    kept = rank_candidates(searched, are_aliases, len(views), first)
     if len(kept) != 1 or not kept[0].is_accepted:
         return kept
     aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, likely)
@@ -161,7 +161,7 @@ def find_candidates(
     repeated = _sift(pictures, kept[0].room, kept[0].world_from_robot, _list_repetitions(robot, kept[0], rooms))
     beside += _build_distinct(robot, views, repeated, [*kept, *beside])
     rivals = [_polish(robot, views, c) for c in (*kept, *beside)]
-    return rank_candidates(rivals, look_alike, len(views), rivals[0])
+    return rank_candidates(rivals, are_aliases, len(views), rivals[0])
 
 
 def choose_rooms(
@@ -248,12 +248,12 @@ def find_aliases(
     """
     lines = [predict_lines(robot, view.pose_then(pose)) for view in views]
     predicted = [replace(view, segments_px=seen.segments_px) for view, seen in zip(views, lines, strict=True)]
-    look_alike = make_alias_test(robot, [view.now_from_then for view in views])
+    are_aliases = make_alias_test(robot, [view.now_from_then for view in views])
     found: list[PlaceCandidate] = []
 
     def is_alias(other: Pose2) -> bool:
         known = (pose, *(alias.world_from_robot for alias in found))
-        return all(are_distinct(other, one) for one in known) and look_alike(pose, other)
+        return all(are_distinct(other, one) for one in known) and are_aliases(pose, other)
 
     pictures = PictureSearch.from_views(robot, predicted[-MAX_VIEWS_OF_SEARCH:])
     for refined in _find_refined(robot, predicted, rooms if likely is None else likely, pictures):
@@ -266,19 +266,19 @@ def find_aliases(
     return tuple(found)
 
 
-def make_alias_test(robot: RobotModel, looked: Sequence[Pose2]) -> LookAlike:
+def make_alias_test(robot: RobotModel, looked: Sequence[Pose2]) -> AliasTest:
     """Return a test whether two poses would look the same in all views, by the model."""
     predict = lru_cache(maxsize=64)(make_view_predictor(robot))
 
-    def look_alike(one: Pose2, other: Pose2) -> bool:
+    def are_aliases(one: Pose2, other: Pose2) -> bool:
         views, others = ([predict(pose @ look) for look in looked] for pose in (one, other))
         return not are_distinguishable(views, others)
 
-    return look_alike
+    return are_aliases
 
 
 def rank_candidates(
-    found: Sequence[PlaceCandidate], look_alike: LookAlike, looks: int,
+    found: Sequence[PlaceCandidate], are_aliases: AliasTest, looks: int,
     first: PlaceCandidate | None = None,
 ) -> tuple[PlaceCandidate, ...]:
     """Keep the likely candidates that the likeliest does not refute, with their weights, the likeliest first.
@@ -294,7 +294,7 @@ def rank_candidates(
                    key=lambda c: -c.likelihood.log_likelihood)
     kept = [c for c in order if not _is_refuted(c.likelihood, order[0].likelihood, REFUTING_LOG_RATIO)
             or (c.likelihood.log_likelihood >= order[0].likelihood.log_likelihood - REFUTING_LOG_RATIO - noise
-                and look_alike(order[0].world_from_robot, c.world_from_robot))]
+                and are_aliases(order[0].world_from_robot, c.world_from_robot))]
     if first in kept[MAX_HYPOTHESES:]:
         kept[MAX_HYPOTHESES - 1] = first
     kept = kept[:MAX_HYPOTHESES]

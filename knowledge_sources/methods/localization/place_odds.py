@@ -14,25 +14,25 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import (
-    MAX_TOLD_CHI2,
+    MAX_SLIP_CHI2,
     MIN_P_BELIEVED,
-    TOLD_SIGMA_M,
-    TOLD_SIGMA_RAD,
+    SLIP_SIGMA_M,
+    SLIP_SIGMA_RAD,
     compute_chi2,
     update,
 )
 from knowledge_sources.methods.localization.global_localization import (
     MAX_SEARCHED_VIEWS,
     MIN_VIEWS,
+    AliasTest,
     LocalizationResult,
     LocalizationStatus,
-    LookAlike,
     PlaceCandidate,
 )
 from knowledge_sources.methods.localization.refinement import SURE_LOG_LIKELIHOOD
 from world_models.frames import Pose2
 
-P_TOLD = 0.98  # probability that the robot is where it was told to be at the start
+P_STATED = 0.98  # probability that the robot is where it was told to be at the start
 LOST_AGAIN_ODDS = 0.2  # factor on the odds of that for every time that it was believed by them, and the robot got lost
 MAX_ALIKE_LOG_RATIO = 3.0
 """Largest log likelihood ratio of the pictures between places that look alike by the model: more is chance."""
@@ -47,12 +47,12 @@ class StatedPlace:
 
     Attributes:
         world_from_robot, covariance: the pose, and (3, 3) over (x, y, heading), world.
-        p_told: probability that it is there, before any picture.
+        p_prior: probability that it is there, before any picture.
     """
 
     world_from_robot: Pose2
     covariance: Floats
-    p_told: float
+    p_prior: float
 
     def includes(self, candidate: PlaceCandidate) -> bool:
         """Whether a candidate is this place."""
@@ -60,8 +60,8 @@ class StatedPlace:
                                self.covariance)
 
 
-def weigh_told(
-    result: LocalizationResult, told: StatedPlace, look_alike: LookAlike, looks: int,
+def weigh_prior(
+    result: LocalizationResult, stated: StatedPlace, are_aliases: AliasTest, looks: int,
 ) -> LocalizationResult:
     """Weigh the candidates by the stated place and by the pictures, the likeliest first.
 
@@ -70,21 +70,22 @@ def weigh_told(
     accepted by its share of lines, if that many are not found by chance. Nothing changes where the pictures alone have
     found a place, or where no candidate is the stated place.
     """
-    is_told = [told.includes(c) for c in result.candidates]
-    if result.status is LocalizationStatus.FOUND or not any(is_told):
+    is_stated = [stated.includes(c) for c in result.candidates]
+    if result.status is LocalizationStatus.FOUND or not any(is_stated):
         return result
-    best = next(c for c, here in zip(result.candidates, is_told, strict=True) if here)
-    alike = [look_alike(best.world_from_robot, c.world_from_robot) for c in result.candidates]
-    odds = compute_place_odds([c.likelihood.log_likelihood for c in result.candidates], is_told, alike, told.p_told)
+    best = next(c for c, here in zip(result.candidates, is_stated, strict=True) if here)
+    aliased = [are_aliases(best.world_from_robot, c.world_from_robot) for c in result.candidates]
+    log_likelihoods = [c.likelihood.log_likelihood for c in result.candidates]
+    odds = compute_place_odds(log_likelihoods, is_stated, aliased, stated.p_prior)
     weighed = tuple(sorted((replace(c, weight=p) for c, p in zip(result.candidates, odds, strict=True)),
                            key=lambda c: -c.weight))
     likeliest = weighed[0]
     is_tied = result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None
     enough = MIN_P_BELIEVED if is_tied else MIN_P_SURE
-    is_borne_out = likeliest.is_accepted and looks >= MIN_VIEWS
-    is_borne_out |= looks >= MAX_SEARCHED_VIEWS and _is_far_from_chance(likeliest)
-    is_settled = is_borne_out and likeliest.weight >= enough
-    if is_settled and told.includes(likeliest):
+    is_confirmed = likeliest.is_accepted and looks >= MIN_VIEWS
+    is_confirmed |= looks >= MAX_SEARCHED_VIEWS and _is_far_from_chance(likeliest)
+    is_settled = is_confirmed and likeliest.weight >= enough
+    if is_settled and stated.includes(likeliest):
         return LocalizationResult(LocalizationStatus.FOUND, (likeliest,))
     return replace(result, candidates=weighed)
 
@@ -98,33 +99,33 @@ def _is_far_from_chance(candidate: PlaceCandidate) -> bool:
 
 
 def compute_place_odds(
-    log_likelihoods: Sequence[float], is_told: Sequence[bool], is_alike: Sequence[bool], p_told: float,
+    log_likelihoods: Sequence[float], is_stated: Sequence[bool], is_alias: Sequence[bool], p_prior: float,
 ) -> tuple[float, ...]:
     """Compute the posterior probabilities of places by Bayes' rule; they sum to one.
 
     Args:
         log_likelihoods: of the pictures, of each place.
-        is_told: whether a place is stated. These share the prior ``p_told``, the others what is left of it.
-        is_alike: whether a place looks like the likeliest stated one, by the model. Between such places a ratio of the
+        is_stated: whether a place is stated. These share the prior ``p_prior``, the others what is left of it.
+        is_alias: whether a place looks like the likeliest stated one, by the model. Between such places a ratio of the
             pictures that is larger than ``max_alike_log_ratio`` is chance, and counts as that.
     """
-    told = [i for i, here in enumerate(is_told) if here]
+    stated = [i for i, here in enumerate(is_stated) if here]
     if not log_likelihoods:
         return ()
     logs = list(log_likelihoods)
-    if told:
-        most, best = MAX_ALIKE_LOG_RATIO, max(log_likelihoods[i] for i in told)
-        logs = [best + min(most, max(-most, value - best)) if alike and not here else value
-                for value, here, alike in zip(logs, is_told, is_alike, strict=True)]
-        others = len(logs) - len(told)
+    if stated:
+        most, best = MAX_ALIKE_LOG_RATIO, max(log_likelihoods[i] for i in stated)
+        logs = [best + min(most, max(-most, value - best)) if aliased and not here else value
+                for value, here, aliased in zip(logs, is_stated, is_alias, strict=True)]
+        others = len(logs) - len(stated)
         if others:
-            shares = (math.log((1.0 - p_told) / others), math.log(p_told / len(told)))
-            logs = [value + shares[here] for value, here in zip(logs, is_told, strict=True)]
+            shares = (math.log((1.0 - p_prior) / others), math.log(p_prior / len(stated)))
+            logs = [value + shares[here] for value, here in zip(logs, is_stated, strict=True)]
     weights = np.exp(np.array(logs) - max(logs))
     return tuple(float(w) for w in weights / np.sum(weights))
 
 
-def compute_twin_odds(log_ratios: Sequence[float], p_prior: float) -> tuple[float, ...]:
+def weigh_alias_odds(log_ratios: Sequence[float], p_prior: float) -> tuple[float, ...]:
     """Compute the probabilities of the believed place, first, and of each twin; they sum to one.
 
     Args:
@@ -139,12 +140,12 @@ def compute_twin_odds(log_ratios: Sequence[float], p_prior: float) -> tuple[floa
 
 def compute_prior(times_refuted: int) -> float:
     """Compute the prior probability of the stated place after it was believed and refuted so often."""
-    return update(P_TOLD, times_refuted * math.log(LOST_AGAIN_ODDS))
+    return update(P_STATED, times_refuted * math.log(LOST_AGAIN_ODDS))
 
 
 def is_within_reach(
-    pose: Pose2, covariance: Floats, told: Pose2, told_covariance: Floats,
+    pose: Pose2, covariance: Floats, stated: Pose2, stated_covariance: Floats,
 ) -> bool:
     """Whether a pose may be the stated one, by both covariances (3, 3)."""
-    beyond = np.diag(np.square([TOLD_SIGMA_M, TOLD_SIGMA_M, TOLD_SIGMA_RAD]))
-    return compute_chi2(pose, told, covariance + told_covariance + beyond) <= MAX_TOLD_CHI2
+    beyond = np.diag(np.square([SLIP_SIGMA_M, SLIP_SIGMA_M, SLIP_SIGMA_RAD]))
+    return compute_chi2(pose, stated, covariance + stated_covariance + beyond) <= MAX_SLIP_CHI2

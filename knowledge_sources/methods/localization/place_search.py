@@ -78,14 +78,14 @@ def prefer_reachable(building: Building, result: LocalizationResult, locale: str
 
 
 def find_odds_used(
-    by_pictures: LocalizationResult, result: LocalizationResult, told: StatedPlace, *, was_tracked: bool,
+    by_pictures: LocalizationResult, result: LocalizationResult, stated: StatedPlace, *, was_tracked: bool,
     refuted: int = 0,
 ) -> PlaceOdds | None:
     """The odds by which a place was found that the pictures alone had not found; None where they had."""
     if result.status is not LocalizationStatus.FOUND or by_pictures.status is LocalizationStatus.FOUND:
         return None
     found, count = result.candidates[0], len(by_pictures.candidates)
-    return PlaceOdds(found.room, count, "tracked" if was_tracked else "told", told.p_told, found.weight,
+    return PlaceOdds(found.room, count, "tracked" if was_tracked else "stated", stated.p_prior, found.weight,
                      refuted)
 
 

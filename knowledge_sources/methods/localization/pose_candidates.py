@@ -187,7 +187,7 @@ def are_distinct(a: Pose2, b: Pose2) -> bool:
 class PictureSearch:
     """What poses are scored by: the views, their chamfer maps, and the direction of level lines in the robot's frame.
 
-    It is computed once for the pictures, and shared by all poses that are held against them.
+    It is computed once for the pictures, and shared by all poses that are compared with them.
     """
 
     robot: RobotModel

@@ -224,7 +224,7 @@ def find_start_poses(scene: LineScene, wide: PosePairs) -> list[Pose]:
 def _refine_pose(
     scene: LineScene, wide: PosePairs, pose: Pose, groups: list[tuple[float, ...]]
 ) -> tuple[Pose, float]:
-    """A pose refined with the pairs linearised there, anew for each group of widths; and its support."""
+    """A pose refined with the pairs linearised there, again for each group of widths; and its support."""
     parameters, support = scene.parameters, 0.0
     for group in groups:
         pairs = linearise_pairs(scene, pose, wide.model, wide.data)
@@ -350,7 +350,7 @@ class PoseParameters(ABC):
         prior: ``camera_from_world``.
         information: (d, d) inverse covariance of the unknowns about the prior.
         root: (d, d) a factor of the covariance: times standard normal deviates it gives steps.
-        widths_per_linearisation: when a pose is refined, the pairs are linearised anew after this many widths.
+        widths_per_linearisation: when a pose is refined, the pairs are linearised again after this many widths.
     """
 
     prior: Pose

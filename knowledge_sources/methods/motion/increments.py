@@ -28,7 +28,7 @@ def plan_increment(
 ) -> MotorCommand | None:
     """The next increment from a pose (world); None on arrival. A move is an arc whose chord points at the aim.
 
-    Near its end it may turn in vain, as what it follows shifts its belief as it turns. After a full turn without a move
+    Near its end it may turn for nothing: what it follows shifts its belief in turning. After a full turn without a move
     it has arrived: the look at the milestone tells by how far it missed.
     """
     if leg.turned_rad > math.tau:

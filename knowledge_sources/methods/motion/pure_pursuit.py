@@ -79,7 +79,7 @@ def compute_chord_turn(turn_rad: float, curvature_per_m: float, length_m: float)
 
 
 def compute_curvature_to(point: tuple[float, float], here: Pose2) -> float:
-    """Curvature of the arc tangent to the robot's heading that leads through a point ahead [1/m]."""
+    """Curvature of the arc tangent to the robot's heading that passes through a point ahead [1/m]."""
     away = math.hypot(point[0] - here.x_m, point[1] - here.y_m)
     return 2.0 * math.sin(compute_bearing(point, here)) / max(away, 1e-6)
 

@@ -44,7 +44,7 @@ def find_free_space(
 ) -> shapely.Geometry:
     """Where the robot's centre may be in a locale, ``clearance_m`` from walls and things; cached.
 
-    ``instead``: footprints (k, 2) by the names of things that are taken to stand otherwise.
+    ``instead``: footprints (k, 2) by the names of things that are taken to stand differently.
     """
     key = (locale, clearance_m, is_round, tuple(sorted(instead.items())))
     return building.cached("free spaces", MAX_FREE_SPACES, key, lambda: compute_free_space(
@@ -152,7 +152,7 @@ def find_nearest(
     """Distance [m] of a point (2,) [world] from the nearest wall or obstacle of a locale, and which of them it is.
 
     Args:
-        instead: footprints by the names of things that are taken to stand otherwise.
+        instead: footprints by the names of things that are taken to stand differently.
         of_model: without what the model lacks.
     """
     openings = [np.concatenate(doorway.thresholds_world) for doorway in building.doorways_of(locale)]
@@ -245,7 +245,7 @@ def compute_free_passage(
 def find_line_through(
     free: shapely.Geometry, middles: Any, outward: Any, distances_m: Sequence[float], offsets_m: Sequence[float]
 ) -> tuple[Floats, Floats] | None:
-    """The straight line through a doorway that stays in the free space and is the least aslant.
+    """The straight line through a doorway that stays in the free space and is the least diagonal.
 
     Args:
         free: where the robot's centre may be.
@@ -263,8 +263,8 @@ def find_line_through(
     away, side = (part.ravel() for part in np.meshgrid(distances_m, aside))
     ends = near - away[:, None] * out + side[:, None] * across, far + away[:, None] * out + side[:, None] * across
     first, second = (part.ravel() for part in np.meshgrid(*(np.arange(len(away)),) * 2, indexing="ij"))
-    aslant_m = np.abs(side[first]) + np.abs(side[second]) + np.abs(side[first] - side[second])
-    order = np.lexsort((first + second, aslant_m))
+    diagonal_m = np.abs(side[first]) + np.abs(side[second]) + np.abs(side[first] - side[second])
+    order = np.lexsort((first + second, diagonal_m))
     first, second = first[order], second[order]
     shapely.prepare(free)
     clear = shapely.covers(free, shapely.linestrings(np.stack([ends[0][first], ends[1][second]], axis=1)))

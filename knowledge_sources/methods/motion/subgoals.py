@@ -39,7 +39,7 @@ DOORWAY_DISTANCES_M = (0.65, 0.55, 0.47, 0.40)
 SEEING_PARTS = (1.0, 0.75, 0.6)
 """From so much of the distance at which the robot first sees the floor it approaches a doorway, where there is room."""
 DOORWAY_OFFSETS_M = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
-"""Distances from its middle, to either side, at which it is approached aslant, past what stands before it."""
+"""Distances from its middle, to either side, at which it is approached diagonally, past what stands before it."""
 LOOKOUT_DISTANCES_M = (1.8, 2.4, 3.0)  # distances from which it does so: the floor before it is in the picture
 LOOKOUT_DIRECTIONS = 24  # directions round it from which that is tried
 LOOKOUT_SHORT_M = 0.4  # so near before it something else may be in the line of sight: it may be a part of it
@@ -106,16 +106,16 @@ class SubgoalPlanner:
         """Subgoals through each passage to the destination, at the highest level where they differ (Figure 9).
 
         Where what the model lacks leaves no way through a room or to a passage, other passages are tried; and where
-        none is left, passing one aslant.
+        none is left, passing one diagonally.
         """
-        straight = self._plan_by_any(here, destination, tolerance_m, aslant=False)
+        straight = self._plan_by_any(here, destination, tolerance_m, diagonal=False)
         return straight if straight or not self._cluttered else self._plan_by_any(
-            here, destination, tolerance_m, aslant=True)
+            here, destination, tolerance_m, diagonal=True)
 
     def _plan_by_any(
-        self, here: Place, destination: Place, tolerance_m: float, *, aslant: bool
+        self, here: Place, destination: Place, tolerance_m: float, *, diagonal: bool
     ) -> tuple[Subgoal, ...] | None:
-        """Subgoals by the first route that obstacles leave free; ``aslant``: its passages need not be passed straight.
+        """Subgoals by the first route that obstacles leave free; ``diagonal``: its passages may be passed so.
         """
         tried: set[frozenset[str]] = set()
         todo: list[tuple[Passage, ...]] = [()]
@@ -128,17 +128,17 @@ class SubgoalPlanner:
             route = self._building.route(here.locale, destination.locale, avoided)
             if route is None:
                 continue
-            blocked = self._find_blocked(route, here, destination, aslant)
+            blocked = self._find_blocked(route, here, destination, diagonal)
             if not blocked:
-                return self._plan_route(route, here, destination, tolerance_m, aslant)
+                return self._plan_route(route, here, destination, tolerance_m, diagonal)
             todo += [(*avoided, passage) for passage in blocked]
         return None
 
-    def _find_blocked(self, route: Route, here: Place, destination: Place, aslant: bool) -> list[Passage]:
+    def _find_blocked(self, route: Route, here: Place, destination: Place, diagonal: bool) -> list[Passage]:
         """The passages at the ends of the first part of a route on which obstacles leave no way, if any."""
         came: Passage | None = None
         for step, rooms_m in zip(route.steps, self._measure_rooms_m(route, here, destination), strict=True):
-            ends = self._find_ends(step.passage, step.origin, step.destination, rooms_m, aslant)
+            ends = self._find_ends(step.passage, step.origin, step.destination, rooms_m, diagonal)
             if ends is None:
                 return [step.passage]
             if not self._has_way(here, ends.before):
@@ -154,11 +154,11 @@ class SubgoalPlanner:
         return self._find_way(here.locale, start.position, end.position) is not None
 
     def _plan_route(
-        self, route: Route, here: Place, destination: Place, tolerance_m: float, aslant: bool
+        self, route: Route, here: Place, destination: Place, tolerance_m: float, diagonal: bool
     ) -> tuple[Subgoal, ...] | None:
         subgoals: list[Subgoal] = []
         for step, rooms_m in zip(route.steps, self._measure_rooms_m(route, here, destination), strict=True):
-            ends = self._find_ends(step.passage, step.origin, step.destination, rooms_m, aslant)
+            ends = self._find_ends(step.passage, step.origin, step.destination, rooms_m, diagonal)
             if ends is None:
                 return None
             subgoals.append(self._build_subgoal(here, ends.before, ends.tolerance_m))
@@ -187,15 +187,15 @@ class SubgoalPlanner:
         return np.asarray(passage.threshold_of(locale).mean(axis=0))
 
     def _find_ends(
-        self, passage: Passage, origin: str, destination: str, rooms_m: tuple[float, float], aslant: bool
+        self, passage: Passage, origin: str, destination: str, rooms_m: tuple[float, float], diagonal: bool
     ) -> _Ends | None:
-        """The places before and behind a passage: straight before it, or past what stands there, aslant.
+        """The places before and behind a passage: straight before it, or past what stands there, diagonally.
 
         Where a thing of the model leaves no room for either, it may be elsewhere: the passage is tried.
         """
         sides = origin, destination
         ends = [self._find_place_before(passage, side, m) for side, m in zip(sides, rooms_m, strict=True)]
-        if None in ends and not isinstance(passage, Link) and (aslant or not self._cluttered.intersection(sides)):
+        if None in ends and not isinstance(passage, Link) and (diagonal or not self._cluttered.intersection(sides)):
             middles = [self._find_middle(passage, side) for side in sides]
             for clearance_m in CLEARANCES_M:
                 free = self._find_free_passage(passage, sides, clearance_m)

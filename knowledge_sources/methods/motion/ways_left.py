@@ -1,4 +1,4 @@
-"""What is left of a sketch, held against what has changed on its way."""
+"""What is left of a sketch, compared with what has changed on its way."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def meets(sketch: PlanSketch, obstacle: Obstacle, here: Pose2, robot: RobotModel
 
 
 def leads_through(sketch: PlanSketch, frame: LocaleFrame) -> bool:
-    """Whether what is left of a sketch leads through a door that is shut, or across a room that has changed."""
+    """Whether what is left of a sketch passes through a door that is shut, or across a room that has changed."""
     left = sketch.subgoals[sketch.at:]
     shut = {doorway.name for doorway in frame.shut_doorways}
     if any(subgoal.passage in shut for subgoal in left):

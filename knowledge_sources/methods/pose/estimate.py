@@ -224,7 +224,7 @@ def minimise(
 ) -> Minimum:
     """:func:`kernels.minimise_pose`; the prior counts if its information (6, 6) is given, and lines count alike.
 
-    Arrays that may be read-only are copied: numba compiles a function anew for each kind of argument.
+    Arrays that may be read-only are copied: numba compiles a function again for each kind of argument.
     """
     begin = np.array(start[0]), np.array(start[1])
     towards = begin if prior is None else (np.array(prior.rotation), np.array(prior.translation))

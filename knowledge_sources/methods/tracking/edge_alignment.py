@@ -91,10 +91,10 @@ def _weigh_with_camera(found: EdgeAlignment, prior: Pose2, covariance: Floats, o
     So the alignment comes between the belief and what the edges alone tell, and is never less sure than the belief.
     """
     of_belief = np.linalg.inv(covariance + INFLATION)
-    all_told = np.linalg.inv(found.covariance)
-    less = np.linalg.inv(np.eye(3) + (all_told - of_belief) @ of_camera)
-    weighed = np.linalg.inv(of_belief + less @ (all_told - of_belief))
-    step = weighed @ less @ all_told @ found.world_from_robot.minus(prior)
+    information = np.linalg.inv(found.covariance)
+    less = np.linalg.inv(np.eye(3) + (information - of_belief) @ of_camera)
+    weighed = np.linalg.inv(of_belief + less @ (information - of_belief))
+    step = weighed @ less @ information @ found.world_from_robot.minus(prior)
     return replace(found, world_from_robot=to_pose2(prior.vector + step), covariance=0.5 * (weighed + weighed.T))
 
 

@@ -11,10 +11,10 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import (
     MAX_CAMERA_CHI2,
-    MAX_TOLD_CHI2,
+    MAX_SLIP_CHI2,
     MIN_P_BELIEVED,
-    TOLD_SIGMA_M,
-    TOLD_SIGMA_RAD,
+    SLIP_SIGMA_M,
+    SLIP_SIGMA_RAD,
     Alike,
     BelievedPlace,
     Look,
@@ -48,8 +48,7 @@ from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 P_WRONG_STANDING = 0.02
-"""Prior probability of a wrong belief where the robot stands as it was put down, or found (as localization.p_told has
-it)."""
+"""Prior probability of a wrong belief where the robot stands as it was put down, or found (as P_STATED has it)."""
 P_WRONG_FOLLOWED = 0.05  # the same where landmarks were followed up to here
 MAX_FOLLOWED_PX = 15.0
 """Where the belief leaves more than this open in the picture, followed landmarks tell of no place (half of
@@ -146,14 +145,14 @@ class Verdict(NamedTuple):
         reason: in words, with the one count of lines and the bound that decided.
         p_wrong: the probability of a wrong place by which it was decided.
         most_p_wrong: what of it is accepted; of what agrees too little for any place, where refuting begins.
-        p_rival: of another place at which the picture may have been taken.
+        p_alias: of another place at which the picture may have been taken.
     """
 
     kind: MilestoneVerdict
     reason: str
     p_wrong: float
     most_p_wrong: float
-    p_rival: float = 0.0
+    p_alias: float = 0.0
 
 
 def tell_odds(p_wrong: float, most_p_wrong: float) -> str:
@@ -173,11 +172,11 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     """
     milestone, fix, segments_px, s = seen.milestone, seen.fix, seen.segments.segments_px, settings
     lines, pose = np.array(milestone.expected, float).reshape(-1, 2, 3), fix.world_from_robot
-    asked = find_distinct(project_lines(robot, lines, pose), segments_px)
-    patterned = int(np.count_nonzero(~asked))
-    lines, errors = lines[asked], milestone.errors.take(np.flatnonzero(asked))
+    tested = find_distinct(project_lines(robot, lines, pose), segments_px)
+    patterned = int(np.count_nonzero(~tested))
+    lines, errors = lines[tested], milestone.errors.take(np.flatnonzero(tested))
     agreed = check_lines(robot, lines, segments_px, pose, errors,
-                         [milestone.landmarks[i] for i in np.array(milestone.landmark_of, np.intp)[asked]])
+                         [milestone.landmarks[i] for i in np.array(milestone.landmark_of, np.intp)[tested]])
     plain_px = agreed.projected_px if not milestone.displacement_modes else check_lines(
         robot, lines, segments_px, pose).projected_px
     faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors)
@@ -186,17 +185,17 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     spread = before.covariance + fix.covariance
     motion_px = compute_motion_tolerance_px(robot, lines, before.pose, spread)
     followed = before.has_followed and motion_px <= MAX_FOLLOWED_PX
-    expected_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)[asked]
+    expected_px = np.array(milestone.expected_px, float).reshape(-1, 2, 2)[tested]
     if fix.camera_step:  # how far the robot is from where it was believed, not the camera
         expected_px = robot.camera.project_segments(lines, robot.camera_from_world(before.pose))[0]
     believed = BelievedPlace(before.pose, spread, 1.0 - _find_prior(before, followed=followed))
-    by_looks = _sum_told(milestone) + to_log_odds(p_false)
+    by_looks = _sum_log_odds(milestone) + to_log_odds(p_false)
     p_after = update(believed.compute_p_wrong(pose), by_looks)
     tolerance_px = _find_tolerance_px(before, motion_px, p_after <= POSE_CONFIDENCE.accept, s)
     if p_after <= MAX_P_UNMISTAKABLE:  # as far as what a search finds is still the place where it was tracked to
-        slipped = spread + np.diag(np.square([TOLD_SIGMA_M, TOLD_SIGMA_M, TOLD_SIGMA_RAD]))
+        slipped = spread + np.diag(np.square([SLIP_SIGMA_M, SLIP_SIGMA_M, SLIP_SIGMA_RAD]))
         slip_px = compute_motion_tolerance_px(robot, lines, before.pose, slipped)
-        slip_px *= math.sqrt(MAX_TOLD_CHI2) / MOTION_TOLERANCE_SIGMAS
+        slip_px *= math.sqrt(MAX_SLIP_CHI2) / MOTION_TOLERANCE_SIGMAS
         tolerance_px = max(tolerance_px, s.action.min_tolerance_px + slip_px)
     most = 1.0 - MIN_P_BELIEVED if is_last_look(milestone) else POSE_CONFIDENCE.accept
     return Weighed(
@@ -232,9 +231,10 @@ def _find_prior(before: Before, *, followed: bool) -> float:
     return P_WRONG_FOLLOWED if followed else P_WRONG_UNFOLLOWED
 
 
-def _sum_told(milestone: Milestone) -> float:
+def _sum_log_odds(milestone: Milestone) -> float:
     """The log odds of a wrong place by the looks in other directions: what they show beside this one."""
-    looks = [Look(Pose2(0.0, 0.0, along), told) for along, told in zip(milestone.tried, milestone.told, strict=True)]
+    looks = [Look(Pose2(0.0, 0.0, along), odds)
+             for along, odds in zip(milestone.tried, milestone.log_odds_so_far, strict=True)]
     return add_looks(looks, OTHER_DIRECTIONS, (Pose2(0.0, 0.0, milestone.look_heading_rad),))
 
 
@@ -266,7 +266,7 @@ def judge_place(w: Weighed) -> Verdict:
         return Verdict(kind, f"{found}: by what was seen {tell_odds(*odds)}", *odds)
     where = f"{found}, {w.shift_px:.1f} px from where expected"
     if w.camera_chi2 > MAX_CAMERA_CHI2:
-        return Verdict("refuted", f"{where}: only with a camera that is mounted otherwise than it can be", *odds)
+        return Verdict("refuted", f"{where}: only with a camera that is mounted differently than it can be", *odds)
     if w.p_wrong > w.most_p_wrong:
         return Verdict("not testable", f"{where}: not enough to tell the place by: {tell_odds(*odds)}", *odds)
     if a.matched < least:
@@ -308,11 +308,11 @@ def certify(names: tuple[str, str], w: Weighed, verdict: Verdict, fix: PoseFix) 
         deviation_rad=wrap_angle(w.pose.heading_rad - w.before.heading_rad),
         deviation_px=w.shift_px,
         tolerance_px=w.tolerance_px,
-        p_false=max(w.p_false, verdict.p_rival),
+        p_false=max(w.p_false, verdict.p_alias),
         p_wrong=verdict.p_wrong,
         most_p_wrong=verdict.most_p_wrong,
         faces=w.faces.count,
-        faces_alike=w.faces.agreeing,
+        faces_agreeing=w.faces.agreeing,
     )
 
 

@@ -40,11 +40,11 @@ Tell = Callable[[View], str]
 
 
 class Why(Logger):
-    """Logs the text when something in it changed; only what rests on a change is worded anew."""
+    """Logs the text when something in it changed; only what rests on a change is worded again."""
 
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)
-        self._told: dict[str, str] = {}
+        self._texts: dict[str, str] = {}
 
     def panels(self) -> Sequence[Panel]:
         return (Panel(rrb.TextDocumentView(origin=WHY, name="What Harvey thinks now"), "words", 1, 12),)
@@ -54,17 +54,17 @@ class Why(Logger):
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
         touched = [(title, tell) for title, (tell, *kinds) in THOUGHTS.items() if moment.touched(*kinds)]
-        self._told |= {title: tell(moment.mirror) for title, tell in touched}
+        self._texts |= {title: tell(moment.mirror) for title, tell in touched}
         if moment.touched(Hypothesis):
-            self._told[TRULY] = in_truth(moment.off)
-        if touched and self.is_new(WHY, text := compose(self._told)):
+            self._texts[TRULY] = in_truth(moment.off)
+        if touched and self.is_new(WHY, text := compose(self._texts)):
             stream.log(WHY, rr.TextDocument, text=[text])
 
 
-def compose(told: Mapping[str, str]) -> str:
+def compose(texts: Mapping[str, str]) -> str:
     """Paragraphs in the order of the themes; the beginning of each is its title."""
     parts = [f"**{title}** {text.removeprefix(title.lower()).lstrip()}" if title else f"### {text}"
-             for title in THOUGHTS if (text := told.get(title))]
+             for title in THOUGHTS if (text := texts.get(title))]
     return "\n\n".join(parts)
 
 

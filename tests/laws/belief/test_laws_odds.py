@@ -14,8 +14,8 @@ from knowledge_sources.methods.belief import (
     BelievedPlace,
     Look,
     add_looks,
-    bound_p_rivals,
-    compute_p_rivals,
+    bound_p_aliases,
+    compute_p_aliases,
     measure_common,
     to_log_odds,
     to_probability,
@@ -91,19 +91,19 @@ FAR, FARTHER, NEAR = Pose2(3.66, 0.0, 0.0), Pose2(7.32, 0.0, 0.0), Pose2(0.005, 
 
 @given(probabilities, probabilities, ratios)
 def test_more_prior_knowledge_never_makes_a_right_belief_less_likely(one: float, other: float, ratio: float) -> None:
-    less, more = (compute_p_rivals(BelievedPlace(HERE, SIGMAS, p), NEAR, [(FAR, ratio)]) for p in sorted((one, other)))
+    less, more = (compute_p_aliases(BelievedPlace(HERE, SIGMAS, p), NEAR, [(FAR, ratio)]) for p in sorted((one, other)))
     assert more <= less + 1e-12
 
 
 @given(st.floats(0.005, 5.0), st.floats(1.0, 10.0), st.floats(0.5, 0.9999))
 def test_a_sharper_belief_excludes_more(sigma: float, wider: float, p_there: float) -> None:
     sharp, wide = (BelievedPlace(HERE, np.diag([s, s, 0.01]) ** 2, p_there) for s in (sigma, wider * sigma))
-    assert compute_p_rivals(sharp, HERE, [(FAR, 0.0)]) <= compute_p_rivals(wide, HERE, [(FAR, 0.0)]) + 1e-12
+    assert compute_p_aliases(sharp, HERE, [(FAR, 0.0)]) <= compute_p_aliases(wide, HERE, [(FAR, 0.0)]) + 1e-12
 
 
 @given(st.floats(0.5, 0.9999), ratios)
 def test_a_door_far_outside_the_belief_is_as_likely_as_the_belief_is_wrong(p_there: float, ratio: float) -> None:
-    p = compute_p_rivals(BelievedPlace(HERE, SIGMAS, p_there), HERE, [(FAR, ratio)])
+    p = compute_p_aliases(BelievedPlace(HERE, SIGMAS, p_there), HERE, [(FAR, ratio)])
     share = 0.5 * (1.0 - p_there)  # wrong, the belief leaves this place open too
     there, here = share * math.exp(ratio), p_there + share
     assert p == pytest.approx(there / (there + here), rel=1e-6)
@@ -112,17 +112,17 @@ def test_a_door_far_outside_the_belief_is_as_likely_as_the_belief_is_wrong(p_the
 @given(ratios)
 def test_within_the_belief_the_picture_alone_tells(ratio: float) -> None:
     wide = BelievedPlace(HERE, np.diag([1e6, 1e6, 1e6]), 0.98)
-    assert compute_p_rivals(wide, HERE, [(FAR, ratio)]) == pytest.approx(to_probability(ratio), abs=1e-3)
+    assert compute_p_aliases(wide, HERE, [(FAR, ratio)]) == pytest.approx(to_probability(ratio), abs=1e-3)
 
 
 @given(st.floats(0.5, 0.9999), ratios, ratios)
 def test_rivals_share_what_the_belief_leaves(p_there: float, one: float, other: float) -> None:
     """However many places are tried, together they are no likelier than the likeliest picture of them makes them."""
     believed = BelievedPlace(HERE, SIGMAS, p_there)
-    both = compute_p_rivals(believed, HERE, [(FAR, one), (FARTHER, other)])
-    assert both == compute_p_rivals(believed, HERE, [(FARTHER, other), (FAR, one)])
+    both = compute_p_aliases(believed, HERE, [(FAR, one), (FARTHER, other)])
+    assert both == compute_p_aliases(believed, HERE, [(FARTHER, other), (FAR, one)])
     assert both <= (1.0 - p_there) * math.exp(max(one, other, 0.0)) / p_there + 1e-9
-    assert compute_p_rivals(believed, HERE, []) == 0.0
+    assert compute_p_aliases(believed, HERE, []) == 0.0
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-0.5, 0.5), st.integers(-2, 2))
@@ -137,7 +137,7 @@ def test_headings_that_are_whole_turns_apart_are_the_same(heading: float, off: f
 def test_what_is_believed_speaks_for_a_pose_within_it_and_as_much_against_one_far_outside(
     p_there: float, near: float, far: float, along: float
 ) -> None:
-    """It is never likelier the farther off it is, where the belief speaks for anything; one in doubt says nothing."""
+    """It is never likelier the farther off it is, where the belief supports anything; one in doubt says nothing."""
     believed = BelievedPlace(Pose2(1.0, 2.0, 0.5), np.diag([0.02**2, 0.02**2, 0.01**2]), p_there)
     at = [Pose2(1.0 + off * math.cos(along), 2.0 + off * math.sin(along), 0.5) for off in sorted((near, far))]
     nearer, farther = (believed.compute_p_wrong(pose) for pose in at)
@@ -170,5 +170,5 @@ def test_no_rivals_are_likelier_than_the_bound_by_which_none_is_sought(
     apart = 0.4, 0.3
     rivals = [(pose, max(min(ratio, most), -most)) for pose, ratio in drawn
               if pose.distance_to(here) > apart[0] or abs(wrap_angle(pose.heading_rad - here.heading_rad)) > apart[1]]
-    p = compute_p_rivals(believed, here, rivals)
-    assert p <= bound_p_rivals(believed, here, apart, most) + 1e-12
+    p = compute_p_aliases(believed, here, rivals)
+    assert p <= bound_p_aliases(believed, here, apart, most) + 1e-12

@@ -1,4 +1,4 @@
-"""The agenda against a plain list that is sorted anew for every question."""
+"""The agenda against a plain list that is sorted again for every question."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ def test_a_stop_key_ends_it_at_once_also_while_something_else_is_wrong() -> None
 
 @pytest.mark.parametrize("whole", [0, MAX_BROKEN_MOTIONS - 1])
 def test_a_base_that_breaks_off_every_motion_is_given_up(whole: int) -> None:
-    """Each fault passes at once, but so many in a row are too many; one whole motion starts the count anew."""
+    """Each fault passes at once, but so many in a row are too many; one whole motion starts the count again."""
     script = ["stalled", ""] * (MAX_BROKEN_MOTIONS - 1) + [""] * bool(whole) + ["stalled", ""] * MAX_BROKEN_MOTIONS
     scheduler, told = drive(["move"] * 20, ScriptedBody(script, ""))
     outcome = scheduler.view.latest(Outcome)

@@ -76,12 +76,12 @@ PERCEIVERS = {"correlator_tracker", "landmark_chooser", "line_finder", "matcher"
 SURE = diagonal(0.002, 0.001)
 
 
-UNTOLD = -1.0
+UNCONFIRMED = -1.0
 """What a picture says of a milestone where it cannot be told."""
 
 
 def figure(frame: Entry[CameraPicture]) -> float:
-    """What a picture says: how far things are from where they are expected [px], or UNTOLD."""
+    """What a picture says: how far things are from where they are expected [px], or UNCONFIRMED."""
     return float(frame.value.jpeg)
 
 
@@ -121,7 +121,7 @@ class ScriptedJudge(RobotKnowledgeSource):
         belief, milestone, last = find_belief(view), open_milestone(view), open_discrepancy(view, Level.PLAN)
         assert belief is not None and milestone is not None
         px = figure(trigger.entry)
-        verdict = "not testable" if px == UNTOLD else "verified" if px <= PLAN_PX else "refuted"
+        verdict = "not testable" if px == UNCONFIRMED else "verified" if px <= PLAN_PX else "refuted"
         here, nothing = belief.value.world_from_robot(find_building(view)), np.zeros((0, 2))
         fix = Post(PoseFix("", here, np.array(SURE), nothing[:, 0] > 0, nothing, ()), (trigger.entry,))
         yield fix
@@ -129,9 +129,9 @@ class ScriptedJudge(RobotKnowledgeSource):
                            0.0, 0.0, 0.006)
         yield Post(told, (fix, milestone))
         yield Revise(milestone, replace(milestone.value, status=verdict), (fix,))
-        if px == UNTOLD and len(milestone.value.tried) + 1 < MAX_MILESTONE_LOOKS:
+        if px == UNCONFIRMED and len(milestone.value.tried) + 1 < MAX_MILESTONE_LOOKS:
             return
-        magnitude = math.inf if px == UNTOLD else px
+        magnitude = math.inf if px == UNCONFIRMED else px
         found = Discrepancy(Level.PLAN, "a milestone is elsewhere", magnitude, (0.0, PLAN_PX), "px")
         yield Post(found, (fix,)) if last is None else Revise(last, found, (fix,))
 
@@ -205,7 +205,7 @@ def robot(continuous: bool) -> RobotModel:
 
 
 class Ladder:
-    """A mission of the real knowledge sources with scripted measurements; each decision is held against the laws."""
+    """A mission of the real knowledge sources with scripted measurements; each decision is compared with the laws."""
 
     def __init__(self, continuous: bool = False) -> None:
         real = [source() for source in KNOWLEDGE_SOURCES]
@@ -290,7 +290,7 @@ class Ladder:
 
 
 figures = st.sampled_from([0.0, 1.0, 5.9, 6.1, 20.0, 29.9, 30.1, 500.0, math.inf])
-of_milestones = figures | st.just(UNTOLD)
+of_milestones = figures | st.just(UNCONFIRMED)
 
 
 class LadderMachine(RuleBasedStateMachine):
@@ -358,7 +358,7 @@ def test_whatever_pictures_go_on_saying_the_mission_ends_and_says_how(
     assert all(d.times <= (checks if d.level is Level.ACTION else lost) for d in raised)
     if track <= ACTION_PX and 0.0 <= milestone <= PLAN_PX:
         assert ladder.outcome.kind == "reached" and not raised
-    if milestone > PLAN_PX or milestone == UNTOLD:
+    if milestone > PLAN_PX or milestone == UNCONFIRMED:
         assert ladder.outcome.kind == "lost"
 
 
@@ -366,7 +366,7 @@ def test_in_doubt_it_looks_in_other_directions_before_it_is_lost() -> None:
     """Landmarks are lost once; of the looks that follow the last that is allowed tells that all is well."""
     ladder = Ladder()
     ladder.go_on(30)
-    ladder.body.says.update(track=500.0, milestone=UNTOLD)
+    ladder.body.says.update(track=500.0, milestone=UNCONFIRMED)
     looked: list[float] = []
     while len(looked) < MAX_MILESTONE_LOOKS and ladder.outcome is None:
         if len(looked) == MAX_MILESTONE_LOOKS - 1:

@@ -1,7 +1,7 @@
 """Laws of how sure a tracked pose is, after one picture and after a chain of them, and of the tolerance made from it.
 
 The robot is put together without pictures: templates are cut where the belief has landmarks, so that what they show is
-off by the belief's own error, and stays so until they are cut anew.
+off by the belief's own error, and stays so until they are cut again.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.floor.appearance import compute_looks, default_covariance, find_floor_in_shade
+from knowledge_sources.methods.floor.appearance import compute_appearance, default_covariance, find_floor_in_shade
 from knowledge_sources.methods.floor.model_floor import ModelFloor
 from knowledge_sources.methods.floor.see_floor import find_unlike
 
@@ -32,10 +32,10 @@ def test_what_darkens_little_by_little_is_floor_and_a_thing_in_it_is_not(
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
     along = (x - 80) * math.cos(direction) + (y - 45) * math.sin(direction)
     picture = shaded(dark + (1.0 - dark) / (1.0 + np.exp(along / width_px)))
-    mean, everywhere = compute_looks(FLOOR), np.ones(SHAPE, bool)
-    assert find_floor_in_shade(compute_looks(picture), everywhere, mean, default_covariance()).mean() > 0.97
+    mean, everywhere = compute_appearance(FLOOR), np.ones(SHAPE, bool)
+    assert find_floor_in_shade(compute_appearance(picture), everywhere, mean, default_covariance()).mean() > 0.97
     picture[40:60, 70:95] *= 0.5
-    with_thing = find_floor_in_shade(compute_looks(picture), everywhere, mean, default_covariance())
+    with_thing = find_floor_in_shade(compute_appearance(picture), everywhere, mean, default_covariance())
     assert with_thing[42:58, 72:93].mean() < 0.05, "its own edges part it from the floor"
     assert with_thing[:38].mean() > 0.97
 

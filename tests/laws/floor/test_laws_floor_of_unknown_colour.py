@@ -17,7 +17,7 @@ import harvey
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import MotionBetween, Seen, is_telling, see_free_floor
 from knowledge_sources.methods.floor.model_floor import build_floor_grid, predict_model_floor
-from knowledge_sources.methods.floor.relief import FLAT, STANDING, UNTOLD, Modelled, Relief, TwoPictures
+from knowledge_sources.methods.floor.relief import FLAT, STANDING, UNCONFIRMED, Modelled, Relief, TwoPictures
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries import FreeFloor
@@ -208,7 +208,7 @@ def test_only_what_two_reliefs_tell_alike_stands_where_that_is_asked(seed: int) 
     near, far = np.full(kinds.shape, 0.93, np.float32), np.full(kinds.shape, 0.41, np.float32)
     one = Relief(kinds, near, gains)
     np.testing.assert_array_equal(one.agreeing(one, asked).kinds, kinds)
-    for other in (None, *(Relief(np.full_like(kinds, kind), far, gains) for kind in (FLAT, STANDING, UNTOLD))):
+    for other in (None, *(Relief(np.full_like(kinds, kind), far, gains) for kind in (FLAT, STANDING, UNCONFIRMED))):
         left = one.agreeing(other, asked).kinds
         assert not (left[asked] == STANDING).any()
         np.testing.assert_array_equal(left[~asked], kinds[~asked])

@@ -102,7 +102,7 @@ def look(*, p: float = 0.6, sigma_m: float = 0.05, sigma_height_m: float = 0.3, 
     floor = FreeFloor("camera", HALL, eye.x_m, eye.y_m, (0.0,), (1.0,), (1.0,), ("thing",), (0.02,), (), seen_s)
     thing = FloorThing(known.footprint, sigma_m, height_m, sigma_height_m, p, (0.0, 0.0, 9.0, 9.0), "unlike the floor")
     sight = Sight(floor, "CameraPicture-1", house(), 0.4, NONE, NONE)
-    known = replace(known, told_from=(eye.x_m + way_m, eye.y_m))
+    known = replace(known, judged_from=(eye.x_m + way_m, eye.y_m))
     return see_again(sight, known, thing, shape or ThingShape.of(known), free, DEFAULT.action)
 
 
@@ -120,7 +120,7 @@ def test_of_two_sights_the_sharper_tells_place_and_height(sigma_m: float, sigma_
 @pytest.mark.parametrize("way_m", [0.0, 20.0])
 @pytest.mark.parametrize("status", ["suspected", "there", "gone"])
 def test_only_from_elsewhere_it_is_further_evidence(p: float, way_m: float, status: str) -> None:
-    """There the odds multiply; from the same place the stronger counts; gone, it begins anew."""
+    """There the odds multiply; from the same place the stronger counts; gone, it begins again."""
     known = replace(THING, status=status, certainty=0.4)
     new = look(p=p, way_m=way_m, known=known)
     assert new is not None

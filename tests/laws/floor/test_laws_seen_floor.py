@@ -99,15 +99,15 @@ def test_told_is_what_a_scan_shows_free_up_to_where_it_tells(seen: list[FreeFloo
     points = np.random.default_rng(seed).uniform((-3.0, -2.0), (3.0, 2.0), (60, 2))
     disc = np.array([[0.0, 0.0, 0.4]])
     told = np.linalg.norm(points, axis=1) <= 0.4
-    by_discs = SeenFloor(tuple(replace(scan, told_m=()) for scan in seen), disc).ask_told(points)
+    by_discs = SeenFloor(tuple(replace(scan, confirmed_m=()) for scan in seen), disc).ask_confirmed(points)
     assert (by_discs == told).all()
-    shorter = [replace(scan, told_m=tuple(part * far for far in scan.far_m)) for scan in seen]
+    shorter = [replace(scan, confirmed_m=tuple(part * far for far in scan.far_m)) for scan in seen]
     for scan in shorter:
-        told |= SeenFloor((replace(scan, far_m=scan.told_m),), np.zeros((0, 3))).ask(points)[0]
-    assert (SeenFloor(tuple(shorter), disc).ask_told(points) == told).all()
-    ranged = replace(seen[-1], sense="ranges", told_m=())
+        told |= SeenFloor((replace(scan, far_m=scan.confirmed_m),), np.zeros((0, 3))).ask(points)[0]
+    assert (SeenFloor(tuple(shorter), disc).ask_confirmed(points) == told).all()
+    ranged = replace(seen[-1], sense="ranges", confirmed_m=())
     free = SeenFloor((ranged,), np.zeros((0, 3)))
-    assert (free.ask_told(points) == free.ask(points)[0]).all()
+    assert (free.ask_confirmed(points) == free.ask(points)[0]).all()
 
 
 @settings(max_examples=40)

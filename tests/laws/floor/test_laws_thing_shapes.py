@@ -69,7 +69,7 @@ def test_what_is_seen_now_stays_unless_it_was_seen_from_clearly_nearer(
 def test_from_clearly_nearer_nothing_is_left_in_its_directions_of_what_was_seen_from_afar(
     new: ThingShape, part: float, wider: float
 ) -> None:
-    """From far away it seemed wider and deeper; what lay in the same directions is told anew."""
+    """From far away it seemed wider and deeper; what lay in the same directions is told again."""
     middle = shapely.get_coordinates(new.seen)[:4].mean(axis=0)
     behind = shapely.affinity.translate(new.seen, *(0.4 * middle / np.linalg.norm(middle)))
     within = shapely.affinity.scale(behind, 0.5 / wider, 0.5 / wider)

@@ -33,7 +33,7 @@ SETTINGS = "knowledge_sources.settings"
 def find_held(source: object) -> Iterator[Any]:
     """Every object that a knowledge source holds: in itself, in its classes, and in what these hold."""
     seen, todo = set[int](), [source, *type(source).__mro__[:-1]]
-    kept = list[Any]()  # bound methods are made anew at each look; ids are unique only as long as they live
+    kept = list[Any]()  # bound methods are made again at each look; ids are unique only as long as they live
     while todo:
         thing = todo.pop()
         if id(thing) in seen:

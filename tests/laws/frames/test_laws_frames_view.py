@@ -26,7 +26,7 @@ from world_models.frame_building import FrameBuilding
 def test_acts_are_the_same_on_a_board_that_is_rebuilt_from_the_journal(
     name: str, acting: set[str], request: pytest.FixtureRequest
 ) -> None:
-    """By a knowledge source made for this act, in a world that was read anew: to the byte, with what it read."""
+    """By a knowledge source made for this act, in a world that was read again: to the byte, with what it read."""
     acted = set[str]()
     for rebuilt, decision in rebuild(request.getfixturevalue(name)):
         assert rebuilt.act_again(decision) == recorded_act(decision), decision.cycle

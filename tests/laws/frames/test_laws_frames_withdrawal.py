@@ -105,7 +105,7 @@ def _find_left_over(view: View) -> Iterator[str]:
             yield f"{tracks.ref} follows {followed}"
     for sketch in sketches:
         if shut.intersection(subgoal.passage for subgoal in sketch.value.subgoals[sketch.value.at:]):
-            yield f"{sketch.ref} leads through a shut door"
+            yield f"{sketch.ref} passes through a shut door"
 
 
 def _list_edges(frames: list[LocaleFrame]) -> dict[str, Any]:

@@ -30,17 +30,19 @@ from knowledge_sources.methods.localization import (
     MIN_NEW_VIEW_RAD,
     MIN_P_TRACKED,
     MOVE_M,
-    P_TOLD,
+    P_STATED,
     CameraView,
     compute_pose_likelihood,
     make_alias_test,
 )
 from knowledge_sources.methods.verification import predict_lines
-from knowledge_sources.reads.place_believed import MIN_P_TWIN
+from knowledge_sources.reads.place_believed import MIN_P_ALIAS
 from knowledge_sources.relocalizer import alias_monitor
 from knowledge_sources.relocalizer.alias_monitor import AliasMonitor
 from knowledge_sources.relocalizer.pose_adopter import pose_adopter
 from world_models.entries import (
+    Alias,
+    AliasOdds,
     Certificate,
     Hypothesis,
     LineMatch,
@@ -50,8 +52,6 @@ from world_models.entries import (
     PlaceSearch,
     PoseFix,
     Segments,
-    Twin,
-    TwinOdds,
     diagonal,
 )
 from world_models.frames import Pose2, wrap_angle
@@ -66,7 +66,7 @@ BARE = np.zeros((0, 2, 2))
 @pytest.fixture()
 def keeps_every_twin(monkeypatch: pytest.MonkeyPatch) -> None:
     """A twin is kept in mind however unlikely it is."""
-    monkeypatch.setattr(alias_monitor, "MIN_P_TWIN", 0.0)
+    monkeypatch.setattr(alias_monitor, "MIN_P_ALIAS", 0.0)
 
 
 def verify(
@@ -90,9 +90,9 @@ def say(seen: np.ndarray, here: Pose2, there: Pose2) -> float:
     return math.copysign(max(abs(other - one) - noise, 0.0), other - one)
 
 
-def known(ratios: list[float], p_prior: float, last: Pose2) -> TwinOdds:
-    return TwinOdds(
-        p_prior, 0.9, tuple(Twin(f"twin-{k}", SAME, r) for k, r in enumerate(ratios)), ("Certificate-9",), last
+def known(ratios: list[float], p_prior: float, last: Pose2) -> AliasOdds:
+    return AliasOdds(
+        p_prior, 0.9, tuple(Alias(f"twin-{k}", SAME, r) for k, r in enumerate(ratios)), ("Certificate-9",), last
     )
 
 
@@ -105,22 +105,22 @@ def test_each_place_is_weighed_by_its_own_pictures(ratios: list[float], p_prior:
     old = bench.put(known(ratios, p_prior, Pose2(HERE.x_m - 3.0, HERE.y_m, 0.0)))
     certificate = verify(bench)
     effects = bench.ask(SOURCE, certificate)
-    effect = effect_on(effects, TwinOdds)
+    effect = effect_on(effects, AliasOdds)
     share = (1.0 - p_prior) / len(ratios)
     weights = [p_prior, *(share * math.exp(ratio) for ratio in ratios)]
     own, *others = (weight / sum(weights) for weight in weights)
-    assume(all(abs(p - MIN_P_TWIN) > 1e-9 for p in others) and abs(own - MIN_P_TRACKED) > 1e-9)
+    assume(all(abs(p - MIN_P_ALIAS) > 1e-9 for p in others) and abs(own - MIN_P_TRACKED) > 1e-9)
     found = effect.value
     assert effect.entry.id == old.id and found.probability == pytest.approx(own)
-    assert [t.locale for t in found.twins] == [f"twin-{k}" for k, p in enumerate(others) if p >= MIN_P_TWIN]
-    assert all(t.log_ratio == pytest.approx(ratios[int(t.locale[5:])]) for t in found.twins)
+    assert [t.locale for t in found.aliases] == [f"twin-{k}" for k, p in enumerate(others) if p >= MIN_P_ALIAS]
+    assert all(t.log_ratio == pytest.approx(ratios[int(t.locale[5:])]) for t in found.aliases)
     assert (found.p_prior, found.counted, found.last) == (p_prior, ("Certificate-9", certificate.id), HERE)
     assert reasons(effect) == {certificate.id, "PoseFix-1", "Segments-1", belief.id, old.id}
     doubts = made(effects, Discrepancy)
     assert bool(doubts) == (own < MIN_P_TRACKED)
     if doubts:
         assert (doubts[0].level, doubts[0].magnitude) == (Level.GOAL, None)
-        assert reasons(effect_on(effects, Discrepancy)) == {"TwinOdds"}
+        assert reasons(effect_on(effects, Discrepancy)) == {"AliasOdds"}
     bench.apply(*effects or ())
     assert bench.ask(SOURCE, certificate) is None  # the same picture is not counted twice
 
@@ -131,15 +131,15 @@ def test_the_order_of_the_places_does_not_matter(ratios: list[float]) -> None:
     bench = Bench(plain_robot())
     bench.believe()
     bench.put(known(ratios, 0.5, Pose2(HERE.x_m - 3.0, HERE.y_m, 0.0)))
-    found = effect_on(bench.ask(SOURCE, verify(bench)), TwinOdds).value
-    assert sorted(t.log_ratio for t in found.twins) == pytest.approx([-1.0, 1.0, 3.0])
+    found = effect_on(bench.ask(SOURCE, verify(bench)), AliasOdds).value
+    assert sorted(t.log_ratio for t in found.aliases) == pytest.approx([-1.0, 1.0, 3.0])
 
 
 def test_the_first_time_the_odds_are_those_that_were_told() -> None:
     bench = Bench(plain_robot())
     bench.believe()
-    found = effect_on(bench.ask(SOURCE, verify(bench)), TwinOdds).value
-    assert found.p_prior == pytest.approx(P_TOLD) and len(found.counted) == 1
+    found = effect_on(bench.ask(SOURCE, verify(bench)), AliasOdds).value
+    assert found.p_prior == pytest.approx(P_STATED) and len(found.counted) == 1
 
 
 @pytest.mark.parametrize("there", [Pose2(5.2, 2.3, -1.2), Pose2(4.1, 1.7, 0.6), Pose2(9.5, 1.0, 2.8)])
@@ -152,9 +152,9 @@ def test_each_is_weighed_where_the_robot_would_be_there(there: Pose2, seen_from:
     seen = predict_lines(ROBOT, shot).segments_px
     bench = Bench(ROBOT)
     bench.believe(Pose2(3.2, 1.8, 1.9))
-    twin = Twin(HALL, other @ here.inverse(), 0.7)
-    bench.put(TwinOdds(0.5, 0.9, (twin,), ("Certificate-9",), Pose2(HERE.x_m - 3.0, HERE.y_m, 0.0)))
-    (found,) = effect_on(bench.ask(SOURCE, verify(bench, here, seen=seen)), TwinOdds).value.twins
+    twin = Alias(HALL, other @ here.inverse(), 0.7)
+    bench.put(AliasOdds(0.5, 0.9, (twin,), ("Certificate-9",), Pose2(HERE.x_m - 3.0, HERE.y_m, 0.0)))
+    (found,) = effect_on(bench.ask(SOURCE, verify(bench, here, seen=seen)), AliasOdds).value.aliases
     assert found.there_from_here == twin.there_from_here
     assert found.log_ratio == pytest.approx(0.7 + say(seen, here, other))
 
@@ -170,8 +170,8 @@ def test_what_is_noise_between_places_that_look_alike_says_nothing() -> None:
             seen = predict_lines(ROBOT, shot).segments_px
             bench = Bench(ROBOT)
             bench.believe(Pose2(3.2, 1.8, -2.4))
-            bench.put(TwinOdds(0.5, 0.9, (Twin(HALL, other @ here.inverse(), 0.0),), (), Pose2(0.0, 0.0, 0.0)))
-            (found,) = effect_on(bench.ask(SOURCE, verify(bench, here, seen=seen)), TwinOdds).value.twins
+            bench.put(AliasOdds(0.5, 0.9, (Alias(HALL, other @ here.inverse(), 0.0),), (), Pose2(0.0, 0.0, 0.0)))
+            (found,) = effect_on(bench.ask(SOURCE, verify(bench, here, seen=seen)), AliasOdds).value.aliases
             assert found.log_ratio == pytest.approx(say(seen, here, other))
             told.append(found.log_ratio)
     assert min(told) < 0.0 < max(told) and told.count(0.0) > 0
@@ -183,7 +183,7 @@ def test_twins_are_where_walls_and_doors_are_as_here(pose: Pose2) -> None:
     """The hall turned round, and behind its door what lies to that as the robot does; each goes with the robot."""
     bench, here = Bench(ROBOT), to_world(pose)
     bench.believe(pose)
-    twins = effect_on(bench.ask(SOURCE, verify(bench, here)), TwinOdds).value.twins
+    twins = effect_on(bench.ask(SOURCE, verify(bench, here)), AliasOdds).value.aliases
     wanted = [
         (HALL, Pose2(LENGTH_M - pose.x_m, WIDTH_M - pose.y_m, pose.heading_rad + math.pi)),
         (STUDY, Pose2(LENGTH_M + 8.2 - pose.x_m, WIDTH_M - pose.y_m, pose.heading_rad + math.pi)),
@@ -237,9 +237,9 @@ def test_a_place_that_was_believed_by_odds_and_refuted_is_believed_less(refuted:
     """Each time the odds are a fifth; recomputed without the method."""
     bench = Bench(plain_robot())
     bench.believe()
-    bench.put(PlaceOdds(HALL, 2, "told", 0.9, 0.99, refuted))
-    found = effect_on(bench.ask(SOURCE, verify(bench)), TwinOdds).value
-    odds = P_TOLD / (1.0 - P_TOLD) * LOST_AGAIN_ODDS**refuted
+    bench.put(PlaceOdds(HALL, 2, "stated", 0.9, 0.99, refuted))
+    found = effect_on(bench.ask(SOURCE, verify(bench)), AliasOdds).value
+    odds = P_STATED / (1.0 - P_STATED) * LOST_AGAIN_ODDS**refuted
     assert found.p_prior == pytest.approx(odds / (1.0 + odds))
 
 
@@ -252,7 +252,7 @@ def test_found_again_it_begins_anew() -> None:
     bench.apply(*bench.ask(pose_adopter, bench.put(PlaceSearch("found", "one place"))) or ())
     assert bench.view.get(old.id) is None
     bench.revise(doubt, status="corrected")
-    effect = effect_on(bench.ask(SOURCE, verify(bench)), TwinOdds)
+    effect = effect_on(bench.ask(SOURCE, verify(bench)), AliasOdds)
     assert effect.value.p_prior != old.value.p_prior and old.id not in reasons(effect)
 
 

@@ -12,7 +12,7 @@ from blackboard import Discrepancy, Entry, Level
 from generated_boards import Bench, effect_on, plain_robot, poses, reasons, to_world
 from knowledge_sources.methods.verification import MIN_MATCHED_LINES, turn_headings
 from knowledge_sources.milestone_selector.belief_checker import BeliefChecker
-from knowledge_sources.reads import list_told
+from knowledge_sources.reads import list_log_odds
 from knowledge_sources.reads.looks import MAX_LOOK_LOG_ODDS
 from world_models.entries import Certificate, Milestone, Outcome
 from world_models.entries.task import MilestoneStatus
@@ -42,7 +42,7 @@ def test_the_first_check_is_the_present_view_and_of_no_sketch(pose: Pose2) -> No
     effect = effect_on(bench.ask(SOURCE, doubt), Milestone)
     check = effect.value
     assert check.look_heading_rad == pytest.approx(to_world(pose).heading_rad)
-    assert (check.sketch, check.index, check.tried, check.told, check.status) == ("", -1, (), (), "turning")
+    assert (check.sketch, check.index, check.tried, check.log_odds_so_far, check.status) == ("", -1, (), (), "turning")
     assert doubt.value.what in check.what and reasons(effect) == {doubt.id, "Hypothesis-1"}
 
 
@@ -105,10 +105,10 @@ def test_each_look_is_told_by_what_it_said_alone(before: list[float], p_false: f
     """In log odds, no more than one look may say, and nothing by too few lines."""
     bench = Bench()
     tried = tuple(float(k) for k in range(len(before) + 1))
-    last = bench.await_milestone(look_heading_rad=tried[-1], tried=tried[:-1], told=tuple(before),
+    last = bench.await_milestone(look_heading_rad=tried[-1], tried=tried[:-1], log_odds_so_far=tuple(before),
                                  status="not testable")
     certify(bench, last.id, p_false, matched)
-    told = list_told(bench.view, Milestone("", -1, "", 9.0, tried=tried))
+    told = list_log_odds(bench.view, Milestone("", -1, "", 9.0, tried=tried))
     p, most = min(max(p_false, 1e-12), 1.0 - 1e-12), MAX_LOOK_LOG_ODDS
     said = min(max(math.log(p / (1.0 - p)), -most), most) if matched >= FEW else 0.0
     assert told == pytest.approx((*before, said))
@@ -117,10 +117,10 @@ def test_each_look_is_told_by_what_it_said_alone(before: list[float], p_false: f
 def test_nothing_was_told_without_a_look_or_by_the_verdict_on_another() -> None:
     bench = Bench()
     fresh, again = (Milestone("", -1, "", 1.0, tried=tried) for tried in ((), (0.0,)))
-    assert list_told(bench.view, again) == (0.0,)
+    assert list_log_odds(bench.view, again) == (0.0,)
     last = bench.await_milestone(status="not testable")
-    assert list_told(bench.view, again) == (0.0,)
+    assert list_log_odds(bench.view, again) == (0.0,)
     certify(bench, last.id, 0.1, 20)
-    assert list_told(bench.view, fresh) == () and list_told(bench.view, again)[0] < 0.0
+    assert list_log_odds(bench.view, fresh) == () and list_log_odds(bench.view, again)[0] < 0.0
     certify(bench, "Milestone-9", 0.1, 20)
-    assert list_told(bench.view, again) == (0.0,)
+    assert list_log_odds(bench.view, again) == (0.0,)

@@ -54,7 +54,7 @@ def test_the_camera_is_moved_by_the_step_and_no_surer_than_lines_may_make_it(
     old, new = camera.value.mount, effect.value.mount
     assert (new.tilt_rad, new.roll_rad, new.yaw_rad, new.height_m) == pytest.approx(
         (old.tilt_rad + angles[0], old.roll_rad + angles[1], old.yaw_rad + angles[2], old.height_m + angles[3]))
-    assert (effect.value.told_mount, effect.value.told_lens) == (old, camera.value.lens)
+    assert (effect.value.nominal_mount, effect.value.nominal_lens) == (old, camera.value.lens)
     wanted = [max(sigma, floor) ** 2 for sigma, floor in zip(sigmas, FLOORS, strict=True)]
     assert np.allclose(effect.value.covariance, np.diag(wanted), atol=1e-15)
     assert effect.value.counted == ((HERE.x_m, HERE.y_m, HERE.heading_rad),)
@@ -69,7 +69,7 @@ def test_so_many_looks_are_remembered_and_what_was_told_first() -> None:
         bench.apply(*bench.ask(SOURCE, certificate) or ())
     now = bench.view["CameraState-1"].value
     assert [look[0] for look in now.counted] == [float(n) for n in range(3, MAX_COUNTED + 3)]
-    assert now.as_told().mount == told.mount
+    assert now.as_nominal().mount == told.mount
     assert now.mount.tilt_rad == pytest.approx(told.mount.tilt_rad + 1e-3 * (MAX_COUNTED + 3))
 
 

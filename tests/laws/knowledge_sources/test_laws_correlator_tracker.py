@@ -296,7 +296,7 @@ def test_landmarks_are_taken_anew_where_fewer_are_left_than_serve(
     monkeypatch.setattr(correlator_tracker, "with_anchors", lambda *_: "as they are")
     monkeypatch.setattr(correlator_tracker, "find_camera", lambda _: None)
     monkeypatch.setattr(correlator_tracker, "compute_camera_covariance", lambda *_: None)
-    monkeypatch.setattr(correlator_tracker, "take_new", lambda *_: "anew")
+    monkeypatch.setattr(correlator_tracker, "take_new", lambda *_: "again")
     old = SimpleNamespace(value=SimpleNamespace(anchors=(), taken=taken))
     case: Any = SimpleNamespace(frame=SimpleNamespace(id="CameraPicture-9"), old=old,
                                 belief=SimpleNamespace(seeing=SimpleNamespace(world=None), view=None))
@@ -304,4 +304,4 @@ def test_landmarks_are_taken_anew_where_fewer_are_left_than_serve(
     useless = [follow(False, 0, "near"), follow(True, most, "near"), follow(True, 0, "far")]
     followed = [*useless, *[follow(True, most - 1, "near")] * (least + more)]
     found: Any = CorrelatorTracker()._renew(case, np.zeros((2, 2), np.uint8), followed, belief)
-    assert (found != "anew") == (more >= 0)
+    assert (found != "again") == (more >= 0)

@@ -85,7 +85,7 @@ def test_after_a_stop_it_waits_until_somebody_says_go_on(asks: bool, stop: Any) 
     if effects is not None:
         (wait,) = bench.apply(*effects)
         assert wait.entry.value == Recovery(found.id, "", 3.0, 1.0) and bench.ask(SOURCE, found) is None
-        again = bench.ask(SOURCE, bench.revise(wait.entry, status="in vain"))
+        again = bench.ask(SOURCE, bench.revise(wait.entry, status="still failing"))
         assert [value.status for value in made(again, Recovery)] == ["asked"]
         told = bench.revise(bench.put(Redirection(GO_ON)), answer="and does")
         assert [(d.level, d.magnitude) for d in made(bench.ask(SOURCE, told), Discrepancy)] == [(Level.PLAN, None)]
@@ -136,7 +136,7 @@ def test_the_oldest_open_fault_for_which_nobody_waits_is_answered(drawn: list[An
 
 @given(st.sampled_from((0.0, 0.99, 1.0, 2.0)), st.sampled_from(("", "nobody comes by")))
 def test_an_elevator_that_does_not_come_is_named(part: float, detail: str) -> None:
-    """It blocks the way, as long as it was called in vain for long enough; what the last try found counts."""
+    """It blocks the way, as long as it was called without success for long enough; what the last try found counts."""
     board = Blackboard()
 
     def put(value: Any) -> Entry[Any]:
@@ -144,7 +144,7 @@ def test_an_elevator_that_does_not_come_is_named(part: float, detail: str) -> No
 
     ride = put(Ride("PlanSketch-1", 1, "lift-a", "car-1", "car-2"))
     fault = put(BodyFault("elevator", "no ride", "first", ride.id, 1.0))
-    tried = put(Recovery(fault.id, ride.id, 1.0, 1.0, 3, part * PATIENCE_S, "in vain", "no ride", detail))
+    tried = put(Recovery(fault.id, ride.id, 1.0, 1.0, 3, part * PATIENCE_S, "still failing", "no ride", detail))
     (effect,) = answer(SOURCE, board.view, Revised(tried)) or ()
     if part < 1.0:
         assert isinstance(effect, Revise) and effect.value.status == "asked"

@@ -1,4 +1,4 @@
-"""Laws of the goal renewer: the robot that knows its place again doubts nothing, and begins anew from there."""
+"""Laws of the goal renewer: the robot that knows its place again doubts nothing, and begins again from there."""
 
 from __future__ import annotations
 

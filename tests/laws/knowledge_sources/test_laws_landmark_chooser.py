@@ -1,4 +1,4 @@
-"""Laws of the landmark chooser: all landmarks are taken anew from the newest picture, and the drift starts afresh."""
+"""Laws of the landmark chooser: all landmarks are taken again from the newest picture, and the drift starts afresh."""
 
 from __future__ import annotations
 

@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 
 from blackboard import Discrepancy, Entry, Level, Post, Posted, Retract
 from generated_boards import HALL, Bench, drive, go, made, motions, plain_robot, poses, reasons, to_world, wakes
-from knowledge_sources.methods.localization import LOST_AGAIN_ODDS, MAX_FAR_PROBES, P_TOLD, LocalizationStatus, Search
+from knowledge_sources.methods.localization import (
+    LOST_AGAIN_ODDS,
+    MAX_FAR_PROBES,
+    P_STATED,
+    LocalizationStatus,
+    Search,
+)
 from knowledge_sources.methods.localization.global_localization import LocalizationResult, PlaceCandidate
 from knowledge_sources.methods.localization.next_view import SensingAction
 from knowledge_sources.methods.localization.refinement import PoseLikelihood
@@ -149,8 +155,8 @@ def test_what_may_have_been_learnt_at_the_wrong_place_is_tried_as_it_was_told(
     camera = bench.view["CameraState-1"]
     if learnt:
         moved = camera.value.moved((0.01,) + (0.0,) * 6)
-        bench.revise(camera, lens=moved.lens, mount=moved.mount, told_lens=moved.told_lens,
-                     told_mount=moved.told_mount, counted=((0.0, 0.0, 0.0),) * counted)
+        bench.revise(camera, lens=moved.lens, mount=moved.mount, nominal_lens=moved.nominal_lens,
+                     nominal_mount=moved.nominal_mount, counted=((0.0, 0.0, 0.0),) * counted)
     if finds:
         box = tuple((float(x), float(y)) for x, y in (in_world(Pose2(1.0 + dx, 1.0 + dy, 0.0)).position
                                                       for dx, dy in ((-.1, -.1), (.1, -.1), (.1, .1), (-.1, .1))))
@@ -166,7 +172,7 @@ def test_what_may_have_been_learnt_at_the_wrong_place_is_tried_as_it_was_told(
         assert [sum(t.name.endswith("obstacle-1") for t in robot.world.things_of(ROOM)) for robot in asked] == (
             things * len(tilts))
         (found,) = made(effects, PlaceSearch)
-        assert found.is_camera_as_told == (which >= len(things))
+        assert found.is_camera_nominal == (which >= len(things))
 
 
 @pytest.mark.parametrize("places", [0, 2])
@@ -233,7 +239,7 @@ def test_the_odds_by_which_a_place_is_found_are_told_with_it(refuted: int, verif
     bench = lose()
     if refuted:
         bench.revise(bench.view["Discrepancy-1"], status="corrected")
-        bench.put(PlaceOdds(ROOM, 2, "told", 0.9, 0.99, 0))
+        bench.put(PlaceOdds(ROOM, 2, "stated", 0.9, 0.99, 0))
         bench.put(Discrepancy(Level.GOAL, "it is elsewhere", None, (0.0, 0.0), "px"))
     if verified:
         bench.put(Certificate("Milestone-1", "", "verified", "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0, 0.001, 0.001,
@@ -242,10 +248,10 @@ def test_the_odds_by_which_a_place_is_found_are_told_with_it(refuted: int, verif
     result = LocalizationResult(AMBIGUOUS, (there, here), None)
     effects, _ = search_says(bench, look_round(bench, (math.pi / 2, 0.0)), result)
     (odds,) = made(effects, PlaceOdds)
-    prior = P_TOLD / (1.0 - P_TOLD) * LOST_AGAIN_ODDS**refuted
+    prior = P_STATED / (1.0 - P_STATED) * LOST_AGAIN_ODDS**refuted
     assert odds.p_prior == pytest.approx(prior / (1.0 + prior)) and odds.refuted == refuted
     assert odds.probability == pytest.approx(1.0 / (1.0 + math.exp(-4.0) / prior), abs=1e-6)
-    assert (odds.locale, odds.source) == (ROOM, "tracked" if verified else "told")
+    assert (odds.locale, odds.source) == (ROOM, "tracked" if verified else "stated")
     (kept,) = made(effects, Hypothesis)
     assert kept.world_from_robot(ROBOT.world).distance_to(in_world(TRUTH)) < 1e-9
 

@@ -26,17 +26,17 @@ from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.belief import (
     MAX_CAMERA_CHI2,
-    MAX_TOLD_CHI2,
+    MAX_SLIP_CHI2,
     MIN_P_BELIEVED,
-    TOLD_SIGMA_M,
-    TOLD_SIGMA_RAD,
+    SLIP_SIGMA_M,
+    SLIP_SIGMA_RAD,
     to_log_odds,
     update,
 )
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.features import MIN_CONTRAST
 from knowledge_sources.methods.localization import MAX_ALIKE_LOG_RATIO
-from knowledge_sources.methods.localization.aliasing import Alias
+from knowledge_sources.methods.localization.aliasing import AliasView
 from knowledge_sources.methods.verification import (
     MAX_FOLLOWED_PX,
     MAX_INEXACT_LOOKS,
@@ -285,7 +285,8 @@ def test_where_no_other_view_is_left_all_looks_together_need_only_be_believed(ju
             for wanted in (0.9 * POSE_CONFIDENCE.accept, 0.9 * believed, 1.1 * believed):
                 told = (to_log_odds(wanted) - alone, *(0.0,) * (tried - 1))
                 behind = tuple(plain.look_heading_rad + math.pi + k for k in range(tried))
-                looked: Any = SimpleNamespace(value=replace(plain, tried=behind, told=told, displacement_modes=()))
+                value = replace(plain, tried=behind, log_odds_so_far=told, displacement_modes=())
+                looked: Any = SimpleNamespace(value=value)
                 weighed = MilestoneJudge().weigh(view, case._replace(milestone=looked))
                 assert weighed.p_wrong == pytest.approx(wanted, rel=1e-6)
                 may_be = believed if tried + 1 == most else POSE_CONFIDENCE.accept
@@ -384,7 +385,8 @@ def test_the_deviation_is_measured_where_the_place_is_known_or_is_beyond_the_win
     case, most_px = case_on(view, one.trigger), max(PLAN.max_deviation_px, tolerance_px)
     weighed = replace(judge.weigh(view, case), tolerance_px=tolerance_px, shift_px=off * most_px)
     tried = (1.0,) * (MAX_MILESTONE_LOOKS - 1 if is_last else 0)
-    milestone: Any = case.milestone._replace(value=replace(case.milestone.value, tried=tried, told=(0.0,) * len(tried)))
+    looked = replace(case.milestone.value, tried=tried, log_odds_so_far=(0.0,) * len(tried))
+    milestone: Any = case.milestone._replace(value=looked)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(judge, "weigh", lambda *_: weighed)
         patch.setattr(judge, "_hold_against_others", lambda *_: Verdict(verdict, "so", 1e-3, 0.006))
@@ -432,8 +434,8 @@ def test_what_the_wheels_can_do_and_what_the_picture_leaves_open_count_together(
             if weighed.p_false <= POSE_CONFIDENCE.accept:
                 slip, sigmas = np.zeros(3), MOTION_TOLERANCE_SIGMAS
                 if weighed.p_wrong <= MAX_P_UNMISTAKABLE:
-                    slip = np.square([TOLD_SIGMA_M, TOLD_SIGMA_M, TOLD_SIGMA_RAD])
-                    sigmas = math.sqrt(MAX_TOLD_CHI2)
+                    slip = np.square([SLIP_SIGMA_M, SLIP_SIGMA_M, SLIP_SIGMA_RAD])
+                    sigmas = math.sqrt(MAX_SLIP_CHI2)
                 open_px = sigmas / MOTION_TOLERANCE_SIGMAS * compute_motion_tolerance_px(
                     weighed.robot, np.array(case.milestone.value.expected), weighed.before,
                     weighed.covariance + fix.covariance + np.diag(slip))
@@ -496,7 +498,7 @@ def test_a_place_that_repeats_itself_is_held_against_it_by_bayes_rule(
     weighed = replace(judge.weigh(view, case), p_false=1e-3, is_weak=True)
     near = Pose2(weighed.pose.x_m + 0.05, weighed.pose.y_m, weighed.pose.heading_rad)
     other = near if is_near else Pose2(weighed.pose.x_m + 3.0, weighed.pose.y_m, weighed.pose.heading_rad)
-    monkeypatch.setattr(place_believed, "list_aliases", lambda *_, **__: [Alias(other, margin)])
+    monkeypatch.setattr(place_believed, "list_aliases", lambda *_, **__: [AliasView(other, margin)])
     verdict = judge._hold_against_others(view, case, weighed, Verdict("verified", "so", 1e-3, MAX_P_RIVAL))
     spread = weighed.covariance + case.fix.value.covariance + 1e-9 * np.eye(3)
     (own, away) = (float(d @ np.linalg.solve(spread, d)) for d in (
@@ -507,7 +509,7 @@ def test_a_place_that_repeats_itself_is_held_against_it_by_bayes_rule(
     p = against / (p_there + share + against)
     assert verdict.kind == ("verified" if p <= MAX_P_RIVAL else "not testable")
     assert verdict.p_wrong == pytest.approx(1e-3 if p <= MAX_P_RIVAL else p, rel=1e-3)
-    assert verdict.p_rival == pytest.approx(0.0 if p <= MAX_P_RIVAL else p, rel=1e-3)
+    assert verdict.p_alias == pytest.approx(0.0 if p <= MAX_P_RIVAL else p, rel=1e-3)
 
 
 @pytest.mark.parametrize(("p_false", "is_weak", "asked"), [

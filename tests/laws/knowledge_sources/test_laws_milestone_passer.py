@@ -1,4 +1,4 @@
-"""Laws of the milestone passer: on from a verified milestone, or the same subgoal again; in vain so often, doubt."""
+"""Laws of the milestone passer: on from a verified milestone, or the same subgoal again; failed so often, doubt."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ def test_in_vain_it_says_what_was_not_come_to_and_by_how_much() -> None:
     for way, said in (((step,), "the goal"), ((step, step), "the way"), ((step, ride), "the elevator lift-a")):
         effect = decide(0.5, MOST, way=way)
         assert isinstance(effect, Post) and isinstance(effect.value, Discrepancy)
-        assert effect.value.what.startswith(f"{said} at {TO} was not come to in {MOST + 1} tries")
+        assert effect.value.what.startswith(f"{said} at {TO} was not reached in {MOST + 1} tries")
         assert effect.value.what.endswith("0.50 m from it")
 
 

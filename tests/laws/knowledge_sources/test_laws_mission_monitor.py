@@ -7,7 +7,7 @@ import pytest
 from blackboard import Entry, Level, Posted, Quiescence, Revised
 from generated_boards import HALL, Bench, all_reasons, made, plain_robot, wakes
 from knowledge_sources.goal.mission_monitor import mission_monitor
-from world_models.entries import Hypothesis, Impasse, Obstruction, Outcome, Twin, TwinOdds, diagonal
+from world_models.entries import Alias, AliasOdds, Hypothesis, Impasse, Obstruction, Outcome, diagonal
 from world_models.frames import Pose2
 
 SOURCE = mission_monitor
@@ -58,8 +58,8 @@ def test_where_it_may_be_elsewhere_reached_says_so(probability: float, twins: in
     """The probability and the likeliest of the other places; where none looks the same, or none is likely, nothing."""
     bench = Bench(plain_robot())
     goal = bench.revise(bench.pursue(), status="reached")
-    others = tuple(Twin(f"room-{k}", Pose2(3.0 * k, 0.0, 0.0), -float(k)) for k in range(1, twins + 1))
-    odds = bench.put(TwinOdds(0.98, probability, others, ("Certificate-1",), Pose2(0.0, 0.0, 0.0)))
+    others = tuple(Alias(f"room-{k}", Pose2(3.0 * k, 0.0, 0.0), -float(k)) for k in range(1, twins + 1))
+    odds = bench.put(AliasOdds(0.98, probability, others, ("Certificate-1",), Pose2(0.0, 0.0, 0.0)))
     found = end(bench, goal)
     assert found is not None and found[0] == "reached"
     says = twins > 0 and probability < 0.999

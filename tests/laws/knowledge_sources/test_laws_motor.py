@@ -281,15 +281,15 @@ def test_the_robot_drives_as_far_as_the_floor_is_seen_and_creeps_where_it_is_not
         assert ACTUATOR.reach * command.move_m <= DEFAULT.action.max_creep_m + SMALL
 
 
-@pytest.mark.parametrize(("told_m", "is_wary"), [((), True), (0.8, True), (3.0, False)])
+@pytest.mark.parametrize(("confirmed_m", "is_wary"), [((), True), (0.8, True), (3.0, False)])
 def test_full_speed_is_for_floor_that_more_than_looks_tells_to_be_free(
-    told_m: float | tuple[()], is_wary: bool
+    confirmed_m: float | tuple[()], is_wary: bool
 ) -> None:
     """The sweep of a move of 0.58 m ends 0.96 m before the axis."""
     bench, _ = drive_to_thing(3.0)
     scan = bench.view["FreeFloor-1"]
-    told = tuple(told_m for _ in scan.value.bearings_rad) if isinstance(told_m, float) else told_m
-    bench.revise(scan, told_m=told)
+    told = tuple(confirmed_m for _ in scan.value.bearings_rad) if isinstance(confirmed_m, float) else confirmed_m
+    bench.revise(scan, confirmed_m=told)
     command = command_of(bench.ask(Motor(), bench.view["Leg-1"]))
     assert command is not None and command.move_m == pytest.approx(ACTUATOR.increment_m)
     assert command.speed_m_per_s == (DEFAULT.action.wary_speed_m_per_s if is_wary else None)

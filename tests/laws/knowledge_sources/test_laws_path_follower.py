@@ -225,7 +225,7 @@ def see_up_to(gap_m: float, *, is_told: bool = True) -> Rolling:
             for dx, y in ((0.0, 0.2), (0.4, 0.2), (0.4, 3.8), (0.0, 3.8))]
     scan = scan_floor(find_floor(house(), [HALL]), to_world(AHEAD), HALL, things=[shapely.Polygon(wall)],
                       near_m=0.05, forward_m=0.0, half_rad=1.4, count=200)
-    board.bench.put(scan if is_told else replace(scan, told_m=()), board.belief)
+    board.bench.put(scan if is_told else replace(scan, confirmed_m=()), board.belief)
     return board
 
 

@@ -20,17 +20,17 @@ SOURCE = pose_adopter
 STEP = (0.01, -0.004, 0.0, 0.02, 0.0, 0.0, 0.0)
 
 
-def find(bench: Bench, pose: Pose2, covariance: Covariance, *, as_told: bool = False, locale: str = HALL) -> tuple[
+def find(bench: Bench, pose: Pose2, covariance: Covariance, *, as_nominal: bool = False, locale: str = HALL) -> tuple[
         Entry[Hypothesis], Entry[PlaceSearch]]:
     """A candidate, and the search that found it."""
     place = bench.put(Hypothesis(locale, pose, covariance, "relocalization", status="candidate", weight=0.6))
-    return place, bench.put(PlaceSearch("found", "one place", None, as_told))
+    return place, bench.put(PlaceSearch("found", "one place", None, as_nominal))
 
 
 @settings(max_examples=40)
 @given(poses, covariances, st.booleans(), st.sampled_from((HALL, STUDY)), st.booleans())
 def test_the_belief_is_what_was_found_with_the_motions_it_had(
-    pose: Pose2, covariance: Covariance, as_told: bool, locale: str, has_learnt: bool
+    pose: Pose2, covariance: Covariance, as_nominal: bool, locale: str, has_learnt: bool
 ) -> None:
     bench, robot = Bench(plain_robot()), plain_robot()
     _, report = bench.move()
@@ -38,7 +38,7 @@ def test_the_belief_is_what_was_found_with_the_motions_it_had(
     told = bench.view["CameraState-1"]
     if has_learnt:
         bench.apply(Revise(told, told.value.moved(STEP), (told,)))
-    place, search = find(bench, pose, covariance, as_told=as_told, locale=locale)
+    place, search = find(bench, pose, covariance, as_nominal=as_nominal, locale=locale)
     effects = bench.ask(SOURCE, search)
     change = effect_on(effects, Hypothesis)
     assert change.entry.id == belief.id
@@ -54,7 +54,7 @@ def test_the_belief_is_what_was_found_with_the_motions_it_had(
     (gone,) = [e for e in effects or () if isinstance(e, Retract)]
     assert gone.entry.id == place.id and reasons(gone) == {search.id}
     cameras = made(effects, CameraState)
-    assert bool(cameras) == (as_told and has_learnt)
+    assert bool(cameras) == (as_nominal and has_learnt)
     if cameras:
         assert (cameras[0].lens, cameras[0].mount) == (told.value.lens, told.value.mount)
         assert reasons(effect_on(effects, CameraState)) == {search.id, told.id}

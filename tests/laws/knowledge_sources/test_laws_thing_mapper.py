@@ -14,7 +14,7 @@ from acting import answer
 from blackboard import Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised
 from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, MIN_OBSTACLE_CERTAINTY, MIN_THING_CERTAINTY
 from knowledge_sources.methods.floor.weigh_sight import (
-    ALIKE_FREE_ODDS,
+    CAMOUFLAGED_FREE_ODDS,
     FREE_FLOOR_ODDS,
     LOOKS_FREE_ODDS,
     MAX_OBSTACLE_SIGMA_M,
@@ -123,7 +123,7 @@ def test_odds_multiply_only_where_it_is_seen_from_elsewhere(
     hall = Hall(world, ())
     first = hall.put(hall.look(seen_s=1.0))
     status: ObstacleStatus = "there" if before >= MIN_OBSTACLE_CERTAINTY else "suspected"
-    old = hall.put(replace(known(status, before), told_from=(first.value.x_m, first.value.y_m)), first)
+    old = hall.put(replace(known(status, before), judged_from=(first.value.x_m, first.value.y_m)), first)
     scan, effects = ask(hall, hall.look(carton(p_thing), seen_s=9.0, ahead_m=ahead_m))
     (effect,) = effects or ()
     is_elsewhere = ahead_m >= FLOOR_VIEW_DISTANCE_M / 2.0
@@ -138,22 +138,22 @@ def test_odds_multiply_only_where_it_is_seen_from_elsewhere(
        st.booleans())
 @settings(max_examples=40, deadline=None)
 def test_floor_that_is_seen_free_from_elsewhere_lowers_the_odds_by_a_stated_factor(
-    world: World, before: float, ahead_m: float, is_told: bool, is_alike: bool
+    world: World, before: float, ahead_m: float, is_told: bool, is_camouflaged: bool
 ) -> None:
     """By less where it only looks free; and what looks like the floor is gone only where it would be told."""
     hall = Hall(world, ())
     first = hall.put(hall.look(seen_s=1.0))
-    old = hall.put(replace(known("suspected", before), seen_s=2.0, is_alike=is_alike,
-                           told_from=(first.value.x_m, first.value.y_m)), first)
+    old = hall.put(replace(known("suspected", before), seen_s=2.0, is_camouflaged=is_camouflaged,
+                           judged_from=(first.value.x_m, first.value.y_m)), first)
     look = hall.look(seen_s=6.0, ahead_m=ahead_m)
-    scan, effects = ask(hall, look if is_told else replace(look, told_m=()))
+    scan, effects = ask(hall, look if is_told else replace(look, confirmed_m=()))
     assert effects is not None
-    if ahead_m < MIN_WAY_M or (is_alike and not is_told):
+    if ahead_m < MIN_WAY_M or (is_camouflaged and not is_told):
         assert effects == ()
         return
     (effect,) = effects
     assert isinstance(effect, Revise) and set(effect.because) == {scan, old}
-    odds = ALIKE_FREE_ODDS if is_alike else FREE_FLOOR_ODDS if is_told else LOOKS_FREE_ODDS
+    odds = CAMOUFLAGED_FREE_ODDS if is_camouflaged else FREE_FLOOR_ODDS if is_told else LOOKS_FREE_ODDS
     certainty = probability(odds_of(before), odds)
     assert effect.value.certainty == pytest.approx(certainty, rel=1e-6)
     assert effect.value.status == ("gone" if certainty < S.min_gone_certainty else "suspected")

@@ -79,7 +79,7 @@ def test_it_looks_in_one_of_the_directions_that_come_into_question(pose: Pose2, 
     assert any(abs(wrap_angle(chosen.look_heading_rad - h)) <= MAX_LOOK_ERROR_RAD for h in headings)
     if abs(wrap_angle(chosen.look_heading_rad - here.heading_rad)) <= MAX_LOOK_ERROR_RAD:
         assert chosen.look_heading_rad == pytest.approx(here.heading_rad)
-    assert (chosen.sketch, chosen.index, chosen.status, chosen.tried, chosen.told) == (
+    assert (chosen.sketch, chosen.index, chosen.status, chosen.tried, chosen.log_odds_so_far) == (
         sketch.id, at, "turning", (), ())
     assert reasons(effect_on(effects, Milestone)) == {sketch.id, "Hypothesis-1"}
 

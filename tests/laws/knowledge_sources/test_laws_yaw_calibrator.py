@@ -110,8 +110,8 @@ def test_the_yaw_is_the_mean_of_what_was_known_and_what_the_way_says(
     for k, sigma in zip(others, (SIGMA_TILT_RAD, SIGMA_ROLL_RAD, SIGMA_HEIGHT_M, SIGMA_FOCAL,
                                  SIGMA_CENTRE_PX, SIGMA_CENTRE_PX), strict=True):
         assert covariance[k, k] == pytest.approx(sigma**2)
-    assert camera.lens == told_state.lens and camera.told_mount is not None and camera.told_mount.yaw_rad == 0.0
-    assert replace(camera.mount, yaw_rad=0.0) == camera.told_mount
+    assert camera.lens == told_state.lens and camera.nominal_mount is not None and camera.nominal_mount.yaw_rad == 0.0
+    assert replace(camera.mount, yaw_rad=0.0) == camera.nominal_mount
 
 
 @settings(max_examples=40)

@@ -15,7 +15,7 @@ from knowledge_sources.methods.localization import aliasing, find_repetitions, l
 from knowledge_sources.methods.localization.aliasing import (
     VIEW_GRID_M,
     VIEW_GRID_RAD,
-    Alias,
+    AliasView,
     predict_views_on_grid,
     score_view,
 )
@@ -36,7 +36,7 @@ NONE = np.zeros((0, 2, 2))
 few = settings(max_examples=40, deadline=None)
 
 
-def find_strongest(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> Alias | None:
+def find_strongest(robot: RobotModel, segments_px: Floats, room: str, pose: Pose2) -> AliasView | None:
     """The other pose that the picture speaks least against; None if there is no other."""
     return min(list_aliases(robot, segments_px, room, pose), key=lambda alias: alias.margin, default=None)
 

@@ -16,7 +16,7 @@ import pytest
 
 from blackboard import Discrepancy, Level
 from experiments.generated.floors import generated_floor
-from knowledge_sources.methods.belief import MAX_TOLD_CHI2, MIN_P_BELIEVED, TOLD_SIGMA_M, TOLD_SIGMA_RAD
+from knowledge_sources.methods.belief import MAX_SLIP_CHI2, MIN_P_BELIEVED, SLIP_SIGMA_M, SLIP_SIGMA_RAD
 from knowledge_sources.methods.features import MIN_BRIGHTNESS, MIN_CONTRAST
 from knowledge_sources.methods.localization import (
     ALIKE_LOG_NOISE,
@@ -32,7 +32,7 @@ from knowledge_sources.methods.localization import (
     MIN_PLACE_LINES,
     MIN_VIEW_FRACTION,
     MIN_VIEWS,
-    P_TOLD,
+    P_STATED,
     REFUTING_LOG_RATIO,
     SURE_LOG_LIKELIHOOD,
     SURE_MATCHED_FRACTION,
@@ -43,7 +43,7 @@ from knowledge_sources.methods.localization import (
     find_far_action,
     place_search,
     prefer_reachable,
-    weigh_told,
+    weigh_prior,
 )
 from knowledge_sources.methods.localization.global_localization import (
     LocalizationResult,
@@ -56,10 +56,10 @@ from knowledge_sources.methods.localization.place_odds import LOG_PLACES, comput
 from knowledge_sources.methods.localization.refinement import PoseLikelihood
 from knowledge_sources.reads import count_refuted, find_p_not_alias, find_p_there
 from knowledge_sources.reads import is_dark as is_picture_dark
-from knowledge_sources.reads.place_believed import MIN_P_TWIN, P_DISPLACED_TO_ALIAS
+from knowledge_sources.reads.place_believed import MIN_P_ALIAS, P_DISPLACED_TO_ALIAS
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.entries import PlaceOdds, Segments, TwinOdds
+from world_models.entries import AliasOdds, PlaceOdds, Segments
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
@@ -162,7 +162,7 @@ def test_one_look_of_which_half_is_missing_refutes_where_another_place_shows_it(
 HERE = StatedPlace(Pose2(2.0, 2.0, 0.0), np.diag([1e-4, 1e-4, 1e-5]), 0.5)
 
 
-def find_told_probability(p_told: float, logs: tuple[float, float]) -> float:
+def find_prior_probability(p_told: float, logs: tuple[float, float]) -> float:
     return compute_place_odds(logs, [True, False], [False, False], p_told)[0]
 
 
@@ -173,10 +173,10 @@ def test_the_told_place_is_believed_at_the_stated_odds(tied: bool, bound: float)
     seen = LocalizationResult(AMBIGUOUS if tied else PROBE, two, None if tied else SensingAction(1.0, 0.0, 1.0))
 
     def weigh(p_told: float, looks: int = MIN_VIEWS, result: LocalizationResult = seen) -> LocalizationStatus:
-        return weigh_told(result, replace(HERE, p_told=p_told), lambda one, other: False, looks).status
+        return weigh_prior(result, replace(HERE, p_prior=p_told), lambda one, other: False, looks).status
 
     above, below = bound + 0.5 * (1.0 - bound), bound - 1e-3
-    assert find_told_probability(above, (40.0, 40.0)) == pytest.approx(above)
+    assert find_prior_probability(above, (40.0, 40.0)) == pytest.approx(above)
     assert weigh(above) is FOUND and weigh(below) is seen.status
     assert weigh(above, MIN_VIEWS - 1) is seen.status
     doubtful = replace(seen, candidates=(place(2.0, accepted=False), place(9.0)))
@@ -194,21 +194,21 @@ def test_where_it_was_told_to_be_it_need_only_be_far_from_chance(
 ) -> None:
     """A model that is inexact lacks so many lines that no share of them is enough; elsewhere that rules a place out."""
     seen = LocalizationResult(PROBE, (place(x_m, log, accepted=False),), SensingAction(1.0, 0.0, 1.0))
-    assert weigh_told(seen, replace(HERE, p_told=0.9), lambda one, other: False, looks).status is expected
+    assert weigh_prior(seen, replace(HERE, p_prior=0.9), lambda one, other: False, looks).status is expected
 
 
 def test_a_place_is_the_told_one_up_to_the_stated_distance() -> None:
     covariance = np.diag([0.02, 0.03, 0.01])
-    beyond = np.diag(np.square([TOLD_SIGMA_M, TOLD_SIGMA_M, TOLD_SIGMA_RAD]))
+    beyond = np.diag(np.square([SLIP_SIGMA_M, SLIP_SIGMA_M, SLIP_SIGMA_RAD]))
     sigma_m = float(np.sqrt((2.0 * covariance + beyond)[0, 0]))
     for part, is_there in ((0.999, True), (1.001, False)):
-        pose = Pose2(part * sigma_m * np.sqrt(MAX_TOLD_CHI2), 0.0, 0.0)
+        pose = Pose2(part * sigma_m * np.sqrt(MAX_SLIP_CHI2), 0.0, 0.0)
         assert is_within_reach(pose, covariance, Pose2(0.0, 0.0, 0.0), covariance) is is_there
 
 
 def test_each_time_it_was_lost_again_the_told_place_is_less_likely() -> None:
     odds = [p / (1.0 - p) for p in (compute_prior(times) for times in range(4))]
-    assert odds[0] == pytest.approx(P_TOLD / (1.0 - P_TOLD))
+    assert odds[0] == pytest.approx(P_STATED / (1.0 - P_STATED))
     assert [b / a for a, b in pairwise(odds)] == pytest.approx([LOST_AGAIN_ODDS] * 3)
 
 
@@ -281,7 +281,7 @@ def test_a_dark_frame_is_dark_by_contrast_and_brightness_together() -> None:
 def believing(p_twins: float | None = None, refuted: int | None = None, doubt: Any = None) -> Any:
     """A view of a board with these odds."""
     known = {
-        TwinOdds: None if p_twins is None else SimpleNamespace(value=SimpleNamespace(probability=p_twins)),
+        AliasOdds: None if p_twins is None else SimpleNamespace(value=SimpleNamespace(probability=p_twins)),
         PlaceOdds: None if refuted is None else SimpleNamespace(value=SimpleNamespace(refuted=refuted), cycle=5),
     }
     return SimpleNamespace(latest=lambda kind: known[kind], newest=lambda index, level: doubt)
@@ -291,15 +291,15 @@ def test_the_prior_is_the_smaller_of_what_was_told_and_what_twins_leave() -> Non
     def find(p_twins: float | None, times: int) -> float:
         return find_p_there(believing(p_twins), times)
 
-    assert find(None, 0) == pytest.approx(P_TOLD)
-    assert find(P_TOLD - 0.1, 0) == pytest.approx(P_TOLD - 0.1)
-    assert find(min(1.0, P_TOLD + 0.01), 0) == pytest.approx(P_TOLD)
-    assert find(0.0, 0) == MIN_P_TWIN
+    assert find(None, 0) == pytest.approx(P_STATED)
+    assert find(P_STATED - 0.1, 0) == pytest.approx(P_STATED - 0.1)
+    assert find(min(1.0, P_STATED + 0.01), 0) == pytest.approx(P_STATED)
+    assert find(0.0, 0) == MIN_P_ALIAS
     assert find(None, 1) < find(None, 0)
 
 
 def test_against_aliases_all_pictures_count_up_to_what_is_sure() -> None:
-    assert find_p_not_alias(believing()) == pytest.approx(P_TOLD)
+    assert find_p_not_alias(believing()) == pytest.approx(P_STATED)
     assert find_p_not_alias(believing(refuted=1)) == pytest.approx(compute_prior(1))
     assert find_p_not_alias(believing(0.9)) == pytest.approx(0.9)
     assert find_p_not_alias(believing(1.0)) == pytest.approx(MIN_P_SURE)
@@ -320,7 +320,7 @@ def test_only_what_was_measured_speaks_against_a_place(magnitude: float | None, 
 
 
 def test_another_place_that_is_likelier_speaks_against_it() -> None:
-    doubt: Any = SimpleNamespace(cycle=9, because=(SimpleNamespace(id="TwinOdds-1"),))
+    doubt: Any = SimpleNamespace(cycle=9, because=(SimpleNamespace(id="AliasOdds-1"),))
     view = believing(refuted=0)
     view.get = lambda name: SimpleNamespace(value=object())
     assert count_refuted(view, doubt) == 1

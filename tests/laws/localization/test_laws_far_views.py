@@ -110,7 +110,7 @@ def make_far_predictor(robot: RobotModel, places: list[PoseHypothesis], tells_at
 
 @pytest.mark.parametrize("away_m", [3.0, 6.0])
 def test_driving_on_it_comes_to_the_only_view_that_tells(away_m: float) -> None:
-    """Two places in a long corridor: leg by leg, planned anew from each, to where they differ."""
+    """Two places in a long corridor: leg by leg, planned again from each, to where they differ."""
     _, robot = robot_on(11)
     (room,) = [name for name in robot.world.rooms if name == "corridor-0"]
     low, high = robot.world.outline(room).min(axis=0), robot.world.outline(room).max(axis=0)

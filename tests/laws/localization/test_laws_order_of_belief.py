@@ -95,7 +95,7 @@ def test_what_the_belief_excludes_is_not_searched(place: tuple[str, int]) -> Non
 def test_a_belief_that_the_looks_do_not_bear_out_excludes_nothing(
     place: tuple[str, int], believed: tuple[str, int]
 ) -> None:
-    """However sure it was: a robot that was carried off is found as one is that nobody told anything."""
+    """However sure it was: a robot that was kidnapped is found as one is that nobody told anything."""
     pose, views = draw_pose(place), look_from(draw_pose(place), place[1])
     guess = believed[0], draw_pose(believed)
     alone = localize(ROBOT, views, nearest_first(guess[1]))

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from knowledge_sources.methods.belief import MIN_P_BELIEVED
-from knowledge_sources.methods.localization import MAX_ALIKE_LOG_RATIO, P_TOLD, compute_prior
+from knowledge_sources.methods.localization import MAX_ALIKE_LOG_RATIO, P_STATED, compute_prior
 from knowledge_sources.methods.localization.place_odds import compute_place_odds, is_within_reach
 from world_models.frames import Pose2
 
@@ -57,8 +57,8 @@ def test_nothing_is_known_of_places_of_which_none_was_told(values: list[float], 
 
 @given(st.integers(2, 40), st.floats(-30.0, 30.0))
 def test_twins_by_every_picture_are_left_to_the_prior_alone(twins: int, log: float) -> None:
-    odds = compute_place_odds([log] * twins, [True, *[False] * (twins - 1)], [True] * twins, P_TOLD)
-    assert math.isclose(odds[0], P_TOLD)
+    odds = compute_place_odds([log] * twins, [True, *[False] * (twins - 1)], [True] * twins, P_STATED)
+    assert math.isclose(odds[0], P_STATED)
     assert odds[0] >= MIN_P_BELIEVED
 
 
@@ -66,9 +66,9 @@ def test_twins_by_every_picture_are_left_to_the_prior_alone(twins: int, log: flo
 def test_the_prior_alone_is_not_believed_where_the_pictures_speak_for_another(twins: int, log: float) -> None:
     for alike in (True, False):
         odds = compute_place_odds([0.0, log, *[0.0] * (twins - 2)], [True, *[False] * (twins - 1)], [alike] * twins,
-                                  P_TOLD)
+                                  P_STATED)
         bare = math.log(odds[0] / odds[1])
-        even = compute_place_odds([0.0] * twins, [True, *[False] * (twins - 1)], [alike] * twins, P_TOLD)
+        even = compute_place_odds([0.0] * twins, [True, *[False] * (twins - 1)], [alike] * twins, P_STATED)
         assert bare < math.log(even[0] / even[1])
     if twins == 2:
         assert odds[0] < MIN_P_BELIEVED
@@ -76,14 +76,14 @@ def test_the_prior_alone_is_not_believed_where_the_pictures_speak_for_another(tw
 
 @given(st.floats(3.0, 30.0))
 def test_between_places_alike_by_the_model_only_so_much_is_no_chance(log: float) -> None:
-    odds = compute_place_odds([log, 0.0], [True, False], [True, True], P_TOLD)
-    most = P_TOLD / (1.0 - P_TOLD) * math.exp(MAX_ALIKE_LOG_RATIO)
+    odds = compute_place_odds([log, 0.0], [True, False], [True, True], P_STATED)
+    most = P_STATED / (1.0 - P_STATED) * math.exp(MAX_ALIKE_LOG_RATIO)
     assert odds[0] / odds[1] == pytest.approx(most)
 
 
 @given(st.integers(0, 6))
 def test_what_was_believed_and_led_astray_is_believed_less(times: int) -> None:
-    assert math.isclose(compute_prior(0), P_TOLD)
+    assert math.isclose(compute_prior(0), P_STATED)
     assert compute_prior(times + 1) < compute_prior(times)
     assert compute_prior(1) < MIN_P_BELIEVED
 

@@ -73,7 +73,7 @@ def test_where_the_room_behind_a_door_is_barred_it_comes_in_by_another(bars: str
 def test_a_way_is_one_step_after_the_other_through_the_door_and_past_what_stands_before_it(
     thing: tuple[float, float, float] | None, back: bool
 ) -> None:
-    """Straight, or aslant: from the room where it is to the one behind, and clear of what stands there."""
+    """Straight, or diagonally: from the room where it is to the one behind, and clear of what stands there."""
     bench = Bench(plain_robot())
     if thing is not None:
         bench.stand(*thing, thing[2])

@@ -174,7 +174,7 @@ def draw_parallel(rng: np.random.Generator) -> tuple[Array, Array]:
 @given(seed=seeds)
 @quick
 def test_near_parallel_lines_share_no_data_line(seed: int) -> None:
-    """In the image: contested data go to one model line each, and the error is that of the state from anew."""
+    """In the image: contested data go to one model line each, and the error is that of the state from again."""
     model, data = draw_parallel(np.random.default_rng(seed))
     given_: dict[str, Any] = {"start": Peak(0.0, (0.0, 0.0), 1.0), "pair_px": 9.0}
     found = match_lines(model, data, **given_)

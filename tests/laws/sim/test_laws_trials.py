@@ -1,4 +1,4 @@
-"""Laws of campaigns: a break changes nothing; what others found is found anew; results keep the trials' order."""
+"""Laws of campaigns: a break changes nothing; what others found is found again; results keep the trials' order."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def test_what_is_no_compiled_world_is_told(compiled: Path, tmp_path: Path) -> No
         load_world(compiled, details=["others.toml"])
     old = compiled.read_bytes().replace(FORMAT.encode(), b"harvey world 1")
     (tmp_path / "old.world").write_bytes(old)
-    with pytest.raises(WorldError, match=r"old\.world: expected '.*', got 'harvey world 1': compile it anew"):
+    with pytest.raises(WorldError, match=r"old\.world: expected '.*', got 'harvey world 1': compile it again"):
         load_world(tmp_path / "old.world")
     for text in (b"", b"name = 'x'", compiled.read_bytes()[:5000]):
         (tmp_path / "bad.world").write_bytes(text)

@@ -17,7 +17,7 @@ from recorded_runs import Recorded
 
 @pytest.fixture(scope="module")
 def run(recorded: Recorded) -> RunDirectory:
-    """Unplugged, pushed aside and carried off in the hallway."""
+    """Unplugged, pushed aside and kidnapped in the hallway."""
     return recorded("hallway")
 
 

@@ -114,8 +114,8 @@ def test_each_sentence_has_a_cycle_of_the_journal_and_entries_that_it_made(
 
 def test_the_turning_points_are_those_that_the_run_found(told: tuple[str, Path], history: Timeline) -> None:
     kept = RunDirectory(told[1]).read_result()["turning_points"]
-    read = [point for point in read_turning_points(history) if point.is_told]
-    assert read == [*read_turning_points(history, told=True)]
+    read = [point for point in read_turning_points(history) if point.is_main]
+    assert read == [*read_turning_points(history, main=True)]
     assert [(p.cycle, p.kind, p.text, p.time_s) for p in read] == [
         (p["cycle"], p["kind"], p["text"], p["time_s"]) for p in kept]
 

@@ -55,7 +55,7 @@ def test_a_worse_campaign_is_found(tmp_path: Path, capsys: pytest.CaptureFixture
     assert main(["campaign", "compare", bad, good]) == 0
     assert "the second is better" in capsys.readouterr().out
     assert main(["campaign", "compare", good, bad, "--success", "final_error_m<0.05"]) == 0
-    assert "0 of 20 went otherwise" in capsys.readouterr().out
+    assert "0 of 20 went differently" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("argv", "told"), [

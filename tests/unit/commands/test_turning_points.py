@@ -45,7 +45,7 @@ def records() -> list[DecisionRecord]:
 
 def test_what_must_be_told_is_found_with_cycle_and_place() -> None:
     finder = TurningPointFinder()
-    points = [point for decision in decisions() for point in finder.find(decision) if point.is_told]
+    points = [point for decision in decisions() for point in finder.find(decision) if point.is_main]
     assert [(point.cycle, point.kind, point.text) for point in points] == [
         (2, "refuted", "M2 of the route: 1 of 9 lines"),
         (4, "lost", "kitchen (1.00, 2.00) m by its belief; M2 is refuted"),
@@ -107,12 +107,12 @@ def test_a_short_account_tells_them_with_the_collisions_that_the_simulator_knows
 
 
 def test_what_the_simulator_did_is_told_as_that() -> None:
-    happened = [{"cycle": 3, "what": "somebody carries the robot off"}]
+    happened = [{"cycle": 3, "what": "somebody kidnaps the robot"}]
     lines = list(turn_lines(MemoryTimeline(records()), {"happened": happened}))
-    assert lines[2] == "  cycle 3  simulator  somebody carries the robot off, as only the simulator knows"
+    assert lines[2] == "  cycle 3  simulator  somebody kidnaps the robot, as only the simulator knows"
     told = tell_part(MemoryTimeline(records()), HAPPENED, {"happened": happened})
     assert [(one.cycle, one.text) for one in told.steps] == [
-        (3, "Somebody carries the robot off, as only the simulator knows.")]
+        (3, "Somebody kidnaps the robot, as only the simulator knows.")]
     (nothing,) = tell_part(MemoryTimeline(records()), HAPPENED, {"happened": []}).steps
     (unknown,) = tell_part(MemoryTimeline(records()), HAPPENED, {}).steps
     assert nothing.text == "The simulator did nothing to it." and "nobody recorded" in unknown.text
@@ -158,7 +158,7 @@ def test_a_collision_that_is_none_is_one_error(contact: Any) -> None:
 
 def test_the_time_of_a_decision_is_in_the_clock_of_the_run_also_while_a_fault_lasts() -> None:
     fault = BodyFault("camera", "camera unplugged", "no such device", "PictureRequest-1", 7.0)
-    recovery = Recovery("BodyFault-1", "PictureRequest-1", 7.0, 2.0, tries=9, waited_s=31.8, status="in vain")
+    recovery = Recovery("BodyFault-1", "PictureRequest-1", 7.0, 2.0, tries=9, waited_s=31.8, status="still failing")
     board = Blackboard()
     seen = board.apply([Post(fault), Post(recovery)], author="body", cycle=1)
     made = board.apply([Post(Outcome("failed", "camera unplugged"))], author="fault_handler", cycle=1)

@@ -75,7 +75,7 @@ def test_equal_changes_of_two_frames_are_told_once() -> None:
               frame("LocaleFrame-3.0", "study"))
     made = entry("Note-1.0", 0, tuple(f.ref for f in frames))
     (told,) = tell_changes(MemoryTimeline([decision(made, observed=frames)]), made)
-    assert told.text == "It was known otherwise than in the world's file: library-door is shut (user)."
+    assert told.text == "It was known differently than in the world's file: library-door is shut (user)."
     assert told.refs == (frames[0].ref,)
 
 

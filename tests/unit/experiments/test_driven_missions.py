@@ -161,7 +161,7 @@ def test_the_memory_of_each_process_is_told_apart() -> None:
 def test_an_open_door_that_is_believed_shut_is_kept(
     doors: tuple[TrueDoor, ...], p_shut: float, shut: dict[str, float]
 ) -> None:
-    """As long as it never was otherwise; whatever its state is called."""
+    """As long as it never was different; whatever its state is called."""
     picture, beliefs = DoorPicture("p", (0.0, 0.0, 9.0, 9.0), 0.0, 0.0, 0.0, 3.0, "a leaf"), DoorBeliefs(doors)
     known = DoorState("d", ("a", "b"), "unknown", p_shut, to_log_odds(p_shut), 1, picture, 5.0)
     change = SimpleNamespace(entry=SimpleNamespace(value=known))

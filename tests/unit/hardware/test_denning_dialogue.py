@@ -136,7 +136,7 @@ def test_how_a_motion_may_end(done: str, kind: str, detail: str) -> None:
     ("range", "refused", True, 1), ("busy", "refused", False, 2), ("session", "disconnected", True, 1),
 ])
 def test_refusals(refusal: str, kind: str, stopped: bool, again: int) -> None:
-    """A command out of range has no number; a base that has begun anew is greeted anew; else it is stopped first."""
+    """A command out of range has no number; a base that has begun again is greeted again; else it is stopped first."""
     refusals = iter([refusal])
     base = HandMade(lambda verb, seq, words: (
         f"NO {word}" if verb == "GO" and (word := next(refusals, "")) else None))

@@ -34,7 +34,7 @@ LINK = re.compile(r"\]\((?![a-z]+:)([^)#\s]*)(#[^)\s]+)?\)")
 
 @pytest.mark.parametrize("page", [*list_pages()], ids=lambda page: page.stem)
 def test_what_is_generated_in_a_page_is_what_its_generator_makes_now(page: Path) -> None:
-    """``python -m docs.tools.fill`` writes it anew."""
+    """``python -m docs.tools.fill`` writes it again."""
     if page.name == "command-line.md" and (absent := [name for group in EXTRAS for name in list_absent(group)]):
         pytest.skip(f"expected the extras, whose commands are in the page, got none that adds {', '.join(absent)}")
     text = page.read_text(encoding="utf-8")

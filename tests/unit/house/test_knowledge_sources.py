@@ -104,7 +104,7 @@ def test_it_knows_no_other_knowledge_source(stem: str) -> None:
 
 MOST_LINES = 150
 SHARED: dict[str, tuple[int, str]] = {
-    "CameraState": (3, "learnt from lines, from the way, and told anew to who was lost"),
+    "CameraState": (3, "learnt from lines, from the way, and told again to who was lost"),
     "Discrepancy": (12, "who measures a difference posts it; who corrects it says so"),
     "DoorState": (3, "by a leaf in sight, by a touch, and by what a shut door explains"),
     "Drift": (4, "the belief's other half: who turns the heading restarts it"),
@@ -119,9 +119,9 @@ SHARED: dict[str, tuple[int, str]] = {
     "Obstruction": (2, "in looks at milestones, and in looks of who is lost"),
     "PictureRequest": (4, "who needs a picture asks for it"),
     "PlanSketch": (8, "a chain: drawn, refined, advanced, led round, withdrawn"),
-    "Tracks": (4, "followed, taken anew, and dropped on another floor or with what is gone"),
-    "TwinOdds": (2, "kept by pictures, ended where a search finds another place"),
-    "Travel": (4, "gone on, begun anew by either calibration, broken off"),
+    "Tracks": (4, "followed, taken again, and dropped on another floor or with what is gone"),
+    "AliasOdds": (2, "kept by pictures, ended where a search finds another place"),
+    "Travel": (4, "gone on, begun again by either calibration, broken off"),
 }
 """The kinds that several knowledge sources write: how many at most, and why. It may only shrink."""
 

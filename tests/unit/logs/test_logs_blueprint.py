@@ -83,7 +83,7 @@ def matching(rule: str, logged: Logged) -> list[str]:
 
 
 def faults(view: Any, logged: Logged) -> list[str]:
-    """What a view asks for in vain."""
+    """What a view asks for and does not get."""
     found = [f"{view.name}: nothing at {rule}" for rule in rules(view)
              if not matching(rule, logged) and rule[2:] not in ONCE_SOMETHING_AILS]
     shown = {entity for rule in rules(view) if rule[0] == "+" for entity in matching(rule, logged)}

@@ -101,7 +101,7 @@ def test_where_there_is_room_the_way_keeps_away_from_what_the_model_lacks(world:
 
 @pytest.mark.parametrize("seed", [2, 1_000_005])
 def test_things_of_the_model_beside_a_doorway_are_passed_without_contact(seed: int) -> None:
-    """Here things stand beside a doorway, so that there is room only aslant: one was touched again and again."""
+    """Here things stand beside a doorway, so that there is room only diagonally: one was touched again and again."""
     world = generated_floor(seed, 6, open_share=1.0).world
     robot = RobotModel(world, Camera.from_field_of_view(1.1), CameraMount(1.0), ActuatorModel())
     planner, passed = SubgoalPlanner(robot, DEFAULT.plan), 0

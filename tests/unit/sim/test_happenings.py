@@ -35,7 +35,7 @@ def happened(*faults: Fault) -> tuple[str, ...]:
     (CameraUnplugged(duration_s=3.0), "the camera fails for 3 s: no such device"),
     (Bump(left_m=0.3, turn_rad=math.radians(10.0)),
      "somebody bumps into the robot: it stands 0.30 m from where it stood, turned by 10.0 degrees"),
-    (Kidnap(to_locale="hallway", to_x_m=5.0, to_y_m=1.2), "somebody carries the robot off: it stands"),
+    (Kidnap(to_locale="hallway", to_x_m=5.0, to_y_m=1.2), "somebody kidnaps the robot: it stands"),
 ])
 def test_each_fault_is_told_once_in_words(fault: Fault, told: str) -> None:
     (text,) = happened(fault)

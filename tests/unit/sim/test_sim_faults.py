@@ -112,7 +112,7 @@ def test_a_camera_that_stands_still_is_a_fault_once_the_wheels_counted_and_over_
     (broken,) = ask(Course("Leg-1", 0.4, 0.0))
     path_m = robot.truth.path_m
     assert broken.what == STANDS_STILL and broken.move_m > 0.0
-    assert ask(Recovery("", broken.request, 0.0, 1.0))[0].status == "in vain" and robot.truth.path_m == path_m
+    assert ask(Recovery("", broken.request, 0.0, 1.0))[0].status == "still failing" and robot.truth.path_m == path_m
     over, report = ask(Recovery("", broken.request, 0.0, 40.0))
     assert over.status == "over" and report.move_m == broken.move_m
     assert isinstance(ask(PictureRequest("track"))[0], CameraPicture)

@@ -45,7 +45,7 @@ class Known:
 
 
 class LocaleFrames(Logger):
-    """Outlines each room whose frame is on the board, marks what is believed otherwise, and lists all frames."""
+    """Outlines each room whose frame is on the board, marks what is believed differently, and lists all frames."""
 
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)
@@ -118,7 +118,7 @@ def outline_path(room: str) -> str:
 
 
 def marks_path(room: str) -> str:
-    """Entity path of the marks on what is believed otherwise of a room."""
+    """Entity path of the marks on what is believed differently of a room."""
     return f"{outline_path(room)}/changes"
 
 
@@ -135,7 +135,7 @@ def marks_of(frame: LocaleFrame, height_m: float) -> Iterator[tuple[Strip, str]]
 
 
 def describe(known: Iterable[Known], robot: Iterable[Entry[Any]]) -> str:
-    """The list in markdown: frames with what is believed otherwise first, then in the order of the world's file."""
+    """The list in markdown: frames with what is believed differently first, then in the order of the world's file."""
     frames = sorted(known, key=lambda k: (not k.entry.value.changes, k.entry.value.extent.number))
     more = [f"... and {words.count(len(frames) - MAX_LISTED, 'frame')} more"] * (len(frames) > MAX_LISTED)
     table = [HEADER, *(_row(k) for k in frames[:MAX_LISTED])] if frames else ["No frame is on the board."]
