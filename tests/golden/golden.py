@@ -25,12 +25,7 @@ import harvey
 FINGERPRINTS = Path(__file__).parent / "fingerprints.json"
 DIGITS = 6
 
-RENAMED: dict[str, str] = {
-    "AliasOdds": "TwinOdds", "aliases": "twins", "alias_count": "alike", "stated": "told", "log_odds_so_far": "told",
-    "confirmed_m": "told_m", "judged_from": "told_from", "is_camouflaged": "is_alike", "faces_agreeing": "faces_alike",
-    "nominal_lens": "told_lens", "nominal_mount": "told_mount", "is_camera_nominal": "is_camera_as_told",
-    "still failing": "in vain",
-}
+RENAMED: dict[str, str] = {}
 """New name of a kind, field, knowledge source or value: the name that it had when the fingerprints were made."""
 
 LEFT_OUT: frozenset[str] = frozenset()
