@@ -12,8 +12,8 @@ from scipy.stats import beta
 from tqdm import tqdm
 
 from experiments.report import Finding
-from harvey.campaign.case_work import Killed
 from harvey.campaign.engine import RESULTS, Campaign, run_campaign
+from harvey.campaign.workers import Killed
 from harvey.errors import BadInput
 from logs.run_directory import RUNS
 

@@ -6,6 +6,7 @@ the dry run has the plan that the mission will have, as long as nothing goes wro
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -47,6 +48,7 @@ from knowledge_sources.methods.verification import (
 )
 from knowledge_sources.reads import find_belief, find_robot
 from knowledge_sources.settings import DEFAULT, Settings
+from logs.tables import table
 from world_models.building.world import World
 from world_models.entries import (
     Command,
@@ -63,6 +65,7 @@ from world_models.entries import (
 )
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
+from world_models.words import count
 
 ALIAS_MIN_COVERAGE = 0.8  # part of the lines that another place must show to look like a milestone
 ALIAS_MIN_COLORS = 0.8  # part of the colors that another place must show to look like a milestone
@@ -260,3 +263,29 @@ def _repeat(robot: RobotModel, locale: str, pose: Pose2) -> Iterator[Pose2]:
         nearest = min(doors, key=pose.distance_to)
         own = nearest.inverse() @ pose
         yield from (door @ own for door in doors if door is not nearest)
+
+
+def format_previews(ahead: Sequence[MilestonePreview]) -> str:
+    """The milestones to come, one a row."""
+    columns = ("milestone", "in", "x m", "y m", "looking", "landmarks", "lines", "place mm", "heading deg",
+               "p wrong", "verdict")
+    return table(columns, [
+        (p.what, p.locale, f"{p.x_m:.2f}", f"{p.y_m:.2f}", f"{math.degrees(p.look_heading_rad):.0f}",
+         str(p.landmarks), str(p.lines), f"{p.sigma_m * 1000:.1f}", f"{math.degrees(p.sigma_rad):.2f}",
+         f"{p.p_false:.1g}", f"{p.verdict}: {p.alike} looks like it" if p.alike else p.verdict)
+        for p in ahead])
+
+
+def summarize_dry_run(ahead: Sequence[MilestonePreview], outcome: Outcome) -> tuple[str, bool]:
+    """How the dry run of a mission ends, and whether nothing speaks against driving it.
+
+    A dry run verifies every milestone, so reaching the goal says little where one is not testable or ambiguous.
+    """
+    doubtful = [(verdict, sum(1 for p in ahead if p.verdict == verdict)) for verdict in ("not testable", "ambiguous")]
+    doubts = [f"{count(number, 'milestone')} {verdict}" for verdict, number in doubtful if number]
+    weak = sum(1 for p in ahead if p.verdict == "weak")
+    if outcome.kind == "reached" and doubts:
+        return f"may not reach its goal: of {len(ahead)} on the way, {' and '.join(doubts)}", False
+    if outcome.kind == "reached":
+        return f"ends: reached, {outcome.reason}" + (f"; {count(weak, 'milestone')} weak" if weak else ""), True
+    return f"ends: {outcome.kind}, {outcome.reason}" + (f"; {' and '.join(doubts)}" if doubts else ""), False

@@ -103,13 +103,16 @@ def no_follow(path: Path | str, flags: int) -> int:
     return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write a file; an older one stays as it is until the new one is whole. Raises OSError."""
+def write_whole(path: Path, text: str, *, sync: bool = False) -> None:
+    """Write a file, if asked onto the disk; an older one stays until the new one is whole. Raises OSError."""
     part = path.with_name(f"{path.name}.part")
     try:
         part.unlink(missing_ok=True)
         with open(part, "x", encoding="utf-8") as out:
             out.write(text)
+            if sync:
+                out.flush()
+                os.fsync(out.fileno())
         os.replace(part, path)
     except OSError:
         part.unlink(missing_ok=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import sys
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
@@ -157,6 +158,15 @@ def prepare_directory(path: Path, name: str, seed: int) -> tuple[Path, Path | No
     except OSError as error:
         raise BadInput(f"--out {path}: expected a directory to write to, got: {error.strerror}") from None
     return path, aside
+
+
+def make_room(out: Path, name: str, seed: int) -> Path:
+    """As :func:`prepare_directory`; says so where a run of something else was moved aside. Raises BadInput."""
+    path, aside = prepare_directory(out, name, seed)
+    if aside is not None:
+        print(f"--out {out}: the run that was there is of another scenario or seed; it is kept in {aside}",
+              file=sys.stderr)
+    return path
 
 
 def _is_of(path: Path, name: str, seed: int) -> bool:

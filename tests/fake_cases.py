@@ -10,9 +10,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from harvey.campaign.case_work import Killed, origin
 from harvey.campaign.engine import Campaign, run_campaign
-from harvey.campaign.workers import Workers
+from harvey.campaign.workers import Killed, Workers, origin
 
 
 @dataclass(frozen=True, slots=True)

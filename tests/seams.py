@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from experiments.generated.scenes import box_room
 from fake_cases import fake_cases, work_on
-from harvey.campaign.case_work import CaseAnswer, Killed
-from harvey.campaign.workers import ClusterWorkers
+from harvey.campaign.workers import CaseAnswer, ClusterWorkers, Killed
 from harvey.commands.command import CliCommand, add_parser
 from harvey.errors import BadInput
 from sim.render.lighting import Lighting

@@ -27,8 +27,7 @@ from tqdm import tqdm
 
 from experiments.report import Report
 from experiments.robustness.malformed_texts import GML, IFC, SMALL
-from harvey.campaign.case_work import Killed
-from harvey.campaign.engine import map_cases
+from harvey.campaign.workers import Killed, map_cases
 from harvey.errors import BadInput
 from world_models.building.checks import check_world
 from world_models.files.toml.source import Source, WorldError

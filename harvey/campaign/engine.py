@@ -15,60 +15,122 @@ import fcntl
 import json
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from harvey.campaign.case_work import CaseAnswer, Killed, check_origin, map_locally, origin
-from harvey.campaign.workers import Workers, chosen_workers, find_cluster
+from harvey.campaign.workers import Killed, Workers, chosen_workers, map_cases, origin
 from harvey.errors import BadInput
 from logs.disk import MOST_JOURNAL_BYTES, no_follow, sync_folder, write_whole
 from world_models.files.regular_files import read_regular
 
-RESULTS, TIMES = "results.jsonl", "times.jsonl"
+RESULTS, TIMES, CAMPAIGN = "results.jsonl", "times.jsonl", "campaign.json"
 CASE, RESULT, KILLED = "case", "result", "killed"
+MEASURED = ("wall_time_s", "wall_s", "seconds")
+"""Fields of results that tell of the machine, not of the case: they are kept beside the results."""
 
-Records = dict[int, dict[str, Any]]
-"""By case."""
+T = TypeVar("T")
+R = TypeVar("R")
 
 
-class ResultsFile:
-    """The results of a campaign, open for more.
+@dataclass(frozen=True, slots=True)
+class Campaign(Generic[T, R]):
+    """Cases to work on.
 
     Attributes:
-        known: result by case.
+        work: a function of a module, so that another process finds it.
+        cases: by number, which is their key in the results file.
+        folder: where results are kept.
+        to_record, of_record: a result as JSON types, and back.
+        about: what else the results follow from; kept results of anything else are computed again.
+        name: of the campaign, for people; unit: what a case is.
+        anew: whether all cases are done again, whatever is kept.
+        has_files: whether what a kept result of a case needs beside it is there; without, the case is done again.
     """
 
-    def __init__(self, folder: Path, head: Mapping[str, Any]) -> None:
-        """Open or begin it; use :func:`open_results`."""
-        self.path, self._head = folder / RESULTS, dict(head)
-        self._file = open(self.path, "a+b", opener=no_follow)  # noqa: SIM115 (open_results closes it)
+    work: Callable[[T], R]
+    cases: Mapping[int, T]
+    folder: Path
+    to_record: Callable[[R], Mapping[str, Any]]
+    of_record: Callable[[Mapping[str, Any]], R]
+    about: Mapping[str, Any] = field(default_factory=dict)
+    name: str = "campaign"
+    unit: str = "case"
+    anew: bool = False
+    has_files: Callable[[int], bool] = lambda case: True
+
+
+def run_campaign(campaign: Campaign[T, R], workers: Workers | None = None) -> Iterator[tuple[int, R | Killed]]:
+    """(case, result), first those that are kept already, then as they are done; on the disk before they are told.
+
+    Raises:
+        BadInput: another process works on it, or the workers cannot be used. What ``work`` raises comes through.
+    """
+    workers = workers or chosen_workers()
+
+    def describe(dashboard: str | None = None) -> None:
+        about = {"name": campaign.name, "unit": campaign.unit, "total": len(campaign.cases), "workers": workers.text,
+                 "dashboard": dashboard, "began": datetime.now(UTC).isoformat(timespec="seconds")}
+        write_whole(campaign.folder / CAMPAIGN, json.dumps(about, indent=2) + "\n")
+
+    with closing(Results(campaign.folder, {**origin(), **campaign.about}, anew=campaign.anew)) as results:
+        describe()
+        kept = {case: results.known[case] for case in campaign.cases
+                if case in results.known and campaign.has_files(case)}
+        for case, record in kept.items():
+            yield case, campaign.of_record(record)
+        todo = [case for case in campaign.cases if case not in kept]
+        for place, answer in map_cases(campaign.work, [campaign.cases[case] for case in todo], workers, describe):
+            case = todo[place]
+            if isinstance(answer, Killed):
+                results.give_up(case, answer.kills)
+                yield case, answer
+            else:
+                results.add(case, campaign.to_record(answer.value),
+                            {"took_s": round(answer.seconds, 4), "worker": answer.worker})
+                yield case, answer.value
+        results.sort()
+
+
+class Results:
+    """The results of a campaign, open for more; nobody else adds to them meanwhile.
+
+    Attributes:
+        known: result by case, with what was measured; NaN where a kill lost that.
+    """
+
+    def __init__(self, folder: Path, head: Mapping[str, Any], *, anew: bool = False) -> None:
+        """``anew``: drop those that are there, as those of another head are in any case. Raises BadInput, OSError."""
+        folder.mkdir(parents=True, exist_ok=True)
+        self.path, self._times, self._head = folder / RESULTS, folder / TIMES, dict(head)
+        self._file = open(self.path, "a+b", opener=no_follow)  # noqa: SIM115 (close does it)
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            self._file.close()
+            self.close()
             raise BadInput(f"{self.path}: expected a campaign that nobody works on, got one that another process"
                            " works on") from None
         found, records = read_results(self.path)
-        self._times = folder / TIMES
-        if found != self._head:
+        if anew or found != self._head:
             self._file.truncate(0)
             self._times.unlink(missing_ok=True)
             self._append(self._head)
             records = {}
         else:
             self._file.truncate(self.path.read_bytes().rfind(b"\n") + 1)  # up to the end of the last whole line
-        self.known = {case: record[RESULT] for case, record in records.items() if RESULT in record}
+        measured = {times[CASE]: times.get("measured", {}) for times in read_times(folder)}
+        self.known = {case: _with_measured(record[RESULT], measured.get(case, {}))
+                      for case, record in records.items() if RESULT in record}
 
     def add(self, case: int, result: Mapping[str, Any], times: Mapping[str, Any]) -> None:
-        """Append what was found of a case; on the disk when this returns."""
+        """Append what was found of a case, and when and how; on the disk when this returns."""
+        measured = {key: result[key] for key in MEASURED if key in result}
         with open(self._times, "a", encoding="utf-8", opener=no_follow) as out:
-            out.write(_line({CASE: case, **times}).decode())
-        self._append({CASE: case, RESULT: result})
+            out.write(json.dumps({CASE: case, "at": round(time.time(), 3), **times, "measured": measured}) + "\n")
+        self._append({CASE: case, RESULT: {**result, **dict.fromkeys(measured)}})
         self.known[case] = dict(result)
 
     def give_up(self, case: int, kills: int) -> None:
@@ -77,14 +139,8 @@ class ResultsFile:
 
     def sort(self) -> None:
         """Put the lines in the order of the cases; the file as it was stays until the new one is whole."""
-        _, records = read_results(self.path)
-        lines = [self._head, *(records[case] for case in sorted(records))]
-        part = self.path.with_suffix(".part")
-        with open(part, "wb", opener=no_follow) as out:
-            out.writelines(map(_line, lines))
-            out.flush()
-            os.fsync(out.fileno())
-        os.replace(part, self.path)
+        lines = (self._head, *read_results(self.path)[1].values())
+        write_whole(self.path, "".join(json.dumps(line) + "\n" for line in lines), sync=True)
         sync_folder(self.path.parent)
 
     def close(self) -> None:
@@ -92,23 +148,12 @@ class ResultsFile:
         self._file.close()
 
     def _append(self, record: Mapping[str, Any]) -> None:
-        self._file.write(_line(record))
+        self._file.write(json.dumps(record).encode() + b"\n")
         self._file.flush()
         os.fsync(self._file.fileno())
 
 
-@contextmanager
-def open_results(folder: Path, head: Mapping[str, Any]) -> Iterator[ResultsFile]:
-    """The results in a folder, begun again where they are of another head. Raises BadInput, OSError."""
-    folder.mkdir(parents=True, exist_ok=True)
-    results = ResultsFile(folder, head)
-    try:
-        yield results
-    finally:
-        results.close()
-
-
-def read_results(path: Path) -> tuple[dict[str, Any], Records]:
+def read_results(path: Path) -> tuple[dict[str, Any], dict[int, dict[str, Any]]]:
     """The head, and the line of each case in the order of the cases; lines that cannot be read are left out.
 
     Of two results of a case the first counts; that it was given up counts only until there is a result. Raises BadInput
@@ -116,7 +161,7 @@ def read_results(path: Path) -> tuple[dict[str, Any], Records]:
     """
     records = list(_read_lines(path))
     head = records[0] if records and CASE not in records[0] else {}
-    found: Records = {}
+    found: dict[int, dict[str, Any]] = {}
     for record in records[1:]:
         case, result, kills = record.get(CASE), record.get(RESULT, {}), record.get(KILLED, 0)
         if not (isinstance(result, dict) and is_number(kills)):
@@ -137,6 +182,11 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and -1e15 < value < 1e15
 
 
+def _with_measured(record: Mapping[str, Any], measured: Mapping[str, Any]) -> dict[str, Any]:
+    """A result that is kept without what was measured, and that."""
+    return {**record, **{key: measured.get(key, float("nan")) for key in MEASURED if key in record}}
+
+
 def _read_lines(path: Path) -> Iterator[dict[str, Any]]:
     for line in read_regular(path, MOST_JOURNAL_BYTES).split(b"\n")[:-1] if path.is_file() else []:
         try:
@@ -145,108 +195,3 @@ def _read_lines(path: Path) -> Iterator[dict[str, Any]]:
             continue
         if isinstance(record, dict):
             yield record
-
-
-def _line(record: Mapping[str, Any]) -> bytes:
-    return json.dumps(record).encode() + b"\n"
-
-
-T = TypeVar("T")
-R = TypeVar("R")
-
-CAMPAIGN = "campaign.json"
-MEASURED = ("wall_time_s", "wall_s", "seconds")
-"""Fields of results that tell of the machine, not of the case: they are kept beside the results."""
-
-
-@dataclass(frozen=True, slots=True)
-class Campaign(Generic[T, R]):
-    """Cases to work on.
-
-    Attributes:
-        work: a function of a module, so that another process finds it.
-        cases: by number, which is their key in the results file.
-        folder: where results are kept.
-        to_record, of_record: a result as JSON types, and back.
-        about: what else the results follow from; kept results of anything else are computed again.
-        name: of the campaign, for people; unit: what a case is.
-        has_files: whether what a kept result of a case needs beside it is there; without, the case is done again.
-    """
-
-    work: Callable[[T], R]
-    cases: Mapping[int, T]
-    folder: Path
-    to_record: Callable[[R], Mapping[str, Any]]
-    of_record: Callable[[Mapping[str, Any]], R]
-    about: Mapping[str, Any] = field(default_factory=dict)
-    name: str = "campaign"
-    unit: str = "case"
-    has_files: Callable[[int], bool] = lambda case: True
-
-
-def map_cases(
-    work: Callable[[T], R], cases: Sequence[T], workers: Workers | None = None,
-    tell: Callable[[str], None] | None = None,
-) -> Iterator[tuple[int, CaseAnswer | Killed]]:
-    """(place in ``cases``, answer) as they are done, in whatever order; kept nowhere. Raises BadInput.
-
-    Args:
-        workers: who works; None for those that the command was told to use.
-        tell: is told where a cluster's dashboard is.
-    """
-    workers = workers or chosen_workers()
-    if workers.cluster is not None:
-        done = find_cluster("--cluster").map_on_cluster(work, cases, workers.cluster, tell)
-    else:
-        done = map_locally(work, cases, workers.number)
-    for place, answer in done:
-        if isinstance(answer, CaseAnswer):
-            check_origin(answer)
-        yield place, answer
-
-
-def run_campaign(campaign: Campaign[T, R], workers: Workers | None = None) -> Iterator[tuple[int, R | Killed]]:
-    """(case, result), first those that are kept already, then as they are done; on the disk before they are told.
-
-    Raises:
-        BadInput: another process works on it, or the workers cannot be used. What ``work`` raises comes through.
-    """
-    workers = workers or chosen_workers()
-    with open_results(campaign.folder, {**origin(), **campaign.about}) as results:
-        tell = partial(_describe, campaign, workers)
-        tell(None)
-        measured = {record["case"]: record for record in read_times(campaign.folder)}
-        kept = [case for case in campaign.cases if case in results.known and campaign.has_files(case)]
-        for case in kept:
-            yield case, campaign.of_record(_with_measured(results.known[case], measured.get(case, {})))
-        todo = [case for case in campaign.cases if case not in set(kept)]
-        for place, answer in map_cases(campaign.work, [campaign.cases[case] for case in todo], workers, tell):
-            case = todo[place]
-            if isinstance(answer, Killed):
-                results.give_up(case, answer.kills)
-                yield case, answer
-                continue
-            record, times = _split_measured(campaign.to_record(answer.value))
-            results.add(case, record, {"at": round(time.time(), 3), "took_s": round(answer.seconds, 4),
-                                       "worker": answer.worker, "measured": times})
-            yield case, answer.value
-        results.sort()
-
-
-def _describe(campaign: Campaign[Any, Any], workers: Workers, dashboard: str | None) -> None:
-    """Write what ``harvey campaign show`` needs beside the results."""
-    about = {"name": campaign.name, "unit": campaign.unit, "total": len(campaign.cases), "workers": workers.text,
-             "dashboard": dashboard, "began": datetime.now(UTC).isoformat(timespec="seconds")}
-    write_whole(campaign.folder / CAMPAIGN, json.dumps(about, indent=2) + "\n")
-
-
-def _split_measured(record: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What follows from the case, with None where something was measured; and what was."""
-    times = {key: record[key] for key in MEASURED if key in record}
-    return {**record, **dict.fromkeys(times)}, times
-
-
-def _with_measured(record: Mapping[str, Any], times: Mapping[str, Any]) -> dict[str, Any]:
-    """Both together; NaN where a kill lost what was measured."""
-    measured = times.get("measured", {})
-    return {**record, **{key: measured.get(key, float("nan")) for key in MEASURED if key in record}}

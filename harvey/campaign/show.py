@@ -19,6 +19,9 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
+from scipy.special import bdtr, betaincinv
+
 from harvey.campaign.engine import CAMPAIGN, KILLED, RESULT, RESULTS, is_number, read_results, read_times
 from harvey.errors import BadInput
 from logs.run_directory import RUNS, read_json
@@ -147,8 +150,6 @@ def _kinds(results: Sequence[dict[str, Any]]) -> list[tuple[str, str, str, str]]
 
 def draw_progress(progress: CampaignProgress) -> Path:
     """Draw how many cases were done when, by outcome where they have one; returns the picture (PNG)."""
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=SIZE_IN, dpi=DOTS, layout="constrained")
     axes = figure.add_subplot()
     minutes = [at / 60.0 for at in progress.done_at_s]
@@ -206,9 +207,7 @@ class Comparison:
     @property
     def p_value(self) -> float:
         """How often so much or more would come by chance, were both alike; two-sided."""
-        from scipy.stats import binomtest
-
-        return float(binomtest(len(self.gained), self.discordant).pvalue) if self.discordant else 1.0
+        return min(1.0, 2.0 * float(bdtr(min(len(self.gained), len(self.lost)), self.discordant, 0.5)))
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -240,10 +239,10 @@ def compare(first: Results, second: Results, succeeds: Callable[[Mapping[str, An
 
 def rate_interval(successes: int, of: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
     """Of a rate, by Clopper and Pearson."""
-    from scipy.stats import binomtest
-
-    bounds = binomtest(successes, of).proportion_ci(confidence, method="exact")
-    return float(bounds.low), float(bounds.high)
+    failures, risk = of - successes, (1.0 - confidence) / 2.0
+    low = betaincinv(successes, failures + 1, risk) if successes else 0.0
+    high = betaincinv(successes + 1, failures, 1.0 - risk) if failures else 1.0
+    return float(low), float(high)
 
 
 def parse_success(text: str) -> Callable[[Mapping[str, Any]], bool]:

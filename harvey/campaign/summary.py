@@ -1,23 +1,78 @@
-"""How missions went, in words and as a table."""
+"""What is said of missions: how far one is, meanwhile; and how they went, in words and as a table."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
+from tqdm import tqdm
+
+from blackboard import Decision
+from harvey.runner.result import MissionResult
+from logs.explain.turning_points import TurningPointFinder
 from logs.tables import table
+from world_models.entries import Goal, Hypothesis, Milestone
 from world_models.units import FOOT_M, INCH_M
 from world_models.words import count, degrees
 
 if TYPE_CHECKING:
-    from harvey.dry_run import MilestonePreview
-    from harvey.runner.result import MissionResult
-    from world_models.entries import Outcome
+    from sim.stage import Stage
 
 COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "wrong", "sketches", "replans",
            "relocated", "collisions", "path m", "robot s", "cycles", "wall s")
+
+
+class Progress:
+    """A sink that shows how far a mission is, by Harvey's own belief.
+
+    On a terminal it is a bar that fills as the way to go shrinks. Elsewhere it is a line whenever a milestone is
+    verified, and at each turning point that must not be left out.
+
+    Attributes:
+        verified: milestones so far.
+        to_go_m: distance to the goal as the crow flies.
+        is_lost: whether the robot does not know where it is.
+    """
+
+    def __init__(self, stage: Stage, out: TextIO) -> None:
+        self._world, self._goal, self._out = stage.world, stage.goal_world, out
+        self.verified, self.is_lost = 0, False
+        self.to_go_m = self._way_m = stage.start_world.distance_to(stage.goal_world)
+        self._finder = TurningPointFinder()
+        self._bar = tqdm(total=self._way_m, file=out, leave=False, dynamic_ncols=True, disable=not out.isatty(),
+                         bar_format="{percentage:3.0f} %|{bar}| {desc} [{elapsed}]")
+
+    def __call__(self, decision: Decision) -> None:
+        before = self.verified
+        for point in self._finder.find(decision):
+            if point.is_main:
+                self.is_lost = point.kind == "lost" or (self.is_lost and point.kind != "found")
+                self._print(f"cycle {point.cycle}: {point.kind}: {point.text}")
+        for change in decision.made:
+            value = change.entry.value
+            if isinstance(value, Milestone):
+                self.verified += value.status == "verified"
+            elif isinstance(value, Goal) and value.is_active:
+                self._goal = value.destination.in_world(self._world)
+            elif isinstance(value, Hypothesis) and value.is_held:
+                self.to_go_m = value.world_from_robot(self._world).distance_to(self._goal)
+        verified = f"{count(self.verified, 'milestone')} verified"
+        if self.verified > before:
+            self._print(f"cycle {decision.cycle}: {verified}, {self.to_go_m:.1f} m to go")
+        self._bar.n = min(max(0.0, self._way_m - self.to_go_m), self._way_m)
+        line = f"{self.to_go_m:.1f} m to go, {verified}, cycle {decision.cycle}{', lost' * self.is_lost}"
+        self._bar.set_description_str(line, refresh=False)
+        self._bar.update(0)
+
+    def close(self) -> None:
+        """Take the bar away."""
+        self._bar.close()
+
+    def _print(self, line: str) -> None:
+        if self._bar.disable:
+            print(line, file=self._out, flush=True)
 
 
 def format_error(error_m: float) -> str:
@@ -57,60 +112,24 @@ def format_result(r: MissionResult, out: Path | None, story: Sequence[str] = ())
 
 
 def format_results(results: Sequence[MissionResult]) -> str:
-    """A table, one row a seed, with a summary row."""
-    rows = table(COLUMNS, [*(_cells(r) for r in results), _total(results)], last_is_summary=True)
-    return "\n".join([rows, *(f"seed {r.seed}: {text}" for r in results for text in (*r.amiss, *r.starved))])
+    """A table, one row a seed, with a summary row: counts are summed, ways averaged, of errors the worst is told."""
+    counts = [(r.milestones["verified"] or 0, r.milestones["refuted"] or 0, r.false_accepts, r.sketches, r.replans,
+               r.relocalizations, r.collisions or 0) for r in results]
+    ways = [(r.path_length_m, r.sim_time_s, r.cycles, r.wall_time_s) for r in results]
+    reached = sum(r.outcome == "reached" for r in results)
+    rows = [_row(str(r.seed), r.outcome, "", r.error_m, counted, way)
+            for r, counted, way in zip(results, counts, ways, strict=True)]
+    rows.append(_row("all", f"{reached} of {len(results)} reached", "max ", max(r.error_m for r in results),
+                     [sum(column) for column in zip(*counts, strict=True)],
+                     [math.fsum(column) / len(results) for column in zip(*ways, strict=True)]))
+    return "\n".join([table(COLUMNS, rows, last_is_summary=True),
+                      *(f"seed {r.seed}: {text}" for r in results for text in (*r.amiss, *r.starved))])
 
 
-def format_previews(ahead: Sequence[MilestonePreview]) -> str:
-    """The milestones to come, one a row."""
-    columns = ("milestone", "in", "x m", "y m", "looking", "landmarks", "lines", "place mm", "heading deg",
-               "p wrong", "verdict")
-    return table(columns, [_preview(p) for p in ahead])
-
-
-def summarize_dry_run(ahead: Sequence[MilestonePreview], outcome: Outcome) -> tuple[str, bool]:
-    """How the dry run of a mission ends, and whether nothing speaks against driving it.
-
-    A dry run verifies every milestone, so reaching the goal says little where one is not testable or ambiguous.
-    """
-    doubtful = [(verdict, sum(1 for p in ahead if p.verdict == verdict)) for verdict in ("not testable", "ambiguous")]
-    doubts = [f"{count(number, 'milestone')} {verdict}" for verdict, number in doubtful if number]
-    weak = sum(1 for p in ahead if p.verdict == "weak")
-    if outcome.kind == "reached" and doubts:
-        return f"may not reach its goal: of {len(ahead)} on the way, {' and '.join(doubts)}", False
-    if outcome.kind == "reached":
-        return f"ends: reached, {outcome.reason}" + (f"; {count(weak, 'milestone')} weak" if weak else ""), True
-    return f"ends: {outcome.kind}, {outcome.reason}" + (f"; {' and '.join(doubts)}" if doubts else ""), False
-
-
-def _preview(p: MilestonePreview) -> tuple[str, ...]:
-    return (p.what, p.locale, f"{p.x_m:.2f}", f"{p.y_m:.2f}", f"{math.degrees(p.look_heading_rad):.0f}",
-            str(p.landmarks), str(p.lines), f"{p.sigma_m * 1000:.1f}", f"{math.degrees(p.sigma_rad):.2f}",
-            f"{p.p_false:.1g}", f"{p.verdict}: {p.alike} looks like it" if p.alike else p.verdict)
-
-
-def _cells(r: MissionResult) -> tuple[str, ...]:
-    counts, ways = _counts(r), _ways(r)
-    return (str(r.seed), r.outcome, f"{r.error_m * 1000:.1f}", f"{r.error_m / INCH_M:.2f}",
-            *(str(n) for n in counts), f"{ways[0]:.1f}", f"{ways[1]:.0f}", f"{ways[2]:.0f}", f"{ways[3]:.1f}")
-
-
-def _counts(r: MissionResult) -> tuple[int, ...]:
-    m = r.milestones
-    return (m["verified"] or 0, m["refuted"] or 0, r.false_accepts, r.sketches, r.replans, r.relocalizations,
-            r.collisions or 0)
-
-
-def _ways(r: MissionResult) -> tuple[float, ...]:
-    return r.path_length_m, r.sim_time_s, r.cycles, r.wall_time_s
-
-
-def _total(results: Sequence[MissionResult]) -> tuple[str, ...]:
-    """Counts are summed, ways averaged, of errors the worst is told."""
-    reached = sum(1 for r in results if r.outcome == "reached")
-    worst_m = max(r.error_m for r in results)
-    sums = [sum(values) for values in zip(*(_counts(r) for r in results), strict=True)]
-    means = [math.fsum(values) / len(results) for values in zip(*(_ways(r) for r in results), strict=True)]
-    return ("all", f"{reached} of {len(results)} reached", f"max {worst_m * 1000:.1f}", f"{worst_m / INCH_M:.2f}",
-            *(str(n) for n in sums), f"{means[0]:.1f}", f"{means[1]:.0f}", f"{means[2]:.0f}", f"{means[3]:.1f}")
+def _row(
+    what: str, outcome: str, sign: str, error_m: float, counts: Sequence[int], ways: Sequence[float]
+) -> tuple[str, ...]:
+    """``ways``: the path [m], the robot's time [s], cycles, time that it took [s]."""
+    path_m, robot_s, cycles, wall_s = ways
+    return (what, outcome, f"{sign}{error_m * 1000:.1f}", f"{error_m / INCH_M:.2f}", *map(str, counts),
+            f"{path_m:.1f}", f"{robot_s:.0f}", f"{cycles:.0f}", f"{wall_s:.1f}")

@@ -10,8 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harvey.campaign.campaign import parse_pairs
-from harvey.commands.command import CliCommand
+from harvey.commands.command import CliCommand, parse_pairs
 from harvey.errors import BadInput
 from logs.run_directory import RunDirectory, check_vacant, expect_unwritten, open_run
 from world_models.words import count

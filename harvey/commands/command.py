@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
+
+from harvey.errors import BadInput, in_one_line
+
+MAX_SEEDS = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +47,6 @@ class OneLineParser(ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raises SystemExit(2)."""
-        from harvey.errors import in_one_line
-
         print(in_one_line(f"{self.prog}: {message}; see {self.prog} --help"), file=sys.stderr)
         raise SystemExit(2)
 
@@ -63,3 +66,25 @@ def whole(text: str) -> int:
     if not (text.isascii() and text.isdecimal()):
         raise ArgumentTypeError(f"expected a whole number from 0, got {text!r}")
     return int(text)
+
+
+def parse_seeds(text: str) -> tuple[int, ...]:
+    """``3``, ``0..19`` (both included) or ``1,4,9``. Raises BadInput."""
+    seeds: list[int] = []
+    for part in text.split(","):
+        match = re.fullmatch(r"(\d{1,9})(?:\.\.(\d{1,9}))?", part.strip(), re.ASCII)
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
+        if last < first or last - first >= MAX_SEEDS:
+            raise BadInput("--seed: expected a number from 0 to 999999999, a range as 0..19 or a list as 1,4,9,"
+                           f" of {MAX_SEEDS} at most, got {text!r}")
+        seeds += range(first, last + 1)
+    return tuple(dict.fromkeys(seeds))
+
+
+def parse_pairs(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """``key=value`` pairs. Raises BadInput."""
+    for text in texts:
+        if not text.partition("=")[0] or "=" not in text:
+            raise BadInput(f"--set: expected key=value, as servo.action=off, got {text!r}")
+    pairs = (text.partition("=") for text in texts)
+    return tuple((key.strip(), value.strip()) for key, _, value in pairs)

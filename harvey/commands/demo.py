@@ -22,8 +22,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.campaign.campaign import Task, run_task
-    from harvey.campaign.progress import following
+    from harvey.campaign.task import Task, run_task
     from harvey.commands.report import build_run_page, write_page
     from logs.explain.story import first_lines
 
@@ -31,8 +30,7 @@ def _run(args: Namespace) -> int:
     task = Task(SCENARIO, (), 0, out)
     task.load()
     print(f"{BEFORE}\n", flush=True)
-    with following(sys.stderr) as follow:
-        result = run_task(task, follow=follow)
+    result = run_task(task, progress=sys.stderr)
     page = out / "report.html"
     write_page(page, build_run_page(RunDirectory(out)))
     print("", *first_lines(out), "", f"{page}: the whole run; opens in any browser", "", sep="\n")

@@ -11,9 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harvey.commands.command import CliCommand
+from harvey.commands.command import CliCommand, parse_pairs
 from harvey.errors import BadInput
-from logs.run_directory import RUNS, check_vacant, expect_unwritten
+from logs.run_directory import RUNS, check_vacant, expect_unwritten, make_room
 
 if TYPE_CHECKING:
     from blackboard import Decision
@@ -58,7 +58,6 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a camera is said by us
     from harvey.agent_settings import build_settings, split_settings
-    from harvey.campaign.campaign import make_room, parse_pairs
     from harvey.hardware.hardware_mission import FORMAT
     from harvey.hardware.preflight import Preflight
     from harvey.replay.what_if import WhatIf

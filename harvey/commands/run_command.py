@@ -7,12 +7,15 @@ import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from harvey.campaign.campaign import Keep, Task, drive_missions, parse_pairs, parse_seeds, run_task
 from harvey.campaign.workers import add_worker_arguments, choose_workers, parse_workers
-from harvey.commands.command import CliCommand
+from harvey.commands.command import CliCommand, parse_pairs, parse_seeds
 from harvey.errors import BadInput, Terminated
 from logs.run_directory import RUNS, check_vacant
+
+if TYPE_CHECKING:
+    from harvey.campaign.task import Keep, Task
 
 
 def _add_run_arguments(parser: ArgumentParser) -> None:
@@ -49,10 +52,11 @@ def _add_run_arguments(parser: ArgumentParser) -> None:
 
 
 def _run_run(args: Namespace) -> int:
+    workers, seeds, settings = parse_workers(args), parse_seeds(args.seed), parse_pairs(args.settings)
+    from harvey.campaign.task import Task
     from harvey.simulation.serial_body import body_kind
 
-    workers = parse_workers(args)
-    seeds, settings, body = parse_seeds(args.seed), parse_pairs(args.settings), body_kind(args.body)
+    body = body_kind(args.body)
     tasks = tuple(
         Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1), body, args.go_on, args.sync)
         for seed in seeds)
@@ -82,8 +86,7 @@ def _out(args: Namespace, seed: int, many: bool) -> Path:
 def _check(task: Task) -> int:
     stage = task.stage()
     from harvey.agent_settings import build_settings
-    from harvey.campaign.summary import format_previews, summarize_dry_run
-    from harvey.dry_run import dry_run
+    from harvey.dry_run import dry_run, format_previews, summarize_dry_run
     from harvey.replay.what_if import WhatIf
     from harvey.simulation.simulated_run import build_robot_model
     from world_models.files.world_files import load_world
@@ -100,8 +103,8 @@ def _check(task: Task) -> int:
 
 
 def _one(task: Task, args: Namespace) -> int:
-    from harvey.campaign.progress import following
     from harvey.campaign.summary import format_result
+    from harvey.campaign.task import run_task
     from logs.explain.story import first_lines
     from logs.explain.web import printing
 
@@ -109,20 +112,19 @@ def _one(task: Task, args: Namespace) -> int:
     sinks = (printing(sys.stdout, whole=args.trace_all),) if is_traced else ()
     task.load()  # what is wrong with it is said first
     print(f"{task.label}: setting the stage", file=sys.stderr, flush=True)
-    with following(sys.stderr) as follow:
-        result = run_task(task, sinks=sinks, follow=None if is_traced else follow, live=args.live)
+    result = run_task(task, sinks=sinks, progress=None if is_traced else sys.stderr, live=args.live)
     print(format_result(result, task.out, first_lines(task.out)))
     return 0 if result.outcome == "reached" else 1
 
 
 def _several(tasks: tuple[Task, ...], keep: Keep) -> int:
-    from harvey.campaign.progress import count_missions
     from harvey.campaign.summary import format_results
+    from harvey.campaign.task import drive_missions
     from harvey.runner.result import MissionResult
 
     folder = tasks[0].out.parent if tasks[0].out else RUNS
     try:
-        done = dict(count_missions(drive_missions(tasks, folder, keep), len(tasks), sys.stderr))
+        done = drive_missions(tasks, folder, sys.stderr, keep)
     except (KeyboardInterrupt, Terminated) as stop:
         stop.add_note("what was recorded is kept; the same command with --go-on goes on")
         raise

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from harvey.campaign.summary import summarize_dry_run
-from harvey.dry_run import MilestonePreview, Otherwise, dry_run, not_otherwise
+from harvey.dry_run import MilestonePreview, Otherwise, dry_run, not_otherwise, summarize_dry_run
 from harvey.errors import BadInput
 from harvey.hardware.bases import kind_of, open_base
 from harvey.hardware.drivers.base_driver import Base, BaseFault

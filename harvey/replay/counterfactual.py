@@ -15,7 +15,6 @@ from typing import Any
 
 from blackboard import Change, Decision, Post, Scheduler, View, decision_record, plain
 from harvey.agent import Agent, build_agent
-from harvey.campaign.campaign import make_room
 from harvey.campaign.summary import format_error
 from harvey.replay.what_if import check_segments
 from harvey.runner.ports import BodyPort
@@ -29,7 +28,7 @@ from harvey.simulation.simulated_run import SimulatedRun, rebuild_stage
 from logs.explain.diff import describe, differing_leaves
 from logs.explain.phrases import sentence
 from logs.records import WHAT_IF, DecisionRecord, EntryRecord, Originals, as_line, decision_of, effect_of, read_records
-from logs.run_directory import RunDirectory
+from logs.run_directory import RunDirectory, make_room
 from logs.run_head import SIMULATOR, RunHead
 from logs.run_recorder import RunRecorder
 from world_models.building.locale_frame import LocaleFrame

@@ -18,7 +18,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from harvey.campaign.case_work import MOST_KILLS, CaseAnswer, Killed, answer_case
+from harvey.campaign.workers import MOST_KILLS, CaseAnswer, Killed, answer_case
 from harvey.errors import BadInput
 
 dask: Any = import_module("dask")  # annotated only in part

@@ -6,11 +6,14 @@ import math
 import time
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from harvey.campaign.campaign import Task, make_room, parse_pairs, parse_seeds
-from harvey.commands.command import CliCommand
+from harvey.commands.command import CliCommand, parse_pairs, parse_seeds
 from harvey.errors import BadInput
-from logs.run_directory import RUNS, check_vacant
+from logs.run_directory import RUNS, check_vacant, make_room
+
+if TYPE_CHECKING:
+    from harvey.campaign.task import Task
 
 PORT = 8750
 
@@ -33,6 +36,8 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
+    from harvey.campaign.task import Task
+
     if not (math.isfinite(args.speed) and args.speed >= 0.0):
         raise BadInput(f"--speed: expected a number that is not below 0, got {args.speed}")
     if Path(args.scenario).is_dir():

@@ -6,6 +6,7 @@ import multiprocessing
 import signal
 import tempfile
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fake_cases import be_client, run_here, serial
-from harvey.campaign.engine import RESULTS, open_results, read_times
+from harvey.campaign.engine import RESULTS, Results, read_times
 from harvey.campaign.workers import Workers
 from harvey.errors import BadInput
 
@@ -54,7 +55,7 @@ def test_a_file_cut_off_anywhere_goes_on_to_the_same(order: list[int], data: st.
         path = Path(name) / RESULTS
         whole = b""
         for again in range(2):
-            with open_results(Path(name), head) as results:
+            with closing(Results(Path(name), head)) as results:
                 for case in order:
                     if case not in results.known:
                         results.add(case, {"x": case}, {"at": 0.0})
@@ -67,15 +68,14 @@ def test_a_file_cut_off_anywhere_goes_on_to_the_same(order: list[int], data: st.
 
 def test_results_of_another_program_are_not_mixed(tmp_path: Path) -> None:
     for code in "12":
-        with open_results(tmp_path, {"code": code}) as results:
+        with closing(Results(tmp_path, {"code": code})) as results:
             assert results.known == {}
             results.add(0, {"x": code}, {})
 
 
 def test_two_processes_do_not_work_on_the_same(tmp_path: Path) -> None:
-    with open_results(tmp_path, {}), pytest.raises(BadInput, match="another process works on"), \
-            open_results(tmp_path, {}):
-        pass
+    with closing(Results(tmp_path, {})), pytest.raises(BadInput, match="another process works on"):
+        Results(tmp_path, {})
 
 
 def test_workers_end_with_a_client_that_is_killed(tmp_path: Path) -> None:

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from harvey.campaign import campaign as missions
-from harvey.campaign.campaign import Task
-from harvey.campaign.case_work import CaseAnswer, check_origin, code_digest
-from harvey.campaign.engine import open_results
+from harvey.campaign import task as missions
+from harvey.campaign.engine import Results
 from harvey.campaign.show import read_progress
-from harvey.campaign.workers import Workers, choose_workers, chosen_workers
+from harvey.campaign.task import Task
+from harvey.campaign.workers import CaseAnswer, Workers, check_origin, choose_workers, chosen_workers, origin
 from harvey.cli import main
 from harvey.errors import BadInput
-from logs.decided_by import arithmetic
 from world_models import plugins
 
 
 def campaign(folder: Path, outcomes: list[str], total: int = 40, killed: tuple[int, ...] = ()) -> str:
     """The files of a campaign that has done a case every two seconds, and was left alone for an hour once."""
-    with open_results(folder, {"code": "any"}) as results:
+    with closing(Results(folder, {"code": "any"})) as results:
         for case, outcome in enumerate(outcomes):
             at = 1000.0 + 2.0 * case + 3600.0 * (case >= 3)
             result = {"outcome": outcome, "final_error_m": 0.01 * case}
@@ -93,9 +92,9 @@ def test_who_works_is_chosen_for_a_while() -> None:
     assert chosen_workers() == Workers()
 
 
-@pytest.mark.parametrize(("code", "calculated"), [("other", None), (None, "abacus")])
-def test_a_worker_that_computes_otherwise_is_refused(code: str | None, calculated: str | None) -> None:
-    answer = CaseAnswer(1, 0.1, "host:1", code or code_digest(), calculated or arithmetic())
+@pytest.mark.parametrize(("what", "theirs"), [("code", "other"), ("arithmetic", "abacus")])
+def test_a_worker_that_computes_otherwise_is_refused(what: str, theirs: str) -> None:
+    answer = CaseAnswer(1, 0.1, "host:1", {**origin(), what: theirs})
     with pytest.raises(BadInput, match="worker host:1: expected the"):
         check_origin(answer)
 

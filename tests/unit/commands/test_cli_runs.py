@@ -15,10 +15,10 @@ from typing import Any
 
 import pytest
 
-from harvey.campaign.campaign import Task, parse_pairs, parse_seeds, run_task
-from harvey.campaign.engine import map_cases
-from harvey.campaign.workers import Workers
+from harvey.campaign.task import Task, run_task
+from harvey.campaign.workers import Workers, map_cases
 from harvey.cli import main
+from harvey.commands.command import parse_pairs, parse_seeds
 from harvey.errors import BadInput, Terminated
 from harvey.wiring import load_kinds
 from journals import read_decisions, read_journal

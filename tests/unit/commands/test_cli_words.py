@@ -15,8 +15,8 @@ from blackboard import Discrepancy, Level, plain
 from experiments.paper.levels import _row
 from experiments.report import Report
 from experiments.scale.render_speed import measure_edge_offsets_px
-from harvey.campaign.summary import format_error, format_result, format_results, summarize_dry_run
-from harvey.dry_run import MilestonePreview
+from harvey.campaign.summary import format_error, format_result, format_results
+from harvey.dry_run import MilestonePreview, summarize_dry_run
 from harvey.errors import BadInput
 from harvey.runner.result import MissionResult
 from logs.explain.phrases import sentence

@@ -12,8 +12,7 @@ from typing import Any, cast
 import pytest
 
 from blackboard import Blackboard, Decision, Effect, Level, Post, Revise, decision_line
-from harvey.campaign.progress import Lines, Tally
-from harvey.campaign.summary import format_result
+from harvey.campaign.summary import Progress, format_result
 from harvey.errors import BadInput
 from harvey.runner.result import MissionResult, RunCounts
 from harvey.simulation.contacts import ContactWatch
@@ -206,12 +205,11 @@ def test_the_summary_tells_them_and_the_result_keeps_them() -> None:
 
 def test_progress_says_that_it_is_lost_and_found() -> None:
     stage = SimpleNamespace(world=house(), goal_world=Pose2(0.0, 0.0, 0.0), start_world=Pose2(4.0, 0.0, 0.0))
-    tally, out = Tally(cast(Any, stage)), io.StringIO()
-    lines, lost = Lines(tally, out), list[bool]()
+    out = io.StringIO()
+    progress, lost = Progress(cast(Any, stage), out), list[bool]()
     for decision in decisions():
-        tally(decision)
-        lines(decision)
-        lost.append(tally.is_lost)
+        progress(decision)
+        lost.append(progress.is_lost)
     assert lost == [False, False, False, True, False, False, False, False]
     assert "cycle 4: lost: kitchen (1.00, 2.00) m by its belief; M2 is refuted\n" in out.getvalue()
     assert "cycle 5: found: kitchen (3.00, 1.00) m; it knows again where it is\n" in out.getvalue()

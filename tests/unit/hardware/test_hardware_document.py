@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from harvey.campaign.summary import summarize_dry_run
 from harvey.cli import main, parser
-from harvey.dry_run import dry_run
+from harvey.dry_run import dry_run, summarize_dry_run
 from harvey.hardware.hardware_body import BASE_WORDS, CAMERA_WORDS
 from harvey.hardware.hardware_mission import load_mission
 from harvey.simulation.simulated_run import build_robot_model
