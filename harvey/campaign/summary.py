@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, TextIO
 from tqdm import tqdm
 
 from blackboard import Decision
-from harvey.runner.result import MissionResult
+from harvey.runner.result import MissionResult, format_error
 from logs.explain.turning_points import TurningPointFinder
 from logs.tables import table
 from world_models.entries import Goal, Hypothesis, Milestone
-from world_models.units import FOOT_M, INCH_M
+from world_models.units import INCH_M
 from world_models.words import count, degrees
 
 if TYPE_CHECKING:
@@ -73,15 +73,6 @@ class Progress:
     def _print(self, line: str) -> None:
         if self._bar.disable:
             print(line, file=self._out, flush=True)
-
-
-def format_error(error_m: float) -> str:
-    """An error in millimetres and inches; beyond a metre in metres and feet; NaN is not known."""
-    if math.isnan(error_m):
-        return "not known"
-    if abs(error_m) > 1.0:
-        return f"{error_m:.2f} m ({error_m / FOOT_M:.1f} feet)"
-    return f"{error_m * 1000.0:.1f} mm ({error_m / INCH_M:.2f} inches)"
 
 
 def format_result(r: MissionResult, out: Path | None, story: Sequence[str] = ()) -> str:

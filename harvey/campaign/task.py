@@ -20,10 +20,10 @@ from tqdm import tqdm
 from blackboard import Sink
 from harvey.agent_settings import Pairs, split_settings
 from harvey.campaign.engine import Campaign, run_campaign
-from harvey.campaign.summary import Progress, format_error
+from harvey.campaign.summary import Progress
 from harvey.campaign.workers import Killed
 from harvey.errors import BadInput
-from harvey.runner.result import MissionResult
+from harvey.runner.result import MissionResult, format_error
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import build_head, resume_mission, run_mission
 from logs.decided_by import DIGITS

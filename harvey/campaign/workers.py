@@ -1,4 +1,4 @@
-"""Workers: which processes work on cases, as the user chose with ``--workers`` and ``--cluster``, and how.
+"""Workers: which processes work on cases, and how.
 
 A worker has one case at a time, so that it is known on which case it worked when it ended. Another takes its place, and
 the case is done again.
@@ -15,7 +15,6 @@ import socket
 import sys
 import threading
 import time
-from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -140,26 +139,6 @@ def choose_workers(workers: Workers) -> Iterator[None]:
         yield
     finally:
         _chosen.reset(before)
-
-
-def add_worker_arguments(parser: ArgumentParser) -> None:
-    """``--workers`` and ``--cluster``."""
-    parser.add_argument("--workers", metavar="N", help="processes of this machine, or all: one a processor (all)")
-    parser.add_argument("--cluster", metavar="WHERE",
-                        help="let a Dask cluster work: local:N, tcp://host:port of a scheduler, or its scheduler file"
-                             "; needs harvey-cluster")
-
-
-def parse_workers(args: Namespace) -> Workers:
-    """What :func:`add_worker_arguments` added. Raises BadInput."""
-    number, cluster = args.workers, args.cluster
-    if number is not None and cluster is not None:
-        raise BadInput(f"--workers: expected it without --cluster, which has its own workers, got {number!r}")
-    if number not in (None, "all") and not (number.isascii() and number.isdecimal() and 0 < int(number) <= 4096):
-        raise BadInput(f"--workers: expected a number from 1 to 4096, or all, got {number!r}")
-    if cluster is not None:
-        find_cluster("--cluster")  # where it is absent that is said before anything is begun
-    return Workers(None if number in (None, "all") else int(number), cluster)
 
 
 def count_processors() -> int:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
+from harvey.campaign.workers import Workers, find_cluster
 from harvey.errors import BadInput, in_one_line
 
 MAX_SEEDS = 10_000
@@ -88,3 +89,23 @@ def parse_pairs(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
             raise BadInput(f"--set: expected key=value, as servo.action=off, got {text!r}")
     pairs = (text.partition("=") for text in texts)
     return tuple((key.strip(), value.strip()) for key, _, value in pairs)
+
+
+def add_worker_arguments(parser: ArgumentParser) -> None:
+    """``--workers`` and ``--cluster``."""
+    parser.add_argument("--workers", metavar="N", help="processes of this machine, or all: one a processor (all)")
+    parser.add_argument("--cluster", metavar="WHERE",
+                        help="let a Dask cluster work: local:N, tcp://host:port of a scheduler, or its scheduler file"
+                             "; needs harvey-cluster")
+
+
+def parse_workers(args: Namespace) -> Workers:
+    """What :func:`add_worker_arguments` added. Raises BadInput."""
+    number, cluster = args.workers, args.cluster
+    if number is not None and cluster is not None:
+        raise BadInput(f"--workers: expected it without --cluster, which has its own workers, got {number!r}")
+    if number not in (None, "all") and not (number.isascii() and number.isdecimal() and 0 < int(number) <= 4096):
+        raise BadInput(f"--workers: expected a number from 1 to 4096, or all, got {number!r}")
+    if cluster is not None:
+        find_cluster("--cluster")  # where it is absent that is said before anything is begun
+    return Workers(None if number in (None, "all") else int(number), cluster)

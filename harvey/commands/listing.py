@@ -13,8 +13,8 @@ from textwrap import fill, wrap
 from typing import TYPE_CHECKING, Any
 
 from experiments import EXPERIMENTS
-from harvey.campaign.workers import add_worker_arguments, choose_workers, parse_workers
-from harvey.commands.command import CliCommand, whole
+from harvey.campaign.workers import choose_workers
+from harvey.commands.command import CliCommand, add_worker_arguments, parse_workers, whole
 from harvey.errors import BadInput
 
 if TYPE_CHECKING:

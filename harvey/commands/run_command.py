@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harvey.campaign.workers import add_worker_arguments, choose_workers, parse_workers
-from harvey.commands.command import CliCommand, parse_pairs, parse_seeds
+from harvey.campaign.workers import choose_workers, count_processors, find_cluster
+from harvey.commands.command import CliCommand, add_worker_arguments, parse_pairs, parse_seeds, parse_workers
 from harvey.errors import BadInput, Terminated
 from logs.run_directory import RUNS, check_vacant
 
@@ -225,8 +225,6 @@ def _compare(args: Namespace) -> int:
 
 def _worker(args: Namespace) -> int:
     """Becomes Dask's own worker, in an environment in which the libraries calculate as ours do."""
-    from harvey.campaign.workers import count_processors, find_cluster, parse_workers
-
     workers = replace(parse_workers(args), cluster=None)
     if "://" not in args.scheduler and not os.path.isfile(args.scheduler):
         raise BadInput(f"expected tcp://host:port or the file of a scheduler, got {args.scheduler!r}")

@@ -15,11 +15,10 @@ from typing import Any
 
 from blackboard import Change, Decision, Post, Scheduler, View, decision_record, plain
 from harvey.agent import Agent, build_agent
-from harvey.campaign.summary import format_error
 from harvey.replay.what_if import check_segments
 from harvey.runner.ports import BodyPort
 from harvey.runner.replay import Live, ignore, open_originals
-from harvey.runner.result import UNFINISHED, MissionResult
+from harvey.runner.result import UNFINISHED, MissionResult, format_error
 from harvey.runner.resume import RESUME
 from harvey.runner.run import Over, run_to_outcome
 from harvey.runner.teller import PAGE, USER

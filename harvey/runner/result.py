@@ -23,6 +23,7 @@ from world_models.entries import (
     PlanSketch,
     find_camera_lessons,
 )
+from world_models.units import FOOT_M, INCH_M
 from world_models.words import count
 
 PARTS = ("contacts", "happened", "turning_points", "camera")
@@ -116,6 +117,15 @@ class MissionResult:
         happened = None if listed is None else tuple(Happening(**one) for one in listed)
         return MissionResult(**{**record, "contacts": contacts, "turning_points": turning_points, "camera": camera,
                                 "happened": happened})
+
+
+def format_error(error_m: float) -> str:
+    """An error in millimetres and inches; beyond a metre in metres and feet; NaN is not known."""
+    if math.isnan(error_m):
+        return "not known"
+    if abs(error_m) > 1.0:
+        return f"{error_m:.2f} m ({error_m / FOOT_M:.1f} feet)"
+    return f"{error_m * 1000.0:.1f} mm ({error_m / INCH_M:.2f} inches)"
 
 
 MIN_WOKEN, MAX_STARVED_SHARE = 10, 0.1

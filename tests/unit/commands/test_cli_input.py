@@ -323,7 +323,7 @@ MUTANTS = settings(deadline=None, max_examples=20, suppress_health_check=[Health
 def test_a_damaged_scenario_never_ends_in_a_traceback(
     data: st.DataObject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sim.stage.build_stage", lambda scenario: SimpleNamespace(scenario=scenario))
+    monkeypatch.setattr("harvey.campaign.task.build_stage", lambda scenario: SimpleNamespace(scenario=scenario))
     monkeypatch.setattr("harvey.dry_run.dry_run", lambda *_known: ((), Outcome("reached", "")))
     file = tmp_path / "mission.toml"
     file.write_bytes(data.draw(damaged((SCENARIOS / "hallway-kidnap.toml").read_bytes())))

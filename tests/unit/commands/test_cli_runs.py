@@ -333,8 +333,8 @@ def test_being_stopped_is_told_in_a_line(
         raise raised
 
     here = Pose2(0.0, 0.0, 0.0)
-    monkeypatch.setattr("harvey.simulation.simulated_run.run_mission", stopped)
-    monkeypatch.setattr("sim.stage.build_stage", lambda scenario: SimpleNamespace(
+    monkeypatch.setattr("harvey.campaign.task.run_mission", stopped)
+    monkeypatch.setattr("harvey.campaign.task.build_stage", lambda scenario: SimpleNamespace(
         scenario=scenario, world=None, start_world=here, goal_world=here))
     assert main(["run", "bump", "--out", str(tmp_path / "run")]) == code
     assert word in capsys.readouterr().err

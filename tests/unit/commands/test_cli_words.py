@@ -15,10 +15,10 @@ from blackboard import Discrepancy, Level, plain
 from experiments.paper.levels import _row
 from experiments.report import Report
 from experiments.scale.render_speed import measure_edge_offsets_px
-from harvey.campaign.summary import format_error, format_result, format_results
+from harvey.campaign.summary import format_result, format_results
 from harvey.dry_run import MilestonePreview, summarize_dry_run
 from harvey.errors import BadInput
-from harvey.runner.result import MissionResult
+from harvey.runner.result import MissionResult, format_error
 from logs.explain.phrases import sentence
 from logs.records import EntryRecord
 from logs.tables import table
