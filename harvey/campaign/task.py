@@ -10,8 +10,8 @@ import json
 import shutil
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
-from dataclasses import asdict, dataclass, replace
-from functools import partial
+from dataclasses import asdict, dataclass, field, replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Literal, TextIO
 
@@ -94,21 +94,27 @@ class Task:
         except (OSError, WorldError):
             files = ()  # the error is reported where they are read
         texts = scenario.source.text, scenario.folder, tuple(self._split()[0].items()), files
-        if texts not in _newest_stage:
-            _newest_stage.clear()
-            try:
-                _newest_stage[texts] = build_stage(scenario)
-            except ScenarioError as error:
-                raise BadInput(str(error)) from None
-        return _newest_stage[texts]
+        try:
+            return _stage(_Staged(texts, scenario))
+        except ScenarioError as error:
+            raise BadInput(str(error)) from None
 
     def head(self, stage: Stage) -> RunHead:
         """How its run begins."""
         return build_head(stage, self.seed, self.body, self.agent_settings)
 
 
-_newest_stage: dict[object, Stage] = {}
-"""The stage that was set last, by the texts that it was read from."""
+@dataclass(frozen=True, slots=True)
+class _Staged:
+    """A scenario; the same as another where all the texts are that it and its building were read from."""
+
+    texts: tuple[object, ...]
+    scenario: Scenario = field(compare=False)
+
+
+@lru_cache(maxsize=1)
+def _stage(staged: _Staged) -> Stage:
+    return build_stage(staged.scenario)
 
 
 def run_task(
