@@ -8,9 +8,7 @@ what it has to be, a pure function of the board; no act is repeated and no pictu
 
 from __future__ import annotations
 
-import ast
 import difflib
-import inspect
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -40,6 +38,7 @@ from world_models import words
 from world_models.frame_store import FrameStore
 from world_models.words import count, sentence
 
+T = TypeVar("T")
 LEVELS = ("action", "plan", "goal")
 REVISED = re.compile(r"is now|no longer held")
 """Reasons that only say that the same entry has changed again."""
@@ -254,11 +253,6 @@ def _ask_again(run: RunDirectory, history: Timeline, source: str, cycle: int | N
         yield from why_absent(history, sources[source], cycle, agent.kinds, agent.store)
 
 
-T = TypeVar("T")
-MOST_OF_A_VALUE = 120
-"""Letters of a value that a condition asked for."""
-
-
 def why_absent(
     history: Timeline, source: KnowledgeSource, cycle: int, kinds: Registry, store: FrameStore
 ) -> Iterator[str]:
@@ -286,11 +280,7 @@ def _tell_why_not_triggered(source: KnowledgeSource, seen: Sequence[Change], cyc
         came = ", ".join(f"{change.entry.ref} {change.kind.lower()}" for change in held_back)
         yield (f"In cycle {cycle} came what the {name} watches for, {came}, but its watch has a condition, which did"
                " not hold for the values:")
-        for change in held_back:
-            yield f"  {change.entry.ref}: {sentence(change.entry.value)}"
-            watches = [watch for watch in source.on if watch.is_for(type(change), type(change.entry.value))]
-            yield from (f"    it needs: {condition}." for watch in watches
-                        if (condition := tell_predicate(watch.where, change.entry.value)))
+        yield from (f"  {change.entry.ref}: {sentence(change.entry.value)}" for change in held_back)
         return
     watched = ", ".join(dict.fromkeys(f"{w.value_type.__name__} {_kinds(w.kinds)}" for w in source.on))
     came = ", ".join(f"{change.entry.ref} {change.kind.lower()}" for change in seen) or "nothing"
@@ -325,45 +315,8 @@ def tell_of_trigger(source: KnowledgeSource, board: Blackboard, change: Change) 
         yield "The last of these decided."
 
 
-def tell_predicate(where: Callable[[Any], bool], value: Any) -> str:
-    """``verdict == 'verified'; verdict is 'refuted'``: a condition as its source has it, and what it asks of a value.
-
-    "" where its source is not at hand.
-    """
-    text, fields = read_predicate(where)
-    return "; ".join([text, *(f"{one} is {getattr(value, one, None)!r}"[:MOST_OF_A_VALUE] for one in fields)])
-
-
-def read_predicate(where: Callable[[Any], bool]) -> tuple[str, tuple[str, ...]]:
-    """A predicate of one argument as its source has it, without the argument's name, and the fields that it asks for.
-
-    ("", ()) where its source is not at hand, or is no expression.
-    """
-    try:
-        module = ast.parse("".join(inspect.findsource(where)[0]))
-        spots = [spot for spot in where.__code__.co_positions() if all(one is not None for one in spot)]
-    except (OSError, TypeError, SyntaxError, AttributeError):
-        return "", ()
-    starts = [(row, first) for row, end, first, last in spots if (row, first) != (end, last)]
-    around = [one for one in ast.walk(module) if isinstance(one, ast.Lambda | ast.FunctionDef) and one.args.args
-              and starts and (one.lineno, one.col_offset) <= min(starts)
-              and max(starts) <= (one.end_lineno or 0, one.end_col_offset or 0)]
-    if not around:
-        return "", ()
-    body: Any = around[-1].body  # of those round its code the innermost
-    if isinstance(body, list):
-        body = getattr(body[-1], "value", None)
-    if not isinstance(body, ast.expr):
-        return "", ()
-    name = around[-1].args.args[0].arg
-    fields = dict.fromkeys(one.attr for one in ast.walk(body) if isinstance(one, ast.Attribute)
-                           and isinstance(one.value, ast.Name) and one.value.id == name)
-    return re.sub(rf"\b{name}\.", "", ast.unparse(body)), tuple(fields)
-
-
 def _with_condition(where: Callable[[Any], bool]) -> str:
-    text, _ = read_predicate(where)
-    return "" if where is always else f" that meets a condition{f' ({text})' if text else ''}"
+    return "" if where is always else " that meets a condition"
 
 
 def _kinds(kinds: Iterable[type[Change]]) -> str:
