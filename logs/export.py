@@ -90,8 +90,6 @@ def _decisions(history: Timeline) -> Iterator[tuple[Cell, ...]]:
 
 def _poses(history: Timeline, world: World | None) -> Iterator[tuple[Cell, ...]]:
     for record in history.of_kind(Hypothesis):
-        if record.is_gone:
-            continue
         value = record.value
         pose, (xx, xy, xh), (_, yy, yh), (_, _, hh) = value.locale_from_robot, *value.covariance
         there = None if world is None else value.world_from_robot(world)

@@ -1,6 +1,6 @@
 """``harvey why RUN --not NAME``: what a knowledge source or an entry could have brought about and did not, and what
 decided; read from the journal, and, of a knowledge source that the journal does not name in a cycle, asked again: could
-it have acted, and if not, what did it find on the board?
+it have acted, and if not, which need was not met?
 
 The board as it stood is rebuilt from the journal, and ``bind`` is asked once more. That is honest as far as ``bind`` is
 what it has to be, a pure function of the board; no act is repeated and no picture is looked at.
@@ -11,23 +11,18 @@ from __future__ import annotations
 import difflib
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from enum import Enum
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from blackboard import (
     Blackboard,
     Change,
-    Entry,
-    Index,
     KnowledgeSource,
-    Level,
     MissingEntryError,
     Posted,
     Registry,
     Retracted,
-    View,
-    always,
 )
 from harvey.errors import BadInput
 from logs.explain import phrases
@@ -38,7 +33,6 @@ from world_models import words
 from world_models.frame_store import FrameStore
 from world_models.words import count, sentence
 
-T = TypeVar("T")
 LEVELS = ("action", "plan", "goal")
 REVISED = re.compile(r"is now|no longer held")
 """Reasons that only say that the same entry has changed again."""
@@ -294,13 +288,12 @@ def tell_of_trigger(source: KnowledgeSource, board: Blackboard, change: Change) 
         now = board.view.get(change.entry.id)
         yield f"{ref} would have woken the {name}, but was {f'{now.ref} already' if now else 'withdrawn already'}."
         return
-    view = AskedView(board)
     try:
         unmet = source.find_unmet(board.view)
         if unmet is not None:
             yield f"{ref} woke the {name}. It needs: {unmet.name}; {unmet.tell_otherwise(board.view)}."
             return
-        case = source.bind(view, change)
+        case = source.bind(board.view, change)
     except MissingEntryError as missing:
         yield (f"{ref} woke the {name}; asked again, it lacks something to tell whether it could act:"
                f" it {sentence(missing.request)}.")
@@ -309,58 +302,11 @@ def tell_of_trigger(source: KnowledgeSource, board: Blackboard, change: Change) 
         rating = float(source.rate(case))
         yield f"{ref} woke the {name}; asked again, it says that it could have acted, rated {rating:.2f}."
         return
-    yield f"{ref} woke the {name}, but it could not act. What it asked of the board, and found:"
-    yield from (f"  {question}: {', '.join(dict.fromkeys(answers)) or 'nothing'}" for question, answers in view.asked)
-    if view.asked:
-        yield "The last of these decided."
-
-
-def _with_condition(where: Callable[[Any], bool]) -> str:
-    return "" if where is always else " that meets a condition"
+    yield f"{ref} woke the {name}, but it could not act: what it takes besides was not on the board."
 
 
 def _kinds(kinds: Iterable[type[Change]]) -> str:
     return "/".join(kind.__name__.lower() for kind in kinds)
-
-
-class AskedView(View):
-    """A view that remembers what was asked of it, in words, and the answers."""
-
-    __slots__ = ("asked",)
-
-    def __init__(self, board: Blackboard) -> None:
-        super().__init__(board)
-        self.asked: list[tuple[str, list[str]]] = []
-
-    def _note(self, question: str, found: T) -> T:
-        if not self.asked or self.asked[-1][0] != question:
-            self.asked.append((question, []))
-        entries: Any = (found,) if isinstance(found, Entry) else found or ()
-        self.asked[-1][1].extend(str(entry.ref) for entry in entries)
-        return found
-
-    def get(self, id: str) -> Entry[Any] | None:
-        return self._note(f"what {id} is now", super().get(id))
-
-    def latest(self, kind: type[Any], where: Callable[[Any], bool] = always) -> Entry[Any] | None:
-        return self._note(f"the newest {kind.__name__}{_with_condition(where)}", super().latest(kind, where))
-
-    def where(self, kind: type[Any], predicate: Callable[[Any], bool]) -> tuple[Entry[Any], ...]:
-        return self._note(f"every {kind.__name__}{_with_condition(predicate)}", super().where(kind, predicate))
-
-    def newest(self, index: Index[Any], key: Any) -> Entry[Any] | None:
-        return self._note(f"the newest {_by(index, key)}", super().newest(index, key))
-
-    def having(self, index: Index[Any], key: Any) -> tuple[Entry[Any], ...]:
-        return self._note(f"every {_by(index, key)}", super().having(index, key))
-
-
-def _by(index: Index[Any], key: Any) -> str:
-    """``open Discrepancy (plan level)``: what an index finds by a key."""
-    what = f"{index.word} {index.kind.__name__}".lstrip()
-    if key is True:
-        return what
-    return f"{what} ({key} level)" if isinstance(key, Level) else f"{what} ({key})"
 
 
 def changes(history: Timeline, cycle: int, kinds: Registry, store: FrameStore) -> tuple[Change, ...]:

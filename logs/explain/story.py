@@ -219,10 +219,10 @@ def _plan(history: Timeline, record: EntryRecord[Any]) -> str:
         look = "to look from elsewhere, " if sketch.is_look else ""
         parts = count(len(sketch.subgoals), "part")
         return f"Plan {look}{sketch.where()}, {parts}: to {phrases.steps(sketch.subgoals)}."
-    if not record.is_gone and turning_points.is_adjusted(sketch, record.author):
+    if turning_points.is_adjusted(sketch, record.author):
         return (f"The plan {sketch.where()} was adjusted in part {min(sketch.at + 1, len(sketch.subgoals))} of "
                 f"{len(sketch.subgoals)}, as a milestone told where the robot is: to {phrases.steps(sketch.subgoals)}.")
-    if record.is_gone or sketch.status != "superseded":
+    if sketch.status != "superseded":
         return ""
     causes = listed([cause for ref in record.because if (cause := _cause(history, ref))]) or "it no longer held"
     part = f"in part {sketch.at + 1} of {len(sketch.subgoals)}"
@@ -389,12 +389,11 @@ def read_milestones(history: Timeline) -> tuple[MilestoneRow, ...]:
     """Every verdict of a run, and every milestone that got none, in the order of time."""
     rows: list[MilestoneRow] = []
     for record in history.of_kind(Certificate):
-        if not record.is_gone:
-            c, below = record.value, history.reason(record, Milestone)
-            name, ref = (c.milestone, f"{c.milestone}.0") if below is None else (phrases.milestone_of(below), below.ref)
-            rows.append(MilestoneRow(
-                record.cycle, history.time_at(record.cycle), name, c.verdict, c.expected, c.matched, c.deviation_m,
-                c.deviation_rad, c.p_wrong, c.most_p_wrong, (record.ref, ref)))
+        c, below = record.value, history.reason(record, Milestone)
+        name, ref = (c.milestone, f"{c.milestone}.0") if below is None else (phrases.milestone_of(below), below.ref)
+        rows.append(MilestoneRow(
+            record.cycle, history.time_at(record.cycle), name, c.verdict, c.expected, c.matched, c.deviation_m,
+            c.deviation_rad, c.p_wrong, c.most_p_wrong, (record.ref, ref)))
     judged = {ref.rpartition(".")[0] for row in rows for ref in row.refs}
     rows += [MilestoneRow(one.cycle, history.time_at(one.cycle), phrases.milestone_of(one), str(one.fields["status"]),
                           len(one.fields["expected"]), 0, None, None, None, None, (one.ref,))
