@@ -130,9 +130,7 @@ def _run_export(args: Namespace) -> int:
     run = open_run(args.run)
     exporter = None if args.mcap is None else find_run_exporter("mcap")
     history = Timeline(run.journal)
-    if not history.cycles:
-        history.verify()
-        raise BadInput(f"{run.journal}: expected at least one decision, got none")
+    history.expect_decisions()
     if exporter is not None:
         print(f"{args.mcap}: {count(exporter.write(run, Path(args.mcap)), 'message')}")
     with reading(run.journal):

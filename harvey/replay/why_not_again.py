@@ -313,7 +313,8 @@ def changes(history: Timeline, cycle: int, kinds: Registry, store: FrameStore) -
     """What a cycle took up: what the one before had made, and what came from outside. Raises BadInput."""
     decision = history.decision(cycle)
     outside = {r.ref for r in decision.observed}
-    before = [r for r in history.written_by(cycle - 1) if r.ref in decision.seen and r.ref not in outside]
+    last = history.cycle_of(cycle - 1)
+    before = [] if last is None else [r for r in last.made if r.ref in decision.seen and r.ref not in outside]
     return tuple(CHANGES.get(r.change, Posted)(entry_of(r, kinds, store)) for r in (*before, *decision.observed))
 
 

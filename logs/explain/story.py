@@ -15,13 +15,14 @@ from logs.explain.turning_points import (
     COLLISION,
     SIMULATOR,
     TurningPoint,
+    read_trouble,
     read_truth,
     read_turning_points,
     turn_lines,
 )
 from logs.records import EntryRecord, is_a
 from logs.run_directory import RunDirectory, read_head
-from logs.run_errors import BadInput, reading
+from logs.run_errors import reading
 from logs.tables import table
 from logs.timeline import Timeline
 from world_models.building.locale_frame import LocaleFrame
@@ -153,15 +154,12 @@ def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
 
     Raises BadInput where the journal has no decision, or ``result.json`` is malformed.
     """
-    if not history.cycles:
-        history.verify()
-        raise BadInput(f"{history.source}: expected at least one decision, got none")
+    history.expect_decisions()
     with reading(history.source):
         outcome = history.last(Outcome)
         cycle = history.cycles[-1] if outcome is None else outcome.cycle
-        time_s = history.time_at(cycle)
-        when = f"in cycle {cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run")
-        yield f"{run_name(run)}: {'cut off' if outcome is None else outcome.value.kind} {when}."
+        end = "cut off" if outcome is None else outcome.value.kind
+        yield f"{run_name(run)}: {end} in {phrases.moment(history, cycle)}."
         yield from levels_off(run)
         yield from turn_lines(history, run.read_result(), is_whole=outcome is not None)
 
@@ -360,8 +358,7 @@ def _truth(result: Mapping[str, Any]) -> Iterator[str]:
 
 def _tell_trouble(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
     """What a short account of the run does not leave out."""
-    truly = (point for point in read_truth(history, result) if point.kind != COLLISION)
-    points = sorted([*truly, *read_turning_points(history, main=True)], key=lambda point: point.cycle)
+    points = [point for point in read_trouble(history, result) if point.kind != COLLISION]
     yield from (Sentence(f"{point.kind}: {point.text}.", cycle=point.cycle) for point in points)
     if not points:
         yield Sentence("Nothing went wrong." if history.last(Outcome) is not None else

@@ -105,7 +105,7 @@ def _tell(
 
 def _tell_consequences(history: Timeline, certificate: EntryRecord[Any]) -> Iterator[Sentence]:
     """What those did whom the verdict woke."""
-    for record in history.written_by(certificate.cycle):
+    for record in history.decision(certificate.cycle).made:
         for decision in history.naming(record.ref) if record.kind in FOLLOWED else ():
             if decision.chosen is not None and decision.chosen.trigger == record.ref:
                 came = "; ".join(f"{r.ref}: {sentence(r)}" for r in decision.made if r.kind is not Discrepancy)
