@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, Self, TypeVar
 from blackboard import Decision, Sink
 from experiments.report import Cell, Claim, Report
 from experiments.trials import RESULTS, at_least, at_most, campaign_folder, judge_rare, judge_share, run_trials
-from harvey.campaign.task import Task, run_task
+from harvey.campaign.mission_task import Task, run_task
 from harvey.runner.result import MissionResult
 from knowledge_sources.methods.belief import to_probability
 from sim.ground_truth.table import TrueDoor

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from experiments.generated.missions import HALLWAY, OFFICE, fault
 from harvey.agent import build_agent
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from harvey.runner.replay import open_originals, replay
 from harvey.simulation.simulated_run import build_head, run_mission
 from logs.run_directory import RunDirectory

@@ -16,7 +16,7 @@ from experiments import drives
 from experiments.drives import Driven, End, Trial
 from experiments.generated.door_missions import write_door_mission
 from experiments.report import Claim, Report
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from sim.scenario import load_scenario
 from world_models.entries import DoorState
 from world_models.words import listed

@@ -22,7 +22,7 @@ from experiments.generated.missions import WHEELS_WORSE, write_inexact_mission
 from experiments.report import Cell, Claim, Report
 from experiments.trials import at_most, judge_rare
 from harvey.agent import build_agent
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from harvey.simulation.simulated_run import SimulatedRun, build_head
 from logs.run_recorder import RunRecorder
 from sim.body.simulated_body import SimulatedBody

@@ -16,7 +16,7 @@ from experiments.drives import End, Trial
 from experiments.generated.door_missions import write_door_mission
 from experiments.generated.light import LIGHT_KINDS, draw_light, format_light
 from experiments.report import Cell, Report
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 
 FLAT = "flat"
 MISSIONS = 1_000

@@ -19,7 +19,7 @@ from experiments import drives
 from experiments.drives import Driven, End, Trial
 from experiments.generated.missions import write_camera_mission
 from experiments.report import Cell, Claim, Report
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from sim.faults.built_in_faults import CameraKnocked
 from sim.scenario import Scenario, load_scenario
 from world_models.camera import CAMERA_UNKNOWNS, Camera, CameraMount, subtract_cameras

@@ -24,7 +24,7 @@ from experiments.generated.free_floor import find_free_floor, find_shortest_way
 from experiments.generated.missions import write_cluttered_mission
 from experiments.report import OURS, PAPER, PEER, Cell, Claim, Report, chart
 from experiments.trials import RESULTS, at_least, at_most
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from sim.body.collision import Obstacles
 from sim.ground_truth.table import NO_DIFFERENCES
 from sim.stage import Stage, build_stage

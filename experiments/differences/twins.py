@@ -19,7 +19,7 @@ from experiments.drives import Driven, GoalEnd, Trial
 from experiments.generated.missions import write_twin_mission
 from experiments.report import Cell, Claim, Report
 from experiments.trials import at_least, at_most, judge_rare
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from world_models.entries import AliasOdds, Outcome, PlaceOdds
 
 RIGHT, WRONG = "right", "wrong"

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from experiments.report import Cell, Report, count_kinds
 from experiments.trials import campaign_folder, run_trials
-from harvey.campaign.task import Task, run_task
+from harvey.campaign.mission_task import Task, run_task
 from harvey.runner.result import MissionResult
 from world_models.units import INCH_M
 

@@ -16,7 +16,7 @@ from blackboard import Decision
 from experiments.report import OURS, PAPER, PEER, Cell, Report, chart
 from experiments.trials import RESULTS, campaign_folder, run_trials
 from harvey.agent import build_agent
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from harvey.simulation.simulated_run import SimulatedRun, build_head
 from logs.run_directory import RunDirectory, check_vacant
 from logs.run_recorder import RunRecorder

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from harvey.agent import build_agent
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from harvey.runner.ports import Body
 from harvey.runner.replay import open_originals, replay
 from harvey.runner.resume import find_remains

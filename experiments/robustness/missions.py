@@ -16,7 +16,7 @@ import numpy as np
 from experiments import drives
 from experiments.drives import Driven, End, Trial
 from experiments.report import OURS, PAPER, PEER, Cell, Claim, Report, chart, count_kinds
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from world_models.units import INCH_M
 from world_models.words import count
 

@@ -20,7 +20,7 @@ from experiments.generated.light import LIGHT_KINDS, MOST_SAG_DEG, SAG_DEG_PER_D
 from experiments.report import Cell, Claim, Report
 from experiments.scale.agenda_memory import resident_bytes
 from experiments.trials import at_most, judge_rare
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 
 MISSIONS, QUICK_MISSIONS, A_DAY = 20_000, 2, 10
 SEEDS_APART = 100_000

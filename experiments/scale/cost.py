@@ -24,7 +24,7 @@ from tempfile import TemporaryDirectory
 from types import FrameType
 
 from experiments.report import Cell, Report
-from harvey.campaign.task import Task, run_task
+from harvey.campaign.mission_task import Task, run_task
 from harvey.errors import BadInput
 
 PERIOD_S = 0.004
@@ -38,7 +38,7 @@ PARTS: Mapping[str, str] = {
     MODULES: "<frozen importlib",
     COMPILED: r".*/numba/core/dispatcher\.py",
     "stage and agent": r"sim/stage\.py:(build_stage|Stage\.body)$|harvey/agent\.py|logs/run_head\.py"
-                       r"|harvey/campaign/task\.py:Task\.",
+                       r"|harvey/campaign/mission_task\.py:Task\.",
     "scheduler, board, conditions": r"blackboard/scheduler\.py",
     "body: pictures": r"sim/body/body_camera\.py:BodyCamera\.take_",
     "body: motion, senses": r"harvey/runner/ports\.py",

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from experiments.report import Report
 from experiments.trials import campaign_folder, run_trials
-from harvey.campaign.task import Task, run_task
+from harvey.campaign.mission_task import Task, run_task
 from logs.explain.web import GOAL, KINDS, MODEL, SENSOR, check
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline

@@ -15,7 +15,7 @@ from experiments import drives
 from experiments.drives import Driven, GoalEnd, Trial
 from experiments.generated.missions import write_large_mission
 from experiments.report import Claim, Report
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from logs.run_head import load_known_world
 
 MAX_CPU_S: Mapping[str, float] = {"58 rooms": 15.0, "99 rooms": 20.0}

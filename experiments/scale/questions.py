@@ -17,7 +17,7 @@ from experiments.generated.missions import HALLWAY, OFFICE, fault
 from experiments.report import Report
 from experiments.scale.questions_asked import KINDS, Question, ask
 from experiments.trials import at_least, campaign_folder, run_trials
-from harvey.campaign.task import Task, run_task
+from harvey.campaign.mission_task import Task, run_task
 from logs.run_directory import RunDirectory
 
 MISSIONS: Mapping[str, str] = {

@@ -22,7 +22,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.campaign.task import Task, run_task
+    from harvey.campaign.mission_task import Task, run_task
     from harvey.commands.report import build_run_page, write_page
     from logs.explain.story import first_lines
 

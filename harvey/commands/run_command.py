@@ -15,7 +15,7 @@ from harvey.errors import BadInput, Terminated
 from logs.run_directory import RUNS, check_vacant
 
 if TYPE_CHECKING:
-    from harvey.campaign.task import Keep, Task
+    from harvey.campaign.mission_task import Keep, Task
 
 
 def _add_run_arguments(parser: ArgumentParser) -> None:
@@ -47,13 +47,11 @@ def _add_run_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
     parser.add_argument("--trace", action="store_true",
                         help="print a line for each cycle: who acted, woken by what, what came of it")
-    parser.add_argument("--trace-all", action="store_true",
-                        help="print every cycle whole: changes, candidates, choice, effects")
 
 
 def _run_run(args: Namespace) -> int:
     workers, seeds, settings = parse_workers(args), parse_seeds(args.seed), parse_pairs(args.settings)
-    from harvey.campaign.task import Task
+    from harvey.campaign.mission_task import Task
     from harvey.simulation.serial_body import body_kind
 
     body = body_kind(args.body)
@@ -61,7 +59,7 @@ def _run_run(args: Namespace) -> int:
         Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1), body, args.go_on, args.sync)
         for seed in seeds)
     if args.check:
-        if also := [name for name in ("live", "trace", "trace_all", "go_on") if getattr(args, name)]:
+        if also := [name for name in ("live", "trace", "go_on") if getattr(args, name)]:
             raise BadInput(f"--check: expected it without --{also[0].replace('_', '-')}, because nothing is driven")
         return _check(tasks[0])
     if len(tasks) == 1:
@@ -70,7 +68,7 @@ def _run_run(args: Namespace) -> int:
             if value != usual:
                 raise BadInput(f"{name}: expected several seeds, as --seed 0..19, got one")
         return _one(tasks[0], args)
-    if args.trace or args.trace_all or args.live:
+    if args.trace or args.live:
         raise BadInput(f"--{'live' if args.live else 'trace'}: expected one seed, got {len(tasks)}")
     with choose_workers(workers):
         return _several(tasks, args.keep)
@@ -103,23 +101,22 @@ def _check(task: Task) -> int:
 
 
 def _one(task: Task, args: Namespace) -> int:
+    from harvey.campaign.mission_task import run_task
     from harvey.campaign.summary import format_result
-    from harvey.campaign.task import run_task
     from logs.explain.story import first_lines
     from logs.explain.web import printing
 
-    is_traced = args.trace or args.trace_all
-    sinks = (printing(sys.stdout, whole=args.trace_all),) if is_traced else ()
+    sinks = (printing(sys.stdout),) if args.trace else ()
     task.load()  # what is wrong with it is said first
     print(f"{task.label}: setting the stage", file=sys.stderr, flush=True)
-    result = run_task(task, sinks=sinks, progress=None if is_traced else sys.stderr, live=args.live)
+    result = run_task(task, sinks=sinks, progress=None if args.trace else sys.stderr, live=args.live)
     print(format_result(result, task.out, first_lines(task.out)))
     return 0 if result.outcome == "reached" else 1
 
 
 def _several(tasks: tuple[Task, ...], keep: Keep) -> int:
+    from harvey.campaign.mission_task import drive_missions
     from harvey.campaign.summary import format_results
-    from harvey.campaign.task import drive_missions
     from harvey.runner.result import MissionResult
 
     folder = tasks[0].out.parent if tasks[0].out else RUNS

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("harvey_serve", reason="the extra harvey-serve is not installed")
 
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from harvey.runner.result import MissionResult
 from harvey.simulation.simulated_run import build_head, run_mission
 from harvey_serve.live_page import open_page as serve_page

@@ -13,7 +13,7 @@ from harvey.errors import BadInput
 from logs.run_directory import RUNS, check_vacant, make_room
 
 if TYPE_CHECKING:
-    from harvey.campaign.task import Task
+    from harvey.campaign.mission_task import Task
 
 PORT = 8750
 
@@ -36,7 +36,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.campaign.task import Task
+    from harvey.campaign.mission_task import Task
 
     if not (math.isfinite(args.speed) and args.speed >= 0.0):
         raise BadInput(f"--speed: expected a number that is not below 0, got {args.speed}")

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from harvey.cli import main
 from harvey.simulation.simulated_run import build_head, run_mission
 from harvey_serve.app import build_app

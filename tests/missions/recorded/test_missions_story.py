@@ -13,7 +13,7 @@ import pytest
 from blackboard import decision_line
 from docs.tools.moments import moments_of
 from harvey.agent import build_agent
-from harvey.campaign.task import Task, run_task
+from harvey.campaign.mission_task import Task, run_task
 from harvey.cli import main
 from harvey.runner.replay import replay
 from headless_viewer import look_or_skip

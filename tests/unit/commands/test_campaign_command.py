@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from harvey.campaign import task as missions
+from harvey.campaign import mission_task as missions
 from harvey.campaign.engine import Results
+from harvey.campaign.mission_task import Task
 from harvey.campaign.show import read_progress
-from harvey.campaign.task import Task
 from harvey.campaign.workers import CaseAnswer, Workers, check_origin, choose_workers, chosen_workers, origin
 from harvey.cli import main
 from harvey.errors import BadInput

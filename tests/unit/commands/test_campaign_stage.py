@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from experiments.generated.missions import OFFICE
-from harvey.campaign.task import Task
+from harvey.campaign.mission_task import Task
 from harvey.errors import BadInput
 from harvey.simulation.simulated_run import build_head
 from world_models.files.world_files import WORLDS

@@ -9,7 +9,7 @@ SPARED = ("harvey.hardware", "sim.emulators", "scipy.stats", "scipy.ndimage", "s
 
 
 def test_a_simulated_mission_loads_no_drivers_and_none_of_what_few_missions_need() -> None:
-    program = (f"import sys, harvey.simulation.simulated_run, harvey.campaign.task;"
+    program = (f"import sys, harvey.simulation.simulated_run, harvey.campaign.mission_task;"
                f"print([name for name in sys.modules if name.startswith({SPARED!r})])")
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -18,7 +18,7 @@ import numpy as np
 from experiments.report import Cell, Report, count_kinds
 from experiments.shared_data import DUPLEX, data_path, describe_absence
 from experiments.trials import campaign_folder, run_trials
-from harvey.campaign.task import Task, run_task
+from harvey.campaign.mission_task import Task, run_task
 from harvey_buildings import import_building
 from world_models.building.checks import check_world
 from world_models.building.geometry.outlines import distance_to_border

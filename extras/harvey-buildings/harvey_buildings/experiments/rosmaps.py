@@ -19,7 +19,7 @@ from experiments.generated.floors import ScanNoise, generated_floor, write_floor
 from experiments.report import Cell, Report, count_kinds
 from experiments.shared_data import MAP_PLANS, data_path, describe_absence
 from experiments.trials import at_least, campaign_folder, run_trials
-from harvey.campaign.task import run_task
+from harvey.campaign.mission_task import run_task
 from harvey_buildings import import_building
 from harvey_buildings.experiments.imported_building import Trip, draw_trips, write_trip
 from harvey_buildings.experiments.rosmaps_scores import (
