@@ -322,17 +322,6 @@ def test_what_does_not_open_in_time_is_given_up() -> None:
     hangs.set()
 
 
-@pytest.mark.parametrize("rate_hz", [5.0, 10.0])
-def test_a_written_video_has_the_rate_and_the_count_that_are_told(tmp_path: Path, rate_hz: float) -> None:
-    path = tmp_path / "v.avi"
-    more = {} if rate_hz == 10.0 else {"rate_hz": rate_hz}
-    assert write_video(path, [jpeg(9), jpeg(99), jpeg(200)], **more) == 3
-    video = cv2.VideoCapture(str(path))
-    assert video.get(cv2.CAP_PROP_FPS) == rate_hz and video.get(cv2.CAP_PROP_FRAME_COUNT) == 3
-    with pytest.raises(ValueError, match=r"got one that is not whole as number 1"):
-        write_video(path, [jpeg(9), b"x"])
-
-
 def test_a_video_tells_which_picture_is_not_whole_and_where_it_ends(tmp_path: Path) -> None:
     capture = Bench.__new__(Bench)  # no thread: a file is read picture by picture
     images = iter([jpeg(9), b"", jpeg(99)])
