@@ -22,7 +22,6 @@ from world_models.entries import (
     Goal,
     Impasse,
     Obstacle,
-    Outcome,
     Place,
     PlanSketch,
     SketchStatus,
@@ -165,18 +164,15 @@ def test_where_the_robot_does_not_fit_at_the_goal_it_sees_no_way_on(
         assert effect.value.is_open and reasons(effect) == {goal.id, belief.id}
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "belief", "goal", "need", "mission"])
+@pytest.mark.parametrize("lacks", ["nothing", "belief", "goal", "need", "course of things"])
 def test_it_draws_only_what_is_needed(lacks: str) -> None:
     bench = Bench(plain_robot())
-    if lacks != "belief":
-        bench.believe()
+    bench.believe()
     goal = bench.pursue(AIM)
-    if lacks == "goal":
-        bench.revise(goal, status="abandoned")
-    elif lacks == "need":
+    if lacks == "need":
         bench.sketch(goal=goal)
-    elif lacks == "mission":
-        bench.put(Outcome("failed", ""))
+    else:
+        bench.lack(lacks)
     assert (bench.ask(SOURCE, goal) is not None) == (lacks == "nothing")
 
 
