@@ -20,9 +20,7 @@ from knowledge_sources.reads import find_building_as_filed
 from knowledge_sources.reads.floor_ahead import PUT_DOWN_FREE_M, list_free_discs
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, X_M, Y_M, Hall, carton
-from world_models.building.world import World
 from world_models.entries import Contact, FloorThing, FreeFloor, Goal, Hypothesis, MotorCommand, Obstacle, Place
-from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 from world_models.visibility.lines_and_points import visible_lines
@@ -30,23 +28,18 @@ from world_models.visibility.lines_and_points import visible_lines
 SCREEN = tuple((X_M + x, Y_M + y) for x, y in ((3.9, 0.6), (4.3, 0.6), (4.3, 1.8), (3.9, 1.8)))
 
 
-@pytest.fixture(scope="module")
-def world() -> World:
-    return load_world(WORLDS / "two_ways.toml")
-
-
 @pytest.fixture
-def hall(world: World) -> Hall:
-    return Hall(world)
+def hall() -> Hall:
+    return Hall()
 
 
 @given(st.floats(-1.0, 1.0), st.lists(st.floats(-0.6, 0.6), max_size=3),
        st.sampled_from(["milestone", "relocalization"]))
 @settings(max_examples=15, deadline=None)
 def test_what_was_touched_is_where_it_was_touched_however_the_robot_has_turned_since(
-    world: World, direction_rad: float, turns: list[float], basis: str
+    direction_rad: float, turns: list[float], basis: str
 ) -> None:
-    hall = Hall(world)
+    hall = Hall()
     hall.touch(direction_rad, turns=tuple(turns), basis=basis)
     (found,) = hall.obstacles
     radius_m = hall.robot.radius_m
@@ -136,9 +129,9 @@ def test_what_was_touched_is_forgotten_when_its_floor_is_clearly_free(hall: Hall
 
 @given(st.floats(2.0, 4.2), st.booleans())
 @settings(max_examples=10, deadline=None)
-def test_a_touch_is_not_explained_by_what_is_known_on_another_side(world: World, away_rad: float, left: bool) -> None:
+def test_a_touch_is_not_explained_by_what_is_known_on_another_side(away_rad: float, left: bool) -> None:
     """What the model lacks explains no touch elsewhere: something else stands there."""
-    hall = Hall(world)
+    hall = Hall()
     direction = 0.3 if left else -0.3
     out = cmath.exp(1j * (direction + away_rad)) * (hall.robot.radius_m + 0.05)
     x, y = HERE.x_m + out.real, HERE.y_m + out.imag
@@ -219,7 +212,7 @@ def test_without_what_was_found_the_building_is_as_before_and_what_is_known_of_b
     assert len(computed) == 2
 
 
-def test_nothing_is_expected_to_be_seen_behind_it_and_all_of_it_when_it_is_gone(world: World, hall: Hall) -> None:
+def test_nothing_is_expected_to_be_seen_behind_it_and_all_of_it_when_it_is_gone(hall: Hall) -> None:
     robot = hall.robot
     camera_from_world = robot.camera_from_world(HERE)
     high = replace(carton(height_m=1.2), footprint=SCREEN)
@@ -250,10 +243,8 @@ def test_the_numbers_fit_together() -> None:
 
 @given(st.floats(-0.6, 0.6))
 @settings(max_examples=10, deadline=None)
-def test_what_was_touched_stays_in_the_way_though_a_sight_without_feet_shows_less(
-    world: World, direction_rad: float
-) -> None:
-    hall = Hall(world)
+def test_what_was_touched_stays_in_the_way_though_a_sight_without_feet_shows_less(direction_rad: float) -> None:
+    hall = Hall()
     hall.touch(direction_rad, turns=(), basis="milestone")
     (touched,) = hall.obstacles
     x, y = shapely.Polygon(touched.footprint).centroid.coords[0]

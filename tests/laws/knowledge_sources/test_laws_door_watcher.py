@@ -22,7 +22,6 @@ from sim.ground_truth.table import TrueDoor
 from sim.ground_truth.true_changes import build_leaf
 from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from things_in_hall import HALL, Hall
-from world_models.building.world import World
 from world_models.entries import CameraPicture, DoorState, Hypothesis, Milestone, Outcome, diagonal
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
@@ -33,13 +32,9 @@ PLACES = ((2.5, 0.0), (1.6, 0.4))
 
 
 @pytest.fixture(scope="module")
-def world() -> World:
-    return load_world(WORLDS / "two_ways.toml")
-
-
-@pytest.fixture(scope="module")
-def buildings(world: World) -> dict[bool, SimulatedBuilding]:
+def buildings() -> dict[bool, SimulatedBuilding]:
     """As it is, by whether the door is shut."""
+    world = load_world(WORLDS / "two_ways.toml")
     doorway = next(d for d in world.doorways if d.name == DOOR)
     leaf = build_leaf(TrueDoor(name=DOOR), doorway, world.floor_m(HALL))
     return {False: SimulatedBuilding.of_faces(world.faces), True: SimulatedBuilding.of_faces([*world.faces, *leaf])}
@@ -74,8 +69,8 @@ def ask(hall: Hall, frame: Any) -> Sequence[Effect] | None:
     (CameraPicture(b"", 0, 1.0, "track"), {Posted}), (CameraPicture(b"", 0, 1.0, "milestone"), set()),
     (Milestone("PlanSketch-1", 0, "a place", 0.0, (), status="verified"), {Revised}),
     (Milestone("PlanSketch-1", 0, "a place", 0.0, (), status="refuted"), set())])
-def test_it_wakes_by_pictures_that_track_and_by_verified_milestones(world: World, value: Any, wakes: set[Any]) -> None:
-    entry = Hall(world, ()).put(value)
+def test_it_wakes_by_pictures_that_track_and_by_verified_milestones(value: Any, wakes: set[Any]) -> None:
+    entry = Hall(()).put(value)
     assert {kind for kind in (Posted, Revised) if any(w.sees(kind(entry)) for w in SOURCE.on)} == wakes
 
 
@@ -83,9 +78,9 @@ def test_it_wakes_by_pictures_that_track_and_by_verified_milestones(world: World
     (0.9 * MAX_SIGMA_M, 0.005, True), (1.1 * MAX_SIGMA_M, 0.005, False),
     (0.01, 0.9 * MAX_SIGMA_RAD, True), (0.01, 1.1 * MAX_SIGMA_RAD, False)])
 def test_it_looks_while_the_belief_is_sharp_and_not_in_doubt(
-    world: World, buildings: dict[bool, SimulatedBuilding], sigma_m: float, sigma_rad: float, acts: bool
+    buildings: dict[bool, SimulatedBuilding], sigma_m: float, sigma_rad: float, acts: bool
 ) -> None:
-    hall = Hall(world, ())
+    hall = Hall(())
     frame = look(hall, buildings[True], stand(hall, *PLACES[0], sigma_m, sigma_rad))
     assert (ask(hall, frame) is not None) == acts
     for end in (Discrepancy(Level.PLAN, "elsewhere", None, (4.0, 30.0), "px"), Outcome("failed", "")):
@@ -93,26 +88,24 @@ def test_it_looks_while_the_belief_is_sharp_and_not_in_doubt(
         assert ask(hall, frame) is None
 
 
-def test_in_the_dark_nothing_is_told_of_doors_nor_of_the_floor(
-    world: World, buildings: dict[bool, SimulatedBuilding]
-) -> None:
+def test_in_the_dark_nothing_is_told_of_doors_nor_of_the_floor(buildings: dict[bool, SimulatedBuilding]) -> None:
     for lights_on in (False, True):
-        hall = Hall(world, ())
+        hall = Hall(())
         frame = look(hall, buildings[True], stand(hall, *PLACES[0]), lights_on=lights_on)
         assert bool(ask(hall, frame)) == lights_on
         scan, *views = [e.value for e in answer(FloorWatcher(), hall.board.view, Posted(frame)) or ()]
         assert (bool(scan.bearings_rad), bool(views)) == (lights_on, lights_on) and not scan.things
 
 
-def test_what_is_as_it_is_believed_to_be_is_not_said(world: World, buildings: dict[bool, SimulatedBuilding]) -> None:
-    hall = Hall(world, ())
+def test_what_is_as_it_is_believed_to_be_is_not_said(buildings: dict[bool, SimulatedBuilding]) -> None:
+    hall = Hall(())
     assert ask(hall, look(hall, buildings[False], stand(hall, *PLACES[0]))) == []
 
 
 def test_a_leaf_from_two_places_is_a_shut_door_and_what_is_beyond_opens_it_again(
-    world: World, buildings: dict[bool, SimulatedBuilding]
+    buildings: dict[bool, SimulatedBuilding]
 ) -> None:
-    hall = Hall(world)  # with the model reviser, by whose frames it is believed to be shut
+    hall = Hall()  # with the model reviser, by whose frames it is believed to be shut
     known: Any = None
     for number, place in enumerate(PLACES, 1):
         frame = look(hall, buildings[True], stand(hall, *place), 1.0 * number)
