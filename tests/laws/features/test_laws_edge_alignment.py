@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -12,16 +11,12 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.motion import compute_free_space
 from knowledge_sources.methods.tracking import align_to_edges
 from knowledge_sources.methods.tracking.edge_alignment import INFLATION, EdgeAlignment, _intersect_lines
-from sim.render.optics import Optics
-from sim.render.sensor import compress_jpeg, expose
-from sim.scenario import load_scenario
-from sim.stage import Stage, build_stage
+from lab_pictures import photograph, robot
 from world_models.camera import move_camera
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
@@ -31,16 +26,6 @@ KNOWN, TILT = np.zeros((7, 7)), np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 few = settings(max_examples=30, deadline=None)
 seeds = st.integers(0, 2**32 - 1)
 ROOMS = ("hallway", "robot-laboratory", "library", "allens-office", "conference-room", "machine-room")
-
-
-@cache
-def stage() -> Stage:
-    return build_stage(load_scenario("lab-to-allens-office"))
-
-
-@cache
-def robot() -> RobotModel:
-    return build_robot_model(stage().scenario)
 
 
 def draw_pose(rng: np.random.Generator) -> Pose2:
@@ -54,9 +39,7 @@ def draw_pose(rng: np.random.Generator) -> Pose2:
 
 
 def render(pose: Pose2, rng: np.random.Generator) -> Image:
-    s = stage().scenario
-    radiance = Optics.of(s.camera.camera).radiance(stage().building.renderer, robot().camera_from_world(pose))
-    return read_picture(compress_jpeg(expose(radiance, s.sensor, rng, lights_on=True), s.sensor.jpeg_quality)).grey
+    return read_picture(photograph(pose, rng)).grey
 
 
 def draw_belief(pose: Pose2, sigmas: tuple[float, float, float], rng: np.random.Generator) -> tuple[Pose2, Floats]:
