@@ -11,6 +11,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from consistency import compute_error
 from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.motion import compute_free_space
@@ -63,10 +64,6 @@ def align(belief: Pose2, covariance: Floats, image: Image, camera: Floats = KNOW
     return align_to_edges(seen, image, lines.lines_world, belief, covariance, camera)
 
 
-def difference(one: Pose2, other: Pose2) -> Floats:
-    return np.array([one.x_m - other.x_m, one.y_m - other.y_m, wrap_angle(one.heading_rad - other.heading_rad)])
-
-
 def test_however_loose_the_belief_was_it_is_no_further_off_than_it_says() -> None:
     """In 95 of 100 cases within three deviations. Where the next edge need not be a line's own it says nothing."""
     rng = np.random.default_rng(11)
@@ -77,7 +74,7 @@ def test_however_loose_the_belief_was_it_is_no_further_off_than_it_says() -> Non
         belief, covariance = draw_belief(true, sigmas, rng)
         found = align(belief, covariance, render(true, rng))
         if found is not None:
-            error = difference(found.world_from_robot, true)
+            error = compute_error(found.world_from_robot, true)
             assert np.linalg.eigvalsh(found.covariance).min() > 0.0
             off_by.append(math.sqrt(error @ np.linalg.solve(found.covariance, error)))
     assert len(off_by) >= 30
@@ -93,7 +90,7 @@ def test_a_nearly_right_belief_is_corrected_to_a_millimetre_or_so() -> None:
         belief, covariance = draw_belief(true, (0.003, 0.003, math.radians(0.15)), rng)
         found = align(belief, covariance, render(true, rng))
         if found is not None:
-            errors.append(np.abs(difference(found.world_from_robot, true)))
+            errors.append(np.abs(compute_error(found.world_from_robot, true)))
     assert len(errors) >= 20
     x_m, y_m, heading_rad = np.median(errors, axis=0)
     assert math.hypot(x_m, y_m) < 0.001 and heading_rad < math.radians(0.03)
@@ -107,7 +104,7 @@ def test_what_is_not_known_of_the_camera_is_not_known_of_the_pose() -> None:
     here, unsure = align(true, sure, image), align(true, sure, image, np.diag(np.square(TILT)))
     other = align(true, sure, image, of=replace(robot(), mount=move_camera(robot().camera, robot().mount, TILT)[1]))
     assert here is not None and unsure is not None and other is not None
-    off, grown = difference(other.world_from_robot, here.world_from_robot), unsure.covariance - here.covariance
+    off, grown = compute_error(other.world_from_robot, here.world_from_robot), unsure.covariance - here.covariance
     assert 0.3 < math.sqrt(np.trace(grown[:2, :2])) / math.hypot(*off[:2]) < 2.0
     assert np.all(np.linalg.eigvalsh(sure + INFLATION - unsure.covariance) > 0.0)
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from consistency import build_hall, compute_error
 from knowledge_sources.methods.pose import (
     build_line_set,
     compute_camera_poses,
@@ -20,7 +21,7 @@ from knowledge_sources.methods.pose import (
 )
 from knowledge_sources.methods.pose.planar import build_planar_prior
 from world_models.camera import Camera, CameraMount
-from world_models.frames import Pose2, wrap_angle
+from world_models.frames import Pose2
 
 CAMERA = Camera.from_field_of_view(np.radians(65.0))
 MOUNT = CameraMount(1.0, 0.1, 0.05).camera_from_robot
@@ -33,28 +34,13 @@ quick = settings(max_examples=15, deadline=None)
 Array = NDArray[np.float64]
 
 
-def build_hall(truth: Pose2) -> Array:
-    """Door posts, lintels and long edges ahead of the robot (n, 2, 3)."""
-    lines = [[[1.5, y, z], [15.0, y, z]] for y in (-1.2, 1.2) for z in (0.0, 2.4)]
-    for x in (3.0, 5.5, 8.0, 11.0):
-        for y in (-1.2, 1.2):
-            far = x + 0.9
-            lines += [[[x, y, 0.0], [x, y, 2.1]], [[far, y, 0.0], [far, y, 2.1]], [[x, y, 2.1], [far, y, 2.1]]]
-    return truth.lifted().apply(np.array(lines))
-
-
 def observe(truth: Pose2, seed: int) -> tuple[Array, Array, np.random.Generator]:
     """Lines and noisy segments of what is in view."""
     rng = np.random.default_rng(seed)
-    lines = build_hall(truth)
+    lines = truth.lifted().apply(build_hall())
     segments, visible = CAMERA.project_segments(lines, MOUNT @ truth.lifted().inverse())
     lines, segments = lines[visible], segments[visible]
     return lines, segments + rng.normal(0.0, SIGMA_PX, segments.shape), rng
-
-
-def compute_error(found: Pose2, truth: Pose2) -> Array:
-    turn = wrap_angle(found.heading_rad - truth.heading_rad)
-    return np.array([found.x_m - truth.x_m, found.y_m - truth.y_m, turn])
 
 
 def draw_prior(truth: Pose2, rng: np.random.Generator, share: float = 1.0) -> Pose2:
@@ -133,7 +119,7 @@ def test_few_lines_never_make_a_prior_worse(heading: float, count: int, seed: in
     """Exact lines, small errors, measured by the prior's information."""
     truth = Pose2(4.0, -2.0, heading)
     rng = np.random.default_rng(seed)
-    lines = build_hall(truth)
+    lines = truth.lifted().apply(build_hall())
     segments, visible = CAMERA.project_segments(lines, MOUNT @ truth.lifted().inverse())
     rows = rng.permutation(np.flatnonzero(visible))[:count]
     prior = draw_prior(truth, rng, 0.1)
