@@ -9,8 +9,6 @@ is found nine times in ten; a camera's noise is estimated from its own lines, wh
 draws.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """docs/hardware.md is true: commands parse, links lead somewhere, its flat can be driven, its words are the board's."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import tomllib

@@ -1,7 +1,5 @@
 """The overview of several runs: one row a run, made from their recordings."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
