@@ -32,6 +32,7 @@ from blackboard import (
 )
 from knowledge_sources.model.model_reviser import ModelReviser
 from world_models.actuator import ActuatorModel
+from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import (
@@ -176,6 +177,10 @@ class Bench:
         start, end = (place.in_world(house()) for place in (step.origin, step.destination))
         return self.put(replace(Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m,
                                     step.tolerance_m), **fields), sketch)
+
+    def frame(self, locale: str = HALL) -> Entry[LocaleFrame]:
+        """The frame of a locale."""
+        return next(entry for entry in self.view.all(LocaleFrame) if entry.value.name == locale)
 
     def stand(self, x_m: float, y_m: float, along_m: float, across_m: float, locale: str = HALL,
               core: Sequence[tuple[float, float]] = (), **fields: Any) -> Entry[Obstacle]:

@@ -13,7 +13,6 @@ from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.reads import find_frames
 from knowledge_sources.reads.sketches import GOAL_TOLERANCE_M
 from knowledge_sources.sketcher.goal_sketcher import GoalSketcher
-from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import (
     DoorPicture,
     DoorState,
@@ -198,7 +197,7 @@ def test_a_goal_that_is_occupied_is_called_so(side: float, off_m: float, is_take
     corners: Any = tuple(tuple(to_world(Pose2(6.0 + dx, y_m + dy, 0.0)).position.tolist())
                          for dx, dy in ((-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)))
     thing = bench.put(Obstacle(f"{HALL}/obstacle-1", HALL, corners, 0.02, 6.0, y_m, 0.2))
-    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == HALL)
+    frame = bench.frame()
     bench.apply(Revise(frame, revise_by_thing(frame.value, thing.value, "test", 0.0), (frame, thing)))
     effects = bench.ask(SOURCE, goal)
     assert bool(made(effects, Impasse)) is is_taken
