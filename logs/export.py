@@ -4,7 +4,6 @@ milestones, turning points, and the true poses. Numbers come back as they were, 
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -91,8 +90,6 @@ def _decisions(history: Timeline) -> Iterator[tuple[Cell, ...]]:
 
 def _poses(history: Timeline, world: World | None) -> Iterator[tuple[Cell, ...]]:
     for record in history.of_kind(Hypothesis):
-        if record.is_gone:
-            continue
         value = record.value
         pose, (xx, xy, xh), (_, yy, yh), (_, _, hh) = value.locale_from_robot, *value.covariance
         there = None if world is None else value.world_from_robot(world)
@@ -113,41 +110,6 @@ def _world(head: RunHead | None) -> World | None:
         return None if head is None else head.load_world()
     except BadInput:
         return None
-
-
-def write_tum(tables: Iterable[Table], folder: Path) -> list[Path]:
-    """``believed.tum`` and, of a simulated run, ``true.tum``: the poses for evo and other tools that compare tracks.
-
-    A line is ``time x y z qx qy qz qw`` in the world frame [s, m]; z is 0, as on a plan. Of several poses at a time the
-    last one counts. Both have the body's clock.
-
-    Raises:
-        BadInput: the world of the run is not as it was, or the folder cannot be written to.
-    """
-    by_name = {table.name: table for table in tables}
-    poses = by_name["poses"]
-    tracks = {"believed": [row for row in poses.rows if row[poses.columns.index("status")] == "held"]}
-    if tracks["believed"] and tracks["believed"][0][poses.columns.index("world_x_m")] is None:
-        raise BadInput("--tum: expected the world file of the run as it was, got another one, or none")
-    if "truth" in by_name:
-        tracks["true"] = [*by_name["truth"].rows]
-    found = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, rows in tracks.items():
-            columns = (poses if name == "believed" else by_name["truth"]).columns
-            wanted = [columns.index(column) for column in ("time_s", "world_x_m", "world_y_m", "world_heading_rad")]
-            found.append(folder / f"{name}.tum")
-            found[-1].write_text("".join(_tum_lines([tuple(row[n] for n in wanted) for row in rows])), encoding="utf-8")
-    except OSError as error:
-        raise BadInput(f"--tum {folder}: expected a directory to write to, got: {error.strerror or error}") from None
-    return found
-
-
-def _tum_lines(poses: Iterable[tuple[Any, ...]]) -> Iterator[str]:
-    last = {time_s: (x, y, heading) for time_s, x, y, heading in poses if time_s is not None}
-    for time_s, (x, y, heading) in sorted(last.items()):
-        yield f"{time_s!r} {x!r} {y!r} 0 0 0 {math.sin(heading / 2)!r} {math.cos(heading / 2)!r}\n"
 
 
 def write_csv(table: Table, folder: Path) -> Path:

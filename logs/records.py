@@ -166,14 +166,7 @@ class EntryRecord(Generic[T_co]):
         """
         if self.kind is Opaque:
             return cast(T_co, Opaque(self.fields))
-        return cast(T_co, entry_of(self, kinds_for(self.type)).value)
-
-    @property
-    def change_of_board(self) -> Change:
-        """As a change of the board. Raises BadInput as :attr:`value` does."""
-        ref = ref_of(self.ref)
-        entry = Entry(ref.id, ref.revision, self.value, self.author, cycle_of_writing(self), refs_of(self.because))
-        return CHANGES.get(self.change, Posted)(entry, refs_of(self.retracted_because))
+        return cast(T_co, value_of(self, kinds_for(self.type)))
 
 
 def is_a(record: EntryRecord[Any] | None, kind: type[K]) -> TypeGuard[EntryRecord[K]]:

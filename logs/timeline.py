@@ -111,6 +111,12 @@ class Timeline:
         for line in range(len(self._ends)):
             self._decision(line)
 
+    def expect_decisions(self) -> None:
+        """Raises BadInput where the journal has no decision."""
+        if not self.cycles:
+            self.verify()
+            raise BadInput(f"{self.source}: expected at least one decision, got none")
+
     def count_common_lines(self, other: Timeline) -> int:
         """How many of the first lines are the same to the byte."""
         start = 0
@@ -174,11 +180,6 @@ class Timeline:
                 break
         return ranked(found.values(), decision.chosen)
 
-    def written_by(self, cycle: int) -> tuple[EntryRecord[Any], ...]:
-        """The entries that a cycle wrote."""
-        found = self.cycle_of(cycle)
-        return () if found is None else found.made
-
     def time_at(self, cycle: int) -> float | None:
         """The newest time that anything from outside had told by a cycle [s]; None where nothing had lately."""
         for one in reversed(self.cycles[: bisect_right(self.cycles, cycle)][-TIMED_WITHIN:]):
@@ -239,7 +240,7 @@ class Timeline:
 
     def tracks_of(self, belief: EntryRecord[Any]) -> EntryRecord[Tracks] | None:
         """The landmarks that corrected a belief: they were written in the same act."""
-        here = [r for r in self.written_by(belief.cycle) if is_a(r, Tracks) and r.author == belief.author]
+        here = [r for r in self.decision(belief.cycle).made if is_a(r, Tracks) and r.author == belief.author]
         return here[0] if here else self.reason(belief, Tracks)
 
     def anchor_of(self, belief: EntryRecord[Any]) -> EntryRecord[Hypothesis] | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from logs.recording.overview import Series, read_series
+from logs.reader import Series, read_series
 from logs.recording.paths import CHAPTERS, HARVEY
 
 KINDS = ("the end", "fault", "collision", "found", "refuted", "doubt", "in truth", "lost", "resumed", "not testable",

@@ -34,7 +34,6 @@ def _add_replay_arguments(parser: ArgumentParser) -> None:
                               " may be repeated")
     what_if.add_argument("--record-only", action="store_true",
                          help="end where the record no longer answers, instead of going on in the simulator")
-    what_if.add_argument("--values", action="store_true", help="show the first decision that differs, value by value")
     what_if.add_argument("--out", metavar="DIR", help="keep what would have been as a run, for diff, why and view")
 
 
@@ -42,8 +41,8 @@ def _run_replay(args: Namespace) -> int:
     run, settings = open_run(args.run), parse_pairs(args.settings)
     if args.without or settings:
         return _otherwise(run, args, settings)
-    if args.out or args.record_only or args.values:
-        raise BadInput("--out, --record-only and --values: expected --without or --set beside them, got neither")
+    if args.out or args.record_only:
+        raise BadInput("--out and --record-only: expected --without or --set beside them, got neither")
     return _again(run)
 
 
@@ -60,7 +59,7 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
     if out is not None:
         _draw_ways(run, out)
     print("\n".join(describe_answer(answer, run, [*(f"without {name}" for name in args.without),
-                                       *(f"with {key} = {value}" for key, value in settings)], values=args.values)))
+                                       *(f"with {key} = {value}" for key, value in settings)])))
     if elsewhere:
         print(f"\nnote: the run {elsewhere}, so what differs may come of that as well: harvey replay {run.path} tells")
     if out is not None:

@@ -103,9 +103,8 @@ def _record(one: Story) -> dict[str, Any]:
 def _print_check(history: Timeline, as_json: bool) -> int:
     from logs.explain.web import check
 
+    history.expect_decisions()
     found = check(history)
-    if not found.decisions:
-        raise BadInput(f"{history.source}: expected at least one decision, got none")
     if as_json:
         print(json.dumps({"decisions": found.decisions, "acts": found.acts, "reached": found.reached, **found.by_kind,
                           "failing": list(found.failing)}, indent=2))
@@ -194,7 +193,6 @@ STORY = CliCommand(
 def _add_diff_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("first", metavar="RUN", help="a run directory")
     parser.add_argument("second", metavar="RUN", help="another")
-    parser.add_argument("--fields", action="store_true", help="list the first decision that differs field by field")
 
 
 def _run_diff(args: Namespace) -> int:
@@ -215,7 +213,7 @@ def _run_diff(args: Namespace) -> int:
     alike = ours.count_common_lines(theirs)
     more, one, other = first_difference(*(islice(h.decisions(), alike, None) for h in (ours, theirs)))
     agreed = alike + more
-    if one is None or other is None or args.fields:
+    if one is None or other is None:
         print("\n".join(describe(agreed, one, other)))
     else:
         print("\n".join([agreement(agreed), "", *because(ours, theirs, agreed, set_differently)]))
@@ -236,7 +234,6 @@ DIFF = CliCommand(
     (
         ("harvey diff runs/lab-to-allens-office-0 runs/lab-to-allens-office-1", "two seeds of one scenario"),
         ("harvey diff runs/bump-0 runs/without-door", "a run and what would have been (harvey replay --without)"),
-        ("harvey diff runs/bump-0 runs/bump-1 --fields", "the first difference field by field"),
     ),
     _add_diff_arguments, _run_diff,
     "Goes down from the first decision that differs to the observation or the setting that it comes from.\n"

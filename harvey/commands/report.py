@@ -115,50 +115,44 @@ def _add_export_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", help="a run directory")
     parser.add_argument("--csv", metavar="DIR", help="write the tables there as CSV; older ones are overwritten")
     parser.add_argument("--parquet", metavar="DIR", help="write them there as Parquet")
-    parser.add_argument("--tum", metavar="DIR", help="write believed.tum there and, of a simulated run, true.tum")
     parser.add_argument("--mcap", metavar="FILE", help="write it as one MCAP file of ROS 2 messages, for rerun,"
                         " Foxglove and others; needs harvey-ros2")
 
 
 def _run_export(args: Namespace) -> int:
     wanted = {kind: Path(folder) for kind in ("csv", "parquet") if (folder := getattr(args, kind)) is not None}
-    if not wanted and args.tum is None and args.mcap is None:
-        raise BadInput("expected --csv DIR, --parquet DIR, --tum DIR or --mcap FILE, got none of them")
-    from logs.export import read_tables, write_tables, write_tum
+    if not wanted and args.mcap is None:
+        raise BadInput("expected --csv DIR, --parquet DIR or --mcap FILE, got none of them")
+    from logs.export import read_tables, write_tables
     from logs.run_exporter import find_run_exporter
     from logs.timeline import Timeline
 
     run = open_run(args.run)
     exporter = None if args.mcap is None else find_run_exporter("mcap")
     history = Timeline(run.journal)
-    if not history.cycles:
-        history.verify()
-        raise BadInput(f"{run.journal}: expected at least one decision, got none")
+    history.expect_decisions()
     if exporter is not None:
         print(f"{args.mcap}: {count(exporter.write(run, Path(args.mcap)), 'message')}")
     with reading(run.journal):
-        tables = list(read_tables(run, history)) if wanted or args.tum is not None else []
+        tables = list(read_tables(run, history)) if wanted else []
     for kind, folder in wanted.items():
         for path, table in zip(write_tables(tables, kind, folder), tables, strict=True):
             print(f"{path}: {count(len(table.rows), 'row')}")
-    for path in () if args.tum is None else write_tum(tables, Path(args.tum)):
-        print(f"{path}: {count(path.read_text(encoding='utf-8').count(chr(10)), 'pose')}")
     return 0
 
 
 EXPORT = CliCommand(
-    "export", "a run as tables or tracks for other programs: decisions, poses, milestones, turning points",
+    "export", "a run as tables for other programs: decisions, poses, milestones, turning points",
     (
         ("harvey export runs/lab-to-allens-office-0 --csv tables", "decisions.csv, poses.csv, milestones.csv, ..."),
         ("harvey export runs/lab-to-allens-office-0 --parquet tables", "the same for pandas, polars, DuckDB, Arrow"),
-        ("harvey export runs/lab-to-allens-office-0 --tum tracks", "believed.tum and true.tum, as evo reads them"),
         ("harvey export runs/lab-to-allens-office-0 --mcap run.mcap", "for rerun, Foxglove and tools that read bags"),
     ),
     _add_export_arguments, _run_export,
     "decisions: who acted in each cycle, woken by what; poses: each believed pose with its covariance, in its room's\n"
     "frame and in the world's; milestones: each verdict; turning_points; of a simulated run also truth: where the\n"
     "robot truly was, from the recording. Units stand at the end of each column's name: _m, _rad, _s; time_s is the\n"
-    "body's clock. A line of a .tum file is time, x, y, z, qx, qy, qz, qw in the world frame; z is 0.\n"
+    "body's clock.\n"
     "The MCAP file has pictures, camera, odometry, transforms, believed poses, plan, landmarks and verdicts, by the\n"
     "run's time; a pose that no certificate vouches for has a covariance that says so.",
 )

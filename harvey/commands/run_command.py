@@ -44,8 +44,6 @@ def _add_run_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--live", action="store_true", help="send the recording to an open viewer as well")
     parser.add_argument("--trace", action="store_true",
                         help="print a line for each cycle: who acted, woken by what, what came of it")
-    parser.add_argument("--trace-all", action="store_true",
-                        help="print every cycle whole: changes, candidates, choice, effects")
 
 
 def _run_run(args: Namespace) -> int:
@@ -57,7 +55,7 @@ def _run_run(args: Namespace) -> int:
         Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1), body, args.go_on, args.sync)
         for seed in seeds)
     if args.check:
-        if also := [name for name in ("live", "trace", "trace_all", "go_on") if getattr(args, name)]:
+        if also := [name for name in ("live", "trace", "go_on") if getattr(args, name)]:
             raise BadInput(f"--check: expected it without --{also[0].replace('_', '-')}, because nothing is driven")
         return _check(tasks[0])
     if len(tasks) == 1:
@@ -66,7 +64,7 @@ def _run_run(args: Namespace) -> int:
             if value != usual:
                 raise BadInput(f"{name}: expected several seeds, as --seed 0..19, got one")
         return _one(tasks[0], args)
-    if args.trace or args.trace_all or args.live:
+    if args.trace or args.live:
         raise BadInput(f"--{'live' if args.live else 'trace'}: expected one seed, got {len(tasks)}")
     with choose_workers(workers):
         return _several(tasks, args.keep)
@@ -105,12 +103,11 @@ def _one(task: Task, args: Namespace) -> int:
     from logs.explain.story import first_lines
     from logs.explain.web import printing
 
-    is_traced = args.trace or args.trace_all
-    sinks = (printing(sys.stdout, whole=args.trace_all),) if is_traced else ()
+    sinks = (printing(sys.stdout),) if args.trace else ()
     task.load()  # what is wrong with it is said first
     print(f"{task.label}: setting the stage", file=sys.stderr, flush=True)
     with following(sys.stderr) as follow:
-        result = run_task(task, sinks=sinks, follow=None if is_traced else follow, live=args.live)
+        result = run_task(task, sinks=sinks, follow=None if args.trace else follow, live=args.live)
     print(format_result(result, task.out, first_lines(task.out)))
     return 0 if result.outcome == "reached" else 1
 

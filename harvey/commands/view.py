@@ -1,4 +1,4 @@
-"""``harvey view``: open the recording of a run, or an overview of several; or write one of its pictures."""
+"""``harvey view``: open the recording of a run, or write one of its pictures."""
 
 from __future__ import annotations
 
@@ -14,47 +14,30 @@ from typing import Any
 
 from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
-from logs.run_directory import RunDirectory, find_directory, open_run
+from logs.run_directory import RunDirectory, open_run
 
-OVERVIEW = "overview.rrd"
 LOOPBACK = ("--bind", "127.0.0.1")
 """The viewer listens on this machine only; by itself it listens on every interface."""
 
 
 def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("runs", metavar="RUN", nargs="+",
-                        help="a run directory; several, or a directory of them, make an overview of one row a run")
-    parser.add_argument("--save", metavar="FILE",
-                        help=f"write the overview there and do not open it (else {OVERVIEW} beside the runs); "
-                             "with --picture: the name of the file")
+    parser.add_argument("run", metavar="RUN", help="a run directory")
     how = parser.add_mutually_exclusive_group()
     how.add_argument("--web", action="store_true",
                      help="in a browser; the viewer serves it on this machine only, until Ctrl-C")
     how.add_argument("--picture", metavar="AT", type=whole,
                      help="write the camera picture that was seen last in cycle AT, as PNG, with the lines that were"
                           " found in it and those that were expected, and open nothing")
+    parser.add_argument("--save", metavar="FILE", help="with --picture: the name of the file")
     parser.add_argument("--plain", action="store_true", help="with --picture: without lines")
 
 
 def _run(args: Namespace) -> int:
-    is_one = len(args.runs) == 1 and not _is_campaign(find_directory(args.runs[0]))
-    if args.plain and args.picture is None:
-        raise BadInput("--plain: expected it with --picture")
     if args.picture is not None:
-        if not is_one:
-            raise BadInput("--picture: expected one run, got several")
-        return _write_picture(open_run(args.runs[0]), args.picture, args.save, plain=args.plain)
-    if is_one:
-        if args.save:
-            raise BadInput("--save: expected several runs, or a directory of them, got one run")
-        return _open(_whole(open_run(args.runs[0], "recording.rrd")), args.web)
-    runs = [run for text in args.runs for run in _runs(text)]
-    overview = Path(args.save) if args.save else _beside(runs)
-    _write(runs, overview)
-    if args.save:
-        print(f"{len(runs)} runs in {overview}; open it with: rerun {overview}")
-        return 0
-    return _open(overview, args.web)
+        return _write_picture(open_run(args.run), args.picture, args.save, plain=args.plain)
+    if args.plain or args.save:
+        raise BadInput(f"--{'plain' if args.plain else 'save'}: expected it with --picture")
+    return _open(_whole(open_run(args.run, "recording.rrd")), args.web)
 
 
 def _write_picture(run: RunDirectory, cycle: int, name: str | None, *, plain: bool) -> int:
@@ -92,37 +75,6 @@ def _whole(run: RunDirectory) -> Path:
     return run.recording
 
 
-def _runs(text: str) -> list[RunDirectory]:
-    """One run, or all runs of a directory in the order of their numbers. Raises BadInput where there is none."""
-    from world_models.words import by_numbers
-
-    here = find_directory(text)
-    if not _is_campaign(here):
-        return [open_run(text)]
-    return [open_run(str(path)) for path in sorted((p.parent for p in here.glob("*/journal.jsonl")), key=by_numbers)]
-
-
-def _is_campaign(here: Path) -> bool:
-    """Whether a directory holds runs and is none."""
-    return not (here / "journal.jsonl").exists() and any(here.glob("*/journal.jsonl"))
-
-
-def _beside(runs: list[RunDirectory]) -> Path:
-    """In the directory that holds all of the runs."""
-    return Path(os.path.commonpath([run.path.resolve().parent for run in runs])) / OVERVIEW
-
-
-def _write(runs: list[RunDirectory], overview: Path) -> None:
-    from logs.recording.overview import RunFiles, write_overview
-
-    names = [run.path.name for run in runs]
-    unique = len(set(names)) == len(names)
-    files = [RunFiles(run.path.name if unique else str(run.path), run.recording, run.read_result()) for run in runs]
-    print(f"reading {len(files)} recordings", file=sys.stderr, flush=True)
-    for line in write_overview(files, overview, overview.parent.name or "runs"):
-        print(f"only its result is shown: {line}", file=sys.stderr)
-
-
 def _open(recording: Path, in_browser: bool) -> int:
     if in_browser:
         how = "--web-viewer" if has_screen() else "--serve-web"  # the latter opens no browser, but says the address
@@ -158,11 +110,9 @@ def find_viewer() -> str:
 
 
 VIEW = CliCommand(
-    "view", "open the recording of a run, or an overview of several, in the rerun viewer",
+    "view", "open the recording of a run in the rerun viewer, or write one of its pictures",
     (
         ("harvey view runs/lab-to-allens-office-0", "building, camera, plan, knowledge sources and why"),
-        ("harvey view runs/lab-to-allens-office", "all runs of a campaign, one row each"),
-        ("harvey view runs/bump-0 runs/hallway-kidnap-0 --save both.rrd", "two runs side by side, kept in a file"),
         ("harvey view runs/bump-0 --web", "in a browser"),
         ("harvey view runs/bump-0 --picture 88", "what the camera saw in cycle 88, with lines: bump-0-88.png"),
     ),

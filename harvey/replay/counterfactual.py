@@ -26,7 +26,6 @@ from harvey.runner.run import Over, run_to_outcome
 from harvey.runner.teller import PAGE, USER
 from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.simulation.simulated_run import SimulatedRun, rebuild_stage
-from logs.explain.diff import describe, differing_leaves
 from logs.explain.phrases import sentence
 from logs.records import WHAT_IF, DecisionRecord, EntryRecord, Originals, as_line, decision_of, effect_of, read_records
 from logs.run_directory import RunDirectory
@@ -316,14 +315,8 @@ def _find_time_s(view: View) -> float:
     return max(newest, default=0.0)
 
 
-def describe_answer(
-    answer: Answer, run: RunDirectory, changes: Sequence[str], *, values: bool = False
-) -> Iterator[str]:
-    """How it would have ended, and where it would have done something else; ``changes`` as ``without line_finder``.
-
-    Args:
-        values: also the first decision that differs, value by value.
-    """
+def describe_answer(answer: Answer, run: RunDirectory, changes: Sequence[str]) -> Iterator[str]:
+    """How it would have ended, and where it would have done something else; ``changes`` as ``without line_finder``."""
     yield f"{run.path}, {' and '.join(changes)}:"
     if answer.then is None and answer.now is None:
         but = f", but for {listed(answer.revised)}, by which it was asked" if answer.revised else ""
@@ -331,17 +324,13 @@ def describe_answer(
                f" byte{but}.")
         return
     yield from _end(answer, run)
-    yield from _parting(answer, values)
-    first = answer.then or answer.now
-    if values:
-        yield from ("", "first: as recorded; second: as it would have been")
-        yield from describe(answer.agreed, answer.then, answer.now)
-    elif first is not None:
+    yield from _parting(answer)
+    if (first := answer.then or answer.now) is not None:
         yield (f"The first decision that differs is that of cycle {first.cycle}, after {answer.agreed} that are the"
-               " same; --values shows it.")
+               " same.")
 
 
-def _parting(answer: Answer, values: bool) -> Iterator[str]:
+def _parting(answer: Answer) -> Iterator[str]:
     if answer.parting is None:
         yield "It asks its body for the same as in the record to the end, so what was observed holds to the end."
         return
@@ -349,7 +338,6 @@ def _parting(answer: Answer, values: bool) -> Iterator[str]:
     yield f"What was observed holds for {held} to the body, which are the same. Then it asks for something else:"
     yield f"  as recorded:              {_describe_requests(answer.parting.then, answer.parting.requests)}"
     yield f"  as it would have been:    {_describe_requests(answer.parting.now, answer.parting.requests)}"
-    yield from _leaves(answer.parting) if values else ()
     if answer.outcome.kind == UNFINISHED:
         yield "From there the record cannot tell what it would have observed."
     else:
@@ -361,15 +349,6 @@ def _describe_requests(decision: DecisionRecord | None, requests: Sequence[type[
         return "nothing any more"
     asked = "; ".join(f"{entry.ref}, {sentence(entry)}" for entry in decision.made if entry.kind in requests)
     return f"cycle {decision.cycle}: {asked}"
-
-
-def _leaves(parting: RequestParting) -> Iterator[str]:
-    """The values in which the requests differ, in full: what is rounded in words may look the same."""
-    if parting.then is not None and parting.now is not None:
-        then, now = ([entry.fields for entry in decision.made if entry.kind in parting.requests]
-                     for decision in (parting.then, parting.now))
-        for path, x, y in differing_leaves(then, now):
-            yield f"    {path}: {x} against {y}"
 
 
 def _end(answer: Answer, run: RunDirectory) -> Iterator[str]:

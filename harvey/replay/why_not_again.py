@@ -1,6 +1,6 @@
 """``harvey why RUN --not NAME``: what a knowledge source or an entry could have brought about and did not, and what
 decided; read from the journal, and, of a knowledge source that the journal does not name in a cycle, asked again: could
-it have acted, and if not, what did it find on the board?
+it have acted, and if not, which need was not met?
 
 The board as it stood is rebuilt from the journal, and ``bind`` is asked once more. That is honest as far as ``bind`` is
 what it has to be, a pure function of the board; no act is repeated and no picture is looked at.
@@ -8,28 +8,21 @@ what it has to be, a pure function of the board; no act is repeated and no pictu
 
 from __future__ import annotations
 
-import ast
 import difflib
-import inspect
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from enum import Enum
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from blackboard import (
     Blackboard,
     Change,
-    Entry,
-    Index,
     KnowledgeSource,
-    Level,
     MissingEntryError,
     Posted,
     Registry,
     Retracted,
-    View,
-    always,
 )
 from harvey.errors import BadInput
 from logs.explain import phrases
@@ -254,11 +247,6 @@ def _ask_again(run: RunDirectory, history: Timeline, source: str, cycle: int | N
         yield from why_absent(history, sources[source], cycle, agent.kinds, agent.store)
 
 
-T = TypeVar("T")
-MOST_OF_A_VALUE = 120
-"""Letters of a value that a condition asked for."""
-
-
 def why_absent(
     history: Timeline, source: KnowledgeSource, cycle: int, kinds: Registry, store: FrameStore
 ) -> Iterator[str]:
@@ -286,11 +274,7 @@ def _tell_why_not_triggered(source: KnowledgeSource, seen: Sequence[Change], cyc
         came = ", ".join(f"{change.entry.ref} {change.kind.lower()}" for change in held_back)
         yield (f"In cycle {cycle} came what the {name} watches for, {came}, but its watch has a condition, which did"
                " not hold for the values:")
-        for change in held_back:
-            yield f"  {change.entry.ref}: {sentence(change.entry.value)}"
-            watches = [watch for watch in source.on if watch.is_for(type(change), type(change.entry.value))]
-            yield from (f"    it needs: {condition}." for watch in watches
-                        if (condition := tell_predicate(watch.where, change.entry.value)))
+        yield from (f"  {change.entry.ref}: {sentence(change.entry.value)}" for change in held_back)
         return
     watched = ", ".join(dict.fromkeys(f"{w.value_type.__name__} {_kinds(w.kinds)}" for w in source.on))
     came = ", ".join(f"{change.entry.ref} {change.kind.lower()}" for change in seen) or "nothing"
@@ -304,13 +288,12 @@ def tell_of_trigger(source: KnowledgeSource, board: Blackboard, change: Change) 
         now = board.view.get(change.entry.id)
         yield f"{ref} would have woken the {name}, but was {f'{now.ref} already' if now else 'withdrawn already'}."
         return
-    view = AskedView(board)
     try:
         unmet = source.find_unmet(board.view)
         if unmet is not None:
             yield f"{ref} woke the {name}. It needs: {unmet.name}; {unmet.tell_otherwise(board.view)}."
             return
-        case = source.bind(view, change)
+        case = source.bind(board.view, change)
     except MissingEntryError as missing:
         yield (f"{ref} woke the {name}; asked again, it lacks something to tell whether it could act:"
                f" it {sentence(missing.request)}.")
@@ -319,102 +302,19 @@ def tell_of_trigger(source: KnowledgeSource, board: Blackboard, change: Change) 
         rating = float(source.rate(case))
         yield f"{ref} woke the {name}; asked again, it says that it could have acted, rated {rating:.2f}."
         return
-    yield f"{ref} woke the {name}, but it could not act. What it asked of the board, and found:"
-    yield from (f"  {question}: {', '.join(dict.fromkeys(answers)) or 'nothing'}" for question, answers in view.asked)
-    if view.asked:
-        yield "The last of these decided."
-
-
-def tell_predicate(where: Callable[[Any], bool], value: Any) -> str:
-    """``verdict == 'verified'; verdict is 'refuted'``: a condition as its source has it, and what it asks of a value.
-
-    "" where its source is not at hand.
-    """
-    text, fields = read_predicate(where)
-    return "; ".join([text, *(f"{one} is {getattr(value, one, None)!r}"[:MOST_OF_A_VALUE] for one in fields)])
-
-
-def read_predicate(where: Callable[[Any], bool]) -> tuple[str, tuple[str, ...]]:
-    """A predicate of one argument as its source has it, without the argument's name, and the fields that it asks for.
-
-    ("", ()) where its source is not at hand, or is no expression.
-    """
-    try:
-        module = ast.parse("".join(inspect.findsource(where)[0]))
-        spots = [spot for spot in where.__code__.co_positions() if all(one is not None for one in spot)]
-    except (OSError, TypeError, SyntaxError, AttributeError):
-        return "", ()
-    starts = [(row, first) for row, end, first, last in spots if (row, first) != (end, last)]
-    around = [one for one in ast.walk(module) if isinstance(one, ast.Lambda | ast.FunctionDef) and one.args.args
-              and starts and (one.lineno, one.col_offset) <= min(starts)
-              and max(starts) <= (one.end_lineno or 0, one.end_col_offset or 0)]
-    if not around:
-        return "", ()
-    body: Any = around[-1].body  # of those round its code the innermost
-    if isinstance(body, list):
-        body = getattr(body[-1], "value", None)
-    if not isinstance(body, ast.expr):
-        return "", ()
-    name = around[-1].args.args[0].arg
-    fields = dict.fromkeys(one.attr for one in ast.walk(body) if isinstance(one, ast.Attribute)
-                           and isinstance(one.value, ast.Name) and one.value.id == name)
-    return re.sub(rf"\b{name}\.", "", ast.unparse(body)), tuple(fields)
-
-
-def _with_condition(where: Callable[[Any], bool]) -> str:
-    text, _ = read_predicate(where)
-    return "" if where is always else f" that meets a condition{f' ({text})' if text else ''}"
+    yield f"{ref} woke the {name}, but it could not act: what it takes besides was not on the board."
 
 
 def _kinds(kinds: Iterable[type[Change]]) -> str:
     return "/".join(kind.__name__.lower() for kind in kinds)
 
 
-class AskedView(View):
-    """A view that remembers what was asked of it, in words, and the answers."""
-
-    __slots__ = ("asked",)
-
-    def __init__(self, board: Blackboard) -> None:
-        super().__init__(board)
-        self.asked: list[tuple[str, list[str]]] = []
-
-    def _note(self, question: str, found: T) -> T:
-        if not self.asked or self.asked[-1][0] != question:
-            self.asked.append((question, []))
-        entries: Any = (found,) if isinstance(found, Entry) else found or ()
-        self.asked[-1][1].extend(str(entry.ref) for entry in entries)
-        return found
-
-    def get(self, id: str) -> Entry[Any] | None:
-        return self._note(f"what {id} is now", super().get(id))
-
-    def latest(self, kind: type[Any], where: Callable[[Any], bool] = always) -> Entry[Any] | None:
-        return self._note(f"the newest {kind.__name__}{_with_condition(where)}", super().latest(kind, where))
-
-    def where(self, kind: type[Any], predicate: Callable[[Any], bool]) -> tuple[Entry[Any], ...]:
-        return self._note(f"every {kind.__name__}{_with_condition(predicate)}", super().where(kind, predicate))
-
-    def newest(self, index: Index[Any], key: Any) -> Entry[Any] | None:
-        return self._note(f"the newest {_by(index, key)}", super().newest(index, key))
-
-    def having(self, index: Index[Any], key: Any) -> tuple[Entry[Any], ...]:
-        return self._note(f"every {_by(index, key)}", super().having(index, key))
-
-
-def _by(index: Index[Any], key: Any) -> str:
-    """``open Discrepancy (plan level)``: what an index finds by a key."""
-    what = f"{index.word} {index.kind.__name__}".lstrip()
-    if key is True:
-        return what
-    return f"{what} ({key} level)" if isinstance(key, Level) else f"{what} ({key})"
-
-
 def changes(history: Timeline, cycle: int, kinds: Registry, store: FrameStore) -> tuple[Change, ...]:
     """What a cycle took up: what the one before had made, and what came from outside. Raises BadInput."""
     decision = history.decision(cycle)
     outside = {r.ref for r in decision.observed}
-    before = [r for r in history.written_by(cycle - 1) if r.ref in decision.seen and r.ref not in outside]
+    last = history.cycle_of(cycle - 1)
+    before = [] if last is None else [r for r in last.made if r.ref in decision.seen and r.ref not in outside]
     return tuple(CHANGES.get(r.change, Posted)(entry_of(r, kinds, store)) for r in (*before, *decision.observed))
 
 

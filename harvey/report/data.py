@@ -50,7 +50,7 @@ def entries(history: Timeline) -> dict[str, dict[str, Any]]:
 
 def beliefs(history: Timeline, world: World | None) -> Iterator[dict[str, Any]]:
     """Each belief that was held: its pose and ellipse in the world frame; nothing where the world is not known."""
-    for record in _hypotheses(history) if world is not None else ():
+    for record in () if world is None else history.of_kind(Hypothesis):
         value = record.value
         if world is not None and value.is_held:
             yield {"cycle": record.cycle, "ref": record.ref, "locale": value.locale, **placed(value, world)}
@@ -58,19 +58,14 @@ def beliefs(history: Timeline, world: World | None) -> Iterator[dict[str, Any]]:
 
 def candidates(history: Timeline, world: World | None) -> Iterator[dict[str, Any]]:
     """Each place that came into question: from which cycle until which, and with which weight."""
-    for record in _hypotheses(history) if world is not None else ():
+    for record in () if world is None else history.of_kind(Hypothesis):
         value = record.value
         if world is None or value.status != "candidate":
             continue
-        id, _, revision = record.ref.rpartition(".")
-        ends = (history.entry(f"{id}.{int(revision) + 1}"), history.retraction(record.ref))
+        ends = (history.entry(f"{record.id}.{record.revision + 1}"), history.retraction(record.ref))
         yield {"cycle": record.cycle, "until": min((end.cycle for end in ends if end is not None), default=None),
                "ref": record.ref, "locale": value.locale, "weight": value.weight, "place": value.place(),
                "evidence": value.evidence, **placed(value, world)}
-
-
-def _hypotheses(history: Timeline) -> Sequence[EntryRecord[Any]]:
-    return [record for record in history.of_kind(Hypothesis) if not record.is_gone]
 
 
 def placed(value: Hypothesis, world: World) -> dict[str, float]:
@@ -108,7 +103,7 @@ def read_pictures(
 ) -> Iterator[dict[str, Any]]:
     """The pictures that are kept, each since the cycle in which it was seen, with its lines."""
     lines = list_lines(history, Lenses(camera))
-    frames = [record for record in history.of_kind(CameraPicture) if not record.is_gone]
+    frames = list(history.of_kind(CameraPicture))
     for record in _chosen(frames, lines):
         number = record.fields.get("number")
         if number not in pictures:
@@ -150,19 +145,14 @@ def list_lines(history: Timeline, lenses: Lenses) -> dict[str, dict[str, Any]]:
     """
     found: dict[str, dict[str, Any]] = {}
     for record in history.of_kind(Segments):
-        if not record.is_gone:
-            segments = record.value
-            found[segments.frame] = {"found": lenses.place(segments.segments_px)}
+        found[record.value.frame] = {"found": lenses.place(record.value.segments_px)}
     for fix in history.of_kind(PoseFix):
-        match = history.reason(fix, LineMatch)
-        seen = None if match is None else history.reason(match, Segments)
-        expected = None if match is None else history.reason(match, Milestone)
-        if match is None or seen is None or fix.is_gone:
+        match, seen = history.chain(fix, LineMatch, Segments)
+        if match is None or seen is None:
             continue
         frame, agreed = seen.value.frame, fix.value.inliers
         found[frame]["agreed"] = lenses.place(match.value.segments_px[agreed])
-        if expected is not None:
-            milestone = expected.value
+        if (milestone := history.because(match, Milestone)) is not None:
             found[frame] |= {"expected": lenses.place(milestone.expected_px), "milestone": milestone.name()}
     return found
 

@@ -51,8 +51,7 @@ from world_models.entries import Anchor, CameraPicture, Drift, Hypothesis, Track
 MAX_MISSES = 2  # a landmark that is not found so many times in a row is dropped
 MIN_EXPECTED_LANDMARKS = 4  # fewest expected landmarks that can make a discrepancy
 MIN_AGREEING_LANDMARKS = 2
-"""Fewest landmarks that must agree for the belief to be corrected by them; of those that were found alone, one in 17
-was something else (34 of them, on drives to and fro in the Research Center)."""
+"""Fewest that must agree for the belief to be corrected; of those found alone, one in 17 was something else (of 34)."""
 MIN_AGREEING_PART = 1.0 / 3.0  # if a smaller part of the expected landmarks agrees, tracking has failed
 MIN_LANDMARKS = 5  # with fewer tracked landmarks than this, new ones are always taken
 ENOUGH_LANDMARKS = 9  # with this many tracked landmarks or more, no new ones are taken
@@ -106,12 +105,9 @@ class CorrelatorTracker(RobotKnowledgeSource):
             yield from self._post_discrepancy(view, what, shift, held, seen, (correction,))
 
     def _follow(self, view: View, belief: Belief, tracks: tuple[Track, ...], image: Image) -> list[TrackUpdate]:
-        _s, robot = self._settings, belief.robot
-
         def template_of(track: Track) -> Template:
-            jpeg = view[track.template_frame].value.jpeg
-            half_px = TEMPLATE_HALF_PX
-            return cut_template(robot.lens, robot.camera, jpeg, track.template_px, half_px)
+            jpeg, robot = view[track.template_frame].value.jpeg, belief.robot
+            return cut_template(robot.lens, robot.camera, jpeg, track.template_px, TEMPLATE_HALF_PX)
 
         return follow_landmarks(belief.seeing, tracks, template_of, image, belief.pose, belief.covariance)
 
@@ -136,9 +132,8 @@ class CorrelatorTracker(RobotKnowledgeSource):
         self, view: View, what: str, magnitude_px: float, belief: Belief, tracks: list[Track],
         because: tuple[object, ...],
     ) -> Iterable[Effect]:
-        points = np.array([track.point_world for track in tracks])
-        bound_px = action_px(find_robot(view), belief.value, points, self._settings)
-        bounds = (bound_px, self._settings.plan.max_deviation_px)
+        points, s = np.array([track.point_world for track in tracks]), self._settings
+        bounds = action_px(find_robot(view), belief.value, points, s), s.plan.max_deviation_px
         found = Discrepancy(Level.ACTION, what, magnitude_px, bounds, "px")
         last = open_discrepancy(view, Level.ACTION)
         if last is None or not last.value.exceeds:  # one beyond its bound is the discrepancy raiser's

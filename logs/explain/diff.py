@@ -4,16 +4,14 @@ that it comes from; and how far apart they went."""
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from itertools import islice, zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from logs.explain.phrases import sentence
-from logs.records import Candidate, DecisionRecord, EntryRecord, as_line, is_a
+from logs.records import DecisionRecord, EntryRecord, as_line, is_a
 from logs.run_directory import RunDirectory
-from logs.run_errors import UNREADABLE
 from logs.tables import table
 from logs.timeline import Timeline
 from world_models import words
@@ -23,15 +21,8 @@ from world_models.words import count, metres
 if TYPE_CHECKING:
     from logs.run_head import RunHead
 
-MEANINGS: Mapping[str, str] = {
-    "cycle": "the number of the cycle", "observed": "what came from outside", "seen": "the changes taken up",
-    "obviated": "what was dropped from the agenda", "focus": "the level in focus", "activated": "who could act",
-    "chosen": "what was chosen", "runner_up": "what came second", "pending": "how many were left pending",
-    "made": "what the act brought about", "refused": "why the act was refused",
-}
-"""The fields of a decision, in the order in which one follows from the other."""
-MOST_VALUES, MOST_SETTINGS = 6, 8
-"""How many differing values of one field, and how many settings, are told."""
+MOST_VALUES, MOST_SETTINGS = 20, 8
+"""How many differing values of a decision, and how many settings, are told."""
 LONGEST = 60
 """Of a value [characters]."""
 IGNORED = frozenset({"harvey", "code", "arithmetic", "folder", "world_sha256"})
@@ -80,36 +71,8 @@ def describe(agreed: int, one: DecisionRecord | None, other: DecisionRecord | No
         yield f"Then the {ended} run ends, while the {name} goes on: {acts}."
         return
     yield f"In cycle {one.cycle} they differ:"
-    if not (fields := [key for key in MEANINGS if as_line(one.data[key]) != as_line(other.data[key])]):
-        yield "  only in how the line is written"
-    for key in fields:
-        yield f"  {MEANINGS[key]} ({key}):"
-        if key in ("observed", "made"):
-            yield from _entries(getattr(one, key), getattr(other, key))
-        else:
-            yield f"    first:  {_to_text(getattr(one, key))}"
-            yield f"    second: {_to_text(getattr(other, key))}"
-
-
-def _entries(ours: Records, theirs: Records) -> Iterator[str]:
-    for a, b in zip_longest(ours, theirs):
-        if same(a, b):
-            continue
-        if a is not None and b is not None and a.ref == b.ref:
-            yield f"    {a.ref}:"
-            yield from (f"    {line}" for line in (f"  first:  {sentence(a)}", f"  second: {sentence(b)}"))
-            yield from (f"      {line}" for line in _values(a, b))
-        else:
-            yield from (f"    only in the {name}: {e.ref}: {sentence(e)}"
-                        for name, e in (("first", a), ("second", b)) if e is not None)
-
-
-def _values(a: EntryRecord[Any], b: EntryRecord[Any]) -> list[str]:
-    """The differing leaves of two records of the same entry."""
-    pairs = (("author", a.author, b.author), ("change", a.change, b.change), ("rests on", a.because, b.because))
-    leaves = [_against(*leaf) for leaf in differing_leaves(a.fields, b.fields)]
-    more = [f"and {len(leaves) - MOST_VALUES} more values"] if len(leaves) > MOST_VALUES else []
-    return [_against(*pair) for pair in pairs if pair[1] != pair[2]] + leaves[:MOST_VALUES] + more
+    yield from _acts(one, other)
+    yield from (f"    {text}" for text in _values(one.data, other.data, MOST_VALUES))
 
 
 def differing_leaves(a: Any, b: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
@@ -128,6 +91,12 @@ def differing_leaves(a: Any, b: Any, path: str = "") -> Iterator[tuple[str, Any,
         yield path or "value", a, b
 
 
+def _values(a: Any, b: Any, most: int) -> list[str]:
+    """The differing values of two JSON values, the first of them in a few words each."""
+    leaves = [_against(*leaf) for leaf in differing_leaves(a, b)]
+    return leaves[:most] + [f"and {len(leaves) - most} more"] * (len(leaves) > most)
+
+
 def _against(path: str, a: Any, b: Any) -> str:
     return f"{path}: {_short(a)} against {_short(b)}"
 
@@ -136,15 +105,6 @@ def _short(value: Any) -> str:
     """A value in a few words."""
     text = f"{len(value)} values" if isinstance(value, list) and len(value) > 4 else str(value)
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
-
-
-def _to_text(value: Any) -> str:
-    if isinstance(value, tuple):
-        return ", ".join(map(_to_text, value)) or "nothing"
-    if isinstance(value, Candidate):
-        reason = f" ({value.reason})" if value.reason else ""
-        return f"{value.source} on {value.trigger} rated {value.rating:.4g}{reason}"
-    return "nothing" if value in (None, "") else str(value).rstrip().splitlines()[-1]
 
 
 class Parting(NamedTuple):
@@ -234,12 +194,9 @@ def settings(first: RunHead, second: RunHead) -> Iterator[str]:
         yield f"decided by different code: {first.code} against {second.code}"
     if first.arithmetic and second.arithmetic and first.arithmetic != second.arithmetic:
         yield f"calculated on different processors: {first.arithmetic} against {second.arithmetic}"
-    ours, theirs = (json.loads(json.dumps(asdict(head))) for head in (first, second))
-    parted = [_against(*leaf) for key in {**ours, **theirs} if key not in IGNORED
-            for leaf in differing_leaves({key: ours.get(key)}, {key: theirs.get(key)})]
-    yield from parted[:MOST_SETTINGS]
-    if len(parted) > MOST_SETTINGS:
-        yield f"and {len(parted) - MOST_SETTINGS} more"
+    ours, theirs = ({key: value for key, value in json.loads(json.dumps(asdict(head))).items() if key not in IGNORED}
+                    for head in (first, second))
+    yield from _values(ours, theirs, MOST_SETTINGS)
 
 
 def because(ours: Timeline, theirs: Timeline, agreed: int, settings: tuple[str, ...]) -> Iterator[str]:
@@ -313,8 +270,12 @@ def _others(
     ours: Timeline, theirs: Timeline, cycle: int, head: str = "They take other steps for the first time in cycle"
 ) -> Iterator[str]:
     yield f"{head} {cycle}:"
-    for name, history in (("first: ", ours), ("second:", theirs)):
-        d = history.decision(cycle)
+    yield from _acts(ours.decision(cycle), theirs.decision(cycle))
+
+
+def _acts(one: DecisionRecord, other: DecisionRecord) -> Iterator[str]:
+    """Who acts in each of two decisions, and what comes of it."""
+    for name, d in (("first: ", one), ("second:", other)):
         if d.chosen is None:
             yield f"  {name} nobody acts"
         else:
@@ -333,10 +294,7 @@ def apart(first: RunDirectory, second: RunDirectory, ours: Timeline, theirs: Tim
         if key in a or key in b:
             cells = (result.get(key) for result in (a, b))
             rows.append([key, *(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells)])
-    try:
-        far, at = _furthest(ours, theirs)
-    except UNREADABLE:
-        far, at = 0.0, ""
+    far, at = _furthest(ours, theirs)
     tail = f"\nthe two beliefs were furthest apart before {at}: {metres(far)}" if at else ""
     return table(["", "first", "second"], rows) + tail
 
@@ -349,10 +307,9 @@ def _furthest(ours: Timeline, theirs: Timeline) -> tuple[float, str]:
         if a is None or b is None:
             break
         here, there = ours.reason(a, Hypothesis), theirs.reason(b, Hypothesis)
-        if here is None or there is None or here.fields["locale"] != there.fields["locale"]:
+        if here is None or there is None or here.value.locale != there.value.locale:
             continue
-        p, q = here.fields["locale_from_robot"], there.fields["locale_from_robot"]
-        away = math.hypot(p["x_m"] - q["x_m"], p["y_m"] - q["y_m"])
+        away = here.value.locale_from_robot.distance_to(there.value.locale_from_robot)
         if away > far:
             far, at = away, a.id
     return far, at

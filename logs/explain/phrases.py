@@ -128,15 +128,21 @@ def plainly(record: EntryRecord[Any]) -> str:
     return f"{capital(sentence(record))}."
 
 
+def moment(history: Timeline, cycle: int) -> str:
+    """``cycle 88, 12.3 s into the run``, as far as anything told the time."""
+    time_s = history.time_at(cycle)
+    return f"cycle {cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run")
+
+
 def describe_decision(history: Timeline, record: EntryRecord[Any]) -> str:
     """By whom, when and against what."""
-    time_s = history.time_at(record.cycle)
-    when = f"cycle {record.cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run,")
+    when = moment(history, record.cycle)
     if record.author == WHAT_IF:
-        return f"It was revised in {when.rstrip(',')} by the question what if."
+        return f"It was revised in {when} by the question what if."
     if record.observed:
-        return f"It came from outside, from {record.author}, and was taken up in {when.rstrip(',')}."
-    decision, text = history.decision(record.cycle), f"Decided in {when} by the {words.source(record.author)}"
+        return f"It came from outside, from {record.author}, and was taken up in {when}."
+    decision = history.decision(record.cycle)
+    text = f"Decided in {when}{',' * (',' in when)} by the {words.source(record.author)}"
     if decision.chosen is None:
         return text + "."
     c = decision.runner_up

@@ -128,8 +128,7 @@ def _part(title: str, nothing: str) -> Answer:
         part = tell_part(asked.history, title, {} if asked.run is None else asked.run.read_result())
         kept = [one for one in part.steps if asked.at is None or (one.cycle is not None and one.cycle <= asked.at)]
         for one in kept:
-            time = "" if one.time_s is None else f", {one.time_s:.1f} s into the run"
-            when = "" if one.cycle is None else f"In cycle {one.cycle}{time}: "
+            when = "" if one.cycle is None else f"In {phrases.moment(asked.history, one.cycle)}: "
             yield Story(f"{when}{one.text}", ref=one.refs[0] if one.refs else "")
         if not kept:
             yield Story(nothing)

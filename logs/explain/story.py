@@ -15,13 +15,14 @@ from logs.explain.turning_points import (
     COLLISION,
     SIMULATOR,
     TurningPoint,
+    read_trouble,
     read_truth,
     read_turning_points,
     turn_lines,
 )
 from logs.records import EntryRecord, is_a
 from logs.run_directory import RunDirectory, read_head
-from logs.run_errors import BadInput, reading
+from logs.run_errors import reading
 from logs.tables import table
 from logs.timeline import Timeline
 from world_models.building.locale_frame import LocaleFrame
@@ -153,15 +154,12 @@ def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
 
     Raises BadInput where the journal has no decision, or ``result.json`` is malformed.
     """
-    if not history.cycles:
-        history.verify()
-        raise BadInput(f"{history.source}: expected at least one decision, got none")
+    history.expect_decisions()
     with reading(history.source):
         outcome = history.last(Outcome)
         cycle = history.cycles[-1] if outcome is None else outcome.cycle
-        time_s = history.time_at(cycle)
-        when = f"in cycle {cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run")
-        yield f"{run_name(run)}: {'cut off' if outcome is None else outcome.value.kind} {when}."
+        end = "cut off" if outcome is None else outcome.value.kind
+        yield f"{run_name(run)}: {end} in {phrases.moment(history, cycle)}."
         yield from levels_off(run)
         yield from turn_lines(history, run.read_result(), is_whole=outcome is not None)
 
@@ -219,10 +217,10 @@ def _plan(history: Timeline, record: EntryRecord[Any]) -> str:
         look = "to look from elsewhere, " if sketch.is_look else ""
         parts = count(len(sketch.subgoals), "part")
         return f"Plan {look}{sketch.where()}, {parts}: to {phrases.steps(sketch.subgoals)}."
-    if not record.is_gone and turning_points.is_adjusted(sketch, record.author):
+    if turning_points.is_adjusted(sketch, record.author):
         return (f"The plan {sketch.where()} was adjusted in part {min(sketch.at + 1, len(sketch.subgoals))} of "
                 f"{len(sketch.subgoals)}, as a milestone told where the robot is: to {phrases.steps(sketch.subgoals)}.")
-    if record.is_gone or sketch.status != "superseded":
+    if sketch.status != "superseded":
         return ""
     causes = listed([cause for ref in record.because if (cause := _cause(history, ref))]) or "it no longer held"
     part = f"in part {sketch.at + 1} of {len(sketch.subgoals)}"
@@ -360,8 +358,7 @@ def _truth(result: Mapping[str, Any]) -> Iterator[str]:
 
 def _tell_trouble(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sentence]:
     """What a short account of the run does not leave out."""
-    truly = (point for point in read_truth(history, result) if point.kind != COLLISION)
-    points = sorted([*truly, *read_turning_points(history, main=True)], key=lambda point: point.cycle)
+    points = [point for point in read_trouble(history, result) if point.kind != COLLISION]
     yield from (Sentence(f"{point.kind}: {point.text}.", cycle=point.cycle) for point in points)
     if not points:
         yield Sentence("Nothing went wrong." if history.last(Outcome) is not None else
@@ -389,12 +386,11 @@ def read_milestones(history: Timeline) -> tuple[MilestoneRow, ...]:
     """Every verdict of a run, and every milestone that got none, in the order of time."""
     rows: list[MilestoneRow] = []
     for record in history.of_kind(Certificate):
-        if not record.is_gone:
-            c, below = record.value, history.reason(record, Milestone)
-            name, ref = (c.milestone, f"{c.milestone}.0") if below is None else (phrases.milestone_of(below), below.ref)
-            rows.append(MilestoneRow(
-                record.cycle, history.time_at(record.cycle), name, c.verdict, c.expected, c.matched, c.deviation_m,
-                c.deviation_rad, c.p_wrong, c.most_p_wrong, (record.ref, ref)))
+        c, below = record.value, history.reason(record, Milestone)
+        name, ref = (c.milestone, f"{c.milestone}.0") if below is None else (phrases.milestone_of(below), below.ref)
+        rows.append(MilestoneRow(
+            record.cycle, history.time_at(record.cycle), name, c.verdict, c.expected, c.matched, c.deviation_m,
+            c.deviation_rad, c.p_wrong, c.most_p_wrong, (record.ref, ref)))
     judged = {ref.rpartition(".")[0] for row in rows for ref in row.refs}
     rows += [MilestoneRow(one.cycle, history.time_at(one.cycle), phrases.milestone_of(one), str(one.fields["status"]),
                           len(one.fields["expected"]), 0, None, None, None, None, (one.ref,))

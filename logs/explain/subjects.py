@@ -14,7 +14,7 @@ from logs.explain.phrases import Sentence, Story, capital, describe_decision, sa
 from logs.explain.web import find_refs
 from logs.explain.why import tell_stories
 from logs.records import WHAT_IF, EntryRecord
-from logs.run_errors import UNREADABLE, BadInput
+from logs.run_errors import BadInput, reading
 from logs.timeline import Timeline
 from world_models import words
 from world_models.building.locale_frame import FrameReference, FrameRequest
@@ -72,14 +72,11 @@ def milestone_story(history: Timeline, id: str, world: WorldFile | None = None) 
     last = history.entry(history.newest[id])
     if last is None:
         raise BadInput(f"{id}: expected it in the journal, which says nothing of it")
-    try:
+    with reading(id):
         revisions = [one for number in range(REVISIONS) if (one := history.entry(f"{id}.{number}")) is not None]
         head = f"{capital(phrases.milestone_name(last.value))}: {last.fields['status']}."
         first = revisions[0] if revisions else last
         return Story(head, tuple(_tell(history, revisions, last, world)), last.ref, describe_decision(history, first))
-    except UNREADABLE as error:
-        what = "expected a milestone and its evidence as this version writes them, got others"
-        raise BadInput(f"{id}: {what} ({error!r})") from None
 
 
 def _tell(
@@ -108,7 +105,7 @@ def _tell(
 
 def _tell_consequences(history: Timeline, certificate: EntryRecord[Any]) -> Iterator[Sentence]:
     """What those did whom the verdict woke."""
-    for record in history.written_by(certificate.cycle):
+    for record in history.decision(certificate.cycle).made:
         for decision in history.naming(record.ref) if record.kind in FOLLOWED else ():
             if decision.chosen is not None and decision.chosen.trigger == record.ref:
                 came = "; ".join(f"{r.ref}: {sentence(r)}" for r in decision.made if r.kind is not Discrepancy)

@@ -60,7 +60,7 @@ def read_errors(run: RunDirectory, history: Timeline, at: int | None = None) -> 
         raise BadInput(f"{run.path}: expected its recording, where the truth is, got none (harvey repair {run.path}"
                        " draws it)")
     world, track = head.load_world(), read_true_track(run.recording)
-    records = [one for one in history.of_kind(Hypothesis, until=at) if not one.is_gone and one.value.is_held]
+    records = [one for one in history.of_kind(Hypothesis, until=at) if one.value.is_held]
     errors = []
     for record in records if at is None else records[-1:]:
         value, cycle = record.value, record.cycle if at is None else at

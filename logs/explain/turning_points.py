@@ -266,13 +266,18 @@ def read_truth(history: Timeline, result: Mapping[str, Any]) -> Iterator[Turning
             yield replace(point, time_s=history.time_at(point.cycle))
 
 
+def read_trouble(history: Timeline, result: Mapping[str, Any]) -> list[TurningPoint]:
+    """What a short account must not leave out: of what the simulator alone knows, and of what the robot knew."""
+    main = read_turning_points(history, main=True)
+    return sorted([*read_truth(history, result), *main], key=lambda point: point.cycle)
+
+
 def turn_lines(history: Timeline, result: Mapping[str, Any], *, is_whole: bool = True) -> Iterator[str]:
     """Those turning points that a short account must not leave out, and what only the simulator knows, a line each.
 
     ``is_whole``: the run has an outcome.
     """
-    main = read_turning_points(history, main=True)
-    points = sorted([*read_truth(history, result), *main], key=lambda point: point.cycle)
+    points = read_trouble(history, result)
     unplaced = (result.get("collisions") or 0) - sum(point.kind == COLLISION for point in points)
     if not points and unplaced <= 0:
         yield NOTHING if is_whole else ENDED_EARLY

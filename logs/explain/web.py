@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TextIO
 
-from blackboard import Decision, Sink, decision_record
+from blackboard import Sink, decision_record
 from logs.explain.diff import differing_leaves
 from logs.explain.phrases import describe_decision, sentence, wrap
 from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of
-from logs.timeline import Timeline, ranked
+from logs.timeline import Timeline
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import (
     CameraPicture,
@@ -54,15 +54,9 @@ Ends = frozenset[str]
 """What some entry ends in: some of KINDS, and the names of the reasons of which the journal says nothing."""
 
 
-def printing(out: TextIO, *, whole: bool) -> Sink:
-    """A sink that prints every cycle: whole, or in a line."""
-    trace = Trace()
-
-    def sink(decision: Decision) -> None:
-        record = decision_of(decision_record(decision))
-        out.write("\n".join(trace.lines(record) if whole else [cycle_line(record)]) + "\n")
-
-    return sink
+def printing(out: TextIO) -> Sink:
+    """A sink that prints every cycle in a line."""
+    return lambda decision: print(cycle_line(decision_of(decision_record(decision))), file=out)
 
 
 MAX_LINE = 160
@@ -76,22 +70,6 @@ def cycle_line(decision: DecisionRecord) -> str:
     line = f"{decision.cycle:5}  {decision.focus:<6}  {outside}{who}{': ' if made else ''}{made}"
     line += " (refused)" if decision.refused else ""
     return line if len(line) <= MAX_LINE else f"{line[:MAX_LINE - 4]} ..."
-
-
-class Trace:
-    """Tells decisions one after the other; it remembers what is pending, as the journal tells only what is new."""
-
-    def __init__(self) -> None:
-        self._pending: dict[int, Candidate] = {}
-
-    def lines(self, decision: DecisionRecord) -> Iterator[str]:
-        """What to print for the next decision."""
-        self._pending |= {c.number: c for c in decision.activated}
-        for dropped in decision.obviated:
-            self._pending.pop(dropped.number, None)
-        yield from cycle_lines(decision, ranked(self._pending.values(), decision.chosen))
-        if decision.chosen is not None and decision.asks is None:
-            self._pending.pop(decision.chosen.number, None)
 
 
 def cycle_lines(decision: DecisionRecord, candidates: Iterable[Candidate]) -> Iterator[str]:

@@ -16,7 +16,6 @@ from typing import Any, Protocol
 import numpy as np
 import pyarrow as pa
 import rerun as rr
-from rerun.chunk import RrdReader
 
 from logs.disk import no_follow
 from logs.run_errors import RecordingError
@@ -120,10 +119,6 @@ class RecordingStream:
         """Properties of the whole recording, by which a catalog of runs is searched: ``property:harvey:outcome``."""
         if not self._lost:
             self._stream.send_property(APPLICATION, rr.AnyValues(True, **values))
-
-    def copy(self, recording: Path, content: str) -> None:
-        """Take over what another recording holds at all times, as ``/world/building/**``."""
-        self._stream.send_chunks(RrdReader(recording).stream().filter(content=content, is_static=True))
 
     def end_cycle(self) -> None:
         """Bring what was logged to the disk once in a while; where that fails, :meth:`close` tells."""

@@ -188,7 +188,7 @@ def test_what_the_file_lacks_stands_on_floor_that_is_asked_after_and_what_it_has
     belief = bench.believe(Pose2(1.5, 2.0, 0.0))
     bench.stand(3.5, 2.0, 0.3, 0.3)
     sketch = bench.sketch(Place(HALL, 1.0, 2.0), Place(HALL, 6.0, 2.0), path=(0,))
-    asked = FloorAhead(bench.view, bench.leg(sketch).value, belief, DEFAULT)._asked
+    asked = FloorAhead(bench.view, bench.leg(sketch).value, belief, DEFAULT)._tested
     things = [t for t in find_robot(bench.view).world.things_of(HALL) if t.is_obstacle]
     assert len(things) == 3
     for thing in things:

@@ -382,14 +382,14 @@ def test_more_evidence_never_makes_a_pose_less_acceptable(
     seen: int, accounted: float, likelihood: float, explained: float, weakest: float, more: float
 ) -> None:
     count = int(accounted * seen)
-    if is_sufficient(count, likelihood, explained, weakest):
-        assert is_sufficient(int(count + more * (seen - count)), likelihood, explained, weakest)
-        assert is_sufficient(count, likelihood + 10.0 * more, explained, weakest)
-        assert is_sufficient(count, likelihood, explained + more * (1.0 - explained), weakest)
-        assert is_sufficient(count, likelihood, explained, weakest + more * (1.0 - weakest))
+    if is_sufficient(seen, count, likelihood, explained, weakest):
+        assert is_sufficient(seen, int(count + more * (seen - count)), likelihood, explained, weakest)
+        assert is_sufficient(seen, count, likelihood + 10.0 * more, explained, weakest)
+        assert is_sufficient(seen, count, likelihood, explained + more * (1.0 - explained), weakest)
+        assert is_sufficient(seen, count, likelihood, explained, weakest + more * (1.0 - weakest))
 
 
 def test_a_little_of_both_is_not_enough() -> None:
     """As at a place 0.12 m beside the right one (rough-day, seed 91), where 99 of 158 lines were accounted for."""
-    assert not is_sufficient(99, 30.0, 0.38, 0.5)
-    assert is_sufficient(204, 30.0, 0.75, 0.5)
+    assert not is_sufficient(158, 99, 30.0, 0.38, 0.5)
+    assert is_sufficient(324, 204, 30.0, 0.75, 0.5)

@@ -31,7 +31,7 @@ from harvey.replay.why_not_again import Fate, in_cycle, in_run, of_entry
 from harvey.wiring import load_kinds
 from logs.explain.diff import describe, differing_leaves, first_difference
 from logs.explain.phrases import sentence
-from logs.explain.web import SENSOR, Trace, explain, explained_by, holds, trace_grounds, walk
+from logs.explain.web import SENSOR, cycle_lines, explain, explained_by, holds, trace_grounds, walk
 from logs.explain.why import lines_of, story
 from logs.records import Candidate, DecisionRecord, EntryRecord, as_line, decision_of
 from logs.timeline import Timeline
@@ -152,10 +152,10 @@ def test_every_reason_is_older_or_of_the_same_act(lines: list[str]) -> None:
 
 @LAWS
 @given(journals())
-def test_the_trace_tells_all_that_is_pending_and_nothing_else(lines: list[str]) -> None:
-    trace = Trace()
+def test_a_cycle_tells_all_that_is_pending_and_nothing_else(lines: list[str]) -> None:
+    history = MemoryTimeline(read(lines))
     for decision in read(lines):
-        told = list(trace.lines(decision))
+        told = list(cycle_lines(decision, history.candidates(decision.cycle)))
         assert sum(line.startswith(("  pending", "  next")) for line in told) == decision.pending
         assert sum(line.startswith("  chooses") for line in told) == (decision.chosen is not None)
         assert all(any(change.ref in line for line in told) for change in decision.made)

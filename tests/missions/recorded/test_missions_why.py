@@ -17,7 +17,7 @@ from blackboard import registry_of
 from experiments.scale.explanations import write_hour
 from harvey.agent import Agent, build_agent
 from harvey.cli import main
-from harvey.replay.why_not_again import AskedView, board_at, changes, in_cycle, why_absent
+from harvey.replay.why_not_again import board_at, changes, in_cycle, why_absent
 from logs.explain.diff import grounds, parting, same
 from logs.explain.phrases import describe_decision
 from logs.explain.web import check
@@ -120,7 +120,7 @@ def test_who_is_not_named_could_not_act_and_who_is_says_so_again(
             for change in changes(history, cycle, KNOWN, agent.store):
                 key = (source.name, str(change.entry.ref))
                 if any(watch.sees(change) for watch in source.on) and board.view.is_current(change.entry):
-                    assert rating(source, AskedView(board), change) == ratings.get(key)
+                    assert rating(source, board.view, change) == ratings.get(key)
                     asked += 1
         absent = [e for e in agent.sources if not in_cycle(history, e.name, cycle)]
         for source in absent[:: len(absent) // 2 or 1]:

@@ -286,7 +286,7 @@ def test_a_result_of_other_types_is_named(
 ) -> None:
     runs = [headed(tmp_path / name, "bump", 0) for name in ("one", "two")]
     (tmp_path / "one" / "result.json").write_text(json.dumps({key: value}))
-    code, err = said(capsys, ["view", *runs, "--save", str(tmp_path / "both.rrd")])
+    code, err = said(capsys, ["report", *runs, "--out", str(tmp_path / "both.html")])
     assert code == 2 and f"{tmp_path / 'one' / 'result.json'}: {key}: expected" in err
 
 
@@ -339,7 +339,7 @@ def test_a_damaged_world_never_ends_in_a_traceback(data: st.DataObject, tmp_path
 @pytest.mark.parametrize("argv", [
     ["why", "RUN"], ["why", "RUN", "when was it lost?"], ["why", "RUN", "--not", "motor"], ["story", "RUN"],
     ["replay", "RUN"], ["replay", "RUN", "--without", "motor"], ["resume", "RUN"], ["repair", "RUN"],
-    ["diff", "RUN", "RUN"], ["report", "RUN"], ["report", "RUN", "RUN"], ["view", "RUN"], ["view", "RUN", "RUN"],
+    ["diff", "RUN", "RUN"], ["report", "RUN"], ["report", "RUN", "RUN"], ["view", "RUN"],
     ["export", "RUN", "--csv", "OUT"],
 ])
 @pytest.mark.parametrize("older", [1, 2, 4, "3", None])

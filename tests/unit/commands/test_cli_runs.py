@@ -36,7 +36,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A mission that was given 36 cycles, in 6 of which an act only asks for locale frames, and its trace."""
     out, printed = tmp_path_factory.mktemp("runs") / "short", io.StringIO()
     with redirect_stdout(printed):
-        assert main(["run", "lab-to-allens-office", *SHORT, "--out", str(out), "--trace-all"]) == 1
+        assert main(["run", "lab-to-allens-office", *SHORT, "--out", str(out), "--trace"]) == 1
     return out, printed.getvalue()
 
 
@@ -272,15 +272,12 @@ def test_diff_names_the_first_decision_that_differs(
     assert "agree for 9 decisions." in out
     assert "The first observation that differs is CameraPicture-1.0" in out
     assert "seed: 0 against 1" in out
-    assert main(["diff", str(run), str(both[0] / "1"), "--fields"]) == 1
-    assert "jpeg.sha256" in capsys.readouterr().out
 
 
 def test_trace_prints_every_cycle(told: tuple[Path, str]) -> None:
     printed = told[1]
-    assert [f"cycle {n}, focus" in printed for n in range(1, 31)] == [True] * 30
-    assert "posted    Goal-1.0 by interpreter: goal: from robot-laboratory" in printed
-    assert "next      milestone_passer" in printed
+    assert [f"\n{n:5}  " in f"\n{printed}" for n in range(1, 31)] == [True] * 30
+    assert "posted Goal-1.0" in printed
 
 
 def test_the_check_foresees_the_milestones_that_come(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

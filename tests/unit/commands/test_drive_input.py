@@ -224,5 +224,5 @@ def test_a_signal_stops_too_and_the_second_one_does_what_it_always_does(number: 
 
 
 def test_an_emulated_camera_needs_something_to_look_at(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["emulate", "create2", "--camera-port", "0"]) == 2
+    assert main(["emulate", "denning", "--camera-port", "0"]) == 2
     assert "expected a --scenario to look at, got none" in capsys.readouterr().err

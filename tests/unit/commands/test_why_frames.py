@@ -11,7 +11,7 @@ from harvey.replay.why_not_again import Fate, in_run
 from logs.explain.model import tell_changes, tell_used
 from logs.explain.phrases import Sentence, sentence
 from logs.explain.subjects import milestone_story
-from logs.explain.web import MODEL, Trace, kind_of
+from logs.explain.web import MODEL, cycle_lines, kind_of
 from logs.explain.why import story
 from logs.records import Candidate, DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
@@ -109,8 +109,8 @@ def test_an_act_that_asked_is_pending_until_it_acts() -> None:
     history = MemoryTimeline(decisions)
     assert [[c.number for c in history.candidates(cycle)] for cycle in (1, 2, 3)] == [[1, 2], [2, 1], [1]]
     assert [(one.cycle, one.fate) for one in in_run(history, "sketcher")] == [(3, Fate.ACTED)]
-    trace = Trace()
-    assert [sum("sketcher (plan)" in line for line in trace.lines(one)) for one in decisions] == [1, 1, 1]
+    told = [cycle_lines(one, history.candidates(one.cycle)) for one in decisions]
+    assert [sum("sketcher (plan)" in line for line in lines) for lines in told] == [1, 1, 1]
 
 
 def test_what_is_known_and_told_is_a_ground() -> None:
