@@ -1,9 +1,9 @@
 """Whether errors are as large as stated: the normalised error squared (NEES) within its chi-square band.
 
+And a hall, for the laws that ask it.
+
 Source: Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, §5.4.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
@@ -20,6 +20,16 @@ P_OUTSIDE = 1e-3
 """Probability that an honest estimator is outside one end of its band."""
 P_UNNOTICED = 0.05
 """How likely variances that are to be found may pass before all draws are made."""
+
+
+def build_hall() -> Array:
+    """Door posts, lintels and long edges ahead of the robot (n, 2, 3)."""
+    lines = [[[1.5, y, z], [15.0, y, z]] for y in (-1.2, 1.2) for z in (0.0, 2.4)]
+    for x in (3.0, 5.5, 8.0, 11.0):
+        for y in (-1.2, 1.2):
+            far = x + 0.9
+            lines += [[[x, y, 0.0], [x, y, 2.1]], [[far, y, 0.0], [far, y, 2.1]], [[x, y, 2.1], [far, y, 2.1]]]
+    return np.array(lines)
 
 
 def compute_error(found: Pose2, truth: Pose2) -> Array:

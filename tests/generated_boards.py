@@ -3,10 +3,8 @@
 The hall is the same left to right, so that a board can be mirrored: :func:`mirrored` is about its middle line.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -34,6 +32,7 @@ from blackboard import (
 )
 from knowledge_sources.model.model_reviser import ModelReviser
 from world_models.actuator import ActuatorModel
+from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import (
@@ -44,6 +43,7 @@ from world_models.entries import (
     MotionReport,
     MotorCommand,
     Obstacle,
+    Outcome,
     Place,
     PlanSketch,
     Subgoal,
@@ -137,6 +137,13 @@ class Bench:
     def retract(self, entry: Entry[Any]) -> None:
         self.apply(Retract(self.view[entry.id]))
 
+    def lack(self, what: str) -> None:
+        """What a source may need is not so: one of ``LACKING``, or the entry of this id is withdrawn."""
+        if what in LACKING:
+            LACKING[what](self)
+        elif what != "nothing":
+            self.retract(self.view[what])
+
     def apply(self, *effects: Effect) -> tuple[Change, ...]:
         """The changes that effects make, in a cycle of their own."""
         self.cycle += 1
@@ -171,6 +178,10 @@ class Bench:
         return self.put(replace(Leg(sketch.id, sketch.value.at, start.x_m, start.y_m, end.x_m, end.y_m,
                                     step.tolerance_m), **fields), sketch)
 
+    def frame(self, locale: str = HALL) -> Entry[LocaleFrame]:
+        """The frame of a locale."""
+        return next(entry for entry in self.view.all(LocaleFrame) if entry.value.name == locale)
+
     def stand(self, x_m: float, y_m: float, along_m: float, across_m: float, locale: str = HALL,
               core: Sequence[tuple[float, float]] = (), **fields: Any) -> Entry[Obstacle]:
         """Something that stands round a place of a locale, half so long and wide; the locale's frame has it.
@@ -200,6 +211,16 @@ class Bench:
         command = self.put(MotorCommand(turn_rad, move_m))
         return command, self.put(MotionReport(turn_rad, move_m, 1.0, 1.0), command)
 
+
+LACKING: Mapping[str, Callable[[Bench], object]] = {
+    "belief": lambda bench: bench.revise(bench.view["Hypothesis-1"], status="candidate"),
+    "doubt": lambda bench: bench.revise(bench.view["Discrepancy-1"], status="corrected"),
+    "rest": Bench.move,
+    "place": Bench.doubt,
+    "course of things": lambda bench: bench.put(Outcome("failed", "")),
+    "goal": lambda bench: bench.revise(bench.view["Goal-1"], status="abandoned"),
+}
+"""How the first belief, doubt and goal come to be none, and the robot to move, to be lost and to be at its end."""
 
 motions = st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(0.0, 0.8)), min_size=1, max_size=3)
 """Turns [rad], each with the way after it [m]."""

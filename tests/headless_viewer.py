@@ -1,11 +1,14 @@
-"""The real viewer without a window, where there is one: a machine without a graphics driver is asked once."""
+"""The real viewer without a window, where there is one: a machine without a graphics driver is asked once.
 
-from __future__ import annotations
+And the views that its window would have.
+"""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
+import rerun.blueprint as rrb
 
 from docs.tools.look import look
 from logs.run_errors import RecordingError
@@ -21,3 +24,12 @@ def look_or_skip(recording: Path, folder: Path, cycles: Sequence[int]) -> list[s
         except RecordingError as error:
             _absent.append(str(error))
     pytest.skip(f"no headless viewer here: {_absent[0]}")
+
+
+def views(part: Any) -> Iterator[Any]:
+    """All views in a container."""
+    if isinstance(part, rrb.View):
+        yield part
+    else:
+        for inner in part.contents:
+            yield from views(inner)

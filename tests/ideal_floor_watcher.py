@@ -1,7 +1,5 @@
 """A watcher of the floor that sees what the model has, and things that a test puts there: for tests of the motion."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 

@@ -1,7 +1,5 @@
 """The north hall of a building, with a robot on a board: what stands there, and who finds it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -17,7 +15,6 @@ from knowledge_sources.model.thing_mover import ThingMover
 from knowledge_sources.model.touch_finder import TouchFinder
 from sim.scenario import load_scenario
 from world_models.building.locale_frame import FRAME_OF, LocaleFrame
-from world_models.building.world import World
 from world_models.entries import (
     Certificate,
     Contact,
@@ -30,6 +27,7 @@ from world_models.entries import (
     diagonal,
 )
 from world_models.entries.entry_kinds import KINDS
+from world_models.files.world_files import WORLDS, load_world
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
 
@@ -44,7 +42,8 @@ FINDERS = (ThingMapper(), TouchFinder(), HaltExplainer(), ThingMover(), ModelRev
 class Hall:
     """A board with a robot in the north hall, and round it those who find things on the floor."""
 
-    def __init__(self, world: World, sources: Sequence[KnowledgeSource] | None = None) -> None:
+    def __init__(self, sources: Sequence[KnowledgeSource] | None = None) -> None:
+        world = load_world(WORLDS / "two_ways.toml")
         store = FrameStore(world)
         sources = FINDERS if sources is None else sources
         self._scheduler = Scheduler(sources, ports=(WorldPort(store),), kinds=KINDS)

@@ -1,7 +1,5 @@
 """Two rooms with two doors between them, and short missions from one to the other on which somebody tells the robot."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

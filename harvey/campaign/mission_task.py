@@ -20,7 +20,7 @@ from tqdm import tqdm
 from blackboard import Sink
 from harvey.agent_settings import Pairs, split_settings
 from harvey.campaign.engine import Campaign, run_campaign
-from harvey.campaign.summary import Progress
+from harvey.campaign.summary import ProgressLine
 from harvey.campaign.workers import Killed
 from harvey.errors import BadInput
 from harvey.runner.result import MissionResult, format_error
@@ -124,7 +124,7 @@ def run_task(
     stage = task.stage()
     with ExitStack() as shown:
         if progress is not None:
-            sinks = (shown.enter_context(closing(Progress(stage, progress))), *sinks)
+            sinks = (shown.enter_context(closing(ProgressLine(stage, progress))), *sinks)
         if task.go_on and task.out is not None and (task.out / "run.json").exists():
             if (found := find_finished(task, stage)) is not None:
                 return found

@@ -24,7 +24,7 @@ COLUMNS = ("seed", "outcome", "error mm", "inches", "milestones", "refuted", "wr
            "relocated", "collisions", "path m", "robot s", "cycles", "wall s")
 
 
-class Progress:
+class ProgressLine:
     """A sink that shows how far a mission is, by Harvey's own belief.
 
     On a terminal it is a bar that fills as the way to go shrinks. Elsewhere it is a line whenever a milestone is

@@ -3,8 +3,6 @@
 A command whose line ends with a comment needs what the reader has (hardware, a file of his own, minutes): it is parsed.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -3,8 +3,6 @@
 Mirrored, y and headings have the other sign, and pictures are flipped. Turned and shifted, all poses of the world are.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -16,7 +14,6 @@ from hypothesis import strategies as st
 from generated_boards import Bench, effect_on, mirrored, plain_robot, to_world
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.doors import MAX_LOG_ODDS, MIN_LOG_RATIO, PRIOR_LOG_ODDS, update_door
-from knowledge_sources.methods.features import find_lines
 from knowledge_sources.methods.motion import (
     compute_bearing,
     compute_free_space,
@@ -250,19 +247,3 @@ def test_what_is_expected_to_be_seen(pose: Pose2) -> None:
     flipped = np.stack([2.0 * ROBOT.camera.cx - other[..., 0], other[..., 1]], axis=-1)
     apart = np.array([min(min(np.abs(line - f).max(), np.abs(line[::-1] - f).max()) for f in flipped) for line in one])
     assert abs(len(one) - len(other)) <= 1 and np.median(apart) < 0.2 and apart.max() < 4.0
-
-
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_lines_of_a_flipped_picture(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    rows, columns = np.mgrid[0:200, 0:200]
-    slant = rng.uniform(-0.3, 0.3)
-    image = np.where(columns > 90 + slant * (rows - 100), 180, 60).astype(np.uint8)
-    image[rows > 150] = 120
-    pictures = [find_lines(picture, min_length_px=20.0).segments_px
-                for picture in (image, np.ascontiguousarray(image[:, ::-1]))]
-    one, other = pictures
-    flipped = np.stack([199.0 - other[..., 0], other[..., 1]], axis=-1)
-    assert len(one) == len(other) > 0
-    for line in one:
-        assert min(min(np.abs(line - f).max(), np.abs(line[::-1] - f).max()) for f in flipped) < 2.0

@@ -1,7 +1,5 @@
 """Experiments that drive: their quick versions hold what they claim."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A robot that is put down roughly: the plan level knows how roughly, so that the first milestone mends it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,20 +1,18 @@
 """A desk that the model has elsewhere: the robot touches it, says so, and why it stopped walks to what it felt."""
 
-from __future__ import annotations
-
 import math
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
 
 from experiments.generated.missions import OFFICE
 from harvey.cli import main
 from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import build_head, resume_mission, run_mission
+from journals import logged
 from logs.explain.turning_points import read_turning_points
 from logs.explain.why import tell_stories
 from logs.recording.paths import CONTACTS, RANGES
@@ -101,12 +99,9 @@ def test_it_is_replayed_byte_for_byte_and_goes_on_after_it_was_cut_off(
 
 
 def test_the_recording_marks_where_it_touched_and_what_was_heard(touched: tuple[MissionResult, Path]) -> None:
-    rows: dict[str, list[list[list[float]]]] = {CONTACTS: [], RANGES: []}
-    for path, component in ((CONTACTS, "Points3D:positions"), (RANGES, "LineStrips3D:strips")):
-        for chunk in RrdReader(touched[1] / "recording.rrd").stream().filter(content=f"/{path}", is_static=False):
-            batch = chunk.to_record_batch()
-            if component in batch.schema.names:
-                rows[path] += [value for value in batch.column(component).to_pylist() if value is not None]
-    assert len(rows[CONTACTS][-1]) == touched[0].collisions and len(rows[RANGES]) > 3
-    nearest_m = min(float(np.hypot(*np.array(lines)[:, 1, :2].T).min()) for lines in rows[RANGES])
+    recording = touched[1] / "recording.rrd"
+    contacts = logged(recording, CONTACTS, "Points3D:positions")
+    heard = [np.array(lines) for _, lines in logged(recording, RANGES, "LineStrips3D:strips")]
+    assert len(contacts[-1][1]) == touched[0].collisions and len(heard) > 3
+    nearest_m = min(float(np.hypot(*lines[:, 1, :2].T).min()) for lines in heard)
     assert math.isclose(nearest_m, 0.35, abs_tol=0.1)

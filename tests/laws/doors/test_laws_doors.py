@@ -1,7 +1,5 @@
 """Laws of doors: what a picture says of an opening, and what pictures together say of a door."""
 
-from __future__ import annotations
-
 import math
 import random
 from dataclasses import replace
@@ -11,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from archive_door import DOORWAY, HALL, ROBOT, WORLD, before_door, photograph
 from knowledge_sources.methods.doors import (
     MAX_LOG_ODDS,
     MIN_LOG_RATIO,
@@ -35,75 +34,27 @@ from knowledge_sources.methods.doors.leaf import (
 )
 from knowledge_sources.methods.doors.rival_views import Views
 from knowledge_sources.methods.features import read_picture
-from sim.body.simulated_building import SimulatedBuilding
-from sim.ground_truth.table import TrueDoor
-from sim.ground_truth.true_changes import build_leaf
-from sim.render.sensor import SensorParameters, compress_jpeg, expose
-from sim.scenario import CameraSettings
-from world_models.actuator import ActuatorModel
-from world_models.building.locales import Doorway
-from world_models.building.world import World
 from world_models.entries import DoorPicture, DoorState, Hypothesis, diagonal
-from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, wrap_angle
-from world_models.robot import RobotModel
 
-HALL, DOOR = "north-hall", "archive-north-door"
 SURE = np.diag([0.01**2, 0.01**2, 0.005**2])
 RATIOS = st.floats(-MAX_LOG_RATIO, MAX_LOG_RATIO)
 
 
-@pytest.fixture(scope="module")
-def world() -> World:
-    return load_world(WORLDS / "two_ways.toml")
-
-
-@pytest.fixture(scope="module")
-def robot(world: World) -> RobotModel:
-    camera = CameraSettings()
-    return RobotModel(world, camera.camera, camera.mount, ActuatorModel())
-
-
-@pytest.fixture(scope="module")
-def doorway(world: World) -> Doorway:
-    return next(d for d in world.doorways if d.name == DOOR)
-
-
-@pytest.fixture(scope="module")
-def buildings(world: World, doorway: Doorway) -> dict[str, SimulatedBuilding]:
-    leaf = build_leaf(TrueDoor(name=DOOR), doorway, world.floor_m(HALL))
-    return {"open": SimulatedBuilding.of_faces(world.faces), "shut": SimulatedBuilding.of_faces([*world.faces, *leaf])}
-
-
-def weigh(
-    robot: RobotModel, doorway: Doorway, building: SimulatedBuilding, pose: Pose2, gain: float = 1.0
-) -> float | None:
+def weigh(pose: Pose2, is_shut: bool, gain: float = 1.0) -> float | None:
     """What a picture of the door says."""
-    opening = predict_opening(robot, pose, SURE, doorway, HALL, robot.world)
+    opening = predict_opening(ROBOT, pose, SURE, DOORWAY, HALL, WORLD)
     if opening is None:
         return None
-    radiance = gain * building.renderer.radiance(robot.lens, robot.camera_from_world(pose))
-    sensor = SensorParameters()
-    jpeg = compress_jpeg(expose(radiance, sensor, np.random.default_rng(1)), sensor.jpeg_quality)
-    evidence = measure_opening(robot, opening, read_picture(jpeg).half)
+    evidence = measure_opening(ROBOT, opening, read_picture(photograph(pose, is_shut, gain=gain)).half)
     return None if evidence is None else weigh_leaf(evidence)
-
-
-def before_door(doorway: Doorway, away_m: float, aside_m: float) -> Pose2:
-    """A pose in the hall that faces the door."""
-    at = doorway.pose_from(HALL) @ Pose2(-away_m, aside_m, 0.0)
-    middle = doorway.pose_from(HALL)
-    return Pose2(at.x_m, at.y_m, math.atan2(middle.y_m - at.y_m, middle.x_m - at.x_m))
 
 
 @pytest.mark.parametrize("gain", [0.5, 1.0])
 @pytest.mark.parametrize(("away_m", "aside_m"), [(1.6, 0.2), (2.5, -0.3), (4.0, 0.4), (5.5, 0.0)])
-def test_a_leaf_is_told_from_what_is_beyond_in_any_light(
-    robot: RobotModel, doorway: Doorway, buildings: dict[str, SimulatedBuilding], away_m: float, aside_m: float,
-    gain: float,
-) -> None:
-    pose = before_door(doorway, away_m, aside_m)
-    shut, opened = (weigh(robot, doorway, buildings[state], pose, gain) for state in ("shut", "open"))
+def test_a_leaf_is_told_from_what_is_beyond_in_any_light(away_m: float, aside_m: float, gain: float) -> None:
+    pose = before_door(away_m, aside_m)
+    shut, opened = (weigh(pose, is_shut, gain) for is_shut in (True, False))
     assert shut is not None and shut >= MIN_LOG_RATIO
     assert opened is not None and opened <= -MIN_LOG_RATIO
 
@@ -112,15 +63,15 @@ def test_a_leaf_is_told_from_what_is_beyond_in_any_light(
 @pytest.mark.parametrize("sigma_rad", [0.001, 0.03])
 @pytest.mark.parametrize("aside_m", [-0.5, 0.0, 0.5])
 def test_samples_keep_off_the_jambs_by_what_the_pose_leaves_open(
-    robot: RobotModel, doorway: Doorway, sigma_m: float, sigma_rad: float, aside_m: float
+    sigma_m: float, sigma_rad: float, aside_m: float
 ) -> None:
     """Two deviations of the place and of the heading at that distance; and every sample passes both thresholds so."""
-    pose = before_door(doorway, 2.5, aside_m)
-    opening = predict_opening(robot, pose, np.diag([sigma_m, sigma_m, sigma_rad]) ** 2, doorway, HALL, robot.world)
+    pose, doorway = before_door(2.5, aside_m), DOORWAY
+    opening = predict_opening(ROBOT, pose, np.diag([sigma_m, sigma_m, sigma_rad]) ** 2, doorway, HALL, WORLD)
     assert opening is not None
     margin_m = JAMB_MARGIN_M + 2.0 * math.hypot(sigma_m, sigma_rad * opening.distance_m)
-    center = robot.camera_from_world(pose).inverse()
-    rays = robot.camera.rays(opening.pixels) @ center.rotation.T
+    center = ROBOT.camera_from_world(pose).inverse()
+    rays = ROBOT.camera.rays(opening.pixels) @ center.rotation.T
     for k, room in enumerate((HALL, doorway.other(HALL))):
         left, right = doorway.threshold_of(room)
         outward = doorway.outward_from(HALL)
@@ -133,27 +84,22 @@ def test_samples_keep_off_the_jambs_by_what_the_pose_leaves_open(
             assert np.allclose(across / doorway.width_m, opening.across) and np.allclose(height, opening.height_m)
 
 
-def test_a_wall_where_the_door_should_be_is_no_leaf(
-    robot: RobotModel, doorway: Doorway, buildings: dict[str, SimulatedBuilding]
-) -> None:
+def test_a_wall_where_the_door_should_be_is_no_leaf() -> None:
     """A robot that is elsewhere sees no frame where it expects it."""
-    pose = before_door(doorway, 2.5, 0.0)
-    opening = predict_opening(robot, pose, SURE, doorway, HALL, robot.world)
+    pose = before_door(2.5, 0.0)
+    opening = predict_opening(ROBOT, pose, SURE, DOORWAY, HALL, WORLD)
     assert opening is not None
     elsewhere = Pose2(pose.x_m, pose.y_m, pose.heading_rad + 0.5 * math.pi)
-    sensor = SensorParameters()
-    radiance = buildings["open"].renderer.radiance(robot.lens, robot.camera_from_world(elsewhere))
-    jpeg = compress_jpeg(expose(radiance, sensor, np.random.default_rng(1)), sensor.jpeg_quality)
-    evidence = measure_opening(robot, opening, read_picture(jpeg).half)
+    evidence = measure_opening(ROBOT, opening, read_picture(photograph(elsewhere, is_shut=False)).half)
     assert evidence is None or weigh_leaf(evidence) <= 0.0
 
 
-def test_a_door_that_is_far_behind_or_seen_from_the_side_is_not_looked_at(robot: RobotModel, doorway: Doorway) -> None:
-    middle = doorway.pose_from(HALL)
-    assert is_in_view(robot, before_door(doorway, 3.0, 0.0), doorway, HALL)
-    assert not is_in_view(robot, before_door(doorway, MAX_DISTANCE_M + 0.5, 0.0), doorway, HALL)
-    assert not is_in_view(robot, middle @ Pose2(-3.0, 0.0, math.pi), doorway, HALL)
-    assert not is_in_view(robot, middle @ Pose2(-0.3, 1.0, -1.3), doorway, HALL)
+def test_a_door_that_is_far_behind_or_seen_from_the_side_is_not_looked_at() -> None:
+    middle = DOORWAY.pose_from(HALL)
+    assert is_in_view(ROBOT, before_door(3.0, 0.0), DOORWAY, HALL)
+    for pose in (before_door(MAX_DISTANCE_M + 0.5, 0.0), middle @ Pose2(-3.0, 0.0, math.pi),
+                 middle @ Pose2(-0.3, 1.0, -1.3)):
+        assert not is_in_view(ROBOT, pose, DOORWAY, HALL)
 
 
 @given(st.lists(st.tuples(*[st.floats(0.0, 6.0)] * 3), min_size=1, max_size=30), st.floats(-2.0, 2.0))
@@ -229,11 +175,9 @@ def test_a_state_says_what_is_seen() -> None:
         "d is shut, with a probability of 99.3% by 2 pictures: the last showed something in its opening, at 1.0 s")
 
 
-@pytest.mark.parametrize("state", ["open", "shut"])
-def test_an_overexposed_opening_says_nothing(
-    robot: RobotModel, doorway: Doorway, buildings: dict[str, SimulatedBuilding], state: str
-) -> None:
-    assert weigh(robot, doorway, buildings[state], before_door(doorway, 2.0, 0.0), gain=9.0) is None
+@pytest.mark.parametrize("is_shut", [False, True])
+def test_an_overexposed_opening_says_nothing(is_shut: bool) -> None:
+    assert weigh(before_door(2.0, 0.0), is_shut, gain=9.0) is None
 
 
 LEAF = LeafEvidence(200, 150, 1.0, 0.5, 0.0, 0.0, 1.0, 1.0, 0.0)

@@ -1,10 +1,7 @@
 """Laws of the alignment of a belief to the model's edges, on rendered pictures of the research center."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -12,16 +9,13 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey.simulation.simulated_run import build_robot_model
+from consistency import compute_error
 from knowledge_sources.methods.arrays import Floats, Image
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.motion import compute_free_space
 from knowledge_sources.methods.tracking import align_to_edges
 from knowledge_sources.methods.tracking.edge_alignment import INFLATION, EdgeAlignment, _intersect_lines
-from sim.render.optics import Optics
-from sim.render.sensor import compress_jpeg, expose
-from sim.scenario import load_scenario
-from sim.stage import Stage, build_stage
+from lab_pictures import photograph, robot
 from world_models.camera import move_camera
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
@@ -31,16 +25,6 @@ KNOWN, TILT = np.zeros((7, 7)), np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 few = settings(max_examples=30, deadline=None)
 seeds = st.integers(0, 2**32 - 1)
 ROOMS = ("hallway", "robot-laboratory", "library", "allens-office", "conference-room", "machine-room")
-
-
-@cache
-def stage() -> Stage:
-    return build_stage(load_scenario("lab-to-allens-office"))
-
-
-@cache
-def robot() -> RobotModel:
-    return build_robot_model(stage().scenario)
 
 
 def draw_pose(rng: np.random.Generator) -> Pose2:
@@ -54,9 +38,7 @@ def draw_pose(rng: np.random.Generator) -> Pose2:
 
 
 def render(pose: Pose2, rng: np.random.Generator) -> Image:
-    s = stage().scenario
-    radiance = Optics.of(s.camera.camera).radiance(stage().building.renderer, robot().camera_from_world(pose))
-    return read_picture(compress_jpeg(expose(radiance, s.sensor, rng, lights_on=True), s.sensor.jpeg_quality)).grey
+    return read_picture(photograph(pose, rng)).grey
 
 
 def draw_belief(pose: Pose2, sigmas: tuple[float, float, float], rng: np.random.Generator) -> tuple[Pose2, Floats]:
@@ -80,10 +62,6 @@ def align(belief: Pose2, covariance: Floats, image: Image, camera: Floats = KNOW
     return align_to_edges(seen, image, lines.lines_world, belief, covariance, camera)
 
 
-def difference(one: Pose2, other: Pose2) -> Floats:
-    return np.array([one.x_m - other.x_m, one.y_m - other.y_m, wrap_angle(one.heading_rad - other.heading_rad)])
-
-
 def test_however_loose_the_belief_was_it_is_no_further_off_than_it_says() -> None:
     """In 95 of 100 cases within three deviations. Where the next edge need not be a line's own it says nothing."""
     rng = np.random.default_rng(11)
@@ -94,7 +72,7 @@ def test_however_loose_the_belief_was_it_is_no_further_off_than_it_says() -> Non
         belief, covariance = draw_belief(true, sigmas, rng)
         found = align(belief, covariance, render(true, rng))
         if found is not None:
-            error = difference(found.world_from_robot, true)
+            error = compute_error(found.world_from_robot, true)
             assert np.linalg.eigvalsh(found.covariance).min() > 0.0
             off_by.append(math.sqrt(error @ np.linalg.solve(found.covariance, error)))
     assert len(off_by) >= 30
@@ -110,7 +88,7 @@ def test_a_nearly_right_belief_is_corrected_to_a_millimetre_or_so() -> None:
         belief, covariance = draw_belief(true, (0.003, 0.003, math.radians(0.15)), rng)
         found = align(belief, covariance, render(true, rng))
         if found is not None:
-            errors.append(np.abs(difference(found.world_from_robot, true)))
+            errors.append(np.abs(compute_error(found.world_from_robot, true)))
     assert len(errors) >= 20
     x_m, y_m, heading_rad = np.median(errors, axis=0)
     assert math.hypot(x_m, y_m) < 0.001 and heading_rad < math.radians(0.03)
@@ -124,7 +102,7 @@ def test_what_is_not_known_of_the_camera_is_not_known_of_the_pose() -> None:
     here, unsure = align(true, sure, image), align(true, sure, image, np.diag(np.square(TILT)))
     other = align(true, sure, image, of=replace(robot(), mount=move_camera(robot().camera, robot().mount, TILT)[1]))
     assert here is not None and unsure is not None and other is not None
-    off, grown = difference(other.world_from_robot, here.world_from_robot), unsure.covariance - here.covariance
+    off, grown = compute_error(other.world_from_robot, here.world_from_robot), unsure.covariance - here.covariance
     assert 0.3 < math.sqrt(np.trace(grown[:2, :2])) / math.hypot(*off[:2]) < 2.0
     assert np.all(np.linalg.eigvalsh(sure + INFLATION - unsure.covariance) > 0.0)
 

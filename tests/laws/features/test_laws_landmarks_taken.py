@@ -1,10 +1,7 @@
 """Laws of which landmarks are taken to be followed, and of what their templates' beliefs leave open."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -12,7 +9,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
 
-from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.tracking import (
     MAX_LANDMARK_DISTANCE_M,
@@ -22,35 +18,20 @@ from knowledge_sources.methods.tracking import (
     template_tracking,
 )
 from knowledge_sources.methods.tracking.template_tracking import _compute_anchor_covariance
-from sim.render.optics import Optics
-from sim.render.sensor import compress_jpeg, expose
-from sim.scenario import load_scenario
-from sim.stage import Stage, build_stage
+from lab_pictures import photograph, robot
 from world_models.entries import Anchor, Track
 from world_models.frames import Pose2
-from world_models.robot import RobotModel
 
 seeds = st.integers(0, 2**32 - 1)
-
-
-@cache
-def stage() -> Stage:
-    return build_stage(load_scenario("lab-to-allens-office"))
-
-
-@cache
-def robot() -> RobotModel:
-    return build_robot_model(stage().scenario)
 
 
 @given(seed=seeds, part=st.floats(0.0, 1.0), most=st.integers(1, 12))
 @settings(max_examples=12, deadline=None)
 def test_new_landmarks_are_apart_from_each_other_and_from_those_kept(seed: int, part: float, most: int) -> None:
-    rng, s = np.random.default_rng(seed), stage().scenario
+    rng = np.random.default_rng(seed)
     corners = np.array(robot().world.outline("robot-laboratory"))
     pose = Pose2(*rng.uniform(corners.min(axis=0) + 1.0, corners.max(axis=0) - 1.0), rng.uniform(-math.pi, math.pi))
-    radiance = Optics.of(s.camera.camera).radiance(stage().building.renderer, robot().camera_from_world(pose))
-    image = read_picture(compress_jpeg(expose(radiance, s.sensor, rng, lights_on=True), s.sensor.jpeg_quality)).grey
+    image = read_picture(photograph(pose, rng)).grey
     first = select_landmarks(robot(), (), "CameraPicture-1", image, pose)
     assume(len(first) >= 2)
     kept = tuple(replace(track, found_px=None) if rng.random() < 0.3 else track

@@ -1,7 +1,5 @@
 """Lens distortion: what is bent is straightened again, the simulator's model is the robot's, and both are OpenCV's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

@@ -1,7 +1,5 @@
 """Footprints: joined from several sights, taken off where the floor is free, and told apart."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Laws of the belief checker: a doubt is measured where the robot stands, ahead first; no look is counted twice."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -14,7 +12,7 @@ from knowledge_sources.methods.verification import MIN_MATCHED_LINES, turn_headi
 from knowledge_sources.milestone_selector.belief_checker import BeliefChecker
 from knowledge_sources.reads import list_log_odds
 from knowledge_sources.reads.looks import MAX_LOOK_LOG_ODDS
-from world_models.entries import Certificate, Milestone, Outcome
+from world_models.entries import Certificate, Milestone
 from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2, wrap_angle
 
@@ -82,20 +80,15 @@ def test_only_looks_since_the_doubt_that_told_nothing_were_in_vain(when: str, st
     assert check.tried == ((0.0,) if (when, status) == ("after", "not testable") else ())
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "doubt", "belief", "rest", "course of things", "place", "look"])
+@pytest.mark.parametrize("lacks", ["nothing", "measure", "belief", "rest", "course of things", "place", "look"])
 def test_it_checks_only_what_is_in_doubt_and_not_while_a_look_is_under_way(lacks: str) -> None:
     bench = Bench(plain_robot())
-    if lacks != "belief":
-        bench.believe()
-    doubt = bench.doubt(Level.PLAN, 3.0 if lacks == "doubt" else None)
-    if lacks == "rest":
-        bench.move()
-    elif lacks == "course of things":
-        bench.put(Outcome("failed", ""))
-    elif lacks == "place":
-        bench.doubt(Level.GOAL)
-    elif lacks == "look":
+    bench.believe()
+    doubt = bench.doubt(Level.PLAN, 3.0 if lacks == "measure" else None)
+    if lacks == "look":
         bench.await_milestone()
+    elif lacks != "measure":
+        bench.lack(lacks)
     assert (bench.ask(SOURCE, doubt) is not None) == (lacks == "nothing")
 
 

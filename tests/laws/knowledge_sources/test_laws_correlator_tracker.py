@@ -3,23 +3,20 @@
 It follows real templates through rendered pictures; where a landmark is not to be found, the picture is grey there.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-from acting import answer
-from blackboard import Blackboard, Change, Discrepancy, Effect, Level, Post, Retract, Revise
-from generated_boards import reasons
-from harvey.simulation.simulated_run import build_robot_model
+from blackboard import Discrepancy, Effect, Level, Retract, Revise
+from generated_boards import Bench, reasons
 from knowledge_sources.action import correlator_tracker
 from knowledge_sources.action.correlator_tracker import (
     ENOUGH_LANDMARKS,
@@ -35,10 +32,8 @@ from knowledge_sources.action.correlator_tracker import (
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.tracking import TEMPLATE_HALF_PX, TOLERANCE_SIGMAS, edge_alignment, select_landmarks
 from knowledge_sources.settings import DEFAULT
-from sim.render.optics import Optics
-from sim.render.sensor import compress_jpeg, expose
-from sim.scenario import load_scenario
-from sim.stage import Stage, build_stage
+from lab_pictures import ROOM, draw_places, photograph, robot, stage
+from sim.render.sensor import compress_jpeg
 from world_models.entries import (
     Anchor,
     CameraPicture,
@@ -50,11 +45,8 @@ from world_models.entries import (
     covariance_tuple,
     diagonal,
 )
-from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
-from world_models.robot import RobotModel
 
-ROOM = "robot-laboratory"
 SURE, TURNED = diagonal(0.004, 0.001), diagonal(0.004, 0.02)
 TURN_RAD, SLIP_RAD = math.radians(3.0), math.radians(0.6)
 """It turns by the first, and believes to have turned by less."""
@@ -71,36 +63,22 @@ class Setting(NamedTuple):
 
 
 @cache
-def stage() -> Stage:
-    return build_stage(load_scenario("lab-to-allens-office"))
-
-
-@cache
 def setting() -> Setting:
     """The first place of some at which enough landmarks are seen before the turn and after it."""
-    scenario, robot = stage().scenario, build_robot_model(stage().scenario)
     rng = np.random.default_rng(5)
-
-    def picture(pose: Pose2) -> bytes:
-        radiance = Optics.of(scenario.camera.camera).radiance(stage().building.renderer, robot.camera_from_world(pose))
-        return compress_jpeg(expose(radiance, scenario.sensor, rng, lights_on=True), scenario.sensor.jpeg_quality)
-
-    corners = np.array(robot.world.outline(ROOM))
-    for _ in range(40):
-        x_m, y_m = rng.uniform(corners.min(axis=0) + 1.5, corners.max(axis=0) - 1.5)
-        start = Pose2(x_m, y_m, rng.uniform(-3.0, 3.0))
+    for start in islice(draw_places(rng), 40):
         end = Pose2(start.x_m, start.y_m, start.heading_rad + TURN_RAD)
-        before = picture(start)
-        found = select_landmarks(robot, (), "CameraPicture-1", read_picture(before).grey, start)
-        half = robot.camera.width / 2
-        inside = tuple(track for track in found if abs(place_px(robot, end, track)[0] - half) < half - 60)
+        before = photograph(start, rng)
+        found = select_landmarks(robot(), (), "CameraPicture-1", read_picture(before).grey, start)
+        half = robot().camera.width / 2
+        inside = tuple(track for track in found if abs(place_px(end, track)[0] - half) < half - 60)
         if len(inside) >= 2 * MIN_EXPECTED_LANDMARKS:
-            return Setting(before, picture(end), inside, start, end)
+            return Setting(before, photograph(end, rng), inside, start, end)
     raise AssertionError("expected a place with enough landmarks")
 
 
-def place_px(robot: RobotModel, pose: Pose2, track: Track) -> tuple[float, float]:
-    u, v = robot.camera.project(robot.camera_from_world(pose).apply(np.array(track.point_world)))
+def place_px(pose: Pose2, track: Track) -> tuple[float, float]:
+    u, v = robot().camera.project(robot().camera_from_world(pose).apply(np.array(track.point_world)))
     return float(u), float(v)
 
 
@@ -110,36 +88,26 @@ def follow(
 ) -> list[Effect]:
     """What the tracker does where so many landmarks are followed and so many of them are not to be found."""
     seen = setting()
-    robot, board, cycle = build_robot_model(stage().scenario), Blackboard(), 0
-    world = stage().world
-    store = FrameStore(world)
-    near = [ROOM, *(doorway.other(ROOM) for doorway in world.doorways_of(ROOM))]
     tracks = [replace(track, misses=misses) for track in seen.tracks[:found + hidden]]
     image = read_picture(seen.after).grey.copy()
     for track in tracks[found:]:
-        u, v = place_px(robot, seen.end, track)
+        u, v = place_px(seen.end, track)
         image[max(0, round(v) - 15):round(v) + 16, max(0, round(u) - 15):round(u) + 16] = 128
 
-    def apply(*effects: Effect) -> tuple[Change, ...]:
-        nonlocal cycle
-        cycle += 1
-        return board.apply(effects, author="test", cycle=cycle)
-
     believed = Pose2(seen.end.x_m, seen.end.y_m, seen.end.heading_rad - SLIP_RAD)
-    containers = [name for name in world.path_of(ROOM) if name != ROOM]
-    apply(*map(Post, robot.entries()), *(Post(store.frame(name)) for name in dict.fromkeys(["", *containers, *near])),
-          Post(Hypothesis.of_world(world, ROOM, believed, np.array(TURNED), "odometry")),
-          Post(CameraPicture(seen.before, 0, 0.0)))
+    bench = Bench(robot())
+    bench.put(Hypothesis.of_world(stage().world, ROOM, believed, np.array(TURNED), "odometry"))
+    bench.put(CameraPicture(seen.before, 0, 0.0))
     anchor = Anchor("CameraPicture-1", seen.start.x_m, seen.start.y_m, covariance_tuple(np.array(SURE)))
-    apply(Post(Tracks("CameraPicture-1", TEMPLATE_HALF_PX, tuple(tracks), (anchor,),
-                      len(tracks) if taken is None else taken, unseen)))
+    bench.put(Tracks("CameraPicture-1", TEMPLATE_HALF_PX, tuple(tracks), (anchor,),
+                     len(tracks) if taken is None else taken, unseen))
     for value in (drift, doubt, *floors):
         if value is not None:
-            apply(Post(value))
-    (picture,) = apply(Post(CameraPicture(compress_jpeg(image, 95), 1, 1.0, "track")))
+            bench.put(value)
+    picture = bench.put(CameraPicture(compress_jpeg(image, 95), 1, 1.0, "track"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(edge_alignment, "MIN_EDGE_LINES", 10**6)  # so that only landmarks correct the belief
-        effects = answer(CorrelatorTracker(), board.view, picture)
+        effects = bench.ask(CorrelatorTracker(), picture)
     assert effects is not None
     return list(effects)
 
@@ -218,14 +186,13 @@ def test_what_is_told_rests_on_the_picture_the_belief_and_the_landmarks() -> Non
 
 def test_the_difference_is_the_median_shift_and_its_bound_that_of_the_belief() -> None:
     seen, effects = setting(), follow(7)
-    robot = build_robot_model(stage().scenario)
     believed = Pose2(seen.end.x_m, seen.end.y_m, seen.end.heading_rad - SLIP_RAD)
-    shifts = [math.dist(place_px(robot, believed, t), place_px(robot, seen.end, t)) for t in seen.tracks[:7]]
+    shifts = [math.dist(place_px(believed, t), place_px(seen.end, t)) for t in seen.tracks[:7]]
     (found,) = discrepancies(effects)
     assert found.magnitude == pytest.approx(sorted(shifts)[3], abs=0.5)
-    ahead = [float(robot.camera_from_world(believed).apply(np.array(t.point_world))[2]) for t in seen.tracks[:7]]
+    ahead = [float(robot().camera_from_world(believed).apply(np.array(t.point_world))[2]) for t in seen.tracks[:7]]
     spread = math.hypot(0.02, 0.004 / sorted(ahead)[3])
-    bound = DEFAULT.action.min_tolerance_px + TOLERANCE_SIGMAS * robot.camera.fx * spread
+    bound = DEFAULT.action.min_tolerance_px + TOLERANCE_SIGMAS * robot().camera.fx * spread
     assert found.bounds == (pytest.approx(min(bound, DEFAULT.plan.max_deviation_px)), DEFAULT.plan.max_deviation_px)
     assert found.level is Level.ACTION and found.unit == "px" and found.what.startswith("7 landmarks are ")
 
@@ -248,7 +215,7 @@ def test_the_drift_is_learnt_where_the_robot_has_gone_far_enough(gone_m: float, 
     if learns:
         (belief,) = corrections(effects)
         heading = belief.world_from_robot(stage().world).heading_rad
-        assert found[0].value == drift.update(build_robot_model(stage().scenario).actuator, heading,
+        assert found[0].value == drift.update(robot().actuator, heading,
                                               math.sqrt(2.0) * belief.sigma_rad)
         assert found[0].value.curvature_per_m > 0.0  # it turned further left than the wheels say
         assert reasons(found[0]) == {"Drift-1", "Hypothesis"}

@@ -1,7 +1,5 @@
 """Laws of the dependency withdrawer: a revised frame takes with it exactly what rested on what it no longer says."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, get_args
@@ -108,10 +106,9 @@ def revise_for(
         bench.revise(bench.view[sketch.value.goal], status="abandoned")
     thing = bench.put(Obstacle("hall/obstacle-1", locale, square(x_m, y_m), 0.05, x_m, y_m, 0.2, seen_s=3.0,
                                touched_s=touched_s, status=status))  # type: ignore[arg-type]
-    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == HALL)
-    (revised,) = bench.apply(Revise(frame, replace(frame.value, changes=(
-        FrameChange("extra", "hall/obstacle-1", "test", square(x_m, y_m)),)), (frame, thing)))
-    effects = answer(DependencyWithdrawer(), bench.view, revised)
+    changed, frame = FrameChange("extra", thing.value.name, "test", square(x_m, y_m)), bench.frame()
+    (revised,) = bench.apply(Revise(frame, replace(frame.value, changes=(changed,)), (frame, thing)))
+    effects = bench.ask(DependencyWithdrawer(), revised.entry)
     assert all(reasons(effect) == {frame.id} for effect in effects or ())
     assert all(s.status == "superseded" for s in made(effects, PlanSketch))
     return {effect.entry.id for effect in effects or () if not isinstance(effect, Post)}
@@ -162,9 +159,8 @@ def test_a_way_through_a_door_that_was_found_shut_is_drawn_anew(passage: str, at
              Subgoal(Place(STUDY, 1.0, 2.0), Place(STUDY, 3.0, 2.0), primitive=True))
     sketches = [bench.put(PlanSketch(goal.id, path, "", steps, at)) for path in ((), (0,))]
     done = bench.put(PlanSketch(goal.id, (), "", steps, 0, status="done"))
-    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == HALL)
-    effects = answer(DependencyWithdrawer(), bench.view, bench.apply(Revise(
-        frame, frame.value.changed(FrameChange("shut", "study-door", "test")), (frame,)))[0])
+    shut = (FrameChange("shut", "study-door", "test"),)
+    effects = bench.ask(DependencyWithdrawer(), bench.revise(bench.frame(), changes=shut))
     misled = passage == "study-door" and at == 0
     ids = {effect.entry.id for effect in effects or () if not isinstance(effect, Post)}
     assert ids == ({sketch.id for sketch in sketches} if misled else set()) and done.id not in ids
@@ -176,10 +172,8 @@ def test_a_way_across_a_room_that_was_rearranged_is_drawn_anew(what: Any, locale
     bench = Bench(plain_robot())
     bench.believe()
     bench.sketch(FROM, MIDDLE, TO)
-    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == locale)
     changed = (FrameChange(what, f"{locale}/desk", "test"),) if what else ()
-    effects = answer(DependencyWithdrawer(), bench.view, bench.apply(
-        Revise(frame, replace(frame.value, changes=changed), (frame,)))[0])
+    effects = bench.ask(DependencyWithdrawer(), bench.revise(bench.frame(locale), changes=changed))
     assert bool(made(effects, PlanSketch)) == is_drawn_anew
 
 
@@ -189,7 +183,7 @@ def test_landmarks_that_are_gone_are_not_followed_and_the_others_are() -> None:
     items = tuple(Track(name, (0.0, 0.0, 0.0), "CameraPicture-1", (0.0, 0.0), 1.0, (0.0, 0.0), None, 0.0, 1.0)
                   for name in names)
     tracks = bench.put(Tracks("CameraPicture-1", 9, items, (), 4))
-    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == HALL)
+    frame = bench.frame()
     for thing, kept in (("hall/desk-1", names[2:]), ("hall/rack", names[:3]), ("hall/lamp", names)):
         changed = replace(frame.value, changes=(FrameChange("gone", thing, "test"),))
         revised = Entry(frame.id, 1, changed, "test", 99)
@@ -205,8 +199,7 @@ def test_a_milestone_of_a_sketch_that_is_drawn_anew_is_not_awaited() -> None:
     bench.believe()
     sketch = bench.sketch(FROM, TO)
     awaited, other = bench.await_milestone(sketch.id, 0), bench.await_milestone("PlanSketch-9", 0)
-    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == HALL)
-    effects = answer(DependencyWithdrawer(), bench.view, bench.apply(Revise(frame, replace(
-        frame.value, changes=(FrameChange("gone", "hall/desk", "test"),)), (frame,)))[0])
+    gone = (FrameChange("gone", "hall/desk", "test"),)
+    effects = bench.ask(DependencyWithdrawer(), bench.revise(bench.frame(), changes=gone))
     ids = {effect.entry.id for effect in effects or () if not isinstance(effect, Post)}
     assert ids == {awaited.id, sketch.id} and other.id not in ids

@@ -1,8 +1,5 @@
 """Law of doors that are looked at: what pictures from several places say is believed of the door, and no more."""
 
-from __future__ import annotations
-
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -11,57 +8,33 @@ import numpy as np
 import pytest
 
 from acting import answer
+from archive_door import DOOR, before_door, photograph
 from blackboard import Discrepancy, Effect, Level, Post, Posted, Revise, Revised
 from knowledge_sources.methods.doors import MAX_LOG_ODDS, PRIOR_LOG_ODDS
 from knowledge_sources.methods.doors.belief import MIN_PICTURES
 from knowledge_sources.model.door_watcher import DoorWatcher
 from knowledge_sources.model.floor_watcher import FloorWatcher
 from knowledge_sources.reads import MAX_SIGMA_M, MAX_SIGMA_RAD
-from sim.body.simulated_building import SimulatedBuilding
-from sim.ground_truth.table import TrueDoor
-from sim.ground_truth.true_changes import build_leaf
-from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from things_in_hall import HALL, Hall
-from world_models.building.world import World
 from world_models.entries import CameraPicture, DoorState, Hypothesis, Milestone, Outcome, diagonal
-from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2
 
-DOOR, SOURCE = "archive-north-door", DoorWatcher()
+SOURCE = DoorWatcher()
 PLACES = ((2.5, 0.0), (1.6, 0.4))
 """How far before the door, and how far aside: pictures from these are independent."""
 
 
-@pytest.fixture(scope="module")
-def world() -> World:
-    return load_world(WORLDS / "two_ways.toml")
-
-
-@pytest.fixture(scope="module")
-def buildings(world: World) -> dict[bool, SimulatedBuilding]:
-    """As it is, by whether the door is shut."""
-    doorway = next(d for d in world.doorways if d.name == DOOR)
-    leaf = build_leaf(TrueDoor(name=DOOR), doorway, world.floor_m(HALL))
-    return {False: SimulatedBuilding.of_faces(world.faces), True: SimulatedBuilding.of_faces([*world.faces, *leaf])}
-
-
 def stand(hall: Hall, away_m: float, aside_m: float, sigma_m: float = 0.01, sigma_rad: float = 0.005) -> Pose2:
     """The robot believes to stand before the door and to face it; its pose [world]."""
-    doorway = next(d for d in hall.robot.world.doorways_of(HALL) if d.name == DOOR)
-    middle, belief = doorway.pose_from(HALL), hall.belief()
-    at = middle @ Pose2(-away_m, aside_m, 0.0)
-    pose = Pose2(at.x_m, at.y_m, math.atan2(middle.y_m - at.y_m, middle.x_m - at.x_m))
+    pose, belief = before_door(away_m, aside_m), hall.belief()
     known = Hypothesis.of_world(hall.robot.world, HALL, pose, np.diag([1e-4, 1e-4, 1e-4]), "tracks")
     hall.apply(Revise(belief, replace(known, covariance=diagonal(sigma_m, sigma_rad)), (belief,)))
     return pose
 
 
-def look(hall: Hall, building: SimulatedBuilding, pose: Pose2, time_s: float = 1.0, *, lights_on: bool = True) -> Any:
+def look(hall: Hall, is_shut: bool, pose: Pose2, time_s: float = 1.0, *, lights_on: bool = True) -> Any:
     """A picture from a pose."""
-    radiance = building.renderer.radiance(hall.robot.lens, hall.robot.camera_from_world(pose))
-    sensor = SensorParameters()
-    jpeg = compress_jpeg(expose(radiance, sensor, np.random.default_rng(1), lights_on=lights_on), sensor.jpeg_quality)
-    return hall.put(CameraPicture(jpeg, 0, time_s, "track"))
+    return hall.put(CameraPicture(photograph(pose, is_shut, lights_on=lights_on), 0, time_s, "track"))
 
 
 def ask(hall: Hall, frame: Any) -> Sequence[Effect] | None:
@@ -74,48 +47,42 @@ def ask(hall: Hall, frame: Any) -> Sequence[Effect] | None:
     (CameraPicture(b"", 0, 1.0, "track"), {Posted}), (CameraPicture(b"", 0, 1.0, "milestone"), set()),
     (Milestone("PlanSketch-1", 0, "a place", 0.0, (), status="verified"), {Revised}),
     (Milestone("PlanSketch-1", 0, "a place", 0.0, (), status="refuted"), set())])
-def test_it_wakes_by_pictures_that_track_and_by_verified_milestones(world: World, value: Any, wakes: set[Any]) -> None:
-    entry = Hall(world, ()).put(value)
+def test_it_wakes_by_pictures_that_track_and_by_verified_milestones(value: Any, wakes: set[Any]) -> None:
+    entry = Hall(()).put(value)
     assert {kind for kind in (Posted, Revised) if any(w.sees(kind(entry)) for w in SOURCE.on)} == wakes
 
 
 @pytest.mark.parametrize(("sigma_m", "sigma_rad", "acts"), [
     (0.9 * MAX_SIGMA_M, 0.005, True), (1.1 * MAX_SIGMA_M, 0.005, False),
     (0.01, 0.9 * MAX_SIGMA_RAD, True), (0.01, 1.1 * MAX_SIGMA_RAD, False)])
-def test_it_looks_while_the_belief_is_sharp_and_not_in_doubt(
-    world: World, buildings: dict[bool, SimulatedBuilding], sigma_m: float, sigma_rad: float, acts: bool
-) -> None:
-    hall = Hall(world, ())
-    frame = look(hall, buildings[True], stand(hall, *PLACES[0], sigma_m, sigma_rad))
+def test_it_looks_while_the_belief_is_sharp_and_not_in_doubt(sigma_m: float, sigma_rad: float, acts: bool) -> None:
+    hall = Hall(())
+    frame = look(hall, True, stand(hall, *PLACES[0], sigma_m, sigma_rad))
     assert (ask(hall, frame) is not None) == acts
     for end in (Discrepancy(Level.PLAN, "elsewhere", None, (4.0, 30.0), "px"), Outcome("failed", "")):
         hall.put(end)
         assert ask(hall, frame) is None
 
 
-def test_in_the_dark_nothing_is_told_of_doors_nor_of_the_floor(
-    world: World, buildings: dict[bool, SimulatedBuilding]
-) -> None:
+def test_in_the_dark_nothing_is_told_of_doors_nor_of_the_floor() -> None:
     for lights_on in (False, True):
-        hall = Hall(world, ())
-        frame = look(hall, buildings[True], stand(hall, *PLACES[0]), lights_on=lights_on)
+        hall = Hall(())
+        frame = look(hall, True, stand(hall, *PLACES[0]), lights_on=lights_on)
         assert bool(ask(hall, frame)) == lights_on
         scan, *views = [e.value for e in answer(FloorWatcher(), hall.board.view, Posted(frame)) or ()]
         assert (bool(scan.bearings_rad), bool(views)) == (lights_on, lights_on) and not scan.things
 
 
-def test_what_is_as_it_is_believed_to_be_is_not_said(world: World, buildings: dict[bool, SimulatedBuilding]) -> None:
-    hall = Hall(world, ())
-    assert ask(hall, look(hall, buildings[False], stand(hall, *PLACES[0]))) == []
+def test_what_is_as_it_is_believed_to_be_is_not_said() -> None:
+    hall = Hall(())
+    assert ask(hall, look(hall, False, stand(hall, *PLACES[0]))) == []
 
 
-def test_a_leaf_from_two_places_is_a_shut_door_and_what_is_beyond_opens_it_again(
-    world: World, buildings: dict[bool, SimulatedBuilding]
-) -> None:
-    hall = Hall(world)  # with the model reviser, by whose frames it is believed to be shut
+def test_a_leaf_from_two_places_is_a_shut_door_and_what_is_beyond_opens_it_again() -> None:
+    hall = Hall()  # with the model reviser, by whose frames it is believed to be shut
     known: Any = None
     for number, place in enumerate(PLACES, 1):
-        frame = look(hall, buildings[True], stand(hall, *place), 1.0 * number)
+        frame = look(hall, True, stand(hall, *place), 1.0 * number)
         (effect,) = ask(hall, frame) or ()
         assert isinstance(effect, Post if known is None else Revise)
         reasons = (frame, hall.belief()) if known is None else (frame, hall.belief(), known)
@@ -130,7 +97,7 @@ def test_a_leaf_from_two_places_is_a_shut_door_and_what_is_beyond_opens_it_again
         assert ask(hall, frame) == []  # the same picture again says nothing new
     assert {(change.what, change.name) for change in hall.frame.changes} == {("shut", DOOR)}
     for number, place in enumerate(PLACES, 3):
-        frame = look(hall, buildings[False], stand(hall, *place), 1.0 * number)
+        frame = look(hall, False, stand(hall, *place), 1.0 * number)
         for effect in ask(hall, frame) or ():
             assert effect.value.last.log_ratio < 0.0 and hall.board.view.latest(DoorState) in effect.because
             hall.apply(effect)

@@ -3,8 +3,6 @@
 One that is over is closed; a motion that it broke off is a doubt, too many in a row are the end.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, get_args
 

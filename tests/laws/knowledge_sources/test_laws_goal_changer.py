@@ -1,20 +1,16 @@
 """Laws of the goal changer on each kind of board: with a goal or without, lost or not, a milestone awaited or not."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import pytest
 
-from acting import answer
-from blackboard import Blackboard, Change, Discrepancy, Effect, Level, Post, Retract, Revise
-from generated_boards import reasons
+from blackboard import Effect, Post, Retract, Revise
+from generated_boards import Bench, reasons
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.goal.goal_changer import goal_changer
 from sim.scenario import load_scenario
-from world_models.entries import Goal, Hypothesis, Milestone, Place, Redirection, diagonal
+from world_models.entries import Goal, Place, Redirection
 from world_models.files.world_files import WORLDS, load_world
-from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
 
 HALL = "north-hall"
@@ -25,25 +21,16 @@ ASKED = "(archive (10,5,0))"
 
 def decide(*texts: str, goal: str = "active", is_lost: bool = False, is_waiting: bool = False) -> list[Effect] | None:
     """What the goal changer does when it is asked; None where it does not act."""
-    world, board = load_world(WORLDS / "two_ways.toml"), Blackboard()
-    store, robot = FrameStore(world), build_robot_model(load_scenario("shut-door"), world)
-    cycle = 0
-
-    def apply(*effects: Effect) -> tuple[Change, ...]:
-        nonlocal cycle
-        cycle += 1
-        return board.apply(effects, author="test", cycle=cycle)
-
-    apply(*map(Post, robot.entries()), *(Post(store.frame(name)) for name in ("", HALL, "archive")),
-          Post(Hypothesis(HALL, BELIEVED, diagonal(0.01, 0.005), "milestone")))
+    bench = Bench(build_robot_model(load_scenario("shut-door"), load_world(WORLDS / "two_ways.toml")))
+    bench.believe(BELIEVED, locale=HALL)
     if goal:
-        apply(Post(Goal(Place(HALL, 1.0, 1.0), Place(HALL, 4.0, 1.2, 0.5), goal)))
+        bench.put(Goal(Place(HALL, 1.0, 1.0), Place(HALL, 4.0, 1.2, 0.5), goal))
     if is_waiting:
-        apply(Post(Milestone("PlanSketch-1", 1, "the end", 0.0)))
+        bench.await_milestone("PlanSketch-1", 1)
     if is_lost:
-        apply(Post(Discrepancy(Level.GOAL, "it fits nowhere", None, (0.0, 0.0), "px")))
-    asked = [apply(Post(Redirection(text)))[0] for text in texts][-1]
-    effects = answer(goal_changer, board.view, asked)
+        bench.doubt()
+    asked = [bench.put(Redirection(text)) for text in texts][-1]
+    effects = bench.ask(goal_changer, asked)
     assert effects is None or effects
     return None if effects is None else list(effects)
 

@@ -1,7 +1,5 @@
 """Laws of the goal sketcher: one sketch for a goal that has none, from where the robot is; else it sees no way on."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -15,14 +13,12 @@ from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.reads import find_frames
 from knowledge_sources.reads.sketches import GOAL_TOLERANCE_M
 from knowledge_sources.sketcher.goal_sketcher import GoalSketcher
-from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import (
     DoorPicture,
     DoorState,
     Goal,
     Impasse,
     Obstacle,
-    Outcome,
     Place,
     PlanSketch,
     SketchStatus,
@@ -165,18 +161,15 @@ def test_where_the_robot_does_not_fit_at_the_goal_it_sees_no_way_on(
         assert effect.value.is_open and reasons(effect) == {goal.id, belief.id}
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "belief", "goal", "need", "mission"])
+@pytest.mark.parametrize("lacks", ["nothing", "belief", "goal", "need", "course of things"])
 def test_it_draws_only_what_is_needed(lacks: str) -> None:
     bench = Bench(plain_robot())
-    if lacks != "belief":
-        bench.believe()
+    bench.believe()
     goal = bench.pursue(AIM)
-    if lacks == "goal":
-        bench.revise(goal, status="abandoned")
-    elif lacks == "need":
+    if lacks == "need":
         bench.sketch(goal=goal)
-    elif lacks == "mission":
-        bench.put(Outcome("failed", ""))
+    else:
+        bench.lack(lacks)
     assert (bench.ask(SOURCE, goal) is not None) == (lacks == "nothing")
 
 
@@ -204,7 +197,7 @@ def test_a_goal_that_is_occupied_is_called_so(side: float, off_m: float, is_take
     corners: Any = tuple(tuple(to_world(Pose2(6.0 + dx, y_m + dy, 0.0)).position.tolist())
                          for dx, dy in ((-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)))
     thing = bench.put(Obstacle(f"{HALL}/obstacle-1", HALL, corners, 0.02, 6.0, y_m, 0.2))
-    frame = next(entry for entry in bench.view.all(LocaleFrame) if entry.value.name == HALL)
+    frame = bench.frame()
     bench.apply(Revise(frame, revise_by_thing(frame.value, thing.value, "test", 0.0), (frame, thing)))
     effects = bench.ask(SOURCE, goal)
     assert bool(made(effects, Impasse)) is is_taken

@@ -16,10 +16,8 @@ from knowledge_sources.model.halt_explainer import HaltExplainer
 from knowledge_sources.reads import SEEN_MARGIN_M
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall
-from world_models.building.world import World
 from world_models.entries import Leg, Obstacle, ObstacleStatus
 from world_models.entries.task import LegStatus
-from world_models.files.world_files import WORLDS, load_world
 
 SOURCE = HaltExplainer()
 things = st.lists(st.tuples(st.floats(-4.0, 4.0), st.floats(-1.5, 1.5), st.sampled_from(get_args(ObstacleStatus))),
@@ -27,18 +25,13 @@ things = st.lists(st.tuples(st.floats(-4.0, 4.0), st.floats(-1.5, 1.5), st.sampl
 """How far each is from the carton's place, and how it is known."""
 
 
-@pytest.fixture(scope="module")
-def world() -> World:
-    return load_world(WORLDS / "two_ways.toml")
-
-
 def leg_to(dx_m: float, dy_m: float, status: LegStatus = "halted") -> Leg:
     return Leg("PlanSketch-1", 0, HERE.x_m, HERE.y_m, HERE.x_m + dx_m, HERE.y_m + dy_m, 0.05, status=status)
 
 
 @pytest.mark.parametrize("status", get_args(LegStatus))
-def test_it_wakes_when_a_leg_is_halted(world: World, status: LegStatus) -> None:
-    entry = Hall(world, ()).put(leg_to(3.0, 0.0, status))
+def test_it_wakes_when_a_leg_is_halted(status: LegStatus) -> None:
+    entry = Hall(()).put(leg_to(3.0, 0.0, status))
     (watch,) = SOURCE.on
     assert watch.sees(Revised(entry)) == (status == "halted")
     assert not watch.sees(Posted(entry))
@@ -46,9 +39,9 @@ def test_it_wakes_when_a_leg_is_halted(world: World, status: LegStatus) -> None:
 
 @pytest.mark.parametrize(("beyond_rim_m", "is_met"), [(-0.01, True), (0.01, False)])
 def test_the_sweep_is_the_robot_with_the_margin_within_which_floor_must_be_seen(
-    world: World, beyond_rim_m: float, is_met: bool
+    beyond_rim_m: float, is_met: bool
 ) -> None:
-    hall = Hall(world, ())
+    hall = Hall(())
     aside_m = hall.robot.radius_m + SEEN_MARGIN_M + beyond_rim_m
     corners = tuple((HERE.x_m + x, HERE.y_m + aside_m + y) for x, y in ((0.2, 0.0), (0.5, 0.0), (0.5, 0.3), (0.2, 0.3)))
     hall.put(Obstacle(f"{HALL}/obstacle-1", HALL, corners, 0.05, 0.0, 0.0, 0.5, certainty=0.7, status="suspected"))
@@ -59,9 +52,9 @@ def test_the_sweep_is_the_robot_with_the_margin_within_which_floor_must_be_seen(
 @given(things, st.floats(-4.0, 4.0), st.floats(-0.8, 0.8))
 @settings(max_examples=60, deadline=None)
 def test_what_is_suspected_in_the_next_sweep_is_there_and_nothing_else(
-    world: World, drawn: list[tuple[float, float, ObstacleStatus]], dx_m: float, dy_m: float
+    drawn: list[tuple[float, float, ObstacleStatus]], dx_m: float, dy_m: float
 ) -> None:
-    hall = Hall(world, ())
+    hall = Hall(())
     entries = []
     for number, (by_x_m, by_y_m, status) in enumerate(drawn, 1):
         corners = tuple((x + by_x_m, y + by_y_m) for x, y in CARTON)

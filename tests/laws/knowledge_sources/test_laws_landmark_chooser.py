@@ -1,9 +1,8 @@
 """Laws of the landmark chooser: all landmarks are taken again from the newest picture, and the drift starts afresh."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -11,18 +10,15 @@ import pytest
 
 from blackboard import Effect, Level, Post, Posted, Revise, Revised
 from generated_boards import Bench, effect_on, made, plain_robot, reasons, to_world, wakes
-from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.action.landmark_chooser import LandmarkChooser
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.tracking import edge_alignment, select_landmarks
-from sim.render.optics import Optics
-from sim.render.sensor import compress_jpeg, expose
-from sim.scenario import load_scenario
-from sim.stage import Stage, build_stage
+from lab_pictures import ROOM, draw_places, photograph, robot, stage
+from sim.render.sensor import compress_jpeg
 from world_models.entries import Anchor, CameraPicture, Drift, Hypothesis, Segments, Tracks, diagonal
 from world_models.frames import Pose2
 
-ROOM, SURE = "robot-laboratory", diagonal(0.004, 0.002)
+SURE = diagonal(0.004, 0.002)
 
 
 @pytest.fixture()
@@ -32,23 +28,12 @@ def no_edges(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @cache
-def stage() -> Stage:
-    return build_stage(load_scenario("lab-to-allens-office"))
-
-
-@cache
 def setting() -> tuple[Pose2, bytes]:
     """A place in the laboratory from which landmarks are seen, and the picture from there."""
-    scenario, robot = stage().scenario, build_robot_model(stage().scenario)
     rng = np.random.default_rng(5)
-    corners = np.array(robot.world.outline(ROOM))
-    for _ in range(40):
-        x_m, y_m = rng.uniform(corners.min(axis=0) + 1.5, corners.max(axis=0) - 1.5)
-        pose = Pose2(x_m, y_m, rng.uniform(-3.0, 3.0))
-        radiance = Optics.of(scenario.camera.camera).radiance(stage().building.renderer, robot.camera_from_world(pose))
-        exposed = expose(radiance, scenario.sensor, rng, lights_on=True)
-        jpeg = compress_jpeg(exposed, scenario.sensor.jpeg_quality)
-        if len(select_landmarks(robot, (), "CameraPicture-2", read_picture(jpeg).grey, pose)) >= 8:
+    for pose in islice(draw_places(rng), 40):
+        jpeg = photograph(pose, rng)
+        if len(select_landmarks(robot(), (), "CameraPicture-2", read_picture(jpeg).grey, pose)) >= 8:
             return pose, jpeg
     raise AssertionError("expected a place with enough landmarks")
 
@@ -63,7 +48,7 @@ class Chosen(NamedTuple):
 def choose(source: LandmarkChooser, *, off_rad: float = 0.0, has_old: bool = True, lost: Level | None = None,
            seen_in: str = "CameraPicture-1") -> Chosen:
     pose, jpeg = setting()
-    bench = Bench(build_robot_model(stage().scenario))
+    bench = Bench(robot())
     if has_old:
         bench.put(CameraPicture(jpeg, 0, 0.0, "milestone"))
         bench.put(Tracks("CameraPicture-1", 9, (), (Anchor("CameraPicture-1", 0.0, 0.0, SURE),), 5))
@@ -86,8 +71,7 @@ def test_all_landmarks_are_of_the_newest_picture(has_old: bool) -> None:
     effects = choose(LandmarkChooser(), has_old=has_old).effects
     effect = effect_on(effects, Tracks)
     tracks, (pose, jpeg) = effect.value, setting()
-    robot = build_robot_model(stage().scenario)
-    expected = select_landmarks(robot, (), "CameraPicture-2", read_picture(jpeg).grey, pose)
+    expected = select_landmarks(robot(), (), "CameraPicture-2", read_picture(jpeg).grey, pose)
     assert [t.landmark for t in tracks.items] == [t.landmark for t in expected] and tracks.taken == len(expected) >= 8
     assert np.allclose([t.template_px for t in tracks.items], [t.template_px for t in expected])
     assert tracks.frame == "CameraPicture-2" and {t.template_frame for t in tracks.items} == {"CameraPicture-2"}

@@ -1,7 +1,5 @@
 """Laws of the localizer: places that agree with the looks stay and go with the robot; no move leads to what it felt."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -281,12 +279,9 @@ def test_candidates_go_with_the_robot_from_when_they_were_found(
 @pytest.mark.parametrize("lacks", ["nothing", "doubt", "belief", "rest"])
 def test_places_are_searched_only_when_lost_and_standing(lacks: str) -> None:
     bench = Bench(plain_robot())
-    if lacks != "belief":
-        bench.believe()
-    if lacks != "doubt":
-        bench.doubt()
+    bench.believe()
+    bench.doubt()
     panorama = bench.put(Panorama(()))
-    if lacks == "rest":
-        bench.move()
+    bench.lack(lacks)
     assert (SOURCE.find_case(bench.view, Posted(panorama)) is not None) == (lacks == "nothing")
     assert wakes(SOURCE, Posted(panorama))

@@ -1,7 +1,5 @@
 """Laws of the lookout planner: what leaves no way is looked at again from elsewhere, so often a goal."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

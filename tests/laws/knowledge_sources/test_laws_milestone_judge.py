@@ -4,8 +4,6 @@ The verdicts of a table of weighed pictures; and, on the boards of a mission, ho
 the robot is in doubt, has followed landmarks, or has not: each state has its own number, and that alone decides.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Hashable, Iterable, Iterator
@@ -250,8 +248,7 @@ def test_each_state_of_the_robot_asks_for_its_own_evidence(judged: list[Judged])
     least, checked = MIN_FOLLOWED_LANDMARKS, []
     states = {"p_wrong_in_doubt": ((True, least), (True, 0)), "p_wrong_followed": ((False, least), (False, least + 1)),
               "p_wrong_unfollowed": ((False, 0), (False, least - 1))}
-
-    def check(board: Blackboard, trigger: Change) -> None:
+    for board, trigger in judged:
         for own, boards in states.items():
             for in_doubt, followed in boards:
                 view = StateView(board, in_doubt, followed, 1e-3)
@@ -266,17 +263,13 @@ def test_each_state_of_the_robot_asks_for_its_own_evidence(judged: list[Judged])
                         weighed = MilestoneJudge().weigh(view, case_on(view, trigger))
                     assert (weighed.p_wrong <= weighed.most_p_wrong) is enough, (own, in_doubt, followed, value)
                 checked.append(own)
-
-    for board, trigger in judged:
-        check(board, trigger)
     assert set(checked) == set(states) and len(checked) >= 6
 
 
 def test_where_no_other_view_is_left_all_looks_together_need_only_be_believed(judged: list[Judged]) -> None:
     """By the standard of the search that would find the same place again; before the last look by the stricter one."""
     most, believed, checked = MAX_MILESTONE_LOOKS, 1.0 - MIN_P_BELIEVED, set()
-
-    def check(board: Blackboard, trigger: Change) -> None:
+    for board, trigger in judged:
         view = StateView(board, True, 0)
         case = case_on(view, trigger)
         plain = case.milestone.value
@@ -292,9 +285,6 @@ def test_where_no_other_view_is_left_all_looks_together_need_only_be_believed(ju
                 may_be = believed if tried + 1 == most else POSE_CONFIDENCE.accept
                 assert weighed.most_p_wrong == may_be
                 checked.add((tried, wanted <= may_be))
-
-    for board, trigger in judged:
-        check(board, trigger)
     assert len(checked) == 4
 
 

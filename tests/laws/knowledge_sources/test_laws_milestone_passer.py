@@ -1,15 +1,12 @@
 """Laws of the milestone passer: on from a verified milestone, or the same subgoal again; failed so often, doubt."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from acting import answer
-from blackboard import Blackboard, Change, Discrepancy, Effect, Level, Post, Posted, Retract, Revise, Revised
+from blackboard import Discrepancy, Effect, Level, Post, Posted, Retract, Revise, Revised
 from generated_boards import Bench, all_reasons, plain_robot, reasons, wakes
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.reads import has_missed
@@ -19,9 +16,7 @@ from knowledge_sources.sketcher.milestone_passer import MilestonePasser
 from sim.scenario import load_scenario
 from world_models.entries import (
     Goal,
-    Hypothesis,
     Impasse,
-    Milestone,
     MotionReport,
     Obstacle,
     ObstacleStatus,
@@ -34,7 +29,6 @@ from world_models.entries import (
 )
 from world_models.entries.task import MilestoneStatus
 from world_models.files.world_files import WORLDS, load_world
-from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
 
 HALL = "north-hall"
@@ -55,32 +49,22 @@ def decide_all(
     is_look: bool = False,
 ) -> tuple[Effect, ...]:
     """What it does when the milestone at the end of a subgoal is verified, so far from where it should be."""
-    world, board = load_world(WORLDS / "two_ways.toml"), Blackboard()
-    store, robot = FrameStore(world), build_robot_model(load_scenario("shut-door"), world)
-    cycle = 0
-
-    def apply(*effects: Effect) -> tuple[Change, ...]:
-        nonlocal cycle
-        cycle += 1
-        return board.apply(effects, author="test", cycle=cycle)
-
-    apply(*map(Post, robot.entries()), *(Post(store.frame(name)) for name in ("", HALL, "reception", "archive")),
-          Post(Hypothesis(HALL, Pose2(TO.x_m - off_m, TO.y_m + left_m, (heading or 0.0) + off_rad),
-                          diagonal(sigma_m, 0.005), "milestone")))
+    world = load_world(WORLDS / "two_ways.toml")
+    bench = Bench(build_robot_model(load_scenario("shut-door"), world))
+    bench.believe(Pose2(TO.x_m - off_m, TO.y_m + left_m, (heading or 0.0) + off_rad), diagonal(sigma_m, 0.005),
+                  locale=HALL)
     if thing is not None:
         (x_m, status), at_goal = thing, TO.in_world(world).position
         corners: Any = tuple((float(at_goal[0] + x_m + dx), float(at_goal[1] + dy))
                              for dx, dy in ((-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)))
-        apply(Post(Obstacle("north-hall/obstacle-1", HALL, corners, 0.02, 1.0, 1.0, 0.2, status=status)))
+        bench.put(Obstacle("north-hall/obstacle-1", HALL, corners, 0.02, 1.0, 1.0, 0.2, status=status))
     for _ in range(earlier_goals):
-        (old,) = apply(Post(Goal(FROM, TO)))
-        apply(Revise(old.entry, replace(old.entry.value, status="abandoned")))
-    (goal,) = apply(Post(Goal(FROM, TO)))
+        bench.revise(bench.put(Goal(FROM, TO)), status="abandoned")
+    goal = bench.put(Goal(FROM, TO))
     steps = way or (Subgoal(FROM, replace(TO, heading_rad=heading), primitive=True, tolerance_m=TOLERANCE_M),)
-    (sketch,) = apply(Post(PlanSketch(goal.entry.id, (), "", steps, at=at, adjustments=adjustments, is_look=is_look)))
-    (expected,) = apply(Post(Milestone(sketch.entry.id, at, "the end", 0.0, displacement_modes=modes)))
-    (verified,) = apply(Revise(expected.entry, replace(expected.entry.value, status="verified")))
-    effects = answer(MilestonePasser(DEFAULT), board.view, verified)
+    sketch = bench.put(PlanSketch(goal.id, (), "", steps, at=at, adjustments=adjustments, is_look=is_look))
+    expected = bench.await_milestone(sketch.id, at, displacement_modes=modes)
+    effects = bench.ask(MilestonePasser(DEFAULT), bench.revise(expected, status="verified"))
     assert effects is not None
     return effects
 
@@ -230,20 +214,16 @@ def test_a_lookout_is_come_to_however_it_turned_since(is_look: bool, side: float
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])
-@pytest.mark.parametrize("lacks", ["nothing", "sketch", "goal", "belief", "life"])
+@pytest.mark.parametrize("lacks", ["nothing", "PlanSketch-1", "Goal-1", "belief", "life"])
 def test_only_the_milestone_that_is_next_lets_its_sketch_go_on(index: int, lacks: str) -> None:
     bench = Bench(plain_robot())
-    belief = bench.believe()
+    bench.believe()
     sketch = bench.sketch(at=1, verified=False)
     milestone = bench.revise(bench.await_milestone(sketch.id, index), status="verified")
-    if lacks == "sketch":
-        bench.retract(sketch)
-    elif lacks == "goal":
-        bench.retract(bench.view["Goal-1"])
-    elif lacks == "belief":
-        bench.revise(belief, status="candidate")
-    elif lacks == "life":
+    if lacks == "life":
         bench.revise(sketch, status="superseded")
+    else:
+        bench.lack(lacks)
     assert (bench.ask(MilestonePasser(), milestone) is not None) == (index == 1 and lacks == "nothing")
 
 

@@ -1,7 +1,5 @@
 """Law of the model reviser: after any run of findings and tellings the frames say what the newest of each says."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,9 +14,7 @@ from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall
 from world_models.building.locale_frame import FRAME_OF, FrameChange, LocaleFrame
-from world_models.building.world import World
 from world_models.entries import DoorPicture, DoorState, Obstacle, UserReport
-from world_models.files.world_files import WORLDS, load_world
 
 SOURCE = ModelReviser()
 DOOR, ROOMS = "archive-north-door", ("archive", HALL)
@@ -28,11 +24,6 @@ found = st.tuples(st.just("found"), st.sampled_from(("suspected", "there", "gone
 seen = st.tuples(st.just("seen"), st.sampled_from(("open", "shut", "unknown")), st.just(0.0))
 told = st.tuples(st.just("told"), st.sampled_from(("open", "shut", "gone")), st.just(0.0))
 """What is found of a thing and by how many times the least change it stands elsewhere; seen of a door; or told."""
-
-
-@pytest.fixture(scope="module")
-def world() -> World:
-    return load_world(WORLDS / "two_ways.toml")
 
 
 def corners(by_m: float) -> tuple[tuple[float, float], ...]:
@@ -62,8 +53,8 @@ def tell(hall: Hall, value: Any) -> Any:
     return change
 
 
-def test_it_wakes_by_what_is_found_seen_or_told(world: World) -> None:
-    hall = Hall(world, ())
+def test_it_wakes_by_what_is_found_seen_or_told() -> None:
+    hall = Hall(())
     for what, state, wakes in (("found", "there", 2), ("seen", "shut", 2), ("told", "shut", 1)):
         entry = hall.put(make(what, state, 0.0))
         kinds = [kind for kind in (Posted, Revised, Retracted) if any(w.sees(kind(entry)) for w in SOURCE.on)]
@@ -72,8 +63,8 @@ def test_it_wakes_by_what_is_found_seen_or_told(world: World) -> None:
 
 @given(st.lists(found | seen | told, max_size=6))
 @settings(max_examples=40, deadline=None)
-def test_the_frames_say_what_the_newest_says(world: World, drawn: Sequence[tuple[str, Any, float]]) -> None:
-    hall, shut, thing = Hall(world, (SOURCE,)), False, None
+def test_the_frames_say_what_the_newest_says(drawn: Sequence[tuple[str, Any, float]]) -> None:
+    hall, shut, thing = Hall((SOURCE,)), False, None
     for what, state, times in drawn:
         change = tell(hall, make(what, state, times))
         answered = hall.board.view[change.entry.id].value
@@ -105,9 +96,9 @@ def test_the_frames_say_what_the_newest_says(world: World, drawn: Sequence[tuple
     (0.0, 0.4, False, False), (0.5 * LEAST_M, 0.4, False, False), (1.5 * LEAST_M, 0.4, False, True),
     (0.0, 0.5, False, False), (0.0, 0.6, False, True), (0.5 * LEAST_M, 0.4, True, True)])
 def test_a_frame_is_revised_where_a_plan_may_change_by_it(
-    world: World, by_m: float, height_m: float, is_touched: bool, is_revised: bool
+    by_m: float, height_m: float, is_touched: bool, is_revised: bool
 ) -> None:
-    hall = Hall(world, (SOURCE,))
+    hall = Hall((SOURCE,))
     first = make("found", "there", 0.0)
     assert isinstance(first, Obstacle)
     tell(hall, first)
@@ -119,10 +110,8 @@ def test_a_frame_is_revised_where_a_plan_may_change_by_it(
 
 @pytest.mark.parametrize(("what", "state", "rooms"), [
     ("found", "there", (HALL,)), ("seen", "shut", ROOMS), ("told", "shut", ROOMS)])
-def test_each_frame_that_it_concerns_names_what_says_so_and_who(
-    world: World, what: str, state: str, rooms: tuple[str, ...]
-) -> None:
-    hall = Hall(world, (SOURCE,))
+def test_each_frame_that_it_concerns_names_what_says_so_and_who(what: str, state: str, rooms: tuple[str, ...]) -> None:
+    hall = Hall((SOURCE,))
     before = {entry.value.name: entry for entry in hall.board.view.all(LocaleFrame)}
     said = hall.put(make(what, state, 0.0))
     after = {entry.value.name: entry for entry in hall.board.view.all(LocaleFrame)}
@@ -132,8 +121,8 @@ def test_each_frame_that_it_concerns_names_what_says_so_and_who(
         assert [change.by for change in after[room].value.changes] == ["test"]
 
 
-def test_all_that_is_new_of_a_room_comes_into_its_frame_at_once(world: World) -> None:
-    hall = Hall(world, ())
+def test_all_that_is_new_of_a_room_comes_into_its_frame_at_once() -> None:
+    hall = Hall(())
     first = hall.put(make("found", "there", 0.0))
     moved = tuple((x + 1.5, y) for x, y in CARTON)
     second = hall.put(Obstacle(f"{HALL}/obstacle-2", HALL, moved, 0.03, 0.0, 0.0, 0.5, by="camera", seen_s=9.0))
@@ -145,8 +134,8 @@ def test_all_that_is_new_of_a_room_comes_into_its_frame_at_once(world: World) ->
     assert answer(SOURCE, hall.board.view, Posted(second)) is None  # it is said already
 
 
-def test_what_the_model_has_not_is_answered_and_revises_nothing(world: World) -> None:
-    hall = Hall(world, (SOURCE,))
+def test_what_the_model_has_not_is_answered_and_revises_nothing() -> None:
+    hall = Hall((SOURCE,))
     for what in ("no-such-door", f"{HALL}/obstacle-9"):
         change = tell(hall, UserReport(what, "shut"))
         assert hall.board.view[change.entry.id].value.answer.startswith("which cannot be")

@@ -1,7 +1,5 @@
 """Laws of the panorama builder: looks are carried along by the motions between them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -53,13 +51,11 @@ def test_a_look_is_where_the_robot_was_as_seen_from_where_it_is(way: list[tuple[
 @pytest.mark.parametrize("lacks", ["nothing", "light", "doubt", "belief", "rest"])
 def test_it_looks_round_only_when_lost_and_standing_in_the_light(lacks: str) -> None:
     bench = Bench(plain_robot())
-    if lacks != "belief":
-        bench.believe()
-    if lacks != "doubt":
-        bench.doubt()
+    bench.believe()
+    bench.doubt()
     seen = looked(bench, 0.0, 0.0) if lacks == "light" else looked(bench)
-    if lacks == "rest":
-        bench.move()
+    if lacks != "light":
+        bench.lack(lacks)
     assert (bench.ask(SOURCE, seen) is not None) == (lacks == "nothing")
 
 

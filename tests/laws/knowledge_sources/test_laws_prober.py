@@ -1,7 +1,5 @@
 """Laws of the prober: the motion that a search asks for is carried out, slowly where nothing tells of the floor."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
@@ -41,15 +39,12 @@ def test_only_a_search_that_asks_for_a_motion_wakes_it(
     assert wakes(Prober(), Posted(search)) == acts
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "belief", "doubt", "rest"])
+@pytest.mark.parametrize("lacks", ["nothing", "belief", "doubt", "level", "rest"])
 def test_it_probes_only_when_lost_and_standing(lacks: str) -> None:
     bench = Bench(plain_robot())
-    if lacks != "belief":
-        bench.believe()
-    doubt = bench.doubt(Level.PLAN if lacks == "doubt" else Level.GOAL)
+    bench.believe()
+    bench.doubt(Level.PLAN if lacks == "level" else Level.GOAL)
     search = bench.put(PlaceSearch("probe", "", (0.1, 0.0)))
-    if lacks == "rest":
-        bench.move()
+    if lacks != "level":
+        bench.lack(lacks)
     assert (bench.ask(Prober(), search) is not None) == (lacks == "nothing")
-    bench.revise(doubt, status="corrected")
-    assert bench.ask(Prober(), search) is None

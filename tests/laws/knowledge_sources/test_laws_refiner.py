@@ -1,14 +1,12 @@
 """Laws of the refiner: the current subgoal, once its milestone holds, is drawn in more detail, once."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given, settings
 
 from blackboard import Entry, Posted, Revised
 from generated_boards import HALL, HOUSE, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, wakes
 from knowledge_sources.sketcher.refiner import Refiner
-from world_models.entries import Impasse, Outcome, Place, PlanSketch, Subgoal
+from world_models.entries import Impasse, Place, PlanSketch, Subgoal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2
@@ -107,19 +105,15 @@ def test_where_a_search_has_just_found_it_the_first_milestone_holds(basis: str) 
     assert drawn.verified is (basis == "relocalization")
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "belief", "goal", "need", "mission"])
+@pytest.mark.parametrize("lacks", ["nothing", "belief", "Goal-1", "need", "course of things"])
 def test_it_refines_only_what_is_needed(lacks: str) -> None:
     bench = Bench(plain_robot())
-    if lacks != "belief":
-        bench.believe()
+    bench.believe()
     sketch = bench.sketch(*WAY, primitive=False)
-    goal = bench.view[sketch.value.goal]
-    if lacks == "goal":
-        bench.retract(goal)
-    elif lacks == "need":
-        bench.sketch(*WAY, goal=goal, path=(0,))
-    elif lacks == "mission":
-        bench.put(Outcome("failed", ""))
+    if lacks == "need":
+        bench.sketch(*WAY, goal=bench.view[sketch.value.goal], path=(0,))
+    else:
+        bench.lack(lacks)
     assert (bench.ask(SOURCE, sketch) is not None) == (lacks == "nothing")
 
 

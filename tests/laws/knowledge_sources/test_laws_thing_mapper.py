@@ -1,7 +1,5 @@
 """Law of what sights of the floor tell: certainty by plain odds, and what is seen free is forgotten."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -23,7 +21,6 @@ from knowledge_sources.methods.floor.weigh_sight import (
 from knowledge_sources.model.thing_mapper import ThingMapper
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall, carton
-from world_models.building.world import World
 from world_models.entries import (
     CameraPicture,
     FreeFloor,
@@ -36,14 +33,8 @@ from world_models.entries import (
     Subgoal,
 )
 from world_models.entries.floor import FloorSense
-from world_models.files.world_files import WORLDS, load_world
 
 SOURCE, S = ThingMapper(), DEFAULT.action
-
-
-@pytest.fixture(scope="module")
-def world() -> World:
-    return load_world(WORLDS / "two_ways.toml")
 
 
 def known(status: ObstacleStatus = "there", certainty: float = 0.9) -> Obstacle:
@@ -66,7 +57,7 @@ def odds_of(p: float) -> float:
 
 
 def test_it_wakes_by_each_new_sight() -> None:
-    entry = Hall(load_world(WORLDS / "two_ways.toml"), ()).put(FreeFloor("camera", HALL, *[0.0] * 2, *[()] * 6, 1.0))
+    entry = Hall(()).put(FreeFloor("camera", HALL, *[0.0] * 2, *[()] * 6, 1.0))
     (watch,) = SOURCE.on
     assert watch.sees(Posted(entry)) and not watch.sees(Revised(entry))
 
@@ -75,9 +66,9 @@ def test_it_wakes_by_each_new_sight() -> None:
        st.sampled_from((None, Level.ACTION, Level.PLAN, Level.GOAL)))
 @settings(max_examples=40, deadline=None)
 def test_it_acts_where_a_sight_may_tell_of_a_thing_and_the_place_is_not_in_doubt(
-    world: World, p_thing: float, sigma_m: float, status: ObstacleStatus | None, doubt: Level | None
+    p_thing: float, sigma_m: float, status: ObstacleStatus | None, doubt: Level | None
 ) -> None:
-    hall = Hall(world, ())
+    hall = Hall(())
     if status is not None:
         hall.put(known(status))
     if doubt is not None:
@@ -92,8 +83,8 @@ def test_it_acts_where_a_sight_may_tell_of_a_thing_and_the_place_is_not_in_doubt
 
 @given(st.floats(MIN_THING_CERTAINTY, 0.99))
 @settings(max_examples=20, deadline=None)
-def test_what_was_not_known_is_as_certain_as_its_sight(world: World, p_thing: float) -> None:
-    hall = Hall(world, ())
+def test_what_was_not_known_is_as_certain_as_its_sight(p_thing: float) -> None:
+    hall = Hall(())
     scan, effects = ask(hall, hall.look(carton(p_thing), seen_s=7.0))
     (effect,) = effects or ()
     assert isinstance(effect, Post) and tuple(effect.because) == (scan,)
@@ -106,8 +97,8 @@ def test_what_was_not_known_is_as_certain_as_its_sight(world: World, p_thing: fl
 
 @pytest.mark.parametrize("sense", ["camera", "ranges"])
 @pytest.mark.parametrize("has_picture", [False, True])
-def test_it_is_told_by_which_picture_or_reading(world: World, sense: FloorSense, has_picture: bool) -> None:
-    hall = Hall(world, ())
+def test_it_is_told_by_which_picture_or_reading(sense: FloorSense, has_picture: bool) -> None:
+    hall = Hall(())
     frame = hall.put(CameraPicture(b"", 0, 7.0, "track"))
     scan = hall.put(replace(hall.look(carton(0.9), seen_s=7.0), sense=sense), *([frame] if has_picture else []))
     (effect,) = answer(SOURCE, hall.board.view, Posted(scan)) or ()
@@ -117,10 +108,8 @@ def test_it_is_told_by_which_picture_or_reading(world: World, sense: FloorSense,
 
 @given(st.floats(0.5, 0.95), st.floats(MIN_THING_CERTAINTY, 0.95), st.floats(0.0, 2.0 * FLOOR_VIEW_DISTANCE_M))
 @settings(max_examples=25, deadline=None)
-def test_odds_multiply_only_where_it_is_seen_from_elsewhere(
-    world: World, before: float, p_thing: float, ahead_m: float
-) -> None:
-    hall = Hall(world, ())
+def test_odds_multiply_only_where_it_is_seen_from_elsewhere(before: float, p_thing: float, ahead_m: float) -> None:
+    hall = Hall(())
     first = hall.put(hall.look(seen_s=1.0))
     status: ObstacleStatus = "there" if before >= MIN_OBSTACLE_CERTAINTY else "suspected"
     old = hall.put(replace(known(status, before), judged_from=(first.value.x_m, first.value.y_m)), first)
@@ -138,10 +127,10 @@ def test_odds_multiply_only_where_it_is_seen_from_elsewhere(
        st.booleans())
 @settings(max_examples=40, deadline=None)
 def test_floor_that_is_seen_free_from_elsewhere_lowers_the_odds_by_a_stated_factor(
-    world: World, before: float, ahead_m: float, is_told: bool, is_camouflaged: bool
+    before: float, ahead_m: float, is_told: bool, is_camouflaged: bool
 ) -> None:
     """By less where it only looks free; and what looks like the floor is gone only where it would be told."""
-    hall = Hall(world, ())
+    hall = Hall(())
     first = hall.put(hall.look(seen_s=1.0))
     old = hall.put(replace(known("suspected", before), seen_s=2.0, is_camouflaged=is_camouflaged,
                            judged_from=(first.value.x_m, first.value.y_m)), first)
@@ -162,8 +151,8 @@ def test_floor_that_is_seen_free_from_elsewhere_lowers_the_odds_by_a_stated_fact
 
 @given(st.floats(2.3, 2.6))
 @settings(max_examples=15, deadline=None)
-def test_where_a_part_is_seen_free_so_much_of_the_factor_counts(world: World, far_m: float) -> None:
-    hall = Hall(world, ())
+def test_where_a_part_is_seen_free_so_much_of_the_factor_counts(far_m: float) -> None:
+    hall = Hall(())
     old = hall.put(known("suspected", 0.7))
     scan = hall.look(seen_s=9.0, far_m=far_m)
     _, effects = ask(hall, scan)
@@ -177,8 +166,8 @@ def test_where_a_part_is_seen_free_so_much_of_the_factor_counts(world: World, fa
 
 @given(st.floats(0.3, 0.999), st.floats(MIN_THING_CERTAINTY, 0.95))
 @settings(max_examples=10, deadline=None)
-def test_what_was_gone_is_as_certain_as_it_is_seen_now(world: World, before: float, p_thing: float) -> None:
-    hall = Hall(world, ())
+def test_what_was_gone_is_as_certain_as_it_is_seen_now(before: float, p_thing: float) -> None:
+    hall = Hall(())
     old = hall.put(known("gone", before))
     _, effects = ask(hall, hall.look(carton(p_thing), seen_s=9.0))
     (effect,) = effects or ()
@@ -188,8 +177,8 @@ def test_what_was_gone_is_as_certain_as_it_is_seen_now(world: World, before: flo
 
 
 @pytest.mark.parametrize(("by_x_m", "by_y_m", "is_same"), [(0.0, 0.45, True), (0.55, 0.45, False), (0.0, 0.6, False)])
-def test_what_lies_aslant_beside_a_thing_is_another(world: World, by_x_m: float, by_y_m: float, is_same: bool) -> None:
-    hall = Hall(world, ())
+def test_what_lies_aslant_beside_a_thing_is_another(by_x_m: float, by_y_m: float, is_same: bool) -> None:
+    hall = Hall(())
     hall.put(known())
     beside = tuple((x + by_x_m, y + by_y_m) for x, y in CARTON)
     _, effects = ask(hall, hall.look(replace(carton(), footprint=beside), seen_s=9.0))
@@ -197,10 +186,8 @@ def test_what_lies_aslant_beside_a_thing_is_another(world: World, by_x_m: float,
 
 
 @pytest.mark.parametrize(("part", "count"), [(0.7, 1), (0.3, 2)])
-def test_another_part_of_a_thing_in_the_same_sight_is_not_another_thing(
-    world: World, part: float, count: int
-) -> None:
-    hall = Hall(world, ())
+def test_another_part_of_a_thing_in_the_same_sight_is_not_another_thing(part: float, count: int) -> None:
+    hall = Hall(())
     aside_m = 0.4 * (1.0 - part)
     _, effects = ask(hall, hall.look(carton(), carton(by_m=aside_m), seen_s=9.0))
     assert len(effects or ()) == count
@@ -208,9 +195,9 @@ def test_another_part_of_a_thing_in_the_same_sight_is_not_another_thing(
 
 @pytest.mark.parametrize(("turn_rad", "is_next"), [(0.0, True), (0.3, True), (-0.3, True), (0.9, False), (2.0, False)])
 def test_what_is_suspected_next_on_the_way_counts_as_there_and_the_leg_is_a_reason(
-    world: World, turn_rad: float, is_next: bool
+    turn_rad: float, is_next: bool
 ) -> None:
-    hall = Hall(world, ())
+    hall = Hall(())
     here, there = (Place(HALL, x_m, 1.2) for x_m in (2.0, 6.0))
     goal = hall.put(Goal(here, there))
     steps = (Subgoal(here, there, primitive=True),)

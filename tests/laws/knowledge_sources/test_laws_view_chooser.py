@@ -1,7 +1,5 @@
 """Laws of the view chooser: when a milestone is due, and in which direction it is looked for."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -13,7 +11,7 @@ from generated_boards import Bench, effect_on, mirrored, mirrored_place, plain_r
 from knowledge_sources.methods.verification import turn_headings
 from knowledge_sources.milestone_selector.view_chooser import LONG_TURN_RAD, ViewChooser
 from knowledge_sources.reads import MAX_LOOK_ERROR_RAD
-from world_models.entries import Milestone, Outcome, Place, PlanSketch, Subgoal
+from world_models.entries import Milestone, Place, PlanSketch, Subgoal
 from world_models.entries.task import MilestoneStatus
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, wrap_angle
@@ -132,17 +130,14 @@ def test_where_the_same_milestone_was_not_testable_it_looks_elsewhere(status: Mi
 @pytest.mark.parametrize("lacks", ["nothing", "belief", "sketch", "rest", "course of things", "place", "measure"])
 def test_it_chooses_only_when_the_robot_stands_and_knows_its_place(lacks: str) -> None:
     bench = Bench(plain_robot())
-    if lacks != "belief":
-        bench.believe()
+    bench.believe()
     sketch = bench.sketch(FROM, TO, verified=False)
     if lacks == "sketch":
         bench.revise(sketch, verified=True)
-    elif lacks == "rest":
-        bench.move()
-    elif lacks == "course of things":
-        bench.put(Outcome("failed", ""))
-    elif lacks in ("place", "measure"):
-        bench.doubt(Level.GOAL if lacks == "place" else Level.PLAN)
+    elif lacks == "measure":
+        bench.doubt(Level.PLAN)
+    else:
+        bench.lack(lacks)
     assert (bench.ask(SOURCE, sketch) is not None) == (lacks == "nothing")
 
 

@@ -1,7 +1,5 @@
 """Laws of views that share motions: their joint covariance, and the covariance of a pose that rests on all of them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -11,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from consistency import compute_error
 from knowledge_sources.methods.localization import CameraView, get_visibility_map, propagate_pose
 from knowledge_sources.methods.localization.refinement import refine_pose
 from knowledge_sources.methods.localization.views import align_headings, join_covariances
@@ -18,7 +17,7 @@ from knowledge_sources.methods.verification import predict_lines
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
-from world_models.frames import Pose2, wrap_angle
+from world_models.frames import Pose2
 from world_models.robot import RobotModel
 
 Floats = NDArray[np.float64]
@@ -57,10 +56,6 @@ def find_motions(steps: list[Pose2]) -> list[Pose2]:
     return out[::-1]
 
 
-def difference(one: Pose2, other: Pose2) -> list[float]:
-    return [one.x_m - other.x_m, one.y_m - other.y_m, wrap_angle(one.heading_rad - other.heading_rad)]
-
-
 @settings(deadline=None, max_examples=6)
 @given(seed=st.integers(0, 2**32 - 1),
        steps=st.lists(st.tuples(st.floats(-2.5, 2.5), st.floats(0.2, 1.5)), min_size=2, max_size=4))
@@ -70,7 +65,7 @@ def test_the_joint_covariance_is_that_of_motions_drawn_at_random(seed: int, step
     drawn = []
     for _ in range(count):
         motions = find_motions([draw_step(*step, rng, scale) for step in steps])
-        drawn.append(np.concatenate([difference(a, b) for a, b in zip(motions, claimed, strict=True)]) / scale)
+        drawn.append(np.concatenate([compute_error(a, b) for a, b in zip(motions, claimed, strict=True)]) / scale)
     measured = np.cov(np.array(drawn).T)
     stated = join_covariances(views_after(steps, [NOTHING] * (len(steps) + 1)))[:-3, :-3]
     sigmas = np.sqrt(np.diag(stated))
@@ -112,7 +107,7 @@ def test_the_covariance_of_a_refined_pose_holds_its_error(blank: tuple[int, ...]
                       true[-1].heading_rad + rng.normal(0.0, 0.02))
         views = align_headings(views_after(TURN_AROUND, shown), CAMERA, MOUNT.camera_from_robot)
         pose, covariance = refine_pose(CENTRE, views, rough)
-        off = np.array(difference(pose, true[-1]))
+        off = np.array(compute_error(pose, true[-1]))
         squares.append(float(off @ np.linalg.solve(covariance, off)))
     within = sum(s <= chi2.ppf(0.99, 3) for s in squares)
     assert within >= DRAWS - 1, squares

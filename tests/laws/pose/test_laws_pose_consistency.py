@@ -9,8 +9,6 @@ is found nine times in ten; a camera's noise is estimated from its own lines, wh
 draws.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -19,7 +17,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from consistency import assert_soon_consistent, compute_error, compute_nees
+from consistency import assert_soon_consistent, build_hall, compute_error, compute_nees
 from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose import (
     MARGINAL_SPREAD,
@@ -49,16 +47,6 @@ ESTIMATED = {1.0: 1.0, 1.5: 1.15, 2.0: 1.15}
 ON_FLOOR, IN_SPACE = 50, 50
 """Draws of three and of six unknowns."""
 Array = NDArray[np.float64]
-
-
-def build_hall() -> Array:
-    """Door posts, lintels and long edges ahead of the robot (n, 2, 3)."""
-    lines = [[[1.5, y, z], [15.0, y, z]] for y in (-1.2, 1.2) for z in (0.0, 2.4)]
-    for x in (3.0, 5.5, 8.0, 11.0):
-        for y in (-1.2, 1.2):
-            far = x + 0.9
-            lines += [[[x, y, 0.0], [x, y, 2.1]], [[far, y, 0.0], [far, y, 2.1]], [[x, y, 2.1], [far, y, 2.1]]]
-    return np.array(lines)
 
 
 class Draw:

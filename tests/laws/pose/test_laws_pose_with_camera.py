@@ -1,7 +1,5 @@
 """Laws of the pose with the camera's own state: consistent, no surer than its lines, true in a known camera."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -13,12 +11,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
+from consistency import build_hall, compute_error, compute_nees
 from knowledge_sources.methods.calibration import widen
 from knowledge_sources.methods.localization.camera_matching import compute_space_covariance
 from knowledge_sources.methods.pose import CameraEstimate, estimate_camera_and_pose
 from knowledge_sources.methods.pose.with_camera import FREE, STILL, _Problem
 from world_models.camera import YAW, Camera, CameraMount, move_camera, subtract_cameras
-from world_models.frames import Pose2, wrap_angle
+from world_models.frames import Pose2
 
 CAMERA, MOUNT = Camera.from_field_of_view(np.radians(65.0)), CameraMount(1.0, 0.1, 0.02, 0.01, -0.02)
 SIGMA_PX = 0.3
@@ -29,16 +28,6 @@ HERE = Pose2(0.3, -0.2, 0.1)
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 quick = settings(max_examples=15, deadline=None)
-
-
-def build_hall() -> Array:
-    """Door posts, lintels and long edges ahead of the robot (n, 2, 3)."""
-    lines = [[[1.5, y, z], [15.0, y, z]] for y in (-1.2, 1.2) for z in (0.0, 2.4)]
-    for x in (3.0, 5.5, 8.0, 11.0):
-        for y in (-1.2, 1.2):
-            far = x + 0.9
-            lines += [[[x, y, 0.0], [x, y, 2.1]], [[far, y, 0.0], [far, y, 2.1]], [[x, y, 2.1], [far, y, 2.1]]]
-    return np.array(lines)
 
 
 def observe(step: Any, seed: int, sigma_px: float = SIGMA_PX) -> tuple[Array, Array, Pose2]:
@@ -72,9 +61,7 @@ def test_camera_and_pose_are_within_their_covariance_as_often_as_it_says() -> No
         found = estimate(lines, segments)
         off = (found.step - step)[SEEN]
         camera.append(off @ np.linalg.solve(found.covariance[np.ix_(SEEN, SEEN)], off))
-        here = found.world_from_robot
-        away = np.array([here.x_m - truth.x_m, here.y_m - truth.y_m, wrap_angle(here.heading_rad - truth.heading_rad)])
-        pose.append(away @ np.linalg.solve(found.pose_covariance, away))
+        pose.append(compute_nees(compute_error(found.world_from_robot, truth), found.pose_covariance))
     for squares, unknowns in ((camera, len(SEEN)), (pose, 3)):
         low, high = chi2.ppf((0.0005, 0.9995), unknowns * len(squares)) / len(squares)
         assert low < np.mean(squares) < high

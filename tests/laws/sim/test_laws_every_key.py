@@ -3,8 +3,6 @@
 And what the field then does is what its name says: of faults, each number by what happens to the body.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import fields
@@ -15,13 +13,12 @@ import pytest
 from experiments.generated.scenes import box_room
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import Helper, SimulatedBuilding
-from sim.faults.built_in_faults import Bump, Kidnap, LightsOff, Occlusion
-from sim.faults.fault import DeviceFault, Fault, FaultSchedule
+from sim.faults.built_in_faults import Bump, Kidnap
+from sim.faults.fault import Fault, FaultSchedule
 from sim.faults.fault_registry import BUILT_IN
 from sim.ground_truth.things import MovedThing
 from sim.scenario import FORMAT
 from world_models.camera import Camera, CameraMount
-from world_models.entries import Place
 from world_models.files.toml.settings_reader import known_keys, read_settings
 from world_models.files.toml.source import Source, WorldError
 from world_models.frames import Pose2
@@ -127,11 +124,6 @@ def test_a_random_displacement_is_as_far_as_it_says_and_depends_on_the_seed() ->
     assert len(set(ends)) == 6
 
 
-def test_a_kidnap_is_to_the_place_that_it_names() -> None:
-    there = Kidnap(to_locale="hall", to_x_m=1.0, to_y_m=2.0, to_heading_rad=0.3).destination
-    assert there == Place("hall", 1.0, 2.0, 0.3)
-
-
 @pytest.mark.parametrize("fault_class", BUILT_IN)
 def test_a_fault_strikes_at_its_bounds_and_not_before(fault_class: type[Fault]) -> None:
     """Path, time and locale, each just below and at the bound."""
@@ -141,31 +133,6 @@ def test_a_fault_strikes_at_its_bounds_and_not_before(fault_class: type[Fault]) 
     ):
         schedule = FaultSchedule.of((fault,)).advance(time_s, path_m, locale)
         assert (schedule.take_due("hall")[0] == (fault,)) is strikes
-
-
-@pytest.mark.parametrize("fault_class", [f for f in BUILT_IN if issubclass(f, DeviceFault)])
-def test_a_device_fault_lasts_as_long_as_it_says(fault_class: type[DeviceFault]) -> None:
-    robot = body()
-    fault_class(duration_s=3.0).apply(robot)
-    robot.wait(2.9)
-    assert set(robot.device_faults) == {fault_class.kind}
-    robot.wait(0.2)
-    assert not robot.device_faults
-
-
-def test_the_dark_and_an_occluder_last_as_long_as_they_say() -> None:
-    robot = body()
-    LightsOff(duration_s=3.0).apply(robot)
-    robot.wait(2.9)
-    assert not robot.truth.lights_on
-    robot.wait(0.2)
-    assert robot.truth.lights_on
-    hidden, plain = body(), body()
-    Occlusion(duration_s=3.0, part=0.4).apply(hidden)
-    for wait_s, is_hidden in ((2.5, True), (0.6, False)):
-        for robot in (hidden, plain):
-            robot.wait(wait_s)
-        assert (hidden.look().jpeg != plain.look().jpeg) is is_hidden
 
 
 @pytest.mark.parametrize("what", ["picture", "wheels", "put down", "ranges"])

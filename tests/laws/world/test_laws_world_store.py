@@ -1,12 +1,7 @@
-"""Laws of the compiled world: it answers as the text that it was compiled from, and touches only what it is asked for.
+"""Laws of the compiled world: it answers as its text, and touches only what it is asked for."""
 
-Also routes, found level by level: they lead there whenever any chain of doorways does.
-"""
-
-from itertools import pairwise
 from pathlib import Path
 
-import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -14,7 +9,6 @@ from hypothesis import strategies as st
 
 from world_models.building.checks import check_world
 from world_models.building.geometry.scene import LocaleGeometry
-from world_models.building.passages import find_route
 from world_models.building.world import World
 from world_models.files.packed import FORMAT, PackedFrames, compile_world
 from world_models.files.toml.source import Source, WorldError
@@ -115,37 +109,6 @@ def networks(draw: st.DrawFn) -> World:
             between = f"between = ['r{index}', 'r{index + 1}']"
             text.append(f"d{index} = {{ {between}, wall = 'east', along = 1.5, open = true }}")
     return read_world(Source.parse("\n".join(text)))
-
-
-def refine_route(world: World, origin: str, destination: str, depth: int = 0) -> list[str] | None:
-    """The rooms of a route, refined until nothing is left to refine."""
-    route = find_route(world.frames, origin, destination)
-    if route is None or depth > 20:
-        return None
-    rooms, here = [origin], origin
-    for step in route.steps:
-        part = refine_route(world, here, step.origin, depth + 1) if here != step.origin else [here]
-        if part is None:
-            return None
-        rooms += [*part[1:], step.destination]
-        here = step.destination
-    if here != destination:
-        rest = refine_route(world, here, destination, depth + 1)
-        if rest is None:
-            return None
-        rooms += rest[1:]
-    return rooms
-
-
-@settings(deadline=None, max_examples=40)
-@given(networks(), st.data())
-def test_a_route_leads_there_whenever_any_chain_of_doorways_does(world: World, data: st.DataObject) -> None:
-    a, b = data.draw(st.sampled_from(world.rooms)), data.draw(st.sampled_from(world.rooms))
-    rooms = refine_route(world, a, b)
-    assert (rooms is not None) == nx.has_path(world.passages, a, b)
-    if rooms is not None:
-        assert rooms[0] == a and rooms[-1] == b
-        assert all(world.passages.has_edge(one, other) for one, other in pairwise(rooms))
 
 
 @settings(deadline=None, max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -1,7 +1,5 @@
 """Commands that other packages add; and those of extras that are not installed say what to install."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The command line on a short recorded run: run, why, replay, diff, and being stopped."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """Words, tables and reports of the command line."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -10,14 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-import experiments
 from blackboard import Discrepancy, Level, plain
 from experiments.paper.levels import _row
 from experiments.report import Report
 from experiments.scale.render_speed import measure_edge_offsets_px
 from harvey.campaign.summary import format_result, format_results
 from harvey.dry_run import MilestonePreview, summarize_dry_run
-from harvey.errors import BadInput
 from harvey.runner.result import MissionResult, format_error
 from logs.explain.phrases import sentence
 from logs.records import EntryRecord
@@ -139,11 +135,6 @@ def test_a_record_says_whose_each_figure_is() -> None:
     assert row["ours"] == 4.0 and row["ours, median"] == 5.0
     row, = Report("t", ("way", "fast", "slow"), (("one", 1.0, 2.0),)).record()["rows"]
     assert row["paper"] is row["peer"] is None and row["ours"] == {"fast": 1.0, "slow": 2.0}
-
-
-def test_an_unknown_experiment_is_answered_with_near_ones() -> None:
-    with pytest.raises(BadInput, match="render-speed"):
-        experiments.run("render-sped")
 
 
 @pytest.mark.parametrize("flat", [False, True])

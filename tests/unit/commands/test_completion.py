@@ -1,7 +1,5 @@
 """``harvey completion``: what a shell completes is what the parsers know."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

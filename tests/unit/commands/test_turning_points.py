@@ -12,7 +12,7 @@ from typing import Any, cast
 import pytest
 
 from blackboard import Blackboard, Decision, Effect, Level, Post, Revise, decision_line
-from harvey.campaign.summary import Progress, format_result
+from harvey.campaign.summary import ProgressLine, format_result
 from harvey.errors import BadInput
 from harvey.runner.result import MissionResult, RunCounts
 from harvey.simulation.contacts import ContactWatch
@@ -206,7 +206,7 @@ def test_the_summary_tells_them_and_the_result_keeps_them() -> None:
 def test_progress_says_that_it_is_lost_and_found() -> None:
     stage = SimpleNamespace(world=house(), goal_world=Pose2(0.0, 0.0, 0.0), start_world=Pose2(4.0, 0.0, 0.0))
     out = io.StringIO()
-    progress, lost = Progress(cast(Any, stage), out), list[bool]()
+    progress, lost = ProgressLine(cast(Any, stage), out), list[bool]()
     for decision in decisions():
         progress(decision)
         lost.append(progress.is_lost)

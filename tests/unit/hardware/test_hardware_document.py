@@ -1,15 +1,12 @@
-"""docs/hardware.md is true: commands parse, links lead somewhere, its flat can be driven, its words are the board's."""
-
-from __future__ import annotations
+"""docs/hardware.md is true: its flat can be driven, what it adds may stand there, its words are the board's."""
 
 import re
-import shlex
 import tomllib
 from pathlib import Path
 
 import pytest
 
-from harvey.cli import main, parser
+from harvey.cli import main
 from harvey.dry_run import dry_run, summarize_dry_run
 from harvey.hardware.hardware_body import BASE_WORDS, CAMERA_WORDS
 from harvey.hardware.hardware_mission import load_mission
@@ -25,23 +22,8 @@ TEXT = (DOCS / "hardware.md").read_text(encoding="utf-8")
 FLAT = DOCS / "flat"
 
 
-def blocks(kind: str = "") -> list[str]:
+def blocks(kind: str) -> list[str]:
     return re.findall(rf"^```{kind}\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
-
-
-def commands() -> list[str]:
-    return [line for block in blocks() for line in block.splitlines() if line.startswith("harvey ")]
-
-
-def test_it_shows_commands_and_each_of_them_parses() -> None:
-    assert len(commands()) >= 8
-    for line in commands():
-        assert parser().parse_args(shlex.split(line)[1:]), line
-
-
-def test_links_lead_somewhere() -> None:
-    links = [link for link in re.findall(r"\]\(([^)#]+)\)", TEXT) if "://" not in link]
-    assert links and [link for link in links if not (DOCS / link).exists()] == []
 
 
 def test_its_flat_is_a_world_without_faults_and_its_mission_is_planned_with_every_milestone_clear() -> None:

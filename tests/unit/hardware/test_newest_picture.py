@@ -3,8 +3,6 @@
 The clock is the test's: each time that the one who waits looks at it, the next thing of a script happens.
 """
 
-from __future__ import annotations
-
 import statistics
 import threading
 from collections.abc import Callable, Iterator
@@ -320,17 +318,6 @@ def test_what_does_not_open_in_time_is_given_up() -> None:
     with pytest.raises(CameraFault, match=r"unplugged: 'slow' did not open within 0\.05 s"):
         open_in_time(lambda source: hangs.wait(20.0), "slow", 0.05)  # type: ignore[arg-type, return-value]
     hangs.set()
-
-
-@pytest.mark.parametrize("rate_hz", [5.0, 10.0])
-def test_a_written_video_has_the_rate_and_the_count_that_are_told(tmp_path: Path, rate_hz: float) -> None:
-    path = tmp_path / "v.avi"
-    more = {} if rate_hz == 10.0 else {"rate_hz": rate_hz}
-    assert write_video(path, [jpeg(9), jpeg(99), jpeg(200)], **more) == 3
-    video = cv2.VideoCapture(str(path))
-    assert video.get(cv2.CAP_PROP_FPS) == rate_hz and video.get(cv2.CAP_PROP_FRAME_COUNT) == 3
-    with pytest.raises(ValueError, match=r"got one that is not whole as number 1"):
-        write_video(path, [jpeg(9), b"x"])
 
 
 def test_a_video_tells_which_picture_is_not_whole_and_where_it_ends(tmp_path: Path) -> None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
-import rerun.blueprint as rrb
 
 from blackboard import Blackboard, Decision, Level, Post
+from headless_viewer import views
 from logs.reader import read_series
 from logs.recording.logger import Subject, blueprint
 from logs.recording.paths import TABLE
@@ -60,15 +58,6 @@ def install(folder: Path, monkeypatch: pytest.MonkeyPatch, entry_point: str) -> 
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: accounts\nVersion: 1.0\n")
     (metadata / "entry_points.txt").write_text(f"[harvey.loggers]\n{entry_point}\n")
     monkeypatch.syspath_prepend(folder)
-
-
-def views(part: Any) -> Iterator[Any]:
-    """All views in a container."""
-    if isinstance(part, rrb.View):
-        yield part
-    else:
-        for inner in part.contents:
-            yield from views(inner)
 
 
 def test_its_panel_is_in_the_window_and_its_data_in_the_recording(

@@ -1,10 +1,8 @@
 """What a user sees: every view finds what it is to show, and in the viewer none of them complains."""
 
-from __future__ import annotations
-
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +12,7 @@ from rerun.chunk import RrdReader
 
 import docs.tools.look as looking
 from docs.tools.look import look
-from headless_viewer import look_or_skip
+from headless_viewer import look_or_skip, views
 from logs.recording.logger import Subject, blueprint
 from logs.recording.paths import BELIEVED_BODY, FAULTS, IMAGE
 from logs.recording.writer import RecordingWriter, logger_classes
@@ -56,15 +54,6 @@ def window() -> Any:
     """The blueprint of a whole recording."""
     subject = Subject("house", house(), CAMERA, MOUNT)
     return blueprint([logger(subject) for logger in logger_classes()]).root_container
-
-
-def views(part: Any) -> Iterator[Any]:
-    """All views in a container."""
-    if isinstance(part, rrb.View):
-        yield part
-    else:
-        for inner in part.contents:
-            yield from views(inner)
 
 
 def rules(view: Any) -> list[str]:

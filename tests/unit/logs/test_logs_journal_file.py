@@ -7,7 +7,6 @@ import pytest
 from blackboard import Decision, decision_line, decision_record
 from journals import read_journal
 from logs.journal_file import HELD_LINES, JournalFile, is_acted_on
-from logs.run_errors import BadInput
 from scripted_mission import play
 
 
@@ -86,30 +85,6 @@ def test_it_goes_on_behind_what_is_whole(tmp_path: Path) -> None:
         journal(decision)
     journal.close()
     assert path.read_bytes() == b"".join(lines)
-
-
-def test_a_truncated_last_line_is_left_out(tmp_path: Path) -> None:
-    path = tmp_path / "journal.jsonl"
-    count = len(play_to(path))
-    path.write_bytes(path.read_bytes()[:-7])
-    assert len(list(read_journal(path))) == count - 1
-
-
-@pytest.mark.parametrize("line", ["{", "[1]", '{"cycle": "one"}', "\\xff"])
-def test_a_malformed_line_is_named(tmp_path: Path, line: str) -> None:
-    path = tmp_path / "journal.jsonl"
-    play_to(path)
-    first, *others = path.read_text().splitlines(keepends=True)
-    path.write_text("".join([first, line + "\n", *others]))
-    with pytest.raises(BadInput, match=r"journal\.jsonl:2: .*expected"):
-        list(read_journal(path))
-
-
-def test_bytes_that_are_no_text_are_named(tmp_path: Path) -> None:
-    path = tmp_path / "journal.jsonl"
-    path.write_bytes(b"\xff\xfe\x00\n")
-    with pytest.raises(BadInput, match=r"journal\.jsonl:1: expected a decision"):
-        list(read_journal(path))
 
 
 def test_a_full_disk_is_told_with_the_name_of_the_file() -> None:

@@ -1,16 +1,14 @@
 """The frames on the board are seen in the recording: as they come, as they change, and as they leave."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
 
 from blackboard import Blackboard, Change, Decision, Effect, Level, Post, Ref, Revise
+from journals import logged
 from logs.reader import read_series
 from logs.recording.loggers.decisions import Messages
 from logs.recording.loggers.surroundings.locale_frames import (
@@ -84,15 +82,6 @@ def recording(tmp_path_factory: pytest.TempPathFactory, world: World) -> Path:
     told.decide([Revise(study, study.value.with_changes(()))], "model_reviser")
     recorder.close()
     return path
-
-
-def logged(recording: Path, entity: str, component: str) -> list[tuple[int, Any]]:
-    """(cycle, value) of what was logged there."""
-    rows = []
-    for chunk in RrdReader(recording).stream().filter(content=f"/{entity}", is_static=False):
-        batch = chunk.to_record_batch()
-        rows += list(zip(batch.column("cycle").to_pylist(), batch.column(component).to_pylist(), strict=True))
-    return sorted(rows, key=lambda pair: pair[0])
 
 
 def colours(recording: Path, entity: str) -> list[tuple[int, tuple[int, ...]]]:

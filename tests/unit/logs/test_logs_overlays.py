@@ -1,12 +1,11 @@
 """What is drawn over the picture stays within the picture, and goes when the next picture comes."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
 
+from journals import logged
 from logs.recording.loggers.picture_overlays import LABEL_PX
 from logs.recording.paths import DRIFTS, EXPECTED, IMAGE, LANDMARK_NAMES, MATCHED, SEGMENTS, WINDOWS
 from logs.recording.writer import RecordingWriter
@@ -22,17 +21,6 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     play([recorder])
     recorder.close()
     return path
-
-
-def logged(recording: Path, entity: str, component: str) -> list[tuple[int, Any]]:
-    """(cycle, value) of what was logged there."""
-    rows = []
-    for chunk in RrdReader(recording).stream().filter(content=f"/{entity}", is_static=False):
-        batch = chunk.to_record_batch()
-        if component in batch.schema.names:
-            pairs = zip(batch.column("cycle").to_pylist(), batch.column(component).to_pylist(), strict=True)
-            rows += [(cycle, value) for cycle, value in pairs if value is not None]
-    return sorted(rows, key=lambda pair: pair[0])
 
 
 @pytest.mark.parametrize("entity", [EXPECTED, SEGMENTS, MATCHED, f"{IMAGE}/rejected"])

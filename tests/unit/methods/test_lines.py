@@ -1,7 +1,5 @@
 """The line finder's edges: empty, malformed and extreme arguments."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The examples in the docstrings of the pose and matching packages."""
 
-from __future__ import annotations
-
 import doctest
 from types import ModuleType
 

@@ -1,7 +1,5 @@
 """Mesh, textures, light and sensor of the simulated camera."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

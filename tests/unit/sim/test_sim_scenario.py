@@ -1,7 +1,5 @@
 """Scenario files and --set."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
