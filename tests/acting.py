@@ -1,5 +1,7 @@
 """How a test asks a knowledge source, as the scheduler does: bind, then act on what was bound."""
 
+from __future__ import annotations
+
 from blackboard import Change, Effect, KnowledgeSource, View
 
 

@@ -1,5 +1,7 @@
 """A door between a hall and an archive, open and shut, before the robot's camera."""
 
+from __future__ import annotations
+
 import math
 from functools import cache
 

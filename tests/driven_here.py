@@ -1,5 +1,7 @@
 """A campaign whose trials are done in this process, by work that is given: what it makes of their ends is tested."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType

@@ -1,5 +1,7 @@
 """Drive the short mission in a process of its own, with another Python."""
 
+from __future__ import annotations
+
 import subprocess
 from pathlib import Path
 

@@ -3,6 +3,8 @@
 The hall is the same left to right, so that a board can be mirrored: :func:`mirrored` is about its middle line.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace

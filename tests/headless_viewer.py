@@ -3,6 +3,8 @@
 And the views that its window would have.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any

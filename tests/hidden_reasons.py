@@ -1,5 +1,7 @@
 """What an act read, and what it names: a view on which entries can be hidden, and the entries that reasons lead to."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Collection, Hashable, Iterable, Iterator
 from typing import Any, TypeVar

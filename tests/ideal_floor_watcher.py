@@ -1,5 +1,7 @@
 """A watcher of the floor that sees what the model has, and things that a test puts there: for tests of the motion."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable, Sequence
 

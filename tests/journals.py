@@ -1,5 +1,7 @@
 """The lines of a journal, as they stand in it and in a recording, and what else a recording has."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path

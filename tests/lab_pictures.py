@@ -1,5 +1,7 @@
 """Pictures of the research center from any pose, as the camera of the main mission takes them."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from functools import cache
 

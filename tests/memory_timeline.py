@@ -1,5 +1,7 @@
 """A timeline of decisions that are in memory: what the one that reads a journal's lines is checked against."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 

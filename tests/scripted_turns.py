@@ -1,5 +1,7 @@
 """A run of eight decisions in which it is refuted, lost, found, and its camera fails."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 from blackboard import Blackboard, Decision, Discrepancy, Effect, Level, Post, Revise

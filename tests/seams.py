@@ -1,5 +1,7 @@
 """What anything that is added by an entry point must keep: each check takes an implementation, whoever wrote it."""
 
+from __future__ import annotations
+
 import shlex
 from argparse import ArgumentParser
 from pathlib import Path

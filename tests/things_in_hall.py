@@ -1,5 +1,7 @@
 """The north hall of a building, with a robot on a board: what stands there, and who finds it."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,5 +1,7 @@
 """Two rooms with two doors between them, and short missions from one to the other on which somebody tells the robot."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """A stream of pictures as a video file that any player, and VideoCamera, can read."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """What a mission decided, but for the coming and going of locale frames."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping
 from typing import Any
 

@@ -1,5 +1,7 @@
 """A real browser, Debian's Chromium, driven by Playwright: what is wrong on a page is a failure of every test."""
 
+from __future__ import annotations
+
 import shutil
 from collections.abc import Callable, Iterator
 from typing import Any

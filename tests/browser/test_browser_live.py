@@ -1,5 +1,7 @@
 """The live page in a browser while a mission runs: it is watched, paused, sent elsewhere and stopped from there."""
 
+from __future__ import annotations
+
 import re
 import threading
 from collections.abc import Callable, Iterator

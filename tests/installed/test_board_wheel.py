@@ -1,5 +1,7 @@
 """The blackboard alone, from a wheel of its own, in a fresh environment that has nothing else."""
 
+from __future__ import annotations
+
 import re
 import shutil
 import subprocess

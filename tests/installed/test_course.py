@@ -1,5 +1,7 @@
 """The notebooks of the course: each is executed, solutions included, and a cell that fails is a failure."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

@@ -5,6 +5,8 @@ here. Where a command names a run, that is driven first; where it names a file o
 command. Many seeds are made few.
 """
 
+from __future__ import annotations
+
 import os
 import re
 import select

@@ -1,5 +1,7 @@
 """The examples run as they are, each in a folder of its own."""
 
+from __future__ import annotations
+
 import os
 import subprocess
 import sys

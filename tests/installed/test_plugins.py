@@ -1,5 +1,7 @@
 """Another package adds a knowledge source with its own kind of entry, a fault, a base and a logger: no edit here."""
 
+from __future__ import annotations
+
 import json
 import os
 import subprocess

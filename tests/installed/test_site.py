@@ -1,5 +1,7 @@
 """The documentation site: it builds without a warning, every link in it leads somewhere, and it needs no network."""
 
+from __future__ import annotations
+
 import shutil
 import subprocess
 import sys

@@ -3,6 +3,8 @@
 A command whose line ends with a comment needs what the reader has (hardware, a file of his own, minutes): it is parsed.
 """
 
+from __future__ import annotations
+
 import os
 import re
 import shlex

@@ -1,5 +1,7 @@
 """From a wheel: built, installed in a fresh environment, and used from a folder that has nothing of the project."""
 
+from __future__ import annotations
+
 import json
 import os
 import shutil

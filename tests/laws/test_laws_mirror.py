@@ -3,6 +3,8 @@
 Mirrored, y and headings have the other sign, and pictures are flipped. Turned and shifted, all poses of the world are.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Mirror law and frame law of matching, of footprints, of place odds and of doors (see test_laws_mirror.py)."""
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

@@ -9,6 +9,8 @@ What is read only to decline is exempt: an entry without which the act makes not
 and one without which it makes the same and more, as a picture of the floor that is kept unless one from here is.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
 from typing import Any
 

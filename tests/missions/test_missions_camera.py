@@ -1,5 +1,7 @@
 """A mission with a camera that is mounted differently than believed: it is reached, and the camera is known better."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,5 +1,7 @@
 """A lost robot whose camera was taught by pictures of a place that is in doubt: it tries the camera as told too."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import pytest

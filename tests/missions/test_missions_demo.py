@@ -1,5 +1,7 @@
 """``harvey demo``: it tells of being kidnapped, lost and found, and leaves a page that needs nothing else."""
 
+from __future__ import annotations
+
 import webbrowser
 from pathlib import Path
 

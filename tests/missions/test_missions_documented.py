@@ -1,5 +1,7 @@
 """The missions that README shows are driven as they stand there, to the last digit."""
 
+from __future__ import annotations
+
 import json
 
 from docs.tools.status import SEEDS, SEEDS_FILE, drive_seed

@@ -1,5 +1,7 @@
 """``harvey drive`` as a user has it: an emulated base on a pseudo-terminal, a camera on the network, real time."""
 
+from __future__ import annotations
+
 import json
 import os
 import signal

@@ -1,5 +1,7 @@
 """One floor down, on pixels: the robot is carried, and goes on only after a milestone holds where it is."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
 

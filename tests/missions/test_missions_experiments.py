@@ -1,5 +1,7 @@
 """Experiments that drive: their quick versions hold what they claim."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,7 @@
 """Something between agent and body fails in mid-mission: it is an entry, nobody moves, and it ends declared."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import Any
 

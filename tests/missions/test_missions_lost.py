@@ -1,5 +1,7 @@
 """Robots that are kidnapped: they find out where they are, or say that the building cannot tell."""
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
 

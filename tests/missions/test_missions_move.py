@@ -1,5 +1,7 @@
 """Motions that are steered on the move: thirty pictures a second, all through the board, and the same once more."""
 
+from __future__ import annotations
+
 import itertools
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """A fifth of the view is hidden for good: the robot finds out what hides it, and arrives without being lost."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from blackboard import Decision

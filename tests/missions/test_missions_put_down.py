@@ -1,5 +1,7 @@
 """A robot that is put down roughly: the plan level knows how roughly, so that the first milestone mends it."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 

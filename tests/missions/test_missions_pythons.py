@@ -1,5 +1,7 @@
 """The same scenario and seed decide the same on every supported Python, byte for byte."""
 
+from __future__ import annotations
+
 import subprocess
 import sys
 from pathlib import Path

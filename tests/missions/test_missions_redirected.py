@@ -1,5 +1,7 @@
 """Asked on its way to go elsewhere: by the mission's file, or by somebody while the run goes on."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

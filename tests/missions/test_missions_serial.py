@@ -1,5 +1,7 @@
 """The simulated body behind a serial line: the same mission over its protocol, and a line that fails."""
 
+from __future__ import annotations
+
 import json
 
 import pytest

@@ -1,5 +1,7 @@
 """What holds for every mission, seen on a short one: it reaches, and twice the same is the same, byte for byte."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
 

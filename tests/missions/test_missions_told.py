@@ -1,5 +1,7 @@
 """What somebody tells the robot on the way: a door is shut, a thing is gone; it goes on by what is so now."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

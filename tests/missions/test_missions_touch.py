@@ -1,5 +1,7 @@
 """A desk that the model has elsewhere: the robot touches it, says so, and why it stopped walks to what it felt."""
 
+from __future__ import annotations
+
 import math
 import shutil
 from pathlib import Path

@@ -2,6 +2,8 @@
 
 What the model explains, or doubt leaves open, is no obstacle."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,5 +1,7 @@
 """A mission in a building that differs from its model: the recording shows how, from when to when."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 from rerun.chunk import RrdReader

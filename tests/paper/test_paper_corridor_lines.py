@@ -1,5 +1,7 @@
 """The focused line finder on real photographs: the lines of a surveyed model are found where they are."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,7 @@
 """The matching experiments in their small versions: Figure 12's trace, the matcher's growth, the photographs."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path

@@ -1,5 +1,7 @@
 """Tables 2 and 3 and the times of a pose, in their small versions."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -5,6 +5,8 @@ data lines numbered as in 12(d), of which the figure's final state names those t
 starts, as there, from C-8 and D-7 alone, both wrong in the end.
 """
 
+from __future__ import annotations
+
 from itertools import pairwise
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Evidence is added by one rule: in any order, the same look once, and what was known before never speaks against."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

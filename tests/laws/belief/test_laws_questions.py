@@ -1,5 +1,7 @@
 """Laws of what the board says of motions: the robot stands where all that was asked for is reported and believed."""
 
+from __future__ import annotations
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,5 +1,7 @@
 """The agenda against a plain list that is sorted again for every question."""
 
+from __future__ import annotations
+
 from typing import Any
 
 from hypothesis import settings

@@ -1,5 +1,7 @@
 """Laws of location and of the actuator model: nothing invents precision, and every frame is there and back."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

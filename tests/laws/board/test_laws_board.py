@@ -1,5 +1,7 @@
 """The blackboard against a dict that knows nothing of revisions, indexes, effects or forgetting."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import pytest

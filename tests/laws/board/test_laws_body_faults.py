@@ -1,5 +1,7 @@
 """Whatever a body does wrong, and for however long: each request is answered, or the mission ends declared."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from typing import Any
 

@@ -4,6 +4,8 @@ Tracker, judge and localizer are replaced by knowledge sources that post what a 
 and the board, are the real ones. The body does what it is asked. Every picture's figure is drawn by hypothesis.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable
 from dataclasses import replace

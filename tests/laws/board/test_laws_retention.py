@@ -1,5 +1,7 @@
 """Forgetting: the same decisions with it and without, to the byte; a board that stays small; nothing lost for good."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -1,5 +1,7 @@
 """One cycle of the scheduler: its order, who acts, what is refused, and what everyone is told."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from enum import Enum
 from itertools import pairwise

@@ -1,5 +1,7 @@
 """The three servo levels (§2, Figure 2) without robot or image: what may climb, and what is worked on meanwhile."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable
 

@@ -1,5 +1,7 @@
 """Laws of doors: what a picture says of an opening, and what pictures together say of a door."""
 
+from __future__ import annotations
+
 import math
 import random
 from dataclasses import replace

@@ -1,5 +1,7 @@
 """Laws of the views that share what an opening shows: shut, open, ajar."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,5 +1,7 @@
 """Laws of template correlation on patterns that are known at every real-valued place."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of the alignment of a belief to the model's edges, on rendered pictures of the research center."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

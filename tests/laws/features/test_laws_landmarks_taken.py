@@ -1,5 +1,7 @@
 """Laws of which landmarks are taken to be followed, and of what their templates' beliefs leave open."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

@@ -1,5 +1,7 @@
 """Lens distortion: what is bent is straightened again, the simulator's model is the robot's, and both are OpenCV's."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import cv2

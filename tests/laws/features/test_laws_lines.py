@@ -3,6 +3,8 @@
 Of what it says is known to a sigma, so much lies within one and within two.
 """
 
+from __future__ import annotations
+
 from typing import Any
 
 import cv2

@@ -1,5 +1,7 @@
 """Laws of the region segmenter."""
 
+from __future__ import annotations
+
 import cv2
 import numpy as np
 from hypothesis import given, settings

@@ -4,6 +4,8 @@ The robot is put together without pictures: templates are cut where the belief h
 off by the belief's own error, and stays so until they are cut again.
 """
 
+from __future__ import annotations
+
 import math
 from functools import cache
 from typing import Any

@@ -1,5 +1,7 @@
 """Laws of a jamb that stands beside its place in the model: it explains what is seen of it, and nothing wider."""
 
+from __future__ import annotations
+
 import numpy as np
 import shapely
 from hypothesis import given, settings

@@ -1,5 +1,7 @@
 """Laws of the floor that is free without being seen: under the robot, where it drove, and where it was put down."""
 
+from __future__ import annotations
+
 import math
 from itertools import pairwise
 from typing import Any

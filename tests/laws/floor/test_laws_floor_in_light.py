@@ -1,5 +1,7 @@
 """The floor in light and shade and in tinted pictures: what stands on it is told from what does not."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

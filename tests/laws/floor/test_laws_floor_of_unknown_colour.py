@@ -1,5 +1,7 @@
 """Laws of floors of unknown colour: what lies in the floor plane moves with it, what stands on it does not."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from functools import cache

@@ -1,5 +1,7 @@
 """Footprints: joined from several sights, taken off where the floor is free, and told apart."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

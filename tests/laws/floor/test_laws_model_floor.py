@@ -1,5 +1,7 @@
 """Where the model has floor in a picture does not depend on where the picture ends."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from functools import cache

@@ -1,5 +1,7 @@
 """Laws of the motion between two pictures: the surer of wheels and beliefs tells it, and neither claims too much."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

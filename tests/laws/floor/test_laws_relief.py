@@ -1,5 +1,7 @@
 """Laws of the relief: a board that is drawn ray by ray, on the floor or over it, flat marks, and dirt on the lens."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Laws of what a further sight or a touch makes of a thing that is known: it loses nothing that was surely there."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

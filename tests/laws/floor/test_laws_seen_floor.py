@@ -1,5 +1,7 @@
 """What scans show free, against a geometry of polygons; and what of a way is not seen."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

@@ -1,5 +1,7 @@
 """Laws of the shape of a thing by several sights: the one from clearly nearer tells it, and nothing seen is lost."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Recorded missions for the laws of frames."""
 
+from __future__ import annotations
+
 import pytest
 
 from logs.run_directory import RunDirectory

@@ -1,5 +1,7 @@
 """What a knowledge source holds: settings and plain values, so all else that it knows it has read from the view."""
 
+from __future__ import annotations
+
 import functools
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping

@@ -1,5 +1,7 @@
 """Decisions depend on nothing but the view, and an act on nothing but what it read there."""
 
+from __future__ import annotations
+
 from random import Random
 from typing import Any
 

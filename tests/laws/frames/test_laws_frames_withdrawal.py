@@ -1,5 +1,7 @@
 """Withdrawal is complete: nothing on the board rests on what the frames no longer say."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -1,5 +1,7 @@
 """What stands on the floor and is not in the model: found when it is certain enough, joined, and forgotten."""
 
+from __future__ import annotations
+
 import cmath
 import math
 from dataclasses import replace

@@ -1,5 +1,7 @@
 """Laws of points moved by a pose on the floor."""
 
+from __future__ import annotations
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,5 +1,7 @@
 """Laws of the alias monitor: every place that looks the same has its own odds, and is kept or dropped by these."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

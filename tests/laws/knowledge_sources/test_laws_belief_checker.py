@@ -1,5 +1,7 @@
 """Laws of the belief checker: a doubt is measured where the robot stands, ahead first; no look is counted twice."""
 
+from __future__ import annotations
+
 import math
 
 import pytest

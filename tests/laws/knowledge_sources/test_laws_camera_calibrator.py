@@ -1,5 +1,7 @@
 """Laws of the camera calibrator: what a verified picture says of the camera is known from then on, and no more sure."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

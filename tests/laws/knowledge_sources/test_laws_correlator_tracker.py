@@ -3,6 +3,8 @@
 It follows real templates through rendered pictures; where a landmark is not to be found, the picture is grey there.
 """
 
+from __future__ import annotations
+
 import math
 import re
 from collections.abc import Sequence

@@ -1,5 +1,7 @@
 """Laws of the dead reckoner: the belief follows the wheels, grows by what is not known of them, and says why."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,5 +1,7 @@
 """Laws of the dependency withdrawer: a revised frame takes with it exactly what rested on what it no longer says."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, get_args

@@ -1,5 +1,7 @@
 """Laws of the detour finder: a halted leg ends its sketches while another way may lead on, so many times."""
 
+from __future__ import annotations
+
 import pytest
 
 from blackboard import Entry, Posted, Revised

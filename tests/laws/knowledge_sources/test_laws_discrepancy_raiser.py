@@ -1,5 +1,7 @@
 """Laws of the discrepancy raiser: beyond its bound up one level, so many times for one thing that is tried."""
 
+from __future__ import annotations
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

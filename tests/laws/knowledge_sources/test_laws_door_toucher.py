@@ -1,5 +1,7 @@
 """Laws of the door toucher: a touch in the opening of a door that may be shut counts beside its pictures, once."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import pytest

@@ -1,5 +1,7 @@
 """Law of doors that are looked at: what pictures from several places say is believed of the door, and no more."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

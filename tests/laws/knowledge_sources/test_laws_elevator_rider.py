@@ -1,5 +1,7 @@
 """Laws of the elevator rider: it asks for the ride that is next, once, and only while nothing above it is in doubt."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import pytest

@@ -3,6 +3,8 @@
 A few acts of each source and run are decided again on the board as the act saw it, changed by what a law says.
 """
 
+from __future__ import annotations
+
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace

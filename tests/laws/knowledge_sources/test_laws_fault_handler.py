@@ -3,6 +3,8 @@
 One that is over is closed; a motion that it broke off is a doubt, too many in a row are the end.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import Any, get_args
 

@@ -1,5 +1,7 @@
 """Laws of the floor changer: in the car of the other floor the robot stands as it did in the one that it came from."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from functools import cache

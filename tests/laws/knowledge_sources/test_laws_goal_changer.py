@@ -1,5 +1,7 @@
 """Laws of the goal changer on each kind of board: with a goal or without, lost or not, a milestone awaited or not."""
 
+from __future__ import annotations
+
 from itertools import product
 
 import pytest

@@ -1,5 +1,7 @@
 """Laws of the goal closer: a goal is reached by the sketch that leads to it, and by no other."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import get_args
 

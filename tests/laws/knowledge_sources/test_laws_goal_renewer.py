@@ -1,5 +1,7 @@
 """Laws of the goal renewer: the robot that knows its place again doubts nothing, and begins again from there."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import pytest

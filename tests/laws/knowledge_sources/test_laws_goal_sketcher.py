@@ -1,5 +1,7 @@
 """Laws of the goal sketcher: one sketch for a goal that has none, from where the robot is; else it sees no way on."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import pytest

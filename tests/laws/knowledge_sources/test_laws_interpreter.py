@@ -1,5 +1,7 @@
 """Laws of the interpreter: feet of a locale become metres of it; what is not understood ends the mission."""
 
+from __future__ import annotations
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,5 +1,7 @@
 """Laws of the landmark chooser: all landmarks are taken again from the newest picture, and the drift starts afresh."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from functools import cache
 from itertools import islice

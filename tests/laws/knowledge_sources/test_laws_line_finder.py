@@ -1,5 +1,7 @@
 """Laws of the line finder: the lines of a picture and its light, of the milestone that waits for it."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import cv2

@@ -1,5 +1,7 @@
 """Laws of the localizer: places that agree with the looks stay and go with the robot; no move leads to what it felt."""
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

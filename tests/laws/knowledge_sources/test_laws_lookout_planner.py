@@ -1,5 +1,7 @@
 """Laws of the lookout planner: what leaves no way is looked at again from elsewhere, so often a goal."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

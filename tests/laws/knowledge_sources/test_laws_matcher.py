@@ -1,5 +1,7 @@
 """Laws of matcher and Med-R-and-T: lines seen from a pose are matched each to its own, and tell that pose."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from types import SimpleNamespace

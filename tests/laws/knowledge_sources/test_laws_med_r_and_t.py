@@ -1,5 +1,7 @@
 """Laws of Med-R-and-T: lines tell from where they were seen, outliers are named, and it says how sure it is."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from typing import Any

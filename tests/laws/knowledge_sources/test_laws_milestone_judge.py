@@ -4,6 +4,8 @@ The verdicts of a table of weighed pictures; and, on the boards of a mission, ho
 the robot is in doubt, has followed landmarks, or has not: each state has its own number, and that alone decides.
 """
 
+from __future__ import annotations
+
 import math
 import re
 from collections.abc import Hashable, Iterable, Iterator

@@ -1,5 +1,7 @@
 """Laws of the milestone passer: on from a verified milestone, or the same subgoal again; failed so often, doubt."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from typing import Any

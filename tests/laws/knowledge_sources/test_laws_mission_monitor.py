@@ -1,5 +1,7 @@
 """Laws of the mission monitor: one outcome a mission, by what weighs most: reached, no way on, lost, nothing left."""
 
+from __future__ import annotations
+
 import pytest
 
 from blackboard import Entry, Level, Posted, Quiescence, Revised

@@ -1,5 +1,7 @@
 """Law of the model reviser: after any run of findings and tellings the frames say what the newest of each says."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

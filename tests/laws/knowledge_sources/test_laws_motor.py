@@ -1,5 +1,7 @@
 """Laws of the motor: one increment at a time, along the leg, as far as the floor is known to be free."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

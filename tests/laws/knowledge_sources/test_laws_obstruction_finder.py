@@ -1,5 +1,7 @@
 """Laws of the obstruction finder: what stands still in looks of several directions is before the camera."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

@@ -1,5 +1,7 @@
 """Laws of the panorama builder: looks are carried along by the motions between them."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of the path follower: when it begins to roll, how it steers and how fast, and what stops it."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,5 +1,7 @@
 """Laws of the plan adjuster: within the plan level's bound the belief becomes the pose of the verified milestone."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of the pose adopter: the place that was found is the belief, whole, and the camera with which it was found."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

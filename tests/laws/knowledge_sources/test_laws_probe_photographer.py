@@ -1,5 +1,7 @@
 """Laws of the probe photographer: a lost robot has one bright picture from where it stands, and asks for no more."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

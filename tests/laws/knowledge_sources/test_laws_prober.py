@@ -1,5 +1,7 @@
 """Laws of the prober: the motion that a search asks for is carried out, slowly where nothing tells of the floor."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import pytest

@@ -1,5 +1,7 @@
 """Laws of the range watcher: the newest reading tells of free floor while the robot's place is known."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

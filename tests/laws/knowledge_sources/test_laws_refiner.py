@@ -1,5 +1,7 @@
 """Laws of the refiner: the current subgoal, once its milestone holds, is drawn in more detail, once."""
 
+from __future__ import annotations
+
 import pytest
 from hypothesis import given, settings
 

@@ -1,5 +1,7 @@
 """Laws of the sketch advancer: what carried out the current subgoal takes its sketch on by one, once."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import get_args
 

@@ -1,5 +1,7 @@
 """Law of what sights of the floor tell: certainty by plain odds, and what is seen free is forgotten."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

@@ -1,5 +1,7 @@
 """Law of what is moved when a lost robot is found: what was seen, and not touched, since it was last sure."""
 
+from __future__ import annotations
+
 import cmath
 from dataclasses import replace
 from typing import Any, get_args

@@ -1,5 +1,7 @@
 """Law of what a touch tells: a square behind the point that was touched, where nothing of the model explains it."""
 
+from __future__ import annotations
+
 import cmath
 import math
 from dataclasses import replace

@@ -1,5 +1,7 @@
 """Laws of the travel breaker: a push, a stop or being lost breaks a way, once, and changes nothing else of it."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

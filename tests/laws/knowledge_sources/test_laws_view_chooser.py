@@ -1,5 +1,7 @@
 """Laws of the view chooser: when a milestone is due, and in which direction it is looked for."""
 
+from __future__ import annotations
+
 import math
 
 import pytest

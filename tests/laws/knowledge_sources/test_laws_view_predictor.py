@@ -1,5 +1,7 @@
 """Laws of the view predictor: it predicts what the robot faces, when it faces it, and asks for the picture once."""
 
+from __future__ import annotations
+
 import math
 
 import pytest

@@ -1,5 +1,7 @@
 """Laws of the view updater: a milestone whose picture is taken is predicted again without what an obstruction hides."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import pytest

@@ -1,5 +1,7 @@
 """Laws of the yaw calibrator: when a way tells of the yaw, how much, on which side, and what turns with it."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from typing import NamedTuple

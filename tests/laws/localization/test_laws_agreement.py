@@ -1,5 +1,7 @@
 """Laws of the evidence for a pose: what is accounted for, what that is worth, and how a view would tell."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

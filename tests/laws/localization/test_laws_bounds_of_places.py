@@ -3,6 +3,8 @@
 A table of boards or results, and the decision that follows. Both sides of each bound must occur.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from itertools import pairwise

@@ -1,5 +1,7 @@
 """Law of the compiled chamfer scores: value by value those of plain projection, with random maps, points and poses."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of the actuator model: where a motion ends, and that no motion makes the robot surer of where it is."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of straight lines through doorways: they keep their distance, the straight one is preferred, none is missed."""
 
+from __future__ import annotations
+
 import numpy as np
 import shapely
 from hypothesis import given

@@ -1,5 +1,7 @@
 """Laws of the way to a view that tells places apart: it is free whichever is true, and its end tells."""
 
+from __future__ import annotations
+
 import math
 from functools import lru_cache
 

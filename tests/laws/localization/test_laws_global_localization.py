@@ -1,5 +1,7 @@
 """Laws of a robot that is lost: what it keeps in mind, which view it chooses, and that it never guesses."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

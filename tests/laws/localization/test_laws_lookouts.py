@@ -1,5 +1,7 @@
 """Laws of places to look again from: they are free, face the thing, and nothing stands in between."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of what a motion leaves open: second moments of what may have been driven, against draws of it."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

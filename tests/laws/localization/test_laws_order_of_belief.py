@@ -1,5 +1,7 @@
 """Laws of the order of belief: what it excludes is not searched, and what it leaves open is found all the same."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Lines in a pattern that the model does not have tell nothing of a place (:func:`find_distinct`)."""
 
+from __future__ import annotations
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,5 +1,7 @@
 """Laws of the odds of where the robot was told to be: a prior that is counted once, and never against what is so."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of the judge's evidence: it is a set of lines and faces, and more of it never makes a pose less sure."""
 
+from __future__ import annotations
+
 import math
 from functools import cache
 

@@ -1,5 +1,7 @@
 """Laws of the way across a room: it keeps clear, it is no longer than it must be, and it is there when there is one."""
 
+from __future__ import annotations
+
 import math
 from itertools import pairwise
 

@@ -1,5 +1,7 @@
 """Laws of what a view is worth: the deviations that it promises and the odds of its lines, against scipy's numbers."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

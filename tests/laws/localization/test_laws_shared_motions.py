@@ -1,5 +1,7 @@
 """Laws of views that share motions: their joint covariance, and the covariance of a pose that rests on all of them."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """§5's law on the motion model, without images: correcting the heading alone keeps the position error bounded."""
 
+from __future__ import annotations
+
 import math
 
 from hypothesis import given, settings

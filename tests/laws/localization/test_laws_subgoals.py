@@ -1,5 +1,7 @@
 """Laws of subgoals round what the model lacks: by which doors, past what stands before them, and from where to look."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 

@@ -1,5 +1,7 @@
 """A lost robot makes no move into what it has just touched, wherever it is (§2, §4)."""
 
+from __future__ import annotations
+
 import cmath
 import math
 from types import SimpleNamespace

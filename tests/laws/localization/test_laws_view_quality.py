@@ -1,5 +1,7 @@
 """Laws of choosing a view and of what is expected in it: the clearest lines, and none of the car that was ridden in."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

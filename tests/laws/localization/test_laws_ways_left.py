@@ -1,5 +1,7 @@
 """Laws of the ways that are left of a sketch: both sides of the reach at which a thing concerns it."""
 
+from __future__ import annotations
+
 import pytest
 
 from generated_boards import HALL, house, plain_robot, to_world

@@ -1,5 +1,7 @@
 """Laws of the 2D matcher (§6.1), with brute force and scipy's minimiser as oracles."""
 
+from __future__ import annotations
+
 from itertools import pairwise, product
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Laws of how many pairs are looked at: never more than the settings say, and the longest ones."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

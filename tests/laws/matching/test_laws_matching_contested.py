@@ -4,6 +4,8 @@ Near-parallel model lines a few pixels apart want the same data lines. Each goes
 that is part of the match error.
 """
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of rivals: where a model repeats itself other poses are found, and nothing wrong is verified beside them."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

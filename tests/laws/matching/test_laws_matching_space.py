@@ -1,5 +1,7 @@
 """Laws of matching with six unknowns, and of locating a camera with it."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,5 +1,7 @@
 """Laws of the matching's evidence, against scipy's distributions, and of its starts, on models that were moved."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of the two sets of pose unknowns, and of the compiled pairs that use them."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

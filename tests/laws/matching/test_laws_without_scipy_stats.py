@@ -1,5 +1,7 @@
 """What stands in for parts of scipy.stats, whose import every mission would wait for, gives the same bits."""
 
+from __future__ import annotations
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,5 +1,7 @@
 """Laws of every pose solver, on any scene (§6.2)."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

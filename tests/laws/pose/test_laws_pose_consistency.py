@@ -9,6 +9,8 @@ is found nine times in ten; a camera's noise is estimated from its own lines, wh
 draws.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

@@ -3,6 +3,8 @@
 A Hessian with a wrong sign still leads to the same minimum, so that only its values tell; the covariance rests on it.
 """
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

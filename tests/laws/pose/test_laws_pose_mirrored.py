@@ -1,5 +1,7 @@
 """Law of model lines behind the camera: they lie on their segments as well as those in front do, and are left out."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,5 +1,7 @@
 """Laws of the pose solvers on the floor, with scipy's least squares as an oracle."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of a prior with a covariance: one more measurement, for every solver that takes it."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

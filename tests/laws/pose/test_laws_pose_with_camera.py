@@ -1,5 +1,7 @@
 """Laws of the pose with the camera's own state: consistent, no surer than its lines, true in a known camera."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import Any
 

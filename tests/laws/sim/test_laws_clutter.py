@@ -1,5 +1,7 @@
 """Laws of clutter: as many things as asked for, where there is room, with a way left or none left, by the truth."""
 
+from __future__ import annotations
+
 from functools import cache
 from itertools import combinations
 from pathlib import Path

@@ -3,6 +3,8 @@
 And what the field then does is what its name says: of faults, each number by what happens to the body.
 """
 
+from __future__ import annotations
+
 import math
 import re
 from dataclasses import fields

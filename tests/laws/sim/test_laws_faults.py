@@ -1,5 +1,7 @@
 """Laws of the fault classes: each has its own keys, and no other key is read."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import fields, replace
 

@@ -1,5 +1,7 @@
 """Laws of ranged floor: nothing solid is in what is called free, and what the model lacks is found where it stands."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

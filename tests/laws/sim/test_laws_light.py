@@ -1,5 +1,7 @@
 """Laws of light that is even, of the lamps, and of a camera that adapts; of baked light: extras/harvey-light/tests."""
 
+from __future__ import annotations
+
 import hashlib
 import math
 from itertools import pairwise

@@ -1,5 +1,7 @@
 """The law of bad lines: nothing that was not asked for, nothing twice, no hang, and it stands in time."""
 
+from __future__ import annotations
+
 import pytest
 
 from tests.serial_bench import (

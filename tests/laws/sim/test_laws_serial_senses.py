@@ -1,5 +1,7 @@
 """Laws of touch and range over the Denning-style line: what a base feels is what its driver tells."""
 
+from __future__ import annotations
+
 import math
 
 import pytest

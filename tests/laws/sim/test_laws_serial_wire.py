@@ -1,5 +1,7 @@
 """Laws of the Denning-style line's bytes: what is said is understood at the other end, and noise is only noise."""
 
+from __future__ import annotations
+
 import math
 
 from hypothesis import given

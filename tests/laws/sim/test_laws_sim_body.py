@@ -1,5 +1,7 @@
 """Laws of the simulated body: nothing drives through a wall, and the same seed is the same run."""
 
+from __future__ import annotations
+
 import math
 from itertools import pairwise
 

@@ -1,5 +1,7 @@
 """Laws of range sensors: an echo is the nearest thing in the cone, what does not come back is none, seeds decide."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Laws of the renderer, against projections and rays computed here by other means."""
 
+from __future__ import annotations
+
 import math
 
 import cv2

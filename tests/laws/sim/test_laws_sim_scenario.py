@@ -1,5 +1,7 @@
 """Laws of scenario files: whatever is done to one, it is read or refused with a ScenarioError."""
 
+from __future__ import annotations
+
 import re
 
 import pytest

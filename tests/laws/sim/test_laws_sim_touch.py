@@ -1,5 +1,7 @@
 """Laws of touch: a contact is felt where something is, once for each collision, and belongs to the motion it ended."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable
 from typing import Any

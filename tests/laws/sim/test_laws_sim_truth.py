@@ -1,5 +1,7 @@
 """Laws of a truth that differs: it is seen and felt where and while it is there, and nowhere and never else."""
 
+from __future__ import annotations
+
 import math
 from functools import cache
 

@@ -1,5 +1,7 @@
 """Laws of what is told about the camera at the end, and of the file that keeps it for the next mission."""
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -1,5 +1,7 @@
 """Laws of how well a model knows its lines: what is stated, what is shared, and how it is kept."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from experiments.generated.floors import generated_floor

@@ -1,5 +1,7 @@
 """Laws of the way since a known place: a yaw that is wrong turns the way that is expected, and nothing else does."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -5,6 +5,8 @@ picked from them is hidden. The two share no code: the renderer has its own proj
 clips by planes and passes through doorways.
 """
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -4,6 +4,8 @@ The board is left out: what the knowledge source asks it for is given. It states
 headings of a way may share an error.
 """
 
+from __future__ import annotations
+
 import math
 from types import SimpleNamespace
 from typing import Any

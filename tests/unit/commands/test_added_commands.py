@@ -1,5 +1,7 @@
 """Commands that other packages add; and those of extras that are not installed say what to install."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,7 @@
 """The libraries use the same instructions on every processor that has them, whatever else it has."""
 
+from __future__ import annotations
+
 import json
 import os
 import subprocess

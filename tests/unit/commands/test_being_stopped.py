@@ -1,5 +1,7 @@
 """What a command says when it is stopped: by a key, by a closed pipe, by a full disk, by a package of another name."""
 
+from __future__ import annotations
+
 import os
 import signal
 import subprocess

@@ -1,5 +1,7 @@
 """The command line with input that cannot be used: one sentence and exit code 2, never a traceback."""
 
+from __future__ import annotations
+
 import json
 import socket
 from importlib.metadata import version

@@ -1,5 +1,7 @@
 """The command line on a short recorded run: run, why, replay, diff, and being stopped."""
 
+from __future__ import annotations
+
 import io
 import json
 import os

@@ -1,5 +1,7 @@
 """Words, tables and reports of the command line."""
 
+from __future__ import annotations
+
 import json
 import math
 from dataclasses import replace

@@ -1,5 +1,7 @@
 """What is compiled beforehand is what a mission calls, with the types with which it calls it."""
 
+from __future__ import annotations
+
 import importlib
 import json
 import os

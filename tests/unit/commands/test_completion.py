@@ -1,5 +1,7 @@
 """``harvey completion``: what a shell completes is what the parsers know."""
 
+from __future__ import annotations
+
 import shutil
 import subprocess
 from pathlib import Path

@@ -1,5 +1,7 @@
 """The name of the program that decides: another whenever what decides is another, and only then."""
 
+from __future__ import annotations
+
 import shutil
 from pathlib import Path
 

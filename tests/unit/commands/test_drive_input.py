@@ -1,5 +1,7 @@
 """What a user gives to ``harvey drive``: each mistake is one clear line with what to do, and nothing is moved."""
 
+from __future__ import annotations
+
 import errno
 import math
 import os

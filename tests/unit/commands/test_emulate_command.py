@@ -1,5 +1,7 @@
 """``harvey emulate``: a port that answers, in a process of its own, until it is interrupted."""
 
+from __future__ import annotations
+
 import re
 import signal
 import subprocess

@@ -1,5 +1,7 @@
 """``harvey export``: what the journal tells comes back from CSV and Parquet to the last bit."""
 
+from __future__ import annotations
+
 import csv
 from collections.abc import Sequence
 from pathlib import Path

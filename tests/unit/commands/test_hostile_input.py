@@ -1,5 +1,7 @@
 """What a hostile file or argument makes a command print: one printable line of at most 300 letters, exit code 2."""
 
+from __future__ import annotations
+
 import os
 import shutil
 import sqlite3

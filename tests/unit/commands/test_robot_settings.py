@@ -1,5 +1,7 @@
 """What the robot believes of itself can be set: each value alone, within its bounds, in several units."""
 
+from __future__ import annotations
+
 import json
 import math
 from dataclasses import fields

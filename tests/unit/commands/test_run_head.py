@@ -1,5 +1,7 @@
 """How a run began, written down and read back."""
 
+from __future__ import annotations
+
 import dataclasses
 import json
 from pathlib import Path

@@ -1,5 +1,7 @@
 """Settings: each has unit, meaning and source; setting one changes it and nothing else; mistakes are named."""
 
+from __future__ import annotations
+
 import json
 import re
 from dataclasses import fields, is_dataclass

@@ -1,5 +1,7 @@
 """What a mission in the simulator need not load is not loaded, as every start would wait for it."""
 
+from __future__ import annotations
+
 import subprocess
 import sys
 

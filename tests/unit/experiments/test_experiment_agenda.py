@@ -1,5 +1,7 @@
 """The loads of ``harvey experiment agenda``: what they wake, what they leave behind, and peers that are not there."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

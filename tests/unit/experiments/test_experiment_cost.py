@@ -1,5 +1,7 @@
 """The sampler of ``harvey experiment cost``: all time is told, and each function's by its file."""
 
+from __future__ import annotations
+
 import signal
 import threading
 import time

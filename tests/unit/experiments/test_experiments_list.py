@@ -1,5 +1,7 @@
 """The list of experiments: complete, in order, in lines that fit a terminal."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,5 +1,7 @@
 """What the truth says of obstacles and ways, on cases that one can check by hand."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

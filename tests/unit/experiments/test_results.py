@@ -1,5 +1,7 @@
 """Results of experiments that are kept: what stands in them, and when they are stale."""
 
+from __future__ import annotations
+
 import json
 import subprocess
 from dataclasses import replace

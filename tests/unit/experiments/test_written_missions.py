@@ -1,5 +1,7 @@
 """Missions that are drawn and written: the same again for the same seed, and such that they can be staged."""
 
+from __future__ import annotations
+
 import tomllib
 from collections.abc import Callable
 from pathlib import Path

@@ -1,5 +1,7 @@
 """Calibration: rendered boards give their camera back, within its standard deviations; unusable pictures say why."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from pathlib import Path

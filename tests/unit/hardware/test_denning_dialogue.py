@@ -1,5 +1,7 @@
 """What the driver of a Denning-style base says, when, and how long it waits: both sides of its bounds."""
 
+from __future__ import annotations
+
 import zlib
 from collections.abc import Callable, Sequence
 from itertools import pairwise

@@ -1,5 +1,7 @@
 """A base and a camera put together: what goes wrong is a value, a stop key stops, and claims are what wheels count."""
 
+from __future__ import annotations
+
 import threading
 from collections.abc import Callable
 from pathlib import Path

@@ -1,5 +1,7 @@
 """docs/hardware.md is true: its flat can be driven, what it adds may stand there, its words are the board's."""
 
+from __future__ import annotations
+
 import re
 import tomllib
 from pathlib import Path

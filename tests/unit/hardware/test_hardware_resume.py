@@ -1,5 +1,7 @@
 """Where a run on hardware stood when it was cut off, by its journal."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from pathlib import Path
 

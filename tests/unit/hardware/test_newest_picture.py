@@ -3,6 +3,8 @@
 The clock is the test's: each time that the one who waits looks at it, the next thing of a script happens.
 """
 
+from __future__ import annotations
+
 import statistics
 import threading
 from collections.abc import Callable, Iterator

@@ -1,5 +1,7 @@
 """A body of one's own: the example of docs/how-to/own-simulator.md drives, and what fails is told."""
 
+from __future__ import annotations
+
 import math
 import runpy
 from pathlib import Path

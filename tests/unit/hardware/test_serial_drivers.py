@@ -1,5 +1,7 @@
 """The driver of the Denning-style base, over each kind of line to its emulator, and what it does when that fails."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 

@@ -1,5 +1,7 @@
 """VideoCamera: files and live cameras through a capture of our own, and what each fault is called."""
 
+from __future__ import annotations
+
 from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,5 +1,7 @@
 """What the documents show can be used as shown: commands with their options, TOML examples, files, pictures."""
 
+from __future__ import annotations
+
 import re
 import shlex
 import tomllib

@@ -5,6 +5,8 @@ hold. One room of the core may lend lines to another; the sum of the core may no
 system is a package outside the core.
 """
 
+from __future__ import annotations
+
 import subprocess
 import tomllib
 from pathlib import Path

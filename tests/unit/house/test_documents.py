@@ -1,5 +1,7 @@
 """Documents say what is: what is generated in them is current, links lead somewhere, nothing is a placeholder."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

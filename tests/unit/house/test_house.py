@@ -1,5 +1,7 @@
 """Rules of the house that a reader of one file cannot see: who imports whom, and what no module may do."""
 
+from __future__ import annotations
+
 import ast
 import importlib
 import sys

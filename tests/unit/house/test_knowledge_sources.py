@@ -1,5 +1,7 @@
 """What every knowledge source must be; sources are found by looking into the folder."""
 
+from __future__ import annotations
+
 import ast
 import dataclasses
 import importlib

@@ -1,5 +1,7 @@
 """README is short enough to be read, and shows what it says."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """The reference pages are made from the code; these are what a builder of the site would not be told."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Callable
 from itertools import repeat

@@ -1,5 +1,7 @@
 """What a user sees: every view finds what it is to show, and in the viewer none of them complains."""
 
+from __future__ import annotations
+
 import os
 import time
 from collections.abc import Mapping

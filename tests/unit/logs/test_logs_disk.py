@@ -1,5 +1,7 @@
 """Files that only grow: all of what is written or nothing of it, by one process, read back as it was."""
 
+from __future__ import annotations
+
 import errno
 import os
 import subprocess

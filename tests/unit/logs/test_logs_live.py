@@ -1,5 +1,7 @@
 """Watching and recording at once: a viewer's stand-in reads the live stream, comes late, or dies on the way."""
 
+from __future__ import annotations
+
 import shutil
 import socket
 import subprocess

@@ -1,5 +1,7 @@
 """The frames on the board are seen in the recording: as they come, as they change, and as they leave."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,7 @@
 """What is seen of the floor and of what stands on it is drawn where it is."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Template correlation at the border, and with arguments that make no sense."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

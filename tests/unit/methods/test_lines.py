@@ -1,5 +1,7 @@
 """The line finder's edges: empty, malformed and extreme arguments."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

@@ -1,5 +1,7 @@
 """Matching with the three unknowns of a robot on the floor, where perspective bends the prediction."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray

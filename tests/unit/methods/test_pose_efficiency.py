@@ -1,5 +1,7 @@
 """Efficiency of the pose solvers: their errors against the Cramér-Rao bound and against their own covariances."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

@@ -1,5 +1,7 @@
 """The examples in the docstrings of the pose and matching packages."""
 
+from __future__ import annotations
+
 import doctest
 from types import ModuleType
 

@@ -1,5 +1,7 @@
 """scipy's least squares as an oracle of each solver's objective, and brute force for Med R and T's."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from itertools import combinations
 

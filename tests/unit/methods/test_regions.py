@@ -1,5 +1,7 @@
 """Regions and decoding: limits and errors."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,5 +1,7 @@
 """Other passages where obstacles leave no way: two rooms with two doors between them."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Floors that nobody drew: the same for the same seed, sound, and symmetric where that is asked for."""
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
 

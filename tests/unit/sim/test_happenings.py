@@ -1,5 +1,7 @@
 """What the simulator did to the robot and its building, as it is told afterwards."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from types import SimpleNamespace

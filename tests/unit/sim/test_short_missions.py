@@ -1,5 +1,7 @@
 """The short missions that experiments and tests share can be read, with every fault that is put into them."""
 
+from __future__ import annotations
+
 import pytest
 
 from experiments.robustness.crash import DECISIONS, FULL, MAIN, QUICK, TEXTS

@@ -1,5 +1,7 @@
 """The simulated wheels against what the paper measured (§3.2, §5, Table 1)."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Mesh, textures, light and sensor of the simulated camera."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,5 +1,7 @@
 """What is solid, and the score of a run."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Bumps, kidnaps and lights: once, at their moment, and never into a wall."""
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

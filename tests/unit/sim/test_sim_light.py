@@ -1,5 +1,7 @@
 """Light in scenarios and in the simulated body: settings, recorded pictures, states of the building."""
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """What hides the view, and what was moved: seen by the camera, felt by the robot, unknown to the model."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Scenario files and --set."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The shipped scenarios in the shipped building: they can be set up, run and seen."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from itertools import pairwise

@@ -1,5 +1,7 @@
 """The ``[truth]`` of a scenario: read, checked against the building, and built."""
 
+from __future__ import annotations
+
 import json
 import math
 

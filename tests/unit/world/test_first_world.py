@@ -1,5 +1,7 @@
 """The first world file: it has no faults whatever its rooms are called, its mission runs, nothing is overwritten."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,7 @@
 """A goal where the robot cannot stand is told before anything moves: blocked, and why."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

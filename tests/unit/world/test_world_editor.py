@@ -1,5 +1,7 @@
 """harvey world edit: each save is checked and drawn; the last plan stays while the file cannot be read."""
 
+from __future__ import annotations
+
 import re
 import sys
 import threading
