@@ -46,8 +46,8 @@ DECISIONS: Mapping[str, type] = {
     "pending": int, "observed": str, "made": str, "refused": str}
 POSES: Mapping[str, type] = {
     "cycle": int, "time_s": float, "entry": str, "locale": str, "x_m": float, "y_m": float, "heading_rad": float,
-    "sigma_m": float, "sigma_rad": float, "cov_xx": float, "cov_xy": float, "cov_xh": float, "cov_yy": float,
-    "cov_yh": float, "cov_hh": float, "basis": str, "status": str, "weight": float, "world_x_m": float,
+    "sigma_m": float, "sigma_rad": float, "protection_m": float, "protection_rad": float, "cov_xx": float,
+    "cov_xy": float, "cov_xh": float, "cov_yy": float, "cov_yh": float, "cov_hh": float, "basis": str, "status": str, "weight": float, "world_x_m": float,
     "world_y_m": float, "world_heading_rad": float}
 """Pose and covariance are in the locale's frame; h is the heading."""
 MILESTONES: Mapping[str, type] = {
@@ -95,8 +95,8 @@ def _poses(history: Timeline, world: World | None) -> Iterator[tuple[Cell, ...]]
         there = None if world is None else value.world_from_robot(world)
         in_world = (None, None, None) if there is None else (there.x_m, there.y_m, there.heading_rad)
         yield (record.cycle, history.time_at(record.cycle), record.ref, value.locale, pose.x_m, pose.y_m,
-               pose.heading_rad, value.sigma_m, value.sigma_rad, xx, xy, xh, yy, yh, hh, value.basis, value.status,
-               value.weight, *in_world)
+               pose.heading_rad, value.sigma_m, value.sigma_rad, value.protection_m, value.protection_rad, xx, xy, xh,
+               yy, yh, hh, value.basis, value.status, value.weight, *in_world)
 
 
 def _milestone(row: MilestoneRow) -> tuple[Cell, ...]:

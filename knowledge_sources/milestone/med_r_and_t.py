@@ -20,7 +20,14 @@ from knowledge_sources.methods.calibration import (
 )
 from knowledge_sources.methods.features import SIGMA_ACROSS_PX
 from knowledge_sources.methods.localization import CAMERA_LINE_SIGMA_PX, MIN_CAMERA_LINES
-from knowledge_sources.methods.pose import CameraEstimate, PlanarEstimate, estimate_camera_and_pose, planar_from_lines
+from knowledge_sources.methods.pose import (
+    CameraEstimate,
+    PlanarEstimate,
+    Rests,
+    compute_protection,
+    estimate_camera_and_pose,
+    planar_from_lines,
+)
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, find_camera, find_robot
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -69,13 +76,20 @@ class MedRAndT(RobotKnowledgeSource):
         if learnt is not None:
             spread = learnt.covariance if moves else known
             covariance = covariance + learnt.pose_slopes @ spread @ learnt.pose_slopes.T
+        camera_step = np.zeros(len(known)) if learnt is None or not moves else learnt.step
+        near = np.asarray(found.inliers, bool)
+        rests = Rests(
+            match.value.lines_world[near], match.value.segments_px[near],
+            [m.landmarks[m.landmark_of[i]] for i in match.value.pairs[near, 0]], robot.camera, robot.mount, camera_step,
+            here, belief.covariance, prior, known)
         yield Post(
             PoseFix(
-                match.id, found.world_from_robot, frozen(covariance), np.asarray(found.inliers, bool),
-                frozen(found.residuals_px), tuple(reason or "" for reason in found.rejected),
+                match.id, found.world_from_robot, frozen(covariance), near, frozen(found.residuals_px),
+                tuple(reason or "" for reason in found.rejected),
                 () if learnt is None or not moves else tuple(learnt.step.tolist()),
                 () if learnt is None or not moves else to_tuples(learnt.covariance),
                 0.0 if learnt is None or not moves else learnt.prior_chi2,
+                compute_protection(found.world_from_robot, covariance, rests),
             ),
             (match, milestone, belief.entry),
         )

@@ -11,6 +11,7 @@ import numpy as np
 
 from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch, open_or_measure
 from knowledge_sources.methods.calibration import add_yaw, compute_camera_covariance, is_camera_known
+from knowledge_sources.methods.pose import tell_unavailable
 from knowledge_sources.methods.verification import (
     Before,
     PictureEvidence,
@@ -87,6 +88,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         milestone = case.milestone
         weighed = self.weigh(view, case)
         verdict = self._hold_against_others(view, case, weighed, judge_place(weighed))
+        verdict = self._hold_against_single_lies(case, weighed, verdict)
         because = case.fix, milestone, *find_followed(view), *view.all(Travel)
         certificate = Post(certify((milestone.id, case.fix.id), weighed, verdict, case.fix.value), because)
         yield certificate
@@ -123,3 +125,16 @@ class MilestoneJudge(RobotKnowledgeSource):
         odds = alias.p, MAX_P_RIVAL
         reason = f"{verdict.reason}; but {alias.said}: {tell_odds(*odds)}"
         return Verdict("not testable", reason, *odds, p_alias=alias.p)
+
+    def _hold_against_single_lies(self, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:
+        """What would be verified is looked at once more where one false thing may have moved the pose too far.
+
+        But for a last look, and while the camera is hardly known: it is this picture that tells of it.
+        """
+        protection = case.fix.value.protection
+        if verdict.kind != "verified" or protection.is_available:
+            return verdict
+        reason = f"{verdict.reason}; but {tell_unavailable(protection)}"
+        if is_last_look(case.milestone.value) or not weighed.is_camera_known:
+            return verdict._replace(reason=reason)
+        return verdict._replace(kind="not testable", reason=reason)

@@ -24,6 +24,7 @@ def plan_adjuster(view: View, case: tuple[Entry[Certificate], Entry[PoseFix]]) -
     """Replaces the belief by the pose of a verified milestone, within the plan level's bound."""
     (certificate, fix), belief, found = case, HELD.of(view), PLAN_DOUBT.of(view)
     here = belief.moved_to(fix.value.world_from_robot, fix.value.covariance, "milestone")
+    here = here.protected(fix.value.protection)
     correction = Revise(belief.entry, here, (certificate, fix, belief.entry))
     yield correction
     yield Revise(found, found.value.corrected(), (correction,))

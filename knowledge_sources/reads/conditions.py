@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -87,10 +87,12 @@ class Belief:
     ) -> Hypothesis:
         """What is believed from now on: another pose with its covariance (3, 3), world frame, and what that rests on.
 
-        In the same locale, and with the same motion taken into account, where no other is given.
+        In the same locale, and with the same motion taken into account, where no other is given. What may be false in
+        the place that it starts from may be false in this one.
         """
-        return Hypothesis.of_world(
+        moved = Hypothesis.of_world(
             self.world, locale or self.locale, pose, covariance, basis, motion=motion or self.value.motion)
+        return replace(moved, excess_m=self.value.excess_m, excess_rad=self.value.excess_rad)
 
 
 def find_held(view: View) -> Belief | None:

@@ -181,7 +181,8 @@ def place(p: Place) -> str:
 def pose(h: Hypothesis) -> str:
     """Where a hypothesis says that the robot stands, and how surely."""
     p = h.locale_from_robot
-    sure = f"within {metres(h.sigma_m)} and {degrees(h.sigma_rad)}, one sigma"
+    sure = (f"within {metres(h.sigma_m)} and {degrees(h.sigma_rad)}, one sigma; protection level"
+            f" {metres(h.protection_m)}")
     return f"{point(p.x_m, p.y_m)} of {h.locale}, heading {degrees(p.heading_rad)} ({sure})"
 
 

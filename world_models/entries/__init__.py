@@ -4,7 +4,8 @@
 ``robot_state``: what the robot knows of its camera, wheels and footprint, and what of the camera was believed
 wrongly. ``body``: requests to the robot's body and its answers. ``task``: command, goal, plan sketch, leg, milestone,
 certificate, outcome. ``percepts``: tracks, segments, matches, pose fixes. ``user_reports``: what somebody says on the
-way. ``location``: pose hypotheses, and the way since a known place. ``obstacle``: contacts and ranges, what stands in
+way. ``location``: pose hypotheses, and the way since a known place.
+``protection_level``: how far off a pose may be at a stated risk. ``obstacle``: contacts and ranges, what stands in
 the way, what stands before the camera. ``floor``: free floor, and what floors look like. ``door_state``: which doors
 are seen open or shut. ``entry_kinds``: all of them; not part of this face, as frames stand with the building.
 """
@@ -25,6 +26,9 @@ from world_models.entries.obstacle import (
     AROUND_SIGMA_RAD, Contact, Corners, Obstacle, ObstacleStatus, Ranges, Sense,
 )
 from world_models.entries.percepts import Anchor, Glimpse, LineMatch, Panorama, PoseFix, Segments, Track, Tracks
+from world_models.entries.protection_level import (
+    ALERT_LIMIT_M, Protection, RISK, SHARED_SIGMA_M, count_sigmas,
+)
 from world_models.entries.robot_state import CameraLesson, CameraState, Drift, Footprint, Wheels, find_camera_lessons
 from world_models.entries.task import (
     Certificate, Command, Goal, Impasse, Leg, Milestone, MilestoneVerdict, Outcome, PlanSketch, Resumed, SketchStatus,
@@ -34,13 +38,14 @@ from world_models.obstruction import Obstruction
 from world_models.entries.user_reports import DOOR_STATES, GO_ON, Redirection, UserReport
 
 __all__ = [
-    "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "LAST_VIEWS", "STOP_KEY", "Alias", "AliasOdds", "Anchor", "BodyFault",
-    "CameraLesson", "CameraPicture", "CameraState", "Certificate", "Command", "Contact", "Corners", "Course",
-    "DoorCondition", "DoorPicture", "DoorState", "Drift", "FloorAppearance", "FloorEnd", "FloorThing", "FloorView",
-    "Footprint", "FreeFloor", "Glimpse", "Goal", "Hypothesis", "Impasse", "Leg", "Light", "LineMatch", "LocalePoses",
-    "Milestone", "MilestoneVerdict", "MotionReport", "MotorCommand", "Obstacle", "ObstacleStatus", "Obstruction",
-    "Odometry", "Outcome", "Panorama", "PictureRequest", "Place", "PlaceOdds", "PlaceSearch", "PlanSketch", "Point",
-    "PoseFix", "Ranges", "Recovery", "Redirection", "Resumed", "Ride", "RideReport", "Segments", "Sense",
-    "SketchStatus", "Subgoal", "Track", "Tracks", "Travel", "UserReport", "Wheels", "begin_travel", "covariance_tuple",
-    "diagonal", "find_camera_lessons", "turn_about_camera",
+    "ALERT_LIMIT_M", "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "LAST_VIEWS", "RISK", "SHARED_SIGMA_M", "STOP_KEY",
+    "Alias", "AliasOdds", "Anchor", "BodyFault", "CameraLesson", "CameraPicture", "CameraState", "Certificate",
+    "Command", "Contact", "Corners", "Course", "DoorCondition", "DoorPicture", "DoorState", "Drift", "FloorAppearance",
+    "FloorEnd", "FloorThing", "FloorView", "Footprint", "FreeFloor", "Glimpse", "Goal", "Hypothesis", "Impasse", "Leg",
+    "Light", "LineMatch", "LocalePoses", "Milestone", "MilestoneVerdict", "MotionReport", "MotorCommand", "Obstacle",
+    "ObstacleStatus", "Obstruction", "Odometry", "Outcome", "Panorama", "PictureRequest", "Place", "PlaceOdds",
+    "PlaceSearch", "PlanSketch", "Point", "PoseFix", "Protection", "Ranges", "Recovery", "Redirection", "Resumed",
+    "Ride", "RideReport", "Segments", "Sense", "SketchStatus", "Subgoal", "Track", "Tracks", "Travel", "UserReport",
+    "Wheels", "begin_travel", "count_sigmas", "covariance_tuple", "diagonal", "find_camera_lessons",
+    "turn_about_camera",
 ]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from blackboard import inference
 from world_models import words
+from world_models.entries.protection_level import SHARED_SIGMA_M, Protection, count_sigmas
 from world_models.frames import Pose, Pose2, flattened, wrap_angle
 
 HypothesisStatus = Literal["held", "candidate"]
@@ -84,6 +85,7 @@ class Hypothesis:
         motion: id of the last motion report that is taken into account, or "".
         evidence: what supports it, in words, where no other entry says it.
         correction: where it is, as seen from where it was believed to be, of one that a search has found.
+        excess_m, excess_rad: by how much its protection level is above what its covariance says.
     """
 
     locale: str
@@ -95,6 +97,8 @@ class Hypothesis:
     motion: str = ""
     evidence: str = ""
     correction: Pose2 | None = None
+    excess_m: float = 0.0
+    excess_rad: float = 0.0
 
     @property
     def is_held(self) -> bool:
@@ -109,6 +113,22 @@ class Hypothesis:
     def sigma_rad(self) -> float:
         """Standard deviation of the heading [rad]."""
         return math.sqrt(max(0.0, self.covariance[2][2]))
+
+    @property
+    def protection_m(self) -> float:
+        """The place is further off than this with a probability of at most :data:`.RISK` [m]."""
+        return self.excess_m + count_sigmas(1) * math.hypot(self.sigma_m, SHARED_SIGMA_M)
+
+    @property
+    def protection_rad(self) -> float:
+        """The same of the heading [rad]."""
+        return self.excess_rad + count_sigmas(1) * self.sigma_rad
+
+    def protected(self, protection: Protection) -> Hypothesis:
+        """The same, with the protection level of what it rests on."""
+        plain = replace(self, excess_m=0.0, excess_rad=0.0)
+        return replace(plain, excess_m=max(0.0, protection.place_m - plain.protection_m),
+                       excess_rad=max(0.0, protection.heading_rad - plain.protection_rad))
 
     def world_from_robot(self, world: LocalePoses) -> Pose2:
         return flattened(world.world_from_locale(self.locale)) @ self.locale_from_robot
@@ -145,7 +165,8 @@ class Hypothesis:
         sure = words.sigma(self.covariance)
         likely = f" (weight {self.weight:.2f})" if self.status == "candidate" else ""
         return (f"{self.status}: in {self.locale} at {words.point(pose.x_m, pose.y_m)}, heading"
-                f" {words.degrees(pose.heading_rad)}{likely}; {sure}, by {self.basis}{evidence}")
+                f" {words.degrees(pose.heading_rad)}{likely}; {sure}, protection level"
+                f" {words.metres(self.protection_m)}, by {self.basis}{evidence}")
 
 
 @inference()

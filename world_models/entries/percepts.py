@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from blackboard import OPEN, Entry, Level, View, inference
 from world_models import words
 from world_models.entries.location import Covariance
+from world_models.entries.protection_level import UNPROTECTED, Protection
 from world_models.frames import Pose2
 
 LAST_SEGMENTS = 8
@@ -198,6 +199,7 @@ class PoseFix:
         rejected: (p,) why a pair was rejected, "" for inliers.
         camera_step: (7,) by how much the camera differs from what is believed, as the lines say; () for as believed.
         camera_covariance: (7, 7) of the camera then. camera_chi2: squared distance from what was believed.
+        protection: how far off it may be if one of the things that it rests on is false.
     """
 
     match: str
@@ -209,12 +211,14 @@ class PoseFix:
     camera_step: tuple[float, ...] = ()
     camera_covariance: tuple[tuple[float, ...], ...] = ()
     camera_chi2: float = 0.0
+    protection: Protection = UNPROTECTED
 
     def sentence(self) -> str:
         pose = self.world_from_robot
         agree = f"{int(self.inliers.sum())} of {words.count(len(self.inliers), 'matched pair')} agree on one pose"
         return (f"{agree}; from {self.match} the robot stands at {words.point(pose.x_m, pose.y_m)}, heading"
-                f" {words.degrees(pose.heading_rad)} in the world ({words.sigma(self.covariance.tolist())})")
+                f" {words.degrees(pose.heading_rad)} in the world ({words.sigma(self.covariance.tolist())};"
+                f" {self.protection.words()})")
 
 
 @dataclass(frozen=True, slots=True)

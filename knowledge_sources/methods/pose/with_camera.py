@@ -88,7 +88,7 @@ def estimate_camera_and_pose(
     covariance = np.asarray(camera_covariance, float)
     if covariance.shape != (len(CAMERA_UNKNOWNS),) * 2:
         raise ValueError(f"expected a camera_covariance of shape (7, 7), got {covariance.shape}")
-    information = _build_information(prior_covariance, covariance)
+    information = build_information(prior_covariance, covariance)
     problem = _Problem(model, segments, camera, mount, sigma_px, information, prior)
     bound = 2.0 * OUTLIER_SIGMAS**2
     ends = [problem.anneal(problem.start_at(start)) for start in (prior, *starts)]
@@ -180,7 +180,7 @@ def compute_pose_slopes(lines_world: Floats, camera: Camera, mount: CameraMount,
     return np.asarray(np.linalg.lstsq(slopes[:, :POSE], -slopes[:, POSE:])[0])
 
 
-def _build_information(pose_covariance: Any, camera_covariance: Floats) -> Floats:
+def build_information(pose_covariance: Any, camera_covariance: Floats) -> Floats:
     """(10, 10) of both priors, 0 for the yaw, which is not estimated."""
     information = np.zeros((UNKNOWNS, UNKNOWNS))
     information[:POSE, :POSE] = np.linalg.inv(np.asarray(pose_covariance, float))

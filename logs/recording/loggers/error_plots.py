@@ -30,7 +30,8 @@ MAX_SHOWN_MM, MAX_SHOWN_DEG, MAX_SHOWN_PX = 25.0, 2.0, 40.0
 class Errors(Logger):
     """Logs how far the belief is from the truth, where that is known, and what differs from what was expected.
 
-    One standard deviation of the belief lies to either side of an error: a band far from zero is too sure of itself.
+    One standard deviation of the belief lies to either side of an error: a band far from zero is too sure of itself. No
+    error lies beyond the protection level.
     """
 
     def panels(self) -> Sequence[Panel]:
@@ -42,6 +43,8 @@ class Errors(Logger):
 
     def begin(self, stream: RecordingStream) -> None:
         stream.fix(POSITION, _style(["ahead ±1 sigma", "left ±1 sigma"], "mm"))
+        stream.fix(f"{POSITION}/protection", rr.SeriesLines(
+            names=["protection level", ""], colors=[faint(BELIEVED, 110)] * 2, widths=[1.0] * 2))
         stream.fix(HEADING, _style(["turned left ±1 sigma"], "deg"))
         for level, when in WHEN.items():
             stream.fix(f"{DEVIATION}/{level}", rr.SeriesLines(
@@ -52,6 +55,8 @@ class Errors(Logger):
             error = moment.off or Pose2(0.0, 0.0, 0.0)
             stream.log(POSITION, rr.Measurements, values=[MM * error.x_m, MM * error.y_m],
                        variances=[(MM * held.sigma_m) ** 2] * 2)
+            level_mm = MM * held.value.protection_m
+            stream.log(f"{POSITION}/protection", rr.Scalars, scalars=[level_mm, -level_mm])
             stream.log(HEADING, rr.Measurements, values=[math.degrees(error.heading_rad)],
                        variances=[math.degrees(held.value.sigma_rad) ** 2])
         for entry in moment.changed(Discrepancy):

@@ -1,0 +1,149 @@
+"""How far off a pose may be although nothing says so: its protection level, by solution separation.
+
+A covariance speaks of noise. It does not speak of a wall that stands elsewhere, of a belief that was pushed, or of
+lines that were taken for their neighbours. So each thing that the pose rests on is left out in turn, and the pose is
+solved for again. If that one thing is false, the truth is near the pose without it: as far as both poses differ, and as
+the noise of the second one allows. The largest of these is the protection level, as aviation has it (receiver
+autonomous integrity monitoring; multiple hypothesis solution separation, Blanch et al., 2012). What cannot be told
+apart is in it: a pose that rests on one wall alone is no surer than what was believed before.
+
+One thing is a landmark, all that is on one side, what is near or what is far; and the belief. A side and a landmark are
+held against the belief as it is stated: the model is false there, and the belief is not. What is near or far is held
+against a loosened belief: lines that were taken for their neighbours come with a belief that was pushed, and they
+disagree with depth. The camera's own state is an unknown beside the pose, with what is known of it. How much the lines
+scatter is taken from the picture itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from knowledge_sources.methods.arrays import Floats, Mask
+from knowledge_sources.methods.pose.camera_kernel import measure_lines
+from knowledge_sources.methods.pose.with_camera import FREE, POSE, UNKNOWNS, build_information
+from world_models.camera import Camera, CameraMount
+from world_models.entries import ALERT_LIMIT_M, SHARED_SIGMA_M, Protection, count_sigmas
+from world_models.frames import Pose2
+
+LINE_SIGMA_PX = 0.45
+"""Deviation of a segment's end across the line before the picture has said anything of it."""
+LINE_SIGMA_FREEDOM = 10.0
+"""Weight of that, in degrees of freedom."""
+STATED_FACTOR = 4.0
+"""Factor on a belief's covariance where something else is taken as false: beliefs have longer tails than stated."""
+NOISE, BELIEF = "noise alone", "the belief before"
+LEFT, RIGHT, NEAR, FAR = "what is on the left", "what is on the right", "what is near", "what is far"
+
+
+class Rests(NamedTuple):
+    """What a pose rests on.
+
+    Attributes:
+        lines_world: (n, 2, 3) [m] of the lines that agree; segments_px: (n, 2, 2); landmarks: n names.
+        camera, mount: as it was solved for; step: (7,) from what was believed of it.
+        belief: before; covariance: (3, 3) of it over (x, y, heading), as stated; loosened: as the prior of the pose.
+        camera_covariance: (7, 7) of what was believed of the camera.
+    """
+
+    lines_world: Floats
+    segments_px: Floats
+    landmarks: Sequence[str]
+    camera: Camera
+    mount: CameraMount
+    step: Floats
+    belief: Pose2
+    covariance: Floats
+    loosened: Floats
+    camera_covariance: Floats
+
+
+def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protection:
+    """The protection level of a pose with a stated covariance (3, 3), world frame; linear near the pose."""
+    if not len(rests.lines_world):
+        return _measure(NOISE, np.zeros(POSE), covariance, count_sigmas(1))
+    state = np.array([*pose.vector, *np.zeros(UNKNOWNS - POSE)])
+    c, m = rests.camera, rests.mount
+    distances, slopes = measure_lines(
+        np.ascontiguousarray(rests.lines_world), np.ascontiguousarray(rests.segments_px),
+        np.array([c.fx, c.fy, c.cx, c.cy]), np.array([m.height_m, m.forward_m, m.tilt_rad, m.roll_rad, m.yaw_rad]),
+        state)
+    slopes = slopes[..., FREE]
+    variance = _estimate_variance(distances)
+    hessians = np.einsum("nea,neb->nab", slopes, slopes) / variance
+    gradients = np.einsum("nea,ne->na", slopes, distances) / variance
+    offset = np.concatenate([pose.minus(rests.belief), rests.step])[FREE]
+    stated, loosened = (build_information(prior, rests.camera_covariance)[np.ix_(FREE, FREE)]
+                        for prior in (STATED_FACTOR * rests.covariance, rests.loosened))
+    camera = np.array(loosened)
+    camera[:POSE, :POSE] = 0.0
+    everything = np.ones(len(distances), bool)
+    left_out = [
+        *((name, ~of, stated) for name, of in _list_landmarks_and_sides(rests, pose)),
+        *((name, ~of, loosened) for name, of in _list_depths(rests, pose)),
+        (BELIEF, everything, camera),
+    ]
+    factor = count_sigmas(1 + len(left_out))
+    levels = [_measure(NOISE, np.zeros(POSE), covariance, factor)]
+    for name, rest, information in left_out:
+        without = _invert(hessians[rest].sum(axis=0) + information)
+        step = -(without @ (gradients[rest].sum(axis=0) + information @ offset))[:POSE]
+        levels.append(_measure(name, step, without[:POSE, :POSE], factor))
+    worst = max(levels)
+    return Protection(worst.place_m, max(level.heading_rad for level in levels), worst.doubted)
+
+
+def tell_unavailable(protection: Protection) -> str:
+    """That a place may be further off than the alert limit, in words."""
+    return (f"it may be {100.0 * protection.place_m:.0f} cm off if {protection.doubted} is not as it seems: the"
+            f" protection level is above the alert limit of {100.0 * ALERT_LIMIT_M:.0f} cm")
+
+
+def _estimate_variance(distances: Floats) -> float:
+    """The variance [px2] of the lines' ends, by what was expected and by how much they scatter."""
+    freedom = max(distances.size - POSE, 0)
+    said = LINE_SIGMA_FREEDOM * LINE_SIGMA_PX**2 + float(np.sum(distances**2))
+    return said / (LINE_SIGMA_FREEDOM + freedom)
+
+
+def _list_landmarks_and_sides(rests: Rests, pose: Pose2) -> Iterator[tuple[str, Mask]]:
+    """Each landmark, and each side of the robot, by its name: the lines (n,) that are false with it."""
+    names = np.asarray(rests.landmarks)
+    for name in dict.fromkeys(rests.landmarks):
+        yield name, names == name
+    x_m, y_m = _find_middles(rests, pose).T
+    is_left = math.cos(pose.heading_rad) * y_m - math.sin(pose.heading_rad) * x_m > 0.0
+    yield LEFT, is_left
+    yield RIGHT, ~is_left
+
+
+def _list_depths(rests: Rests, pose: Pose2) -> Iterator[tuple[str, Mask]]:
+    """The nearer half of the lines and the farther one."""
+    away_m = np.hypot(*_find_middles(rests, pose).T)
+    far = away_m > np.median(away_m)
+    yield NEAR, ~far
+    yield FAR, far
+
+
+def _find_middles(rests: Rests, pose: Pose2) -> Floats:
+    """(n, 2) the lines' middles on the floor, from the robot, in the world's directions [m]."""
+    return np.asarray(rests.lines_world[..., :2].mean(axis=1) - (pose.x_m, pose.y_m))
+
+
+def _measure(name: str, step: Floats, covariance: Floats, factor: float) -> Protection:
+    """The level where ``name`` is false: the pose without it is ``step`` (3,) away, and has this covariance."""
+    variance = max(0.0, float(np.linalg.eigvalsh(covariance[:2, :2])[-1])) + SHARED_SIGMA_M**2
+    sigma_rad = math.sqrt(max(0.0, float(covariance[2, 2])))
+    return Protection(
+        math.hypot(step[0], step[1]) + factor * math.sqrt(variance), abs(float(step[2])) + factor * sigma_rad, name)
+
+
+def _invert(information: Floats) -> Floats:
+    """Inverse (u, u) of unknowns of different units; what is left open is very uncertain."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-12))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    inverse = (vectors / np.maximum(values, 1e-9)) @ vectors.T
+    return np.asarray(inverse / np.outer(scale, scale))
