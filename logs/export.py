@@ -47,8 +47,8 @@ DECISIONS: Mapping[str, type] = {
 POSES: Mapping[str, type] = {
     "cycle": int, "time_s": float, "entry": str, "locale": str, "x_m": float, "y_m": float, "heading_rad": float,
     "sigma_m": float, "sigma_rad": float, "protection_m": float, "protection_rad": float, "cov_xx": float,
-    "cov_xy": float, "cov_xh": float, "cov_yy": float, "cov_yh": float, "cov_hh": float, "basis": str, "status": str, "weight": float, "world_x_m": float,
-    "world_y_m": float, "world_heading_rad": float}
+    "cov_xy": float, "cov_xh": float, "cov_yy": float, "cov_yh": float, "cov_hh": float,
+    "basis": str, "status": str, "weight": float, "world_x_m": float, "world_y_m": float, "world_heading_rad": float}
 """Pose and covariance are in the locale's frame; h is the heading."""
 MILESTONES: Mapping[str, type] = {
     "cycle": int, "time_s": float, "name": str, "verdict": str, "expected": int, "matched": int,
