@@ -112,7 +112,7 @@ class Blackboard:
             self._remove(entry.id)
 
     def forget(self, id: str) -> None:
-        """Let go of an entry that nobody can need any more. That is no change: nobody is told.
+        """Let go of an entry that nobody can need any more. That is no change: it wakes nobody.
 
         Raises:
             KeyError: it is not on the board.

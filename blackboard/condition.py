@@ -18,7 +18,7 @@ class Condition(Generic[T]):
     Attributes:
         name: what is needed, in words, as after "it needs".
         find: finds it on the board; None or False where it is not so. Pure.
-        otherwise: what is so instead, in words; or what tells that of the board.
+        otherwise: what is the case instead, in words; or a function of the board that says it.
     """
 
     name: str

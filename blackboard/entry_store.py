@@ -17,7 +17,7 @@ class Index(Generic[T_contra]):
     """A question that is asked often: which entries of a type have a certain key?
 
     The board keeps the answer from the first time that it is asked, and brings it up to date with every change. Declare
-    an index once, beside the questions that use it, and not again for each question.
+    an index once, next to the questions that use it, and not again for each question.
 
     Attributes:
         kind: the class of the values.

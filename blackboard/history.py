@@ -47,7 +47,7 @@ class History:
         return cls(Path(path).read_text(encoding="utf-8").splitlines())
 
     def why(self, name: str) -> str:
-        """What an entry is because of, down to what came from outside; each entry is told once.
+        """What an entry is because of, down to what came from outside; each entry is listed once.
 
         Args:
             name: ``Word-3``, or ``Word-3.1`` for a revision that is not the last.

@@ -2,7 +2,7 @@
 
 ``@request``, ``@observation`` and ``@inference`` mark a frozen dataclass as a kind of entry, and make one of a class
 that is none yet. Everything that differs by kind follows from the mark: what ports are asked for, what is written
-before they are asked, what is read back from a journal, how long an entry is kept, and what people are told of it.
+before they are asked, what is read back from a journal, how long an entry is kept, and how people read of it.
 """
 
 from __future__ import annotations

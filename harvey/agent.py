@@ -42,7 +42,7 @@ class Agent:
         store: of the locale frames.
         sources: the knowledge sources; settings: their numbers.
         servoing: the servo levels that are on.
-        what_if: revises before each cycle what the robot is to know otherwise.
+        what_if: revises before each cycle what the robot is to know differently.
     """
 
     world: World

@@ -149,7 +149,7 @@ def names() -> tuple[str, ...]:
 
 
 def build_settings(pairs: Iterable[tuple[str, str]], others: Sequence[str] = ()) -> Settings:
-    """The default settings with some values replaced; ``others`` are keys that the caller understands beside them.
+    """The default settings with some values replaced; ``others`` are further keys that the caller understands.
 
     What the robot believes of itself is checked as well, but is no setting.
 

@@ -77,7 +77,7 @@ def run(
             ``{"servo.action": False, "start.heading_deg": 80, "plan.max_leg_m": 2.0}``.
         out: the run directory; an older run of the same scenario and seed there is replaced, another one moved aside.
             None keeps nothing.
-        knowledge_sources: classes that sit round the board beside the project's; what they decide can be replayed by
+        knowledge_sources: classes that sit round the board with the project's; what they decide can be replayed by
             ``open_run(out, knowledge_sources=...)`` with the same classes.
         on_decision: called with every decision, as it is made.
         live: also send the recording to an open rerun viewer.
@@ -102,7 +102,7 @@ def open_run(path: str | Path, *, knowledge_sources: Sequence[type[KnowledgeSour
     """A run that was recorded: its directory, or its name under ``runs/``.
 
     Args:
-        knowledge_sources: those that were given to :func:`run` beside the project's.
+        knowledge_sources: those that were given to :func:`run`.
 
     Raises:
         BadInput: there is none.

@@ -1,6 +1,6 @@
 """Every number that can be set, one frozen dataclass for each room; ``harvey settings`` prints them.
 
-A number is set here where an experiment, a scenario or a document varies it; all others are constants beside their
+A number is set here where an experiment, a scenario or a document varies it; all others are constants next to their
 use. ``--set ROOM.NAME=VALUE`` replaces one. A function takes the settings of its own room, or :class:`Settings`
 where it also calls other rooms.
 """
@@ -107,7 +107,7 @@ class Settings:
 
 
 DEFAULT = Settings()
-"""What holds unless somebody sets it otherwise."""
+"""The default settings."""
 
 
 @dataclass(frozen=True, slots=True)

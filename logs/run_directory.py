@@ -22,7 +22,7 @@ from logs.run_errors import BadInput
 from world_models.files.regular_files import read_regular
 
 RUNS = Path("runs")
-"""Where runs are kept unless ``--out`` says otherwise."""
+"""Where runs are kept without ``--out``."""
 FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json", "camera.toml")
 MOST_JSON_BYTES = 20_000_000
 """Of the files of a run that are read as a whole."""
@@ -77,7 +77,7 @@ class RunDirectory:
         return data
 
     def write_camera(self, text: str) -> None:
-        """Write ``camera.toml``: the camera at the end, where it differs from what was told. Raises OSError."""
+        """Write ``camera.toml``: the camera at the end, where it differs from its nominal state. Raises OSError."""
         write_whole(self.path / "camera.toml", text)
 
     def write_result(self, record: Mapping[str, Any]) -> None:
@@ -184,7 +184,7 @@ def expect_unwritten(path: Path) -> Path:
 
 
 def _free_beside(path: Path) -> Path:
-    """The first name beside a directory that nothing has: ``runs/try-older-1``."""
+    """The first unused name next to a directory: ``runs/try-older-1``."""
     there = path if path.name not in ("", "..") else path.resolve()
     return next(p for n in count(1) if not (p := there.with_name(f"{there.name}-older-{n}")).exists())
 

@@ -43,7 +43,7 @@ class RunHead:
         seed: of all chance in the simulator; 0 on hardware.
         world: the world file that the robot believes in; relative to the project where it comes with it.
         world_sha256: of that file's bytes.
-        robot: what the robot knows of itself beside the world, as JSON types.
+        robot: what the robot knows of itself, without the world, as JSON types.
         servo: which levels of perceptual servoing are on.
         command: what the user asked for, as JSON types.
         without, constants: what was taken from the agent or set otherwise, in a counterfactual run.

@@ -2,7 +2,7 @@
 and, of a run that goes on, a mirror of its board.
 
 Where each entry stands in the journal is found in one sweep over its bytes, and only the lines that are needed are
-read. No index is kept beside the journal: the sweep over an hour's journal takes a tenth of a second, and what a line
+read. No index is kept with the journal: the sweep over an hour's journal takes a tenth of a second, and what a line
 says is believed only once the line has been read as a decision.
 """
 
@@ -181,7 +181,7 @@ class Timeline:
         return ranked(found.values(), decision.chosen)
 
     def time_at(self, cycle: int) -> float | None:
-        """The newest time that anything from outside had told by a cycle [s]; None where nothing had lately."""
+        """The newest time of any observation by a cycle [s]; None where there was none lately."""
         for one in reversed(self.cycles[: bisect_right(self.cycles, cycle)][-TIMED_WITHIN:]):
             times = [read_time_s(record.field) for record in self.decision(one).observed]
             if known := [time_s for time_s in times if time_s is not None]:
@@ -189,7 +189,7 @@ class Timeline:
         return None
 
     def outcome(self) -> str:
-        """Ref of how the mission ended, or, where it did not come to that, of the last entry.
+        """Ref of how the mission ended, or, where it has not ended, of the last entry.
 
         Raises BadInput where the journal is empty.
         """

@@ -1,4 +1,4 @@
-"""Which scenarios come with the project, told without reading what they are made of."""
+"""Which scenarios come with the project, known without reading what they are made of."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ class ActuatorModel(Bounded):
     def motion_covariance(self, turn_rad: float, move_m: float) -> NDArray[np.float64]:
         """(3, 3) covariance of (x, y, heading) after a TURN and a MOVE, in the robot's frame before them.
 
-        An arc of length d and curvature c ends c d^2 / 2 beside the line, with heading error c d: the two errors
+        An arc of length d and curvature c ends c d^2 / 2 off the line, with heading error c d: the two errors
         are correlated.
         """
         gone = self.reach * move_m

@@ -1,4 +1,4 @@
-"""What stands before the camera (a coat, a cable, dirt on the glass), where nothing is to be expected: an entry too."""
+"""Occlusion of the lens (a coat, a cable, dirt on the glass): nothing is expected to be seen there. An entry too."""
 
 from __future__ import annotations
 

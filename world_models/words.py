@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 SMALL_M, TINY_M = 0.1, 0.01
-"""A length up to the first is told in millimetres, below the second in tenths of them."""
+"""A length up to the first is given in millimetres, below the second in tenths of them."""
 STRAIGHT_RAD = math.radians(0.05)
-"""A smaller angle is told as none."""
+"""A smaller angle is given as none."""
 MAX_FIELDS_TEXT = 160
 """Length of the text that tells a value of unknown kind by its fields [characters]."""
 
@@ -26,7 +26,7 @@ PURPOSES: Mapping[str, str] = {
 UNITS: Mapping[str, str] = {
     "_m": "m", "_px": "px", "_s": "s", "_hz": "Hz", "_m_per_s": "m/s", "_kg": "kg", "_v": "V", "_percent": "%",
 }
-"""The unit of a field, by the end of its name; angles are told in degrees."""
+"""The unit of a field, by the end of its name; angles are given in degrees."""
 PROPER_NAMES: Mapping[str, str] = {"med_r_and_t": "Med-R-and-T"}
 
 
@@ -158,7 +158,7 @@ def short(text: str, most: int = 34) -> str:
 def sentence(value: Any) -> str:
     """What a value on the board says, in one sentence without a full stop.
 
-    A kind of entry says it by its method ``sentence``; one that has none is told by its fields and their units.
+    A kind of entry says it by its method ``sentence``; one that has none is given by its fields and their units.
     """
     say = getattr(value, "sentence", None)
     return str(say()) if callable(say) else fields({f.name: getattr(value, f.name) for f in dataclasses.fields(value)})

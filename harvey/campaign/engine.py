@@ -30,7 +30,7 @@ from world_models.files.regular_files import read_regular
 RESULTS, TIMES, CAMPAIGN = "results.jsonl", "times.jsonl", "campaign.json"
 CASE, RESULT, KILLED = "case", "result", "killed"
 MEASURED = ("wall_time_s", "wall_s", "seconds")
-"""Fields of results that tell of the machine, not of the case: they are kept beside the results."""
+"""Fields of results that tell of the machine, not of the case: they are kept apart from the results."""
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -47,8 +47,8 @@ class Campaign(Generic[T, R]):
         to_record, of_record: a result as JSON types, and back.
         about: what else the results follow from; kept results of anything else are computed again.
         name: of the campaign, for people; unit: what a case is.
-        anew: whether all cases are done again, whatever is kept.
-        has_files: whether what a kept result of a case needs beside it is there; without, the case is done again.
+        anew: whether to do all cases again, whatever is kept.
+        has_files: whether the files that a kept result of a case needs are there; if not, the case is done again.
     """
 
     work: Callable[[T], R]
@@ -64,7 +64,7 @@ class Campaign(Generic[T, R]):
 
 
 def run_campaign(campaign: Campaign[T, R], workers: Workers | None = None) -> Iterator[tuple[int, R | Killed]]:
-    """(case, result), first those that are kept already, then as they are done; on the disk before they are told.
+    """(case, result), first those that are kept already, then as they are done; on the disk before they are yielded.
 
     Raises:
         BadInput: another process works on it, or the workers cannot be used. What ``work`` raises comes through.

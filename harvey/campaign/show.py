@@ -1,4 +1,4 @@
-"""How far a campaign is, told from its files while it runs or afterwards; and is one better than another?
+"""How far a campaign is, read from its files while it runs or afterwards; and is one better than another?
 
 Two campaigns are compared by the same cases of both, in pairs. Where both went alike, a pair says nothing of the
 difference. Of the others, were the two campaigns alike, half would support each: McNemar's exact test (McNemar 1947,

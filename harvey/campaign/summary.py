@@ -103,7 +103,7 @@ def format_result(r: MissionResult, out: Path | None, story: Sequence[str] = ())
 
 
 def format_results(results: Sequence[MissionResult]) -> str:
-    """A table, one row a seed, with a summary row: counts are summed, ways averaged, of errors the worst is told."""
+    """A table, one row a seed, with a summary row: counts are summed, ways averaged, of errors the worst is shown."""
     counts = [(r.milestones["verified"] or 0, r.milestones["refuted"] or 0, r.false_accepts, r.sketches, r.replans,
                r.relocalizations, r.collisions or 0) for r in results]
     ways = [(r.path_length_m, r.sim_time_s, r.cycles, r.wall_time_s) for r in results]

@@ -103,7 +103,7 @@ class ClusterWorkers(Protocol):
         Args:
             work: a function of a module that the workers can import too; each calls ``answer_case`` with it.
             cluster: as ``--cluster`` takes it.
-            tell: is told where the dashboard is.
+            tell: called with where the dashboard is.
 
         Raises:
             BadInput: there is no such cluster, or it was lost. What ``work`` raises comes through.
@@ -184,7 +184,7 @@ def map_cases(
     Args:
         work: a function of a module, so that another process finds it; what it raises comes through.
         workers: who works; None for those that the command was told to use.
-        tell: is told where a cluster's dashboard is.
+        tell: called with where a cluster's dashboard is.
 
     Raises:
         BadInput: the workers cannot be used, or one of them is another program or another kind of processor.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 MAX_PORT = 65535
 TELL_S = 1.0
-"""How often its place is told, with --trace [s of the base]."""
+"""How often its place is printed, with --trace [s of the base]."""
 
 
 def _arguments(parser: ArgumentParser) -> None:

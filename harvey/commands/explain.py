@@ -1,4 +1,4 @@
-"""``harvey why``, ``story`` and ``diff``: what a decision rests on, a run told in a page, where two runs part."""
+"""``harvey why``, ``story`` and ``diff``: what a decision rests on, a run in a page of text, where two runs part."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def has_screen() -> bool:
 
 
 def find_viewer() -> str:
-    """The viewer that came with the recording's library, beside this Python, or one on the path."""
+    """The viewer that came with the recording's library, next to this Python, or one on the path."""
     beside = shutil.which("rerun", path=str(Path(sys.executable).parent))
     viewer = beside or shutil.which("rerun")
     if viewer is None:

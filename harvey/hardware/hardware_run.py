@@ -59,7 +59,7 @@ def drive(
     out: Path, sinks: Sequence[Sink] = (), live: bool = False, settings: Pairs = (),
     around: Around = unchanged, tell: Tell = tell_nothing,
 ) -> MissionResult:
-    """Drive to the outcome; however it ends, the base is told to stop, and what was recorded is kept.
+    """Drive to the outcome; however it ends, the base is stopped, and what was recorded is kept.
 
     Args:
         settings: those of the agent.

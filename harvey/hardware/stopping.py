@@ -22,14 +22,14 @@ from harvey.hardware.drivers.base_driver import Base, BaseFault
 BEAT_S = 0.2
 """Period of the beats [s]."""
 MAX_SILENCE_S = 10.0
-"""A mission whose loop did not tick for so long hangs: the base is told to stop, and no beat is sent [s]."""
+"""A mission whose loop did not tick for so long hangs: the base is stopped, and no beat is sent [s]."""
 
 
 class Heartbeat:
     """A thread that sends heartbeats as long as :meth:`tick` is called often enough.
 
     While a motion is under way the driver itself talks to the base, and a beat waits its turn. When the mission hangs,
-    the base is told to stop and gets no more beats, until the mission goes on.
+    the base is stopped and gets no more beats, until the mission goes on.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Counterfactuals: what a run would have done without a knowledge source, a landmark or a segment, or set otherwise.
+"""Counterfactuals: a run without a knowledge source, a landmark or a segment, or with other settings.
 
 The changed agent gets the recorded observations as long as it requests the same of its body: until then they are what
 it would have observed. From the first motion or picture that differs they no longer hold. A simulated body was replayed

@@ -60,7 +60,7 @@ class WhatIf:
             scheduler.post(effects, WHAT_IF)
 
     def _revise_robot(self, view: View) -> Iterator[Effect]:
-        """The robot's entries as they were told at the start; what is learnt of them later stands."""
+        """The robot's entries as they were at the start; what is learnt of them later stands."""
         for kind in (CameraState, Wheels, Footprint):
             entry: Entry[Any] | None = view.latest(kind)
             if entry is not None and entry.revision == 0:

@@ -37,7 +37,7 @@ LEVELS = ("action", "plan", "goal")
 REVISED = re.compile(r"is now|no longer held")
 """Reasons that only say that the same entry has changed again."""
 SHOWN = 12
-"""So many occasions are told."""
+"""Most occasions that are listed."""
 
 
 class Fate(Enum):

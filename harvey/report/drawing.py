@@ -78,7 +78,7 @@ def draw_errors(
 
 
 OUTCOMES = ("outcome", "verdict")
-"""The field by which missions are told apart, the first that there is."""
+"""The field that distinguishes the missions, the first that there is."""
 IN_NAME = ("seed",)
 """Is left out: a mission's name says it."""
 UNITS: Mapping[str, tuple[str, float]] = {
@@ -187,7 +187,7 @@ LOG_RATIO = 100.0
 """Where the largest is so many times the smallest, the axis is logarithmic."""
 PERCENTILE = 95
 COLOURS = ("#0077bb", "#cc3311", "#ee7733", "#aa3377", "#33bbee", "#009988", "#bbbbbb")
-"""By outcome, the most frequent first; to be told apart by the colour-blind too (Paul Tol's)."""
+"""By outcome, the most frequent first; distinct for the colour-blind too (Paul Tol's)."""
 
 
 def draw_distributions(columns: Sequence[Field]) -> Iterator[tuple[str, str]]:

@@ -104,7 +104,7 @@ def find_known(run: RunDirectory) -> tuple[World | None, Camera | None, bool]:
 
 
 def read_part(name: str) -> str:
-    """A part of the page as it stands beside this file."""
+    """A part of the page, from its file next to this one."""
     return (files("harvey.report") / name).read_text(encoding="utf-8")
 
 

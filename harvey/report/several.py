@@ -83,7 +83,7 @@ def _of_run(run: RunDirectory) -> MissionSummary:
 
 
 OWN = "{}-runs"
-"""The folder beside a page of that name in which the runs' own reports are."""
+"""The folder next to a page of that name in which the runs' own reports are."""
 HEAD_BYTES = 4096
 """The title of a report stands within so many."""
 
@@ -108,13 +108,13 @@ def build_page_of_several(missions: Sequence[MissionSummary], title: str, out: P
 
 
 def report_path(mission: MissionSummary, out: Path) -> Path:
-    """Where the own report of a mission belongs beside the page: the same for the same name."""
+    """Where the own report of a mission belongs, next to the page: the same for the same name."""
     name = quote(mission.name.replace(", ", "-").replace(" ", "-"), safe="")
     return out.parent / OWN.format(out.stem) / f"{name}.html"
 
 
 def find_report(mission: MissionSummary, out: Path) -> str | None:
-    """The link to a run's own report, beside the page or by the name that ``harvey report`` gives; None without one."""
+    """The link to a run's own report, next to the page or as ``harvey report`` names it; None without one."""
     places = [report_path(mission, out)]
     if mission.run is not None:
         places.append(out.parent / f"{mission.run.path.resolve().name}.html")

@@ -148,7 +148,7 @@ class BodyPort:
             yield from self._post_with_ranges(request, answer, touched if isinstance(answer, BodyFault) else ())
 
     def _steer(self, request: Entry[Course]) -> tuple[MotionReport | CameraPicture | BodyFault, ...]:
-        """The next part of a motion; where the camera stands still, it comes to a stand, and that is a fault."""
+        """The next part of a motion; where the camera hangs, the base stops, and that is a fault."""
         found = self._body.steer(request.value)
         if isinstance(found, BodyFault):
             return (found,)

@@ -48,7 +48,7 @@ def replay(
     run: RunDirectory, originals: Originals, scheduler: Scheduler, *,
     live: Live = ignore, before: Callable[[], None] = lambda: None,
 ) -> Iterator[ReplayedDecision]:
-    """Each decision beside its record.
+    """Each decision with its record.
 
     Args:
         live: lets a simulated body do the same again.

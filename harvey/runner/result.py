@@ -50,7 +50,7 @@ class MissionResult:
         max_cross_track_m: how far the robot truly strayed from the line of the leg it was driving.
         contacts: each of the collisions.
         turning_points: what changed the course of the run, as the robot itself knew it.
-        camera: how the camera turned out to differ from what the robot was told.
+        camera: how the camera turned out to differ from its nominal state.
         amiss: which of the scenario's faults did not happen, or not as they were asked for, in words.
         probes: pictures that it asked for to find out where it is; None in the results of older versions.
         happened: what the simulator did to the robot and its building; None on hardware, and in the results of older
@@ -89,7 +89,7 @@ class MissionResult:
 
     @property
     def cycles(self) -> int:
-        """The decisions in which something was done beside asking for locale frames."""
+        """The decisions in which something was done besides asking for locale frames."""
         return self.decisions - self.waits
 
     @property
@@ -206,7 +206,7 @@ class RunCounts:
                 self.relocalizations += value.basis == "relocalization"
 
     def camera_lessons(self) -> tuple[CameraLesson, ...]:
-        """How the camera turned out to differ from what was told."""
+        """How the camera turned out to differ from its nominal state."""
         if self.nominal_camera is None or self.camera is None:
             return ()
         return find_camera_lessons(self.nominal_camera, self.camera)

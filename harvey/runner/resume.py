@@ -25,7 +25,7 @@ from logs.run_recorder import Extent
 from world_models.entries import Course, MotorCommand, Outcome, Resumed
 
 RESUME = "resume"
-"""The author of what a run is told that goes on after a crash."""
+"""The author of what is put on the board of a run that goes on after a crash."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -172,7 +172,7 @@ def run_to_outcome(
 ) -> Outcome:
     """Cycle until an outcome is on the board, a limit is reached, a knowledge source raises, or nothing is left to do.
 
-    The board is told once that nothing is pending (``Quiescence``), so that a knowledge source may answer it.
+    The board hears once that nothing is pending (``Quiescence``), so that a knowledge source may answer it.
 
     Args:
         over: asked after each cycle whether a limit is reached.

@@ -32,7 +32,7 @@ class WorldPort:
 
 
 def tell_robot(scheduler: Scheduler, robot: RobotModel) -> None:
-    """Put what a robot knows of itself on the board: the first thing that it is told."""
+    """Put what a robot knows of itself on the board: the first entries of a run."""
     scheduler.post([Post(entry) for entry in robot.entries()], "robot")
 
 

@@ -1,6 +1,6 @@
 """BodyReplay: a simulated body does again what the journal of its run says that it did.
 
-The same calls give the same answers, so the simulated world comes to where it was when the run was cut off. Recorded
+The same calls give the same answers, so the simulated world is as it was when the run was cut off. Recorded
 pictures are not rendered again. An answer that is not the journal's is an error.
 """
 

@@ -1,4 +1,4 @@
-"""Happenings: what the simulator did to the robot and its building. Only the referee and the recording hear of it."""
+"""Happenings: injected faults and changes of the simulated building. Only the referee and the recording hear of it."""
 
 from __future__ import annotations
 

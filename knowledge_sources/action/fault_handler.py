@@ -46,7 +46,7 @@ class FaultHandler(RobotKnowledgeSource):
     """Asks for recovery from a fault of the body, each time after twice the pause; closes one that is over.
 
     After the stop key, and after ``max_fault_s``, there is no way on. An elevator that does not come is no fault of the
-    robot: then it is blocked. After a contact or an emergency stop it waits to be told to go on, if the mission wants
+    robot: then it is blocked. After a contact or an emergency stop it waits for permission, if the mission wants
     that; then, as after a motion that was broken off, the belief is in doubt: a milestone must be verified before the
     robot moves on. After ``max_broken_motions`` motions in a row that were broken off there is no way on.
     """

@@ -43,7 +43,7 @@ class MedRAndT(RobotKnowledgeSource):
 
     The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose
     poses, the median residual of all lines chooses one, and the inliers refine it. How well the camera is known is
-    known too: what the lines say of it beside the pose is posted with the pose, and its uncertainty is part of the
+    known too: what the lines say of it is posted with the pose, and its uncertainty is part of the
     pose's covariance. Where the model is inexact, its errors are integrated out, and nothing is learnt of the camera.
     """
 
@@ -97,7 +97,7 @@ class MedRAndT(RobotKnowledgeSource):
     def _learn(
         self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, known: Floats
     ) -> CameraEstimate | None:
-        """The camera's state beside the pose; None where the lines say too little."""
+        """The camera's state; None where the lines say too little."""
         if len(match.pairs) < MIN_CAMERA_LINES:
             return None
         found = estimate_camera_and_pose(

@@ -1,4 +1,4 @@
-"""Obstruction finder (§4: models are incomplete): what stands before the camera and hides a part of each picture."""
+"""Obstruction finder (§4: models are incomplete): finds what occludes the lens and hides a part of each picture."""
 
 from __future__ import annotations
 

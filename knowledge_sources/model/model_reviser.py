@@ -1,4 +1,4 @@
-"""Model reviser (§3.4): what is found or told of the building revises the frames of the locales that it concerns."""
+"""Model reviser (§3.4): what is found or reported of the building revises the frames of its locales."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Statement(NamedTuple):
     Attributes:
         locales: whose frames it concerns.
         revise: a frame as it is known by it; raises ValueError where the frame has nothing that could be so.
-        is_from_user: whether somebody told it, who is answered.
+        is_from_user: whether a user reported it, who is answered.
         error: why it concerns none, in words.
     """
 
@@ -34,7 +34,7 @@ class Statement(NamedTuple):
 
 
 class Case(NamedTuple):
-    """Frames as they are known now, each with what says so; and answers to what was told, in words."""
+    """Frames as they are known now, each with what says so; and answers to reports, in words."""
 
     frames: tuple[tuple[Entry[LocaleFrame], LocaleFrame, tuple[Entry[Any], ...]], ...]
     answers: tuple[tuple[Entry[UserReport], str], ...]
@@ -54,7 +54,7 @@ class ModelReviser(RobotKnowledgeSource):
     writes = (LocaleFrame, UserReport)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
-        """The frames that differ by what is new, and all that was told and is not answered yet."""
+        """The frames that differ by what is new, and all reports that are not answered yet."""
         statements = sorted(self._list_statements(view), key=lambda said: said.entry.cycle)
         new = [said for said in statements if said.is_from_user or said.entry is trigger.entry]
         frames, taken, errors = [], set[str](), {s.entry.id: s.error for s in statements if s.error}
@@ -86,7 +86,7 @@ class ModelReviser(RobotKnowledgeSource):
             yield Revise(frame, value, (*reasons, frame))
 
     def _list_statements(self, view: View) -> Iterator[Statement]:
-        """What things on the floor and doors say, and what was told and is not answered."""
+        """What things on the floor and doors say, and reports that are not answered."""
         least_m = self._settings.action.min_footprint_change_m
         for entry in view.all(Obstacle):
             revise = partial(revise_by_thing, thing=entry.value, by=entry.author, least_m=least_m)

@@ -1,6 +1,6 @@
 """Thing mapper (§4: models are incomplete): what is seen on the floor, and is not in the model, is in the way.
 
-It is told of by pictures of the floor or by range sensors; and it is forgotten when its floor is seen free.
+It is seen in pictures of the floor or by range sensors; it is forgotten when its floor is seen free.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ class Case(NamedTuple):
 
 
 class ThingMover(RobotKnowledgeSource):
-    """Moves what was seen on the floor since a milestone was last verified, where the robot was found a little beside.
+    """Moves what was seen on the floor since a milestone was last verified, where the belief was a little off.
 
     It was seen from the robot, so it stands where it stood as seen from there, less surely by what the belief was off.
     Was the robot kidnapped, what it saw on the way was seen before or after that: it stays where it is, and is

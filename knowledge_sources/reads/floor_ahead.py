@@ -116,7 +116,7 @@ class FloorAhead:
 
     @property
     def because(self) -> tuple[Entry[Any], ...]:
-        """What has told something in the answers so far: looks at the floor, what may stand on it, and since when.
+        """What the answers so far rest on: views of the floor, what may stand on it, and since when.
         """
         return tuple(sorted(self._reasons.values(), key=lambda entry: (entry.cycle, entry.id)))
 
@@ -303,7 +303,7 @@ def find_swept_next(belief: Belief, leg: Leg, settings: ActionSettings) -> shape
 
 
 def find_known_free(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> shapely.Geometry:
-    """The floor of the locales here that was seen to be free, or driven over, or told to be free [m, world]."""
+    """The floor of the locales here that was seen to be free, or driven over, or reported to be free [m, world]."""
     robot, scans = find_robot(view), _find_scans(view, belief, settings)
     discs = list_free_discs(view, robot, belief.value.world_from_robot(robot.world), scans)
     seen = [build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
@@ -317,7 +317,7 @@ class FreeDisc(NamedTuple):
 
     Attributes:
         circle: x, y, radius [m, world].
-        because: what tells where it is, beside the belief.
+        because: what tells where it is, besides the belief.
     """
 
     circle: tuple[float, float, float]

@@ -43,7 +43,7 @@ def take_new(
     held: Belief, frame: str, image: Image, kept: tuple[Track, ...], anchors: tuple[Anchor, ...],
     belief: Hypothesis, camera_covariance: Floats | None,
 ) -> Renewed:
-    """Take new landmarks beside those that are kept, once the belief is aligned with the model's edges.
+    """Take new landmarks besides those that are kept, once the belief is aligned with the model's edges.
 
     Args:
         belief: what is held, or that corrected by this picture already.

@@ -35,7 +35,7 @@ def find_car_of(view: View, milestone: Milestone) -> str:
 
 
 def list_log_odds(view: View, milestone: Milestone) -> tuple[float, ...]:
-    """The log odds of a wrong place by each of the looks that were tried for a milestone; 0 where one told nothing."""
+    """The log odds of a wrong place by each view that was tried for a milestone; 0 where it showed nothing."""
     last, certificate = view.latest(Milestone), view.latest(Certificate)
     if not milestone.tried or last is None or certificate is None or certificate.value.milestone != last.id:
         return (0.0,) * len(milestone.tried)

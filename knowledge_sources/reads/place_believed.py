@@ -51,7 +51,7 @@ MAX_P_FALSE_CLEAR = 2e-3
 
 
 def find_p_there(view: View, refuted: int) -> float:
-    """The probability of the believed place: as told, with all pictures since it was told or found.
+    """The probability of the believed place: its prior, with all pictures since it was given or found.
 
     ``refuted``: how often a place that was believed by such odds was refuted.
     """
@@ -62,7 +62,7 @@ def find_p_there(view: View, refuted: int) -> float:
 def find_p_not_alias(view: View) -> float:
     """The probability that the robot is where it believes rather than where everything looks the same.
 
-    By the pictures since it was told or found. A robot in doubt may have been displaced, but hardly to such a place.
+    By the pictures since it was given or found. A robot in doubt may have been displaced, but hardly to such a place.
     """
     known = view.latest(AliasOdds)
     p = compute_prior(count_refuted(view)) if known is None else known.value.probability
@@ -73,7 +73,7 @@ def find_p_not_alias(view: View) -> float:
 def count_refuted(view: View, doubt: Entry[Discrepancy] | None = None) -> int:
     """How often a place that was believed by odds was refuted; ``doubt``: of a robot that is lost now.
 
-    Lost because nothing could be told from where it looked, is no evidence against the place.
+    That it is lost because its views showed nothing is no evidence against the place.
     """
     last = view.latest(PlaceOdds)
     if last is None:
@@ -146,7 +146,7 @@ def find_alias(
 def _find_storey(view: View, fix: Entry[PoseFix], weighed: Weighed) -> AliasRisk | None:
     """The storey, of those where the last ride may have ended, that is likeliest but for the believed one.
 
-    What was reported of the ride supports the believed one, as what is told of any place where the robot stands.
+    What was reported of the ride supports the believed one, as does any report of where the robot stands.
     """
     ride = view.latest(Ride)
     if ride is None or view.latest(RideReport) is None:

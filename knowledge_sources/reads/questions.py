@@ -62,7 +62,7 @@ def rests_on(view: View, entry: Entry[Any], picture: str, steps: int = 4) -> boo
 
 
 def find_camera(view: View) -> CameraState:
-    """The camera as the board knows it. Raises LookupError where nobody has told of it."""
+    """The camera as the board knows it. Raises LookupError where it is not posted."""
     camera = view.latest(CameraState)
     if camera is None:
         raise LookupError("expected the robot's camera on the board, got none")
@@ -73,7 +73,7 @@ def find_robot(view: View, camera: CameraState | None = None) -> RobotModel:
     """The robot as the board knows it, in the building as the board knows it; with another ``camera`` if one is given.
 
     Raises:
-        LookupError: nobody has told of its camera, wheels or footprint.
+        LookupError: its camera, wheels or footprint is not posted.
     """
     known, wheels, footprint = view.latest(CameraState), view.latest(Wheels), view.latest(Footprint)
     if known is None or wheels is None or footprint is None:

@@ -17,7 +17,7 @@ from world_models import words
 from world_models.entries import Goal, Hypothesis, Obstacle, Place, PlanSketch, SketchStatus, Subgoal
 from world_models.frames import wrap_angle
 
-MAX_ADJUSTMENTS = 8  # so often a sketch is adjusted at one milestone; then that was in vain
+MAX_ADJUSTMENTS = 8  # so often a sketch is adjusted at one milestone; then adjusting has failed
 GOAL_TOLERANCE_M = 0.010  # tolerance at the goal
 GOAL_HEADING_TOLERANCE_RAD = 0.02  # tolerance of a heading that the goal states
 INEXACT_TOLERANCE_SIGMAS = 2.0
@@ -28,7 +28,7 @@ Way = tuple[Subgoal, ...]
 
 def list_planners(view: View, settings: PlanSettings) -> list[SubgoalPlanner]:
     """Planners in the order in which they are asked: round all that obstacles may take, then what is seen of them, then
-    as if slivers in doorways were the jambs, which may stand a little beside: nothing so narrow blocks a way.
+    as if slivers in doorways were the jambs, which may be a little displaced: nothing so narrow blocks a way.
 
     Where the feet of an obstacle were not seen, the floor round it may be free: the robot drives as if it were, and
     only into what it then sees to be free.

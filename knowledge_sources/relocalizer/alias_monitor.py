@@ -46,7 +46,7 @@ class Case(NamedTuple):
 class AliasMonitor(RobotKnowledgeSource):
     """Keeps the odds of the believed place against the places that look like it, by every verified milestone.
 
-    The first milestone is verified in each of many identical rooms. What the robot was told supports one of them;
+    The first milestone is verified in each of many identical rooms. The robot's prior supports one of them;
     the others are kept in mind, and go with it wherever it drives: each as it would be if the robot had begun there.
     Every further picture, from another view, is weighed at all of them, once. Where another one is likelier, the robot
     doubts its place at the goal level, and looks round.
@@ -108,7 +108,7 @@ class AliasMonitor(RobotKnowledgeSource):
         return tuple(Alias(room, there @ back, 0.0) for there, room in found.items())
 
     def _weigh(self, robot: RobotModel, looked: Segments, here: Pose2, aliases: tuple[Alias, ...]) -> tuple[Alias, ...]:
-        """The twins with what this picture says of them: less what is noise for those that look the same from here."""
+        """The aliases with what this picture says of them: less where only noise separates them from here."""
         unmoved = Pose2(0.0, 0.0, 0.0)
         seen = [CameraView(looked.segments_px, unmoved, np.zeros((3, 3)))]
         are_aliases = make_alias_test(robot, [unmoved])

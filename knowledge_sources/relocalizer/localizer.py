@@ -37,7 +37,7 @@ from world_models.entries import (
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 
-MAX_DOUBTED_PICTURES = 3  # a camera that so few pictures taught is tried as told too, when the robot is lost
+MAX_DOUBTED_PICTURES = 3  # the nominal camera is tried too, where so few pictures corrected it, when the robot is lost
 MAX_PROBES = 8  # so many looks are taken when lost and no place fits; then the robot says that it does not know
 
 Candidates = tuple[Entry[Hypothesis], ...]
@@ -47,7 +47,7 @@ class Localizer(RobotKnowledgeSource):
     """Keeps every place of the floor that agrees with the panorama, and says which next look tells most.
 
     Among places that look alike from here, that is on the way to a view that tells them apart, over floor that is free
-    in all of them. Of such places the one where it was told to be, or was tracked to, is believed if it is likely
+    in all of them. Of such places the prior one, or the one it was tracked to, is believed if it is likely
     enough by these odds and by the pictures. Otherwise the robot stays lost and the candidates stay on the board: it
     never guesses.
     """
@@ -105,7 +105,7 @@ class Localizer(RobotKnowledgeSource):
             yield Post(place, (found, panorama, held.entry))
 
     def _list_cameras(self, view: View) -> tuple[CameraState, ...]:
-        """The camera as it was learnt; also as it was told, where few pictures taught differently: if the place was not
+        """The camera as it was learnt; also the nominal one, where few pictures corrected it: if the place was not
         where it was believed, they made the camera fit the wrong place.
         """
         camera = find_camera(view)

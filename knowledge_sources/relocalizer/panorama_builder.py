@@ -18,7 +18,7 @@ from world_models.frames import Pose2
 
 
 class PanoramaBuilder(RobotKnowledgeSource):
-    """Composes the pictures since the robot is lost to one view round, and finds what stands before the camera.
+    """Composes the pictures since the robot is lost to one view round, and finds the occlusions of the lens.
 
     What is at the same place in its pictures while it turns is an obstruction. A dark picture does not count; a bright
     one without contrast does, as it shows a bare wall.

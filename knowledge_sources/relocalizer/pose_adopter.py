@@ -26,7 +26,7 @@ def find_place(view: View, trigger: Change) -> Found | None:
 def pose_adopter(view: View, case: Found) -> Iterable[Effect]:
     """Takes the place that was found for the belief, and the camera with which it was found.
 
-    What pictures told of the old place against its twins tells nothing of the one that was found, and ends.
+    The odds of the old place against its aliases say nothing of the one that was found, and end.
     """
     (search, place), belief, camera = case, HELD.of(view), CAMERA.of(view)
     before, now = belief.pose, place.value.world_from_robot(belief.world)

@@ -22,7 +22,7 @@ MIN_TRAVEL_M = 1.0  # shortest way by which the yaw is learnt
 MAX_TRAVEL_M = 15.0  # a longer way is not measured: what the wheels slip adds up
 MIN_STRAIGHTNESS = 0.9  # part of the way's length that its ends are apart; of a more bent one nothing is learnt
 HEADING_SIGMA_RAD = math.radians(0.5)
-"""Standard deviation of the headings on a way of one metre; they average (missions with cameras as told, generated
+"""Standard deviation of the headings on a way of one metre; they average (missions with nominal cameras, generated
 floors 3 to 8)."""
 MAX_YAW_SIGMAS = 3.0  # a way that ends further aside than this tells nothing of the yaw
 MIN_LEARNT = 0.05  # the yaw is revised when its variance shrinks by this part
@@ -38,8 +38,8 @@ class Measured(NamedTuple):
 class YawCalibrator(RobotKnowledgeSource):
     """Learns the camera's yaw on the robot from the direction in which the robot came from one milestone to another.
 
-    No single picture can tell it from the robot's heading. Where the heading is wrong by the yaw, the robot comes to a
-    place beside the one that the wheels and the headings say. With the yaw the believed heading turns, as the camera's
+    No single picture can tell it from the robot's heading. Where the heading is wrong by the yaw, the robot reaches a
+    place next to the one that the wheels and the headings say. With the yaw the believed heading turns, as the camera's
     own direction is what is known. A way on which something pushed or stopped the robot, or it was lost, tells nothing.
     """
 

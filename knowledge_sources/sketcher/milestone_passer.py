@@ -16,7 +16,7 @@ from world_models.entries import Goal, Hypothesis, Impasse, Milestone, Place, Pl
 
 
 class Case(NamedTuple):
-    """A milestone, the sketch that has come to it, the goal, and by what it holds but by being verified."""
+    """A milestone, the sketch that has reached it, the goal, and by what it holds but by being verified."""
 
     milestone: Entry[Milestone]
     sketch: Entry[PlanSketch]

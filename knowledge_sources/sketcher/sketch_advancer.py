@@ -1,4 +1,4 @@
-"""Sketch advancer (§3.3, Figure 3): a subgoal is done, so its sketch comes to the next milestone."""
+"""Sketch advancer (§3.3, Figure 3): a subgoal is done, so its sketch goes on to the next milestone."""
 
 from __future__ import annotations
 

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from logs.run_head import RunHead
 
 MOST_VALUES, MOST_SETTINGS = 20, 8
-"""How many differing values of a decision, and how many settings, are told."""
+"""How many differing values of a decision, and how many settings, are shown."""
 LONGEST = 60
 """Of a value [characters]."""
 IGNORED = frozenset({"harvey", "code", "arithmetic", "folder", "world_sha256"})
-"""Of a run's head: what is told apart, or follows from the rest."""
+"""Of a run's head: what is compared elsewhere, or follows from the rest."""
 Records = Sequence[EntryRecord[Any]]
 Maybe = EntryRecord[Any] | None
 

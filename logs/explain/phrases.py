@@ -1,6 +1,6 @@
 """The phrase book: what a sentence is, and what an entry, a decision, and an entry with its neighbours say.
 
-One entry is told by the sentence of its own kind. A run of another version, whose values do not fit their kinds, raises
+Each entry has the sentence of its own kind. A run of another version, whose values do not fit their kinds, raises
 BadInput.
 """
 
@@ -63,7 +63,7 @@ class Sentence:
         refs: the entries that say so; none for what only the simulator knows.
         cycle: when it was so; None for what is so during the whole run.
         label: what it is about, in a word or two.
-        time_s: of the cycle, since the run began, by the body's clock; None where nothing told it.
+        time_s: of the cycle, since the run began, by the body's clock; None where it is unknown.
     """
 
     text: str
@@ -103,7 +103,7 @@ def capital(text: str) -> str:
 
 
 def wrap(text: str, first: str = "", rest: str | None = None) -> str:
-    """A paragraph; ``first`` stands before it, and ``rest`` before its other lines: as many blanks where None."""
+    """A paragraph; ``first`` precedes it, and ``rest`` its other lines: as many blanks where None."""
     rest = " " * len(first) if rest is None else rest
     return fill(text, WIDTH, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False)
 
@@ -129,7 +129,7 @@ def plainly(record: EntryRecord[Any]) -> str:
 
 
 def moment(history: Timeline, cycle: int) -> str:
-    """``cycle 88, 12.3 s into the run``, as far as anything told the time."""
+    """``cycle 88, 12.3 s into the run``, as far as the time is known."""
     time_s = history.time_at(cycle)
     return f"cycle {cycle}" + ("" if time_s is None else f", {time_s:.1f} s into the run")
 

@@ -1,7 +1,7 @@
 """Questions in words: of what was in the way, why it stopped or took a detour, whether a door is shut; and of the whole
 run: when was it lost, where did it touch anything, how far off was it in truth.
 
-A question is known by a word of it. It asks for entries of some kinds, each of which is told down to the pixels, or for
+A question is known by a word of it. It asks for entries of some kinds, each explained down to the pixels, or for
 a part of the run's story.
 """
 
@@ -40,13 +40,13 @@ from world_models.entries import (
 from world_models.words import count, metres
 
 MOST_STORIES = 6
-"""So many things, stops or doors are told of, the newest."""
+"""Most obstacles, stops or doors that are named, the newest."""
 MOST_SIGHTS = 4
-"""So many revisions of a thing are told of, the newest."""
+"""Most revisions of an obstacle that are named, the newest."""
 CHANGED: tuple[type[Any], ...] = (Obstacle, LocaleFrame, DoorState, Contact, UserReport, Redirection)
 """What a plan may be withdrawn for, the most telling first."""
 BEYOND = 3.0
-"""An error of more standard deviations is told as that."""
+"""An error of more standard deviations is given in them."""
 Record = EntryRecord[Any]
 
 
@@ -225,7 +225,7 @@ def _tell_stops(asked: Asked, records: list[Record]) -> Iterator[Story]:
 
 
 def _tell_reasons(history: Timeline, record: Record) -> Iterator[Sentence]:
-    """What it rests on; then the nearest thing, door or contact below, and the picture that told of it."""
+    """What it rests on; then the nearest obstacle, door or contact below, and the picture that showed it."""
     for ref in record.because:
         below = history.entry(ref)
         if below is not None and below.kind is not record.kind:

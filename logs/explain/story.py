@@ -1,4 +1,4 @@
-"""A run told in a page of text: sentences, each with the cycle that it tells of, and a table of milestones."""
+"""A run in a page of text: sentences, each with its cycle, and a table of milestones."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ WITHOUT: Mapping[str, str] = {
 WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, UserReport, Redirection)
 """What changes the knowledge of a locale."""
 MOST_PLACES = 4
-"""So many places that came into question are told, the newest."""
+"""Most candidate places that are named, the newest."""
 COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong", "at most")
 MOST_ROWS = 60
 """Of more rows only those are printed that were not verified, and the last ones."""
@@ -71,7 +71,7 @@ class MilestoneRow:
 
     Attributes:
         cycle: of the verdict; of a milestone that was not judged its last.
-        time_s: since the run began; None where nothing told it.
+        time_s: since the run began; None where it is unknown.
         name: ``M1 of hallway``, or ``the place where it believes to be``.
         verdict: verified, refuted, not testable; or withdrawn, expected, turning.
         expected, matched: numbers of model lines.
@@ -235,7 +235,7 @@ def _cause(history: Timeline, ref: str) -> str:
     if record.kind is Goal:
         asked = history.nearest(record, Redirection)
         return "there was a new goal" if asked is None else f"it {sentence(asked).partition(';')[0]}"
-    if record.kind is LocaleFrame:  # the changes of a frame are many; what made the last of them is told
+    if record.kind is LocaleFrame:  # the changes of a frame are many; only the cause of the last is given
         record = history.nearest(record, *WHAT_CHANGES) or record
     return sentence(record).partition(";")[0]
 
@@ -319,7 +319,7 @@ def _points(turns: Iterable[TurningPoint], *kinds: str) -> list[Sentence]:
 
 
 def _tell_camera(history: Timeline, _: Mapping[str, Any]) -> Iterator[Sentence]:
-    """How the camera turned out to differ from what was told: each since when it was so to the end."""
+    """How the camera turned out to differ from its nominal state: each difference, from when it held to the end."""
     records = list(history.of_kind(CameraState))
     lessons = [find_camera_lessons(records[0].value, record.value) for record in records]
     for lesson in lessons[-1] if lessons else ():

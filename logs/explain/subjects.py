@@ -35,7 +35,7 @@ FOLLOWED = (Certificate, Milestone, Discrepancy)
 REVISIONS = 8
 """So many revisions of a milestone are looked at for its verdict."""
 MOST_NAMED, MAX_MILESTONES = 12, 8
-"""So many milestones are named where none is similar, and so many are told one by one."""
+"""So many milestones are named where none is similar, and so many are listed one by one."""
 ENTRY = re.compile(r"[A-Z]\w*-\d+(\.\d+)?")
 """What names of entries look like."""
 

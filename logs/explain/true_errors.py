@@ -1,4 +1,4 @@
-"""How far off the belief was: each belief beside the truth, which only the simulator's recording has."""
+"""How far off the belief was: each belief and the truth, which only the simulator's recording has."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class TurningPoint:
         cycle: when.
         kind: goal, plan, a verdict, doubt, lost, found, fault, contact, door, thing, resumed, told or the end.
         text: what happened, without a full stop.
-        time_s: since the run began, by the body's clock: the newest time that anything from outside had told by then;
+        time_s: since the run began, by the body's clock: the newest time of any observation by then;
             None where nothing had, or in the results of older versions.
     """
 

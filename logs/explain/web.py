@@ -38,7 +38,7 @@ from world_models.words import count
 
 DEEPEST_INDENT, FEW = 20, 2
 DEPTH = 5
-"""How many steps down the walk goes unless told otherwise."""
+"""How many steps down the walk goes by default."""
 PRINCIPAL = (Outcome, MotorCommand, Goal, PlanSketch, Recovery, Hypothesis, Certificate, Milestone, Leg, PictureRequest)
 """Of what one act makes, the first of these is what it was done for."""
 GOAL, MODEL, SENSOR = "goal", "model", "sensor"
@@ -47,7 +47,7 @@ KINDS = (GOAL, MODEL, SENSOR)
 GROUNDS: Mapping[type[Any], str] = {
     Command: GOAL, Goal: GOAL, CameraPicture: SENSOR,
     **dict.fromkeys((LocaleFrame, CameraState, Wheels, Footprint, UserReport, Redirection), MODEL)}
-"""The kinds of entries that are such an end themselves; what the robot is told of the model is a part of it."""
+"""The kinds of entries that are such an end themselves; what the robot is given of the model is a part of it."""
 NAMING: Mapping[type[Any], str] = {Milestone: "landmarks", Tracks: "items", PlanSketch: "subgoals"}
 """The fields by which others name what is in the model."""
 Ends = frozenset[str]
@@ -98,7 +98,7 @@ def _change_line(word: str, change: EntryRecord[Any]) -> str:
 
 
 def walk(history: Timeline, refs: Sequence[str], depth: int = DEPTH) -> Iterator[tuple[int, str, str]]:
-    """Each entry, then what it rests on, depth first; what is shared is told once, nearest to what is explained.
+    """Each entry, then what it rests on, depth first; what is shared is listed once, nearest to what is explained.
 
     Returns:
         steps down, ref, sentence; of an earlier revision of what rests on it only what little was different.

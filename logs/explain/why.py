@@ -1,6 +1,6 @@
 """The story of an entry: the one chain from it down to pixels, model and goal that a person would tell.
 
-Everything that an entry rests on is a graph; told whole it is long. A story follows the main reasons only, tells each
+Everything that an entry rests on is a graph; all of it would be long. A story follows the main reasons only, tells each
 kind of thing once, at the place nearest to what is explained, and says by name from which entries each sentence comes.
 """
 
@@ -73,7 +73,7 @@ from world_models.entries import (
 )
 
 MOST, MOST_PLAIN, MOST_MET = 24, 12, 200
-"""So many things are told at the most, of a run of another version, and so many entries reached."""
+"""Most entries that are named, of a run of another version, and most that are reached."""
 LEGEND = """\
 Places are in metres in each room's own frame, headings counter-clockwise from its x axis; pixels count right and
 down from the top left. Model lines are edges that the map of the building says can be seen. Names in brackets are
@@ -91,7 +91,7 @@ def tell_stories(history: Timeline, refs: Iterable[str], world: WorldFile | None
 
 
 def story(history: Timeline, record: EntryRecord[Any], world: WorldFile | None = None) -> Story:
-    """The story of one entry; where values have other fields than those known here, told by the entries as they are.
+    """The story of one entry; where values have other fields than those known here, the entries as they are.
 
     Args:
         world: tells from which file and line model lines come; None where that is not asked for.
@@ -152,7 +152,7 @@ class _Teller:
                 yield from self._one(key, LABELS[kind][0], phrase(self.history, found), found)
 
     def _below(self, record: EntryRecord[Any], kind: type[Any] | None = None) -> Iterator[EntryRecord[Any]]:
-        """What an entry rests on beside itself, of a kind or of any."""
+        """What an entry rests on besides itself, of a kind or of any."""
         for ref in record.because:
             if kind is None or ref.startswith(f"{kind.__name__}-"):
                 found = self.history.entry(ref)
@@ -291,7 +291,7 @@ None stands, and of a kind that is not named here, all."""
 CONTEXT: tuple[type[Any], ...] = (PlanSketch, Goal, Command)
 """What all of it serves."""
 FOLDED = frozenset({PoseFix, LineMatch, Segments, Certificate})
-"""Told by the sentences of what rests on them."""
+"""The sentences of what rests on them name these."""
 SEVERAL = frozenset({Discrepancy, Goal, PlanSketch, BodyFault})
 """Of these a story may tell more than one."""
 

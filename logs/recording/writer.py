@@ -104,7 +104,7 @@ class RecordingWriter:
         self._contacts, self._differences, self._happened = [], [], []
 
     def tell(self, **values: str | int | float) -> None:
-        """Properties of the run as a whole, as its outcome; what is told later is added."""
+        """Properties of the run as a whole, as its outcome; later ones are added."""
         self._stream.tell(**values)
 
     def flush(self) -> None:

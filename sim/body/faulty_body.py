@@ -43,7 +43,7 @@ class FaultyBody:
         return replace(self._done, sim_time_s=self._body.truth.time_s)
 
     def steer(self, course: Course) -> tuple[MotionReport, CameraPicture] | BodyFault:
-        """As the body does; with a fault of the base or the camera it comes to a stand."""
+        """As the body does; with a fault of the base or the camera it stops."""
         fault = self._find_fault("base") or self._find_fault("camera")
         if fault is None:
             answer = self._body.steer(course)

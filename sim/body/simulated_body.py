@@ -227,7 +227,7 @@ class SimulatedBody:
         return turn_rad, move_m
 
     def steer(self, course: Course) -> tuple[MotionReport, CameraPicture] | BodyFault:
-        """Follow a course until the next picture, or come to a stand; the course holds from this picture on.
+        """Follow a course until the next picture, or stop; the course holds from this picture on.
 
         Returns what the encoders counted since the last call, and the picture; it is taken on the move, in no time.
         A contact ends the motion with a fault.
@@ -247,7 +247,7 @@ class SimulatedBody:
         return MotionReport(turn, move, now_s - began_s, now_s), self._take_frame("track")
 
     def halt(self, after_s: float) -> MotionReport:
-        """Break off a motion on the move: the base follows its course for ``after_s`` more, then comes to a stand."""
+        """Break off a motion on the move: the base follows its course for ``after_s`` more, then stops."""
         began_s = self._truth.time_s
         touched = after_s > 0.0 and self._follow_arc(after_s)
         self._motion = self._motion.steer(0.0, self._motion.curvature_per_m)
@@ -376,7 +376,7 @@ class SimulatedBody:
         self._track.append(self._truth)
 
     def _follow_changes(self) -> None:
-        """Let the building change with time. What would come to where the robot stands waits until it has gone."""
+        """Let the building change with time. What would be put where the robot stands waits until it has gone."""
         if self._building.at_time is None:
             return
         now = self._building.at_time(self._truth.time_s)

@@ -38,7 +38,7 @@ PARALLEL = 0.999
 SAME_PLANE_M = 0.02
 """Walls of one room that lie in one plane to this are pieces of one wall [m]."""
 MIN_LONG_M = 5.0
-"""A corridor's walls of this length are beside those who walk along it [m]."""
+"""A corridor's walls of this length are next to those who walk along it [m]."""
 MARGIN_M, NEAR_DOOR_M, OUTSIDE_M = 0.3, 0.05, 0.15
 """Extra things are so far from the ends of their wall and from doors, and reach so far out of their room [m]."""
 
@@ -51,7 +51,7 @@ class TrueInexact(Bounded):
         sigma_m: standard deviation of each displacement.
         missing: share of the model's things that are not there.
         extra: number of things that are there and not in the model, as a share of the model's things.
-        door_m: by how much each door is beside its place besides, to either side.
+        door_m: by how much each door is also displaced along its wall, to either side.
         corridor_m: by how much each hallway is wider, half of it on either side.
         seed: of the random numbers.
     """
@@ -253,7 +253,7 @@ def _list_places(locale: LocaleSpec, wall: str) -> tuple[float, float]:
 
 
 def _add_thing(thing: ThingSpec, locale: LocaleSpec, number: str, rng: np.random.Generator) -> ThingSpec:
-    """A thing once more: elsewhere on its wall, or, where it stands on the floor, beside itself by about its size."""
+    """A thing once more: elsewhere on its wall, or, where it stands on the floor, displaced by about its size."""
     name = f"{thing.name}-once-more-{number}"
     if thing.wall is not None:
         low, high = _list_places(locale, thing.wall)

@@ -167,7 +167,7 @@ AS_BELIEVED = TrueCamera()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrueStart(Bounded):
-    """Where the robot is put down, where that is not the place that it is told: ``[truth.start]``.
+    """Where the robot is put down, where that is not the prior place: ``[truth.start]``.
 
     Attributes:
         locale: the room; x_m, y_m, heading_rad: the pose in its frame, before the errors of putting it down.

@@ -200,7 +200,7 @@ class Building(ABC):
         """The route from room to room at the highest level at which they differ; None where there is none.
 
         Args:
-            avoided: passages that are not to be used, beside those that are believed shut.
+            avoided: passages that are not to be used, besides those that are believed shut.
         """
         for name in (origin, destination):
             self.locale(name)

@@ -226,7 +226,7 @@ class FrameAnswer:
     Attributes:
         asked: the name or phrase.
         locales: those that are meant.
-        error: in words why there are none, or too many; "" otherwise.
+        error: in words why there are none, or too many; else "".
     """
 
     asked: str

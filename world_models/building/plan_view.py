@@ -1,4 +1,4 @@
-"""A floor plan of the world as a drawing: rooms, doors, furniture and names, storey beside storey."""
+"""A floor plan of the world as a drawing: rooms, doors, furniture and names, storeys side by side."""
 
 from __future__ import annotations
 

@@ -4,9 +4,9 @@
 ``robot_state``: what the robot knows of its camera, wheels and footprint, and what of the camera was believed
 wrongly. ``body``: requests to the robot's body and its answers. ``task``: command, goal, plan sketch, leg, milestone,
 certificate, outcome. ``percepts``: tracks, segments, matches, pose fixes. ``user_reports``: what somebody says on the
-way. ``location``: pose hypotheses, and the way since a known place.
-``protection_level``: how far off a pose may be at a stated risk. ``obstacle``: contacts and ranges, what stands in
-the way, what stands before the camera. ``floor``: free floor, and what floors look like. ``door_state``: which doors
+way. ``location``: pose hypotheses, and the way since a known place. ``protection_level``: how far off a pose may be at
+a stated risk. ``obstacle``: contacts and ranges, what stands in the way, occlusions of the lens. ``floor``: free
+floor, and what floors look like. ``door_state``: which doors
 are seen open or shut. ``entry_kinds``: all of them; not part of this face, as frames stand with the building.
 """
 

@@ -72,14 +72,14 @@ class MotorCommand:
 @request(keep=LAST_REQUESTS)
 @dataclass(frozen=True, slots=True)
 class Course:
-    """A motion that goes on until it is told otherwise; each revision is a correction in mid-move (§5).
+    """A motion that goes on until it is revised; each revision is a correction in mid-move (§5).
 
     The body answers each with what the wheels claim since the one before, and with a picture that is taken on the move.
-    Without another word it comes to a stand.
+    Without a revision it ends by a stop.
 
     Attributes:
         leg: id of the leg entry.
-        speed_m_per_s: wanted, ahead; 0: come to a stand.
+        speed_m_per_s: wanted, ahead; 0: stop.
         curvature_per_m: of the arc to steer, positive to the left.
     """
 
@@ -139,7 +139,7 @@ class Ride:
 @observation(keep=2)
 @dataclass(frozen=True, slots=True)
 class RideReport:
-    """What was told when the doors opened: where this is, and how long it took."""
+    """What was reported when the doors opened: where this is, and how long it took."""
 
     passage: str
     destination: str

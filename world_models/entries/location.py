@@ -1,6 +1,6 @@
 """Locale-relative location (§3.1, §3.4): in which locale, where in its frame, and how sure.
 
-And where the robot should have come to by its headings, since a place that it knows: it tells where the camera looks.
+And where its headings should have led it since a place that it knows: that shows the camera's yaw.
 """
 
 from __future__ import annotations
@@ -172,7 +172,7 @@ class Hypothesis:
 @inference()
 @dataclass(frozen=True, slots=True)
 class PlaceOdds:
-    """What the robot was told or had tracked, as evidence of where it is among places that look alike.
+    """The prior: where the robot was told to be or had tracked to, as evidence among places that look alike.
 
     Attributes:
         locale: where it is believed to be.

@@ -120,7 +120,7 @@ class Obstacle:
         certainty: probability that it is there.
         seen_s: when it was last seen, ranged or touched, by the body's clock.
         touched_s: when it was last touched; None where it never was.
-        by: what told of it first.
+        by: what showed it first.
         evidence: what tells of it, in words: which pixels of which picture.
         status: suspected (not certain enough to act on), there, or gone.
         is_camouflaged: whether it looks like the floor: that it is not seen tells little.

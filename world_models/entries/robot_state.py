@@ -184,13 +184,13 @@ class Drift:
 MIN_SIGMAS = 3.0
 """What is off by less than so many standard deviations is as believed."""
 WORTH_TELLING = (math.radians(0.1), math.radians(0.1), math.radians(0.2), 0.005, 0.005, 2.0, 2.0)
-"""Nor is less than this told; in the order of ``CAMERA_UNKNOWNS``."""
+"""Nor is less than this mentioned; in the order of ``CAMERA_UNKNOWNS``."""
 WORDS = (("looks", "degrees lower", "degrees higher"), ("is rolled by", "degrees clockwise", "degrees anticlockwise"),
          ("looks", "degrees further left", "degrees further right"), ("is", "mm higher", "mm lower"),
          ("has a focal length", "% longer", "% shorter"),
          ("has its principal point", "px further right", "px further left"),
          ("has its principal point", "px lower", "px higher"))
-"""How each is told: a verb, and what a positive and a negative difference is."""
+"""How each is put in words: a verb, and what a positive and a negative difference is."""
 SCALES = (*[math.degrees(1.0)] * 3, 1000.0, 100.0, 1.0, 1.0)
 
 
@@ -200,7 +200,7 @@ class CameraLesson:
 
     Attributes:
         what: which of :data:`~world_models.camera.CAMERA_UNKNOWNS`.
-        off: by how much it is more than told [rad, m, part of the focal length, px].
+        off: by how much it is more than nominal [rad, m, part of the focal length, px].
         sigma: standard deviation of that.
     """
 

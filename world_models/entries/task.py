@@ -111,7 +111,7 @@ class PlanSketch:
         goal: id of the goal entry that it serves.
         path: where it hangs in the tree of Figure 3: () for the first level, (1,) refines its subgoal 1.
         locale: the locale that it crosses, or "" for the first level, which goes from locale to locale.
-        subgoals: n of them; milestone k stands before subgoal k, milestone n at the end.
+        subgoals: n of them; milestone k precedes subgoal k, milestone n at the end.
         at: the subgoal that is next or under way; n at the end.
         verified: whether milestone ``at`` holds.
         status: active, done, halted before floor that is not seen, or superseded.
@@ -248,7 +248,7 @@ class Milestone:
         expected_px: their expected projection, ((u0, v0), (u1, v1)).
         landmark_of: for each line, its index in ``landmarks``.
         face_colors: of each face that should be seen its colour (red, green, blue; 0..1) and points [m, world].
-        tried: headings from which it was looked for before, and could not be told [rad, world].
+        tried: headings of earlier views in which it was not testable [rad, world].
         displacement_modes: what of the model may be displaced as one: walls, doors, things; none where it is exact.
         displacements: by how much a standard deviation of a mode displaces a line: (mode, line, x, y, z [m, world]).
         log_odds_so_far: of a wrong place, by each of these looks; 0 where one said nothing.

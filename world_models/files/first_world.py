@@ -93,7 +93,7 @@ DOORS_TEXT = """
 
 LOOKS = (("window", 2.0, "notice", "poster", "notice"), ("cupboard", 2.2, "poster", "notice", "poster"),
          ("notice", 2.3, "notice", "notice", "poster"), ("poster", 1.7, "poster", "poster", "notice"))
-"""What is on the north wall, and where [m], on the west, east and south walls: rooms beside each other differ."""
+"""What is on the north wall, and where [m], on the west, east and south walls: neighbouring rooms differ."""
 
 
 def first_world_text(name: str, rooms: Sequence[str]) -> str:
@@ -117,7 +117,7 @@ def first_world_text(name: str, rooms: Sequence[str]) -> str:
 
 
 def _along_the_corridor(number: int) -> str:
-    """What hangs opposite the door of a room, beside it, and between it and the next."""
+    """What hangs opposite the door of a room, next to it, and between it and the next."""
     x = number * CORRIDOR_M[0]
     parts = ("notice", "poster") if number % 2 else ("poster", "notice")
     return (f'  ["{parts[0]}", "south", {x + 1.2 + 0.2 * (number % 3):g}], ["{parts[1]}", "south", {x + 3.2:g}],\n'

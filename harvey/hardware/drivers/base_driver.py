@@ -19,7 +19,7 @@ FaultKind = Literal["silent", "nonsense", "disconnected", "stalled", "watchdog",
 """How a base fails.
 
 silent: no answer that could be read, though the line is there. nonsense: what arrives is not the protocol, or tells of
-a motion that was not asked for. disconnected: the line is gone. stalled: the wheels do not turn as they were told to.
+a motion that was not asked for. disconnected: the line is gone. stalled: the wheels do not turn as commanded.
 watchdog: the base heard too little of us and stopped by itself. refused: the base understood and would not.
 stopped: :meth:`Base.stop` was called while it moved.
 """
@@ -248,7 +248,7 @@ class BaseKind:
         baud: of its line.
         connect: its driver over a line.
         watchdog: what stops it when it hears nothing any more, in words.
-        connect_emulated: its driver over a line to an emulated base, where that must be otherwise: no real time passes
+        connect_emulated: its driver over a line to an emulated base, where that must differ: no real time passes
             there, and two runs must send the same bytes.
         open_at: its driver by what stands behind the colon, where that is no serial port; raises OSError and BadInput.
     """

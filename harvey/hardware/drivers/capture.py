@@ -118,7 +118,7 @@ class _Untimed:
 
 def open_capture(source: str) -> Capture:
     """VideoCapture of a device by its number, a file or a URL."""
-    # What is wrong is told by CameraFault; OpenCV's own words would only come between.
+    # CameraFault says what is wrong; OpenCV's own messages would only come between.
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     if source.isdecimal() and int(source) > MAX_DEVICE:
         raise CameraFault("unplugged", f"expected a device's number from 0 to {MAX_DEVICE}, got {source}")

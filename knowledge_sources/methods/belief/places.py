@@ -1,8 +1,8 @@
-"""A place against its rivals: what was believed before the look, and what the picture says of both.
+"""A place against its aliases: what was believed before the look, and what the picture says of both.
 
 The belief is one of two: the robot is where its covariance says, or it is elsewhere, and then at any place that looks
-the same. So a rival far outside the covariance is as likely as the belief is wrong, however alike it looks; one inside
-is told apart by the picture alone.
+the same. So an alias far outside the covariance is as likely as the belief is wrong, however alike it looks; one inside
+is distinguished by the picture alone.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ MAX_CAMERA_CHI2 = 30.0  # squared distance from what was believed beyond which a
 SLIP_SIGMA_M = 0.1  # standard deviation that a tracked position has beyond its covariance: it may have slipped
 SLIP_SIGMA_RAD = math.radians(3.0)  # standard deviation that a tracked heading has beyond its covariance
 MAX_SLIP_CHI2 = 21.1
-"""Largest squared distance of a place from where it was told or tracked to be that is still that place, in
+"""Largest squared distance of a place from its prior or tracked pose that is still that place, in
 deviations; three unknowns, 99.99 %."""
 MIN_P_BELIEVED = 0.97  # smallest probability of a place that is believed where no look within reach tells more
 
@@ -64,7 +64,7 @@ class BelievedPlace:
 
 
 def compute_p_aliases(believed: BelievedPlace, here: Pose2, aliases: Sequence[tuple[Pose2, float]]) -> float:
-    """The probability that the robot is at any of the rival places, and not here.
+    """The probability that the robot is at any of the aliases, and not here.
 
     How far this pose is from the believed one does not support an alias: elsewhere it would be off in the same way, as
     by a camera that is mounted differently.
@@ -86,7 +86,7 @@ def compute_p_aliases(believed: BelievedPlace, here: Pose2, aliases: Sequence[tu
 
 
 def bound_p_aliases(believed: BelievedPlace, here: Pose2, apart: tuple[float, float], most_log_ratio: float) -> float:
-    """The most that :func:`compute_p_aliases` can be, whatever the rivals: so those that do not matter are not sought.
+    """The most that :func:`compute_p_aliases` can be, whatever the aliases: so those that do not matter are not sought.
 
     ``apart``: each is farther from here than by so much of the way [m], or of a turn [rad].
     """

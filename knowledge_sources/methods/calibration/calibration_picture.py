@@ -14,7 +14,7 @@ CORNER = (40, 40, 210)
 
 
 def draw_calibration(calibration: Calibration, grey: Image) -> bytes:
-    """One view (h, w) with the corners of all views, and beside it the same view rectified, as PNG bytes."""
+    """One view (h, w) with the corners of all views, and next to it the same view rectified, as PNG bytes."""
     camera = calibration.camera
     raw = np.ascontiguousarray(grey)
     seen, rectified = (cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)

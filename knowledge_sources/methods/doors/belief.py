@@ -43,7 +43,7 @@ MAX_COMMON = 0.5  # of two pictures that have more in common, one is kept
 MAX_VIEWS = 4  # so many are kept, the last ones
 MAX_DOUBTED_SIGMAS = 3.0  # standard deviations of the belief within which the explained pose must be
 MIN_EXPLAINED_BETTER = 10.0  # least ratio by which the pose is likelier to be wrong with the door open
-MIN_FEW_LINES = 3  # fewest lines by which a frame is told, where they are too few to tell the place by
+MIN_FEW_LINES = 3  # fewest lines by which a frame is recognized, where they are too few to tell the place by
 MIN_FEW_SHARE = 0.6  # least share of these that must be there
 
 
@@ -80,7 +80,7 @@ def update_door(
 
 
 def touch_door(known: DoorState, when_s: float) -> DoorState:
-    """What is believed of a door after the first touch in its opening; that counts beside the pictures."""
+    """What is believed of a door after the first touch in its opening; that counts besides the pictures."""
     log_odds = min(known.log_odds + TOUCH_LOG_RATIO, MAX_LOG_ODDS)
     prior = (known.prior if known.views else known.log_odds - known.last.log_ratio) + TOUCH_LOG_RATIO
     state = _name_state(log_odds, known.pictures + 1, known)
@@ -98,7 +98,7 @@ def is_in_opening(doorway: Doorway, locale: str, at: Floats, margin_m: float) ->
 
 
 def _keep(views: tuple[DoorPicture, ...], new: DoorPicture) -> tuple[DoorPicture, ...] | None:
-    """The pictures that count beside a new one; None where one of them says the same, and no less."""
+    """The pictures that count besides a new one; None where one of them says the same, and no less."""
     agreeing = [view for view in views if view.log_ratio * new.log_ratio > 0.0
                 and measure_common(_pose(view), _pose(new), SAME_PLACE) > MAX_COMMON]
     if any(abs(view.log_ratio) >= abs(new.log_ratio) for view in agreeing):

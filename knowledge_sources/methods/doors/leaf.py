@@ -209,10 +209,10 @@ MAX_GAIN_BRIGHTNESS = 0.15  # largest difference of log brightness from the mode
 MAX_GAIN_TINT = 0.06  # largest difference of log color, without brightness, from the model's, up to one gain
 FOOT_M = 0.35  # height of what counts as the foot of an opening
 MIN_FOOT_SAMPLES = 8  # fewest samples at the foot, and above it, by which both compare
-MIN_FRAME_SAMPLES = 12  # fewest samples round an opening by which it is told whether something stands before it
+MIN_FRAME_SAMPLES = 12  # fewest samples round an opening that show whether something stands before it
 MIN_FRAME_SHARE = 0.6  # least share of them that has the model's color, up to one gain, where nothing stands before it
 MAX_FRAME_LEAF_SHARE = 0.4  # largest share of them that has the color of the opening, where that is a leaf
-MIN_LEAF_SINE = 0.6  # least sine of the angle at which a leaf is told from an open doorway: 37 degrees
+MIN_LEAF_SINE = 0.6  # least sine of the angle at which a leaf differs from an open doorway: 37 degrees
 MAX_RIVAL_BETTER = 0.15  # most by which a rival may explain it better [mean log]; chosen on floors 7000 to 7407
 MAX_LOG_RATIO = 4.5  # most that one picture may add to the log odds of a door: 90 to 1
 

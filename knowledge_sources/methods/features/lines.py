@@ -50,7 +50,7 @@ PEAK_FLOOR_PX = 0.03
 # variance of a mean of neighbouring peaks over that of independent ones (measured on rendered edges
 # (tests/laws/features))
 PEAK_CORRELATION = 2.0
-PRIOR_PEAKS = 4.0  # number of peaks for which the predicted scatter counts beside the measured one
+PRIOR_PEAKS = 4.0  # number of peaks as which the predicted scatter counts against the measured one
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,7 +19,7 @@ from knowledge_sources.methods.arrays import Floats
 Corners = tuple[tuple[float, float], ...]
 
 GRAIN_M = 1e-3
-"""Corners are told to this."""
+"""Corners are resolved to this."""
 MIN_SIDE_M = 0.02
 """A footprint is at least so wide and so deep."""
 

@@ -42,7 +42,7 @@ def find_same(
 ) -> str | None:
     """Which obstacle a thing is another sight of: that of which it covers most, within the standard deviations.
 
-    What lies beside an obstacle, so that a hull round both would take much floor that neither takes, is another thing.
+    What lies next to an obstacle, so that a hull round both would take much floor that neither takes, is another thing.
     """
     best: tuple[float, str] | None = None
     for name, obstacle in known.items():

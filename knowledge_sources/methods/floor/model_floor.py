@@ -132,7 +132,7 @@ def predict_model_floor(
     camera_from_world = robot.camera_from_world(pose)
     nearest_m = max(DEPTHS_M[0][0], MIN_DEPTH_M)
     aside = STEP * (1 + int(np.ceil((margin_px + aside_px_m / nearest_m) / STEP_PX)) // STEP)
-    pixels = _widen(grid.pixels, aside)  # what is beside the picture may be in it
+    pixels = _widen(grid.pixels, aside)  # what is outside the picture may be in it
     shape = pixels.shape[:2]
     rays = robot.camera.rays(pixels[::STEP, ::STEP].reshape(-1, 2))
     bounds = np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)])

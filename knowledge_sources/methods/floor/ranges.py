@@ -33,7 +33,7 @@ RANGE_ARC_POINTS = 9  # places on the arc of an echo that are asked after
 RANGE_JOIN_M = 0.2  # echoes of neighbouring sensors that are no further apart are of one thing
 RANGE_DEPTH_M = 0.1  # how deep a thing is taken to be that was ranged
 ECHO_P = 0.7  # probability of a thing after one echo that the model does not explain
-MAX_RANGE_P = 0.99  # probability that many echoes come to
+MAX_RANGE_P = 0.99  # probability that many echoes add up to
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def see_ranges(
 
     Args:
         pose: of the robot [world]; sigma_m, sigma_rad: how well it is known.
-        earlier: what earlier readings told, newest first.
+        earlier: what earlier readings showed, newest first.
     """
     cones = _build_cones(robot, pose, ranges)
     rooms = find_rooms_within(robot.world, locale, pose, ranges.max_range_m)

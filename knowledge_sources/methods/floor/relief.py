@@ -2,7 +2,7 @@
 
 The earlier picture is brought into this one as if all that it shows lay on the floor, on planes above and below it, or
 on the lens (plane sweep, Collins, CVPR 1996). What a pixel shows is where the two are most alike. Where there is
-nothing to tell by, nothing is told: in plain surfaces, along lines that lead to where the robot comes from, far away.
+no evidence, nothing is said: in plain surfaces, along lines that lead to where the robot comes from, far away.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ REACH = 2 * HALF + 3
 MIN_DEVIATION = 3.0
 """A patch with less contrast than this [grey levels] tells nothing."""
 MIN_LIKENESS = 0.6
-"""Least correlation of two patches by which anything is told."""
+"""Least correlation of two patches that is evidence."""
 MIN_LEAD = 0.25
 """Least lead over the correlations of all that it may be different."""
 MIN_APART_PX = 2.5
-"""What stands is told from what lies flat where it was at least so far from there, in the reduced earlier picture."""
+"""Least distance, in the reduced earlier picture, of what stands from where it would lie flat."""
 PARTS = (0.93, 0.86, 0.79, 0.72, 0.65, 0.57, 0.49, 0.41)
 """What stands is nearer than the floor that it hides: its distances that are tried, as parts of that of the floor."""
 DEPTHS = (1.25, 1.5, 1.8, 2.15, 2.6, 3.1, 3.7)
@@ -52,7 +52,7 @@ CONTRAST_SIGMA = 0.5
 PATCH = 10.0
 """So many neighbouring pixels tell as much as one that tells on its own."""
 MIN_AGREEING = 0.6
-"""Least part of the floor with texture that must agree; else the motion is not known, and nothing is told."""
+"""Least part of the floor with texture that must agree; else the motion is not known, and nothing is said."""
 MIN_BESIDE_THINGS = 0.3
 """The same where what seems to stand is not counted."""
 TYPICAL_M, MAX_UNSURE_PX = 2.0, 1.5
@@ -63,7 +63,7 @@ MODEL_GAP_M = 0.35
 MAX_HIDING_M = 0.2
 """What the model had before something, in the earlier picture, by more than this hid it."""
 MIN_ALONG = 0.25
-"""Least share of a patch's texture along the way on which what stands has moved: along a line nothing is told."""
+"""Least share of a patch's texture along the way on which what stands has moved: along a line there is no evidence."""
 OUTSIDE = -1e4
 """Grey level of what is not in the earlier picture: one such pixel makes a patch's mean negative."""
 
@@ -134,7 +134,7 @@ class Modelled(NamedTuple):
     standing_then_m: NDArray[np.float32]
 
     def was_hidden(self, both: TwoPictures) -> NDArray[np.bool_]:
-        """What the earlier picture does not show: something else of the model was before it, or it was beside that."""
+        """What the earlier picture does not show: something else of the model was before it, or it was outside that."""
         places, away_m = both.find_places(np.minimum(self.ranges_m / both.grid.ranges_m, 1.0))
         rows, columns = self.standing_then_m.shape
         x, y = np.moveaxis(np.nan_to_num(np.rint(places), nan=-1.0), -1, 0).astype(int)
@@ -196,7 +196,7 @@ def find_relief(
     Args:
         is_floor: (rows, columns) where the floor is most likely: by it the two are aligned.
         sigma_m, sigma_rad: standard deviations of the motion between the two.
-        modelled: by it what stands is told from what of the model stands there; without, all of it stands.
+        modelled: by it what stands is distinguished from what of the model stands there; without, all of it stands.
     """
     aligned = _align(both, is_floor, np.array([sigma_m, sigma_m, sigma_rad]))
     if aligned is None:
@@ -266,7 +266,7 @@ def _align(both: TwoPictures, is_floor: NDArray[np.bool_], sigmas: Floats) -> Tw
     contrast = _measure_contrast(now)[tested]
 
     def see(change: Floats) -> Floats:
-        """The contrast of the earlier picture where it is asked, if the motion was different; NaN beside it."""
+        """The contrast of the earlier picture where it is asked, if the motion was different; NaN outside it."""
         floor = both._replace(earlier_from_now=_changed(both.earlier_from_now, change)).find_map(1.0)
         if floor is None:
             return np.full(len(contrast), np.nan)

@@ -62,8 +62,8 @@ P_SEEN_ONCE = 0.7  # probability that what does not look like the floor stands o
 MAX_P_SEEN_ONCE = 0.95  # no picture alone makes a thing more certain, whatever it shows
 P_LIKE_FLOOR = 0.015  # the same of what looks like the floor, and seems to stand up from it
 MIN_UNLIKE_SHARE = 0.2  # of a region of which less than that does not look like the floor, all is said to look like it
-CONFIRMED_HEIGHT_M = 0.3  # what looks like the floor is said to be told where something so high would be
-DOUBT_MARGIN_M = 0.15  # floor so near beside what one earlier picture alone tells to stand is not seen to be free
+CONFIRMED_HEIGHT_M = 0.3  # what looks like the floor is confirmed where something so high would be seen
+DOUBT_MARGIN_M = 0.15  # floor so near to what stands by one earlier picture alone is not seen to be free
 MIN_DOUBTFUL_ROWS = 10  # of a column of the picture at half its size, from which that is so
 PART_SIGMA = 0.05  # of the part of the floor's distance at which the earlier picture shows a thing
 
@@ -169,9 +169,9 @@ def see_free_floor(
 
 
 def _keep_off(doubtful_m: Floats, robot: RobotModel) -> Floats:
-    """(columns,) how far the floor is free where something may stand at these distances (rows, columns), and beside it.
+    """(columns,) how far the floor is free next to what may stand at these distances (rows, columns).
 
-    Beside what is high: a speck, as tiles give some, hides nothing beside it.
+    Next to what is high: a speck, as tiles give some, hides nothing next to it.
     """
     nearest_m, high = doubtful_m.min(axis=0), np.count_nonzero(np.isfinite(doubtful_m), axis=0) >= MIN_DOUBTFUL_ROWS
     free_m = nearest_m.copy()
@@ -334,7 +334,7 @@ def _scan(
 
 
 class _Groups:
-    """Neighbouring columns of a picture by which one direction is told; bearings grow to the left."""
+    """Neighbouring columns of a picture that give one direction; bearings grow to the left."""
 
     def __init__(self, columns: int) -> None:
         each, more = divmod(columns, BEARINGS)

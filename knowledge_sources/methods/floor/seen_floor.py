@@ -25,7 +25,7 @@ from world_models.robot import RobotModel
 HIDDEN_M = 0.3
 """So far behind the near side of a thing the floor counts as taken by it."""
 SPACING_M = 0.05
-"""Of the points by which a region is told."""
+"""Of the points that outline a region."""
 MIN_POINTS = 3
 WINDOW_M = 0.15
 """Fewer unseen points than that within so much of the way hide nothing: 75 square centimetres."""

@@ -75,7 +75,7 @@ class Sight(NamedTuple):
         return self.floor.x_m, self.floor.y_m
 
     def is_from_elsewhere(self, known: Obstacle) -> bool:
-        """Whether the eye is not where it was when something was told last of an obstacle: this is further evidence."""
+        """Whether the eye is not where it was at the last evidence of an obstacle: this is further evidence."""
         return known.judged_from is None or math.dist(self.eye, known.judged_from) >= MIN_WAY_M
 
 
@@ -122,7 +122,7 @@ def weigh_sight(
             rest, whole = {id: o for id, o in rest.items() if may_be_there(o)}, math.inf
         id = find_before(rest, new.seen, sight.eye, settings.plan.overhang_m) if thing.is_cut else None
         jamb = find_jamb_beside(sight.world, f.locale, new.seen, sight.eye) if thing.is_cut and id is None else None
-        if jamb is not None:  # a door that is a little beside, before anything wider is believed
+        if jamb is not None:  # a door that is a little displaced, before anything wider is believed
             new = ThingShape(jamb.shape, jamb.shape, float(jamb.shape.distance(shapely.Point(sight.eye))))
             thing = replace(thing, evidence=f"{thing.evidence}, as a jamb of {jamb.door} that stands beside would")
         shape = new.whole

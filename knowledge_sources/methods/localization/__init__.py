@@ -13,7 +13,7 @@ Which of these poses is it, and what to look at next?
 
 * :mod:`next_view`: the turn, move or way whose view separates the hypotheses best (active localization).
 * :mod:`global_localization`: all of the above: found, look again, or ambiguous.
-* :mod:`place_odds`: where it was told to be, or was tracked to, as prior odds.
+* :mod:`place_odds`: the prior odds of where it was told to be, or was tracked to.
 
 Could a known pose be another one that looks the same?
 

@@ -213,7 +213,7 @@ def _build_distinct(
 
 
 def _keep_likelier(found: list[PlaceCandidate], new: PlaceCandidate) -> None:
-    """Add a candidate; of those that are one place the likeliest is kept, as refining may end beside the right pose."""
+    """Add a candidate; of those that are one place the likeliest is kept, as refining may end near the right pose."""
     near = [c for c in found if not are_distinct(new.world_from_robot, c.world_from_robot)]
     if all(new.likelihood.log_likelihood > c.likelihood.log_likelihood for c in near):
         found[:] = [*(c for c in found if c not in near), new]

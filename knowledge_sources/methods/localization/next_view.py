@@ -28,8 +28,8 @@ from world_models.robot import RobotModel
 SAME_LINE_PX = 8.0  # distance up to which lines of two predicted views are the same, as precise as poses are
 SAME_LINE_RAD = 0.12  # angle up to which lines of two predicted views are the same
 MIN_COMPARED_LENGTH_PX = 20.0  # shortest line by which predicted views are compared
-MIN_DIFFERENT_LINES = 3.0  # lines in which two predicted views must differ to be told apart
-MIN_DIFFERENT_FRACTION = 0.15  # part of their lines in which two predicted views must differ to be told apart
+MIN_DIFFERENT_LINES = 3.0  # lines in which two predicted views must differ to be distinct
+MIN_DIFFERENT_FRACTION = 0.15  # part of their lines in which two predicted views must differ to be distinct
 MAX_DIFFERENT_LINES = 20  # lines from which a larger difference separates hypotheses no better
 UNKNOWN_WEIGHT = 0.1  # weight of poses that no hypothesis covers
 TURNS_RAD = tuple(math.radians(a) for a in (180.0, 90.0, -90.0, 135.0, -135.0, 45.0, -45.0))

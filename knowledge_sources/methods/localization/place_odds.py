@@ -126,11 +126,11 @@ def compute_place_odds(
 
 
 def weigh_alias_odds(log_ratios: Sequence[float], p_prior: float) -> tuple[float, ...]:
-    """Compute the probabilities of the believed place, first, and of each twin; they sum to one.
+    """Compute the probabilities of the believed place, first, and of each alias; they sum to one.
 
     Args:
-        log_ratios: of the pictures, of each twin to the believed place.
-        p_prior: of the believed place; the twins share what is left.
+        log_ratios: of the pictures, of each alias to the believed place.
+        p_prior: of the believed place; the aliases share what is left.
     """
     if not log_ratios:
         return (1.0,)

@@ -36,7 +36,7 @@ class Search(NamedTuple):
     """What is looked for.
 
     Attributes:
-        looks: since the robot is lost, without what stands before its camera.
+        looks: views since the robot is lost, without the occlusions of its lens.
         rooms: that are searched, the nearest to the last belief first.
         here: room and pose (world) of the last belief.
         followed: rooms and poses of the candidates of the last search, as the robot has moved since.

@@ -306,7 +306,7 @@ class PoseLikelihood:
 
         Enough lines must be matched, in every view as in the others, and the segments be explained, or else the log
         likelihood be so large that the model may lack much of what is seen, as bricks and planks: the larger it is, the
-        more lines may be missing, and in a single view all of them, as what stands before the camera hides them.
+        more lines may be missing, and in a single view all of them, where an occlusion hides them.
         """
         fraction = self.matched / max(self.visible, 1)
         enough = SURE_LOG_LIKELIHOOD

@@ -1,4 +1,4 @@
-"""Views that were taken while the pose was unknown, and what stands before the camera in them.
+"""Views that were taken while the pose was unknown, and the occlusions of the lens in them.
 
 Views are related by the motions between them; level lines correct the turns. What stays in place in the picture while
 the robot turns is before its camera, not in the building (§4).

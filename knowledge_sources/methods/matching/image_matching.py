@@ -286,7 +286,7 @@ def _vote(
 ) -> Floats:
     """Each near pair votes, at each turn that makes it nearly parallel, for the offset that lays one on the other.
 
-    The offsets beside it get half as much.
+    The offsets next to it get half as much.
     """
     votes, widest = np.zeros((len(turns), len(normals), bins)), 1.5 * turn_step
     for t in range(len(turns)):

@@ -77,7 +77,7 @@ def compute_best_fits(forms: Floats, start: Floats) -> Fits:
 
     Source: §6.1.2, E_fit = sum_i (l_i / 2) sum over both ends (n_i . (R p_i + T) - s rho_i)^2, each bracket linear
     in (cos, sin, T_u, T_v, s), so that a state is the sum of its pairs' forms.
-    A linear term is left beside the square one, and the minimum is a root of a quartic, which Newton's method finds
+    A linear term is left besides the square one, and the minimum is a root of a quartic, which Newton's method finds
     from the turn of ``start`` (5,) or (k, 5).
     """
     turns = np.empty(len(forms))

@@ -3,7 +3,7 @@
 The law: *correcting the heading alone keeps the position error bounded along a segment.* Let y be the distance from the
 line, e the heading against it (both small), and let each increment of length d begin with a TURN towards the point of
 the line that lies L ahead, L >= d, and be an arc of the wheels' curvature c (§3.2). Before the increment the believed
-pose is wrong by at most b beside the line and by at most h in heading; the TURN itself errs by at most t, and the
+pose is wrong by at most b across the line and by at most h in heading; the TURN itself errs by at most t, and the
 estimated drift by at most k in curvature. After the turn the robot faces along ``-(y + b') / L + h' + t'``, with
 |b'| <= b, |h'| <= h, |t'| <= t, whatever its heading was before; the chord of the estimated arc is subtracted from the
 turn, so that the increment ends at::
@@ -85,7 +85,7 @@ def compute_curvature_to(point: tuple[float, float], here: Pose2) -> float:
 
 
 def steer_to(point: tuple[float, float], here: Pose2, drift_per_m: float) -> float:
-    """The curvature to steer to come to a point [1/m], where the wheels add theirs."""
+    """The curvature to steer to reach a point [1/m], where the wheels add theirs."""
     wanted = compute_curvature_to(point, here) - drift_per_m
     return min(max(wanted, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
 

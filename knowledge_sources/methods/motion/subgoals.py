@@ -59,7 +59,7 @@ MAX_ROUTES = 24
 
 
 MAX_FREE_PASSAGES = 32
-"""Size of the cache of what is free in and beside doorways."""
+"""Size of the cache of what is free in and next to doorways."""
 
 
 class _Ends(NamedTuple):
@@ -170,7 +170,7 @@ class SubgoalPlanner:
         return tuple(subgoals)
 
     def _measure_rooms_m(self, route: Route, here: Place, destination: Place) -> list[tuple[float, float]]:
-        """How far from each passage of a route the robot may come to it, and leave it, without turning back: as far as
+        """How far from each passage of a route the robot may turn to it, and leave it, without turning back: as far as
         the way begins or ends from it, or half as far as the next passage is.
         """
         ends = [here.in_world(self._building).position, destination.in_world(self._building).position]

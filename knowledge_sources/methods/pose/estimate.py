@@ -39,7 +39,7 @@ WEAK_TRANSLATION_M = 3.0  # m; standard deviation of a camera's translation wher
 MAX_PRIOR_WEIGHT_LOG10 = 10.0  # largest weight of a weak prior that is tried, as a power of ten
 PRIOR_WEIGHT_STEP_LOG10 = 0.1  # how closely the weight of a weak prior is found, as a power of ten
 MIN_SCATTER_FREEDOM = 6  # degrees of freedom from which a larger scatter of the inliers widens the covariance
-# largest ratio of the noise's variance to the stated one that is told from the inliers' scatter (engineering
+# largest ratio of the noise's variance to the stated one that is estimated from the inliers' scatter (engineering
 # judgement: four times the noise; then the cut on inliers hides the rest)
 MAX_SCATTER = 16.0
 MAX_ITERATIONS = 30  # levenberg-Marquardt steps for the six unknowns of a camera

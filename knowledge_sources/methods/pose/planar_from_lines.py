@@ -174,7 +174,7 @@ class _Floor:
         return measure_lines(self.lines, rotation, translation, MAX_BESIDE_PX)
 
     def find_near(self, state: Floats, bound: float) -> Mask:
-        """(n,) the lines within the bound, in front of the camera and beside their model line."""
+        """(n,) the lines within the bound, in front of the camera and within the ends of their model line."""
         distances, front, overlap = self.measure_lines(state)
         squares = np.sum((distances / self.lines.sigma_px[:, None]) ** 2, axis=1)
         return np.asarray(front & overlap & (squares <= bound))

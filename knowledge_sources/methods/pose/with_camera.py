@@ -1,7 +1,7 @@
 """Robot pose on the floor and the camera's own state from matched lines: maximum a posteriori, the pose marginalised.
 
 Source: §6.2 with the residual in the image; the camera's tilt, roll, height, focal length and principal point are
-unknowns beside (x, y, heading), each with a prior. The camera's yaw on the robot is not: one picture cannot tell it
+unknowns besides (x, y, heading), each with a prior. The camera's yaw on the robot is not: one picture cannot tell it
 from the robot's heading.
 """
 

@@ -129,7 +129,7 @@ def correct_pose(
 def select_landmarks(
     robot: RobotModel, kept: tuple[Track, ...], frame: str, image: Image, pose: Pose2
 ) -> tuple[Track, ...]:
-    """Choose new tracks beside those that are kept: visible model points that are strong corners, unique, well apart.
+    """Choose new tracks besides those that are kept: visible model points that are strong corners, unique, well apart.
 
     Args:
         frame: the entry of the picture ``image`` (h, w), in which their templates will be cut.

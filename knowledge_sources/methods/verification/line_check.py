@@ -161,10 +161,10 @@ def compute_p_share(matched: int, visible: int, matched_before: int, visible_bef
 def find_distinct(
     lines_px: Floats, segments_px: Floats
 ) -> Mask:
-    """Which (m,) of the lines (m, 2, 2) tell of a place: beside the others segments (k, 2, 2) lie wherever one looks.
+    """Which (m,) of the lines (m, 2, 2) tell of a place: near the others segments (k, 2, 2) lie wherever one looks.
 
     Bricks, planks and tiles that the model does not have cover a line by accident, wherever it is. The chance of that
-    is measured in the picture itself: by how many of the places beside the line are covered as well, beyond those that
+    is measured in the picture itself: by how many of the places off the line are covered as well, beyond those that
     the other lines cover by the model.
     """
     expected = lines_px[~np.isnan(lines_px).any(axis=(1, 2))]
@@ -174,7 +174,7 @@ def find_distinct(
 
 
 def take_distinct(segments_px: Floats) -> Floats:
-    """The segments (k, 2, 2) of a picture without those of bricks, planks and tiles: beside these lie others."""
+    """The segments (k, 2, 2) of a picture without those of bricks, planks and tiles: near these lie others."""
     segments = np.array(segments_px, float, order="C").reshape(-1, 2, 2)
     return segments[_find_distinct_segments(segments.tobytes(), LINE_TOLERANCE_PX)]
 
@@ -186,7 +186,7 @@ def _find_distinct_segments(segments: bytes, tolerance_px: float) -> Mask:
 
 
 def _measure_pattern(lines_px: Floats, segments_px: Floats, tolerance_px: float) -> Floats:
-    """(m,) part of the places beside lines (m, 2, 2) at which segments (k, 2, 2) lie."""
+    """(m,) part of the places off lines (m, 2, 2) at which segments (k, 2, 2) lie."""
     if not len(lines_px):
         return np.zeros(0)
     along = lines_px[:, 1] - lines_px[:, 0]

@@ -70,7 +70,7 @@ class Before(NamedTuple):
     Attributes:
         pose: world; covariance: of it, (3, 3).
         in_doubt: whether that is in doubt; has_followed: whether landmarks were followed up to here.
-        stands: whether the robot stands where it was told or found to be, but for turns on the spot.
+        stands: whether the robot stands at its prior or found place, but for turns on the spot.
         is_camera_known: whether the camera's mounting is known well enough for a picture to be predicted.
     """
 
@@ -96,7 +96,7 @@ class Weighed:
     """What a picture says of a milestone, before anything is decided.
 
     Attributes:
-        robot: the model on the floor of the belief, behind what stands before its camera.
+        robot: the model on the floor of the belief, behind the occlusions of its lens.
         segments: of the picture.
         pose: as solved for; before, covariance: as believed before the look, (3, 3).
         expected: number of lines that should be seen, and tell of the place.
@@ -156,7 +156,7 @@ class Verdict(NamedTuple):
 
 
 def tell_odds(p_wrong: float, most_p_wrong: float) -> str:
-    """A probability of a wrong place beside its bound, in words."""
+    """A probability of a wrong place and its bound, in words."""
     return f"wrong with a probability of {say_percent(p_wrong)}; the limit is {say_percent(most_p_wrong)}"
 
 
@@ -223,7 +223,7 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
 
 
 def _find_prior(before: Before, *, followed: bool) -> float:
-    """The probability that the belief is wrong, before the look. Who only turned is where it was told to be."""
+    """The probability that the belief is wrong, before the look. A robot that only turned is at its prior place."""
     if before.in_doubt:
         return P_WRONG_IN_DOUBT
     if before.stands:
@@ -232,7 +232,7 @@ def _find_prior(before: Before, *, followed: bool) -> float:
 
 
 def _sum_log_odds(milestone: Milestone) -> float:
-    """The log odds of a wrong place by the looks in other directions: what they show beside this one."""
+    """The log odds of a wrong place by the views in other directions: what they add to this one."""
     looks = [Look(Pose2(0.0, 0.0, along), odds)
              for along, odds in zip(milestone.tried, milestone.log_odds_so_far, strict=True)]
     return add_looks(looks, OTHER_DIRECTIONS, (Pose2(0.0, 0.0, milestone.look_heading_rad),))

@@ -38,7 +38,7 @@ from world_models.words import without_locale
 
 Floats = NDArray[np.float64]
 NUMBER = "number"
-"""The component beside an image that holds the frame's number."""
+"""The component next to an image that holds the frame's number."""
 DELIVERED = Mixed(blob=rr.EncodedImage)
 """A picture and what is known about it."""
 DRIFT_SCALE = 5.0

@@ -178,7 +178,7 @@ class Solid:
         return list(pairwise(marks))
 
     def _cover_at(self, index: int, axis: int, middle: float, side: Side, other: Side) -> float | None:
-        """Brightness of what covers a side right beside its edge with ``other``; None where the side is open."""
+        """Brightness of what covers a side next to its edge with ``other``; None where the side is open."""
         edge = self.boxes[index].ranges[other[0]][other[1]]
         inwards = edge - 2 * CONTACT_M if other[1] else edge + 2 * CONTACT_M
         for near in self._touching[index][side]:

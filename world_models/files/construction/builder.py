@@ -189,7 +189,7 @@ class _CannotBuildError(Exception):
 
 
 def _fit(wall: Wall, opening: Opening) -> Opening:
-    """An opening in a wall; less than MIN_STRETCH_M of wall beside or above it is none.
+    """An opening in a wall; less than MIN_STRETCH_M of wall next to or above it is none.
 
     Raises _CannotBuildError where it is outside the wall, or over another opening.
     """

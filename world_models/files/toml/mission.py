@@ -103,7 +103,7 @@ class Telling(Bounded):
 
     @property
     def entry(self) -> UserReport | Redirection:
-        """What comes to the board."""
+        """What is put on the board."""
         if self.goal:
             return Redirection(self.goal)
         state: ReportedState = next(state for state in get_args(ReportedState) if state == self.state)
@@ -170,7 +170,7 @@ class Safety:
     """What a person has to do with a robot that has stopped.
 
     Attributes:
-        restart: after a contact or an emergency stop: automatic, or asked: not before it is told to go on (ISO 3691-4).
+        restart: after a contact or an emergency stop: automatic, or asked: only when somebody says so (ISO 3691-4).
     """
 
     restart: str = "automatic"

@@ -104,7 +104,7 @@ def suggest_keys(key: str, known: Iterable[str]) -> str:
 
 
 SWITCHES: Mapping[str, bool] = {"on": True, "yes": True, "off": False, "no": False}
-"""How ``--set`` may say true and false beside TOML's own words."""
+"""How ``--set`` may say true and false besides TOML's own words."""
 
 
 def parse_value(text: str) -> Any:
