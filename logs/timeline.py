@@ -29,11 +29,10 @@ from world_models.entries import Hypothesis, Outcome, Tracks
 from world_models.files.regular_files import read_regular
 
 K = TypeVar("K")
-PLAIN = re.compile(rb'\{"cycle":(\d{1,15}),"')
-"""How a line begins as the scheduler writes it; a line that begins otherwise is read in full."""
-CHANGE = re.compile(rb'\{"change":"(\w+)","entry":"([^"\\]+)"')
-"""How a change begins there. Inside a text every quotation mark has a backslash before it, so no text looks like it."""
-CLOSES = ord("}")
+CYCLE = re.compile(rb'\{"cycle": ?(\d{1,15}),')
+"""How a line begins; a line that begins otherwise is read in full."""
+CHANGE = re.compile(rb'\{"change": ?"(\w+)", ?"entry": ?"([^"\\]+)"')
+"""How a change begins. Inside a text every quotation mark has a backslash before it, so no text looks like it."""
 FAR, REVISIONS, TIMED_WITHIN = 3000, 2000, 100
 """So many entries are looked at for the nearest of a kind, so many revisions of a belief for where it began, so many
 decisions for a time."""
@@ -54,7 +53,6 @@ class Timeline:
         self._path = path
         self._ends = [match.start() for match in re.finditer(rb"\n", self._data)]
         self._read: dict[int, DecisionRecord] = {}
-        self._line_of: dict[int, int] = {}
         self._entries, self._retracted = dict[bytes, int](), dict[bytes, int]()
         self._sweep()
 
@@ -75,12 +73,12 @@ class Timeline:
 
     @cached_property
     def cycles(self) -> Sequence[int]:
-        """Of the decisions, in their order."""
-        return tuple(self._line_of)
+        """Of the decisions, in their order: each cycle has its line."""
+        return tuple(range(1, len(self._ends) + 1))
 
     def entry(self, ref: str) -> EntryRecord[Any] | None:
         """What the journal says of a revision; None where it says nothing."""
-        return self._find(ref, self._entries.get(ref.encode(errors="replace")), retracted=False)
+        return self._find(ref, self._entries, retracted=False)
 
     def cycle_of_ref(self, ref: str) -> int:
         """In which cycle a revision came about; 0 where the journal says nothing of it."""
@@ -89,12 +87,11 @@ class Timeline:
 
     def retraction(self, ref: str) -> EntryRecord[Any] | None:
         """How a revision was retracted; None where it was not."""
-        return self._find(ref, self._retracted.get(ref.encode(errors="replace")), retracted=True)
+        return self._find(ref, self._retracted, retracted=True)
 
     def cycle_of(self, cycle: int) -> DecisionRecord | None:
         """The decision of a cycle; None where the run has no such cycle."""
-        line = self._line_of.get(cycle)
-        return None if line is None else self._decision(line)
+        return self._decision(cycle - 1) if 0 < cycle <= len(self._ends) else None
 
     def naming(self, ref: str) -> Iterator[DecisionRecord]:
         """The decisions that name a revision anywhere, in their order; some that do not may be among them."""
@@ -295,35 +292,22 @@ class Timeline:
                 for n in sorted(numbers[kinds[name]], key=lambda n: (abs(n - wanted), n))[:2]]
 
     def _sweep(self) -> None:
-        """Note where each cycle and each entry stands. What stands in an unusual line is read from it.
-
-        Raises BadInput where a line is not the cycle that follows on the line before.
-        """
-        start, unusual = 0, False
+        """Note where each entry stands. Raises BadInput where a line is not the cycle that has to stand there."""
+        start = 0
         for line, end in enumerate(self._ends):
-            plain = PLAIN.match(self._data, start)
-            unusual |= plain is None or self._data[end - 1] != CLOSES
-            cycle = int(plain[1]) if plain else self._decision(line).cycle
-            check_step(self._path, line + 1, cycle)
-            self._line_of[cycle] = line
+            begins = CYCLE.match(self._data, start)
+            check_step(self._path, line + 1, int(begins[1]) if begins else self._decision(line).cycle)
             start = end + 1
-        for line in range(len(self._ends)) if unusual else ():
-            for record in self._decision(line).changes:
-                where = self._retracted if record.is_gone else self._entries
-                where[record.ref.encode(errors="replace")] = self._ends[line] - 1
-        for change in () if unusual else CHANGE.finditer(self._data, 0, self._ends[-1] if self._ends else 0):
+        for change in CHANGE.finditer(self._data, 0, start):
             kind, ref = change.groups()
             (self._retracted if kind == b"Retracted" else self._entries)[ref] = change.start()
 
-    def _find(self, ref: str, offset: int | None, *, retracted: bool) -> EntryRecord[Any] | None:
-        """The newest change of that name; where the index is wrong, every line is searched."""
-        if offset is None:
-            return None
-        for line in range(self._line_at(offset), -1, -1):
-            found = [one for one in self._decision(line).changes if one.ref == ref and one.is_gone is retracted]
-            if found:
-                return found[-1]
-        return None
+    def _find(self, ref: str, index: Mapping[bytes, int], *, retracted: bool) -> EntryRecord[Any] | None:
+        """The newest change of that name."""
+        at = index.get(ref.encode(errors="replace"))
+        changes = () if at is None else self._decision(self._line_at(at)).changes
+        found = [one for one in changes if one.ref == ref and one.is_gone is retracted]
+        return found[-1] if found else None
 
     def _line_at(self, offset: int) -> int:
         return bisect_right(self._ends, offset - 1)
