@@ -21,7 +21,7 @@ from typing import Any, TypeVar, cast
 
 from blackboard import Blackboard, Change, Entry, Retracted, View
 from logs.disk import MOST_JOURNAL_BYTES
-from logs.records import Candidate, DecisionRecord, EntryRecord, check_step, decision_at, is_a
+from logs.records import Candidate, DecisionRecord, EntryRecord, decision_at, is_a
 from logs.run_directory import check_version
 from logs.run_errors import BadInput
 from world_models.building.locale_frame import FrameReference, LocaleFrame
@@ -105,8 +105,8 @@ class Timeline:
 
     def verify(self) -> None:
         """Read every line. Raises BadInput for the first that is no decision."""
-        for line in range(len(self._ends)):
-            self._decision(line)
+        for _ in self.decisions():
+            pass
 
     def expect_decisions(self) -> None:
         """Raises BadInput where the journal has no decision."""
@@ -155,8 +155,12 @@ class Timeline:
         raise BadInput(f"--at: expected a cycle of the run, which has {have}, got {cycle}")
 
     def decisions(self) -> Iterator[DecisionRecord]:
-        """All of them, in their order."""
-        return (self.decision(cycle) for cycle in self.cycles)
+        """All of them, in their order; none is kept. Raises BadInput where a line is no decision."""
+        return (self._read.get(line) or self._parse(line) for line in range(len(self._ends)))
+
+    def line(self, cycle: int) -> bytes:
+        """A decision as it stands in the journal, without its newline."""
+        return self._data[self._ends[cycle - 2] + 1 if cycle > 1 else 0 : self._ends[cycle - 1]]
 
     def candidates(self, cycle: int) -> tuple[Candidate, ...]:
         """Among whom a cycle chose: what was pending or new, and not dropped; the chosen first, then the best rated.
@@ -296,7 +300,10 @@ class Timeline:
         start = 0
         for line, end in enumerate(self._ends):
             begins = CYCLE.match(self._data, start)
-            check_step(self._path, line + 1, int(begins[1]) if begins else self._decision(line).cycle)
+            cycle = int(begins[1]) if begins else self._parse(line).cycle
+            if cycle != line + 1:
+                why = "a line is missing before it" if cycle > line else "a line is there twice, or was moved"
+                raise BadInput(f"{self._path}:{line + 1}: expected cycle {line + 1}, got {cycle} ({why})")
             start = end + 1
         for change in CHANGE.finditer(self._data, 0, start):
             kind, ref = change.groups()
@@ -313,11 +320,13 @@ class Timeline:
         return bisect_right(self._ends, offset - 1)
 
     def _decision(self, line: int) -> DecisionRecord:
-        """Raises BadInput where the line is no decision; names file and line."""
         if line not in self._read:
-            start = self._ends[line - 1] + 1 if line else 0
-            self._read[line] = decision_at(self._data[start : self._ends[line]], f"{self._path}:{line + 1}")
+            self._read[line] = self._parse(line)
         return self._read[line]
+
+    def _parse(self, line: int) -> DecisionRecord:
+        """Raises BadInput where the line is no decision; names file and line."""
+        return decision_at(self.line(line + 1), f"{self._path}:{line + 1}")
 
 
 def ranked(candidates: Iterable[Candidate], chosen: Candidate | None) -> tuple[Candidate, ...]:

@@ -158,13 +158,11 @@ def _add_story_arguments(parser: ArgumentParser) -> None:
 
 def _run_story(args: Namespace) -> int:
     from logs.explain.story import story_lines, tell_run
-    from logs.records import read_records
     from logs.timeline import Timeline
 
     run = open_run(args.run)
-    for _ in read_records(run.journal):
-        pass  # a line that is no decision is said first, also where the story has no need of it
     history = Timeline(run.journal)
+    history.verify()  # a line that is no decision is said first, also where the story has no need of it
     story = tell_run(run, history)
     print(json.dumps(story.record(), indent=2) if args.json else "\n".join(story_lines(story)))
     if history.cut_off is not None and not is_being_written(run.journal):

@@ -28,10 +28,11 @@ from harvey.runner.result import MissionResult
 from harvey.runner.resume import Remains, continue_run
 from harvey.runner.run import Run
 from harvey.runner.teller import LiveTeller, Tell, tell_each, tell_nothing
-from logs.records import EntryRecord, read_records
+from logs.records import EntryRecord
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import Extent, RunRecorder
+from logs.timeline import Timeline
 from world_models.building.world import World
 from world_models.entries import GO_ON, BodyFault, CameraPicture
 from world_models.robot import RobotModel
@@ -161,7 +162,7 @@ class UnknownMotion:
 
 
 def _observations(files: RunDirectory) -> Iterator[EntryRecord[Any]]:
-    for record in read_records(files.journal) if files.journal.is_file() else ():
+    for record in Timeline(files.journal).decisions() if files.journal.is_file() else ():
         yield from record.observed
 
 

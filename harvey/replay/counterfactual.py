@@ -25,10 +25,11 @@ from harvey.runner.teller import PAGE, USER
 from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.simulation.simulated_run import SimulatedRun, rebuild_stage
 from logs.explain.phrases import sentence
-from logs.records import WHAT_IF, DecisionRecord, EntryRecord, Originals, as_line, decision_of, effect_of, read_records
+from logs.records import WHAT_IF, DecisionRecord, EntryRecord, Originals, as_line, decision_of, effect_of
 from logs.run_directory import RunDirectory, make_room
 from logs.run_head import SIMULATOR, RunHead
 from logs.run_recorder import RunRecorder
+from logs.timeline import Timeline
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import CameraPicture, MotionReport, Outcome, Redirection, RideReport, UserReport
 from world_models.words import count, listed
@@ -146,7 +147,7 @@ class _Player:
 
     def __init__(self, run: RunDirectory, agent: Agent) -> None:
         self.originals = open_originals(run, agent.store)
-        self.records = list(read_records(run.journal))
+        self.records = list(Timeline(run.journal).decisions())
         self._requests = tuple(BodyPort.acts_on)
         self._steps = _steps(self.records, self._requests)
         self._agreed = 0

@@ -19,9 +19,9 @@ from harvey.runner.replay import Live, check_same, open_originals, replay
 from harvey.runner.run import Run
 from logs.mjpeg_file import Pictures
 from logs.pictures import camera_bytes, open_pictures
-from logs.records import read_records
 from logs.run_directory import RunDirectory
 from logs.run_recorder import Extent
+from logs.timeline import Timeline
 from world_models.entries import Course, MotorCommand, Outcome, Resumed
 
 RESUME = "resume"
@@ -137,7 +137,7 @@ def is_command(change: Change) -> bool:
 def _count_decisions(run: RunDirectory) -> tuple[int, Outcome | None]:
     """How many decisions there are, and the outcome, if it was seen."""
     decisions, seen, outcome = 0, False, None
-    for record in read_records(run.journal):
+    for record in Timeline(run.journal).decisions():
         decisions += 1
         ends = [entry.fields for entry in record.changes if entry.kind is Outcome]
         outcome = Outcome(str(ends[0].get("kind")), str(ends[0].get("reason"))) if ends else outcome
