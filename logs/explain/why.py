@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from blackboard import Discrepancy, Quiescence
+from blackboard import Discrepancy
 from logs.explain import model, phrases
 from logs.explain.model import WorldFile, tell_source
 from logs.explain.phrases import (
@@ -31,45 +31,21 @@ from logs.run_errors import UNREADABLE, BadInput
 from logs.timeline import Timeline
 from world_models.building.locale_frame import FrameRequest, LocaleFrame
 from world_models.entries import (
-    BodyFault,
     CameraPicture,
-    CameraState,
     Certificate,
     Command,
-    Contact,
-    Course,
-    DoorState,
-    Drift,
-    FloorAppearance,
-    FloorView,
-    Footprint,
-    FreeFloor,
     Goal,
     Hypothesis,
-    Leg,
     LineMatch,
     Milestone,
     MotionReport,
     MotorCommand,
-    Obstacle,
-    Obstruction,
-    Outcome,
     Panorama,
     PictureRequest,
     PlaceSearch,
     PlanSketch,
     PoseFix,
-    Ranges,
-    Recovery,
-    Redirection,
-    Resumed,
-    Ride,
-    RideReport,
     Segments,
-    Tracks,
-    Travel,
-    UserReport,
-    Wheels,
 )
 
 MOST, MOST_PLAIN, MOST_MET = 24, 12, 200
@@ -111,7 +87,7 @@ def story(history: Timeline, record: EntryRecord[Any], world: WorldFile | None =
 
 def label_of(record: EntryRecord[Any]) -> str:
     """What an entry is about, in a word or two."""
-    return LABELS.get(record.kind, OTHERS)[0] or record.type
+    return LABELS.get(record.type, OTHERS)[0] or record.type
 
 
 class _Teller:
@@ -129,7 +105,7 @@ class _Teller:
             yield from self._certificate(record)
         elif record.kind is PoseFix:
             yield from self._match(record)
-        if (kinds := LABELS.get(record.kind, OTHERS)[1]) is not None:
+        if (kinds := LABELS.get(record.type, OTHERS)[1]) is not None:
             below = [one for kind in kinds for one in self._below(record, kind)]
         else:
             order = [ref.rpartition("-")[0] for ref in record.because]
@@ -148,13 +124,13 @@ class _Teller:
         for kind in CONTEXT:
             found = self.history.nearest(record, kind)
             if found is not None and found.id != record.id:
-                key = found.id if kind in SEVERAL else found.type
-                yield from self._one(key, LABELS[kind][0], phrase(self.history, found), found)
+                key = found.id if found.type in SEVERAL else found.type
+                yield from self._one(key, label_of(found), phrase(self.history, found), found)
 
-    def _below(self, record: EntryRecord[Any], kind: type[Any] | None = None) -> Iterator[EntryRecord[Any]]:
+    def _below(self, record: EntryRecord[Any], kind: str = "") -> Iterator[EntryRecord[Any]]:
         """What an entry rests on beside itself, of a kind or of any."""
         for ref in record.because:
-            if kind is None or ref.startswith(f"{kind.__name__}-"):
+            if ref.startswith(f"{kind}-" if kind else ""):
                 found = self.history.entry(ref)
                 if found is not None and found.id != record.id:
                     yield found
@@ -162,7 +138,7 @@ class _Teller:
     def _tell(self, record: EntryRecord[Any], above: EntryRecord[Any]) -> Iterator[Sentence]:
         """An entry that something rests on, then what it rests on itself."""
         perhaps = is_a(record, Hypothesis) and record.value.status == "candidate"
-        key = record.id if record.kind in SEVERAL or perhaps else record.type
+        key = record.id if record.type in SEVERAL or perhaps else record.type
         if key in self.shown or record.ref in self.met or len(self.shown) > MOST or len(self.met) > MOST_MET:
             return
         self.met.add(record.ref)
@@ -173,10 +149,10 @@ class _Teller:
             frame = self.history.reason(record, CameraPicture)
             text = f"It saw {phrases.describe_segments(record.value)}; where it is did not yet follow from them."
         else:
-            text = "" if record.kind in FOLDED else phrase(self.history, record)
+            text = "" if record.type in FOLDED else phrase(self.history, record)
         yield from self._one(key, label, text, record, frame)
         if perhaps:
-            for below in self._below(record, PlaceSearch):
+            for below in self._below(record, "PlaceSearch"):
                 yield from self._tell(below, record)
         else:
             yield from self.reasons(record)
@@ -240,59 +216,59 @@ class _Teller:
                 yield one
 
 
-OTHERS: tuple[str, None] = ("", None)
-LABELS: Mapping[type[Any], tuple[str, tuple[type[Any], ...] | None]] = {
-    BodyFault: ("fault", None),
-    CameraPicture: ("picture", (PictureRequest, Course)),
-    CameraState: ("camera", None),
-    Certificate: ("", (Milestone,)),
-    Command: ("command", None),
-    Contact: ("touched", (MotorCommand, Course)),
-    Course: ("motion", (Leg, Discrepancy, Hypothesis)),
-    Discrepancy: ("doubted", (Discrepancy, BodyFault, Contact, Certificate, Hypothesis, MotionReport)),
-    DoorState: ("door", None),
-    Drift: ("wheels", None),
-    FloorAppearance: ("floor", None),
-    FloorView: ("floor", None),
-    Footprint: ("body", None),
-    FrameRequest: ("asked", None),
-    FreeFloor: ("floor", None),
-    Goal: ("goal", (Redirection, PlanSketch, Hypothesis)),
-    Hypothesis: ("believed", (BodyFault,)),
-    Leg: ("driving", (Hypothesis,)),
-    LineMatch: ("", (Segments, Milestone)),
-    LocaleFrame: ("known", (UserReport, FrameRequest)),
-    Milestone: ("looked for", (Obstruction, Certificate, Discrepancy, Hypothesis)),
-    MotionReport: ("wheels", (MotorCommand, Course)),
-    MotorCommand: ("motion", (Leg, Milestone, PlaceSearch, Discrepancy, Hypothesis)),
-    Obstacle: ("in the way", None),
-    Obstruction: ("hidden", None),
-    Outcome: ("the end", None),
-    Panorama: ("", (Obstruction, Panorama)),
-    PictureRequest: ("look", (Milestone, Discrepancy, Segments, Hypothesis)),
-    PlaceSearch: ("thought", (Panorama, Hypothesis)),
-    PlanSketch: ("plan", (Milestone, Leg, PlanSketch, Hypothesis)),
-    PoseFix: ("", (LineMatch,)),
-    Quiescence: ("stillness", None),
-    Ranges: ("ranges", None),
-    Recovery: ("recovery", None),
-    Redirection: ("told", None),
-    Resumed: ("resumed", None),
-    Ride: ("ride", (PlanSketch, Hypothesis)),
-    RideReport: ("ride", (Ride,)),
-    Segments: ("seen", (CameraPicture, Milestone)),
-    Tracks: ("seen", (CameraPicture, Hypothesis)),
-    Travel: ("wheels", None),
-    UserReport: ("told", None),
-    Wheels: ("wheels", None),
+OTHERS = ("", None)
+LABELS: Mapping[str, tuple[str, tuple[str, ...] | None]] = {
+    "BodyFault": ("fault", None),
+    "CameraPicture": ("picture", ("PictureRequest", "Course")),
+    "CameraState": ("camera", None),
+    "Certificate": ("", ("Milestone",)),
+    "Command": ("command", None),
+    "Contact": ("touched", ("MotorCommand", "Course")),
+    "Course": ("motion", ("Leg", "Discrepancy", "Hypothesis")),
+    "Discrepancy": ("doubted", ("Discrepancy", "BodyFault", "Contact", "Certificate", "Hypothesis", "MotionReport")),
+    "DoorState": ("door", None),
+    "Drift": ("wheels", None),
+    "FloorAppearance": ("floor", None),
+    "FloorView": ("floor", None),
+    "Footprint": ("body", None),
+    "FrameRequest": ("asked", None),
+    "FreeFloor": ("floor", None),
+    "Goal": ("goal", ("Redirection", "PlanSketch", "Hypothesis")),
+    "Hypothesis": ("believed", ("BodyFault",)),
+    "Leg": ("driving", ("Hypothesis",)),
+    "LineMatch": ("", ("Segments", "Milestone")),
+    "LocaleFrame": ("known", ("UserReport", "FrameRequest")),
+    "Milestone": ("looked for", ("Obstruction", "Certificate", "Discrepancy", "Hypothesis")),
+    "MotionReport": ("wheels", ("MotorCommand", "Course")),
+    "MotorCommand": ("motion", ("Leg", "Milestone", "PlaceSearch", "Discrepancy", "Hypothesis")),
+    "Obstacle": ("in the way", None),
+    "Obstruction": ("hidden", None),
+    "Outcome": ("the end", None),
+    "Panorama": ("", ("Obstruction", "Panorama")),
+    "PictureRequest": ("look", ("Milestone", "Discrepancy", "Segments", "Hypothesis")),
+    "PlaceSearch": ("thought", ("Panorama", "Hypothesis")),
+    "PlanSketch": ("plan", ("Milestone", "Leg", "PlanSketch", "Hypothesis")),
+    "PoseFix": ("", ("LineMatch",)),
+    "Quiescence": ("stillness", None),
+    "Ranges": ("ranges", None),
+    "Recovery": ("recovery", None),
+    "Redirection": ("told", None),
+    "Resumed": ("resumed", None),
+    "Ride": ("ride", ("PlanSketch", "Hypothesis")),
+    "RideReport": ("ride", ("Ride",)),
+    "Segments": ("seen", ("CameraPicture", "Milestone")),
+    "Tracks": ("seen", ("CameraPicture", "Hypothesis")),
+    "Travel": ("wheels", None),
+    "UserReport": ("told", None),
+    "Wheels": ("wheels", None),
 }
-"""What an entry of a kind is about, in a word or two, and which reasons of it a story follows, in which order; where
-None stands, and of a kind that is not named here, all."""
+"""By the name of a kind: what its entries are about, in a word or two, and which kinds of reasons a story follows, in
+which order; where None stands, and of a kind that is not named here, all."""
 CONTEXT: tuple[type[Any], ...] = (PlanSketch, Goal, Command)
 """What all of it serves."""
-FOLDED = frozenset({PoseFix, LineMatch, Segments, Certificate})
+FOLDED = frozenset({"PoseFix", "LineMatch", "Segments", "Certificate"})
 """Told by the sentences of what rests on them."""
-SEVERAL = frozenset({Discrepancy, Goal, PlanSketch, BodyFault})
+SEVERAL = frozenset({"Discrepancy", "Goal", "PlanSketch", "BodyFault"})
 """Of these a story may tell more than one."""
 
 

@@ -12,8 +12,8 @@ from logs.explain.model import tell_changes, tell_used
 from logs.explain.phrases import Sentence, sentence
 from logs.explain.subjects import milestone_story
 from logs.explain.web import MODEL, cycle_lines, kind_of
-from logs.explain.why import story
-from logs.records import Candidate, DecisionRecord, EntryRecord
+from logs.explain.why import LABELS, story
+from logs.records import OWN, Candidate, DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
 from world_models.building.locale_frame import FrameChange, FrameReference, FrameRequest
 from world_models.entries import Footprint, Milestone, UserReport
@@ -117,3 +117,7 @@ def test_what_is_known_and_told_is_a_ground() -> None:
     for ref in ("LocaleFrame-1.0", "CameraState-1.0", "Wheels-1.0", "Footprint-1.0", "UserReport-1.0"):
         assert kind_of(entry(ref, 0)) == MODEL
     assert kind_of(entry("FrameRequest-1.0", 0)) is None
+
+
+def test_the_kinds_that_a_story_follows_are_known() -> None:
+    assert {*LABELS, *(kind for _, follows in LABELS.values() for kind in follows or ())} <= set(OWN)
