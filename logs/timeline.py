@@ -14,7 +14,7 @@ import math
 import re
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -114,15 +114,6 @@ class Timeline:
             self.verify()
             raise BadInput(f"{self.source}: expected at least one decision, got none")
 
-    def count_common_lines(self, other: Timeline) -> int:
-        """How many of the first lines are the same to the byte."""
-        start = 0
-        for line, (end, there) in enumerate(zip(self._ends, other._ends, strict=False)):
-            if end != there or self._data[start:end] != other._data[start:end]:
-                return line
-            start = end + 1
-        return min(len(self._ends), len(other._ends))
-
     def of_kind(self, *kinds: type[K], until: int | None = None) -> Iterator[EntryRecord[K]]:
         """All revisions of some kinds, up to a cycle, in the order in which they came about."""
         heads = tuple(f"{kind.__name__}-" for kind in kinds)
@@ -163,7 +154,8 @@ class Timeline:
         return self._data[self._ends[cycle - 2] + 1 if cycle > 1 else 0 : self._ends[cycle - 1]]
 
     def candidates(self, cycle: int) -> tuple[Candidate, ...]:
-        """Among whom a cycle chose: what was pending or new, and not dropped; the chosen first, then the best rated.
+        """Among whom a cycle chose: what was pending or new, and not dropped; the chosen first, then the best
+        rated, then the oldest.
 
         Raises BadInput where the run has no such cycle.
         """
@@ -179,7 +171,8 @@ class Timeline:
             found.update((c.number, c) for c in past.activated if c.number not in gone)
             if len(found) >= wanted:
                 break
-        return ranked(found.values(), decision.chosen)
+        first = decision.chosen.number if decision.chosen else None
+        return tuple(sorted(found.values(), key=lambda c: (c.number != first, -c.rating, c.number)))
 
     def time_at(self, cycle: int) -> float | None:
         """The newest time that anything from outside had told by a cycle [s]; None where nothing had lately."""
@@ -327,12 +320,6 @@ class Timeline:
     def _parse(self, line: int) -> DecisionRecord:
         """Raises BadInput where the line is no decision; names file and line."""
         return decision_at(self.line(line + 1), f"{self._path}:{line + 1}")
-
-
-def ranked(candidates: Iterable[Candidate], chosen: Candidate | None) -> tuple[Candidate, ...]:
-    """The chosen one first, then the best rated, then the oldest."""
-    first = chosen.number if chosen else None
-    return tuple(sorted(candidates, key=lambda c: (c.number != first, -c.rating, c.number)))
 
 
 def read_time_s(get: Callable[[str], Any]) -> float | None:

@@ -6,7 +6,6 @@ import json
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
-from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from harvey.commands.command import CliCommand, whole
@@ -208,9 +207,7 @@ def _run_diff(args: Namespace) -> int:
     set_differently = tuple(settings(*heads))
     if set_differently:
         print(f"set differently: {'; '.join(set_differently)}")
-    alike = ours.count_common_lines(theirs)
-    more, one, other = first_difference(*(islice(h.decisions(), alike, None) for h in (ours, theirs)))
-    agreed = alike + more
+    agreed, one, other = first_difference(ours, theirs)
     if one is None or other is None:
         print("\n".join(describe(agreed, one, other)))
     else:

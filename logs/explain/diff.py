@@ -4,9 +4,9 @@ that it comes from; and how far apart they went."""
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from itertools import islice, zip_longest
+from itertools import islice, takewhile, zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from logs.explain.phrases import sentence
@@ -41,16 +41,11 @@ class _Absent:
 ABSENT = _Absent()
 
 
-def first_difference(
-    ours: Iterable[DecisionRecord], theirs: Iterable[DecisionRecord]
-) -> tuple[int, DecisionRecord | None, DecisionRecord | None]:
-    """How many decisions agree, and the pair that does not; (n, None, None) where all do."""
-    agreed = 0
-    for one, other in zip_longest(ours, theirs):
-        if one is None or other is None or one.line != other.line:
-            return agreed, one, other
-        agreed += 1
-    return agreed, None, None
+def first_difference(ours: Timeline, theirs: Timeline) -> tuple[int, DecisionRecord | None, DecisionRecord | None]:
+    """How many decisions agree, to the byte, and the pair that does not; (n, None, None) where all do."""
+    lines = zip(*(map(history.line, history.cycles) for history in (ours, theirs)), strict=False)
+    agreed = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], lines))
+    return agreed, ours.cycle_of(agreed + 1), theirs.cycle_of(agreed + 1)
 
 
 def agreement(agreed: int) -> str:
