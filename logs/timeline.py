@@ -61,6 +61,11 @@ class Timeline:
         """Where it is read from."""
         return str(self._path)
 
+    @property
+    def whole_bytes(self) -> int:
+        """Length of the journal up to the end of its last whole line."""
+        return self._ends[-1] + 1 if self._ends else 0
+
     @cached_property
     def newest(self) -> Mapping[str, str]:
         """Id of each entry -> ref of its last revision; in the order in which the entries came about."""

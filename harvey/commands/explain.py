@@ -200,6 +200,8 @@ def _run_diff(args: Namespace) -> int:
     first, second = open_run(args.first), open_run(args.second)
     heads = RunHead.read(first.path), RunHead.read(second.path)
     ours, theirs = Timeline(first.journal), Timeline(second.journal)
+    for history in (ours, theirs):
+        history.verify()
     print(f"first:  {_title(first)}\nsecond: {_title(second)}")
     for name, head in zip(("first", "second"), heads, strict=True):
         if elsewhere := head.decided_elsewhere():
