@@ -13,42 +13,23 @@ from logs.explain.diff import differing_leaves
 from logs.explain.phrases import describe_decision, sentence, wrap
 from logs.records import Candidate, DecisionRecord, EntryRecord, decision_of
 from logs.timeline import Timeline
-from world_models.building.locale_frame import LocaleFrame
-from world_models.entries import (
-    CameraPicture,
-    CameraState,
-    Certificate,
-    Command,
-    Footprint,
-    Goal,
-    Hypothesis,
-    Leg,
-    Milestone,
-    MotorCommand,
-    Outcome,
-    PictureRequest,
-    PlanSketch,
-    Recovery,
-    Redirection,
-    Tracks,
-    UserReport,
-    Wheels,
-)
+from world_models.entries import Hypothesis
 from world_models.words import count
 
 DEEPEST_INDENT, FEW = 20, 2
 DEPTH = 5
 """How many steps down the walk goes unless told otherwise."""
-PRINCIPAL = (Outcome, MotorCommand, Goal, PlanSketch, Recovery, Hypothesis, Certificate, Milestone, Leg, PictureRequest)
+PRINCIPAL = ("Outcome", "MotorCommand", "Goal", "PlanSketch", "Recovery", "Hypothesis", "Certificate", "Milestone",
+             "Leg", "PictureRequest")
 """Of what one act makes, the first of these is what it was done for."""
 GOAL, MODEL, SENSOR = "goal", "model", "sensor"
 KINDS = (GOAL, MODEL, SENSOR)
 """What an explanation may end in: what was asked for, what is known of building and robot, what the camera saw."""
-GROUNDS: Mapping[type[Any], str] = {
-    Command: GOAL, Goal: GOAL, CameraPicture: SENSOR,
-    **dict.fromkeys((LocaleFrame, CameraState, Wheels, Footprint, UserReport, Redirection), MODEL)}
+GROUNDS: Mapping[str, str] = {
+    "Command": GOAL, "Goal": GOAL, "CameraPicture": SENSOR,
+    **dict.fromkeys(("LocaleFrame", "CameraState", "Wheels", "Footprint", "UserReport", "Redirection"), MODEL)}
 """The kinds of entries that are such an end themselves; what the robot is told of the model is a part of it."""
-NAMING: Mapping[type[Any], str] = {Milestone: "landmarks", Tracks: "items", PlanSketch: "subgoals"}
+NAMING: Mapping[str, str] = {"Milestone": "landmarks", "Tracks": "items", "PlanSketch": "subgoals"}
 """The fields by which others name what is in the model."""
 Ends = frozenset[str]
 """What some entry ends in: some of KINDS, and the names of the reasons of which the journal says nothing."""
@@ -174,13 +155,13 @@ def _rank(record: EntryRecord[Any]) -> int:
     """A smaller number for what an act was rather done for; that it found out where it is comes before its new goal."""
     if record.kind is Hypothesis and (record.field("basis"), record.field("status")) == ("relocalization", "held"):
         return 0
-    return 1 + (PRINCIPAL.index(record.kind) if record.kind in PRINCIPAL else len(PRINCIPAL))
+    return 1 + (PRINCIPAL.index(record.type) if record.type in PRINCIPAL else len(PRINCIPAL))
 
 
 def kind_of(record: EntryRecord[Any]) -> str | None:
     """The kind of ground that an entry is itself; None where it is none."""
-    names_the_model = record.kind in NAMING and record.field(NAMING[record.kind])
-    return MODEL if names_the_model else GROUNDS.get(record.kind)
+    names_the_model = record.type in NAMING and record.field(NAMING[record.type])
+    return MODEL if names_the_model else GROUNDS.get(record.type)
 
 
 def explained_by(decision: DecisionRecord) -> tuple[str, ...]:

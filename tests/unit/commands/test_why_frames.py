@@ -11,8 +11,8 @@ from harvey.replay.why_not_again import Fate, in_run
 from logs.explain.model import tell_changes, tell_used
 from logs.explain.phrases import Sentence, sentence
 from logs.explain.subjects import milestone_story
-from logs.explain.web import MODEL, cycle_lines, kind_of
-from logs.explain.why import LABELS, story
+from logs.explain.web import GROUNDS, MODEL, NAMING, PRINCIPAL, cycle_lines, kind_of
+from logs.explain.why import FOLDED, LABELS, SEVERAL, story
 from logs.records import OWN, Candidate, DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
 from world_models.building.locale_frame import FrameChange, FrameReference, FrameRequest
@@ -119,5 +119,6 @@ def test_what_is_known_and_told_is_a_ground() -> None:
     assert kind_of(entry("FrameRequest-1.0", 0)) is None
 
 
-def test_the_kinds_that_a_story_follows_are_known() -> None:
-    assert {*LABELS, *(kind for _, follows in LABELS.values() for kind in follows or ())} <= set(OWN)
+def test_the_kinds_that_are_told_apart_by_name_are_known() -> None:
+    followed = {kind for _, follows in LABELS.values() for kind in follows or ()}
+    assert {*LABELS, *followed, *SEVERAL, *FOLDED, *PRINCIPAL, *GROUNDS, *NAMING} <= set(OWN)
