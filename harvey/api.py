@@ -195,8 +195,7 @@ class RecordedRun:
 
     def records(self) -> Iterator[EntryRecord[Any]]:
         """Every change of every entry, in order, observed ones too. Raises BadInput."""
-        for decision in self.decisions():
-            yield from (*decision.observed, *decision.made)
+        return (record for decision in self.decisions() for record in decision.changes)
 
     @overload
     def entries(self, kind: type[T]) -> Iterator[Entry[T]]: ...

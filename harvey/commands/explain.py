@@ -6,7 +6,8 @@ import json
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
@@ -58,7 +59,7 @@ def _run_why(args: Namespace) -> int:
     if of_the_end and history.cut_off is not None:
         print(_describe_unfinished(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
     if args.json:
-        print(json.dumps([_record(one) for one in stories], indent=2))
+        print(json.dumps([asdict(one) for one in stories], indent=2))
         return 0
     parts = [[*opening(run, history)]] * of_the_end
     if args.at is not None and args.entry is None:
@@ -92,11 +93,6 @@ def _stories(run: RunDirectory, history: Timeline, args: Namespace) -> Iterator[
         yield from (milestone_story(history, id, world) for id in milestones(history, args.milestone))
     else:
         yield from stories_of(history, args.entry if args.at is None else args.at, world)
-
-
-def _record(one: Story) -> dict[str, Any]:
-    steps = [{"label": step.label, "text": step.text, "entries": step.refs} for step in one.steps]
-    return {"entry": one.ref, "headline": one.headline, "decided": one.decided, "steps": steps}
 
 
 def _print_check(history: Timeline, as_json: bool) -> int:
@@ -163,7 +159,7 @@ def _run_story(args: Namespace) -> int:
     history = Timeline(run.journal)
     history.verify()  # a line that is no decision is said first, also where the story has no need of it
     story = tell_run(run, history)
-    print(json.dumps(story.record(), indent=2) if args.json else "\n".join(story_lines(story)))
+    print(json.dumps(asdict(story), indent=2) if args.json else "\n".join(story_lines(story)))
     if history.cut_off is not None and not is_being_written(run.journal):
         raise BadInput(
             f"{run.path}: the run was cut off in cycle {history.cut_off}, before it had an outcome; harvey"

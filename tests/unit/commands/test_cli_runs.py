@@ -158,7 +158,7 @@ def test_a_run_that_was_cut_off_says_so_first(run: Path, tmp_path: Path, capsys:
     assert main(["why", cut, "--json"]) == 0
     told = capsys.readouterr()
     assert "cut off in cycle 20" in told.err
-    assert json.loads(told.out)[0]["entry"]
+    assert json.loads(told.out)[0]["ref"]
     for asked in ([str(run)], [cut, "CameraPicture-1"], [cut, "--at", "3"]):
         assert main(["why", *asked]) == 0
         assert "cut off" not in "".join(capsys.readouterr())
