@@ -280,18 +280,13 @@ class Timeline:
         return None
 
     def near(self, text: str) -> list[str]:
-        """Names like one that is not there: of the same kind with near numbers, else of a kind that is spelt alike."""
-        numbers: dict[str, list[int]] = {}
-        for head, _, number in (id.rpartition("-") for id in self.newest):
-            numbers.setdefault(head, []).extend([int(number)] if number.isdecimal() else [])
-        kinds = {kind.lower(): kind for kind in numbers}
-        kind, _, rest = text.rpartition("-")
-        alike = difflib.get_close_matches((kind or text).lower(), sorted(kinds), n=2, cutoff=0.6)
-        if not alike:
-            return [*self.newest][:1] + [*self.newest][-1:]
-        wanted = int(rest.partition(".")[0]) if rest.partition(".")[0].isdecimal() else 1
-        return [f"{kinds[name]}-{n}" for name in alike
-                for n in sorted(numbers[kinds[name]], key=lambda n: (abs(n - wanted), n))[:2]]
+        """Names like one that is not there: first and last of each kind that is spelt alike, else of all."""
+        kinds = dict[str, list[str]]()
+        for id in self.newest:
+            kinds.setdefault(id.rpartition("-")[0].lower(), []).append(id)
+        alike = difflib.get_close_matches((text.rpartition("-")[0] or text).lower(), sorted(kinds), n=2, cutoff=0.6)
+        ends = [kinds[kind] for kind in alike] or [list(self.newest)]
+        return list(dict.fromkeys(id for ids in ends for id in (*ids[:1], *ids[-1:])))
 
     def _sweep(self) -> None:
         """Note where each entry stands. Raises BadInput where a line is not the cycle that has to stand there."""
