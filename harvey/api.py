@@ -38,7 +38,7 @@ from logs.explain.subjects import stories_of
 from logs.explain.why import lines_of
 from logs.pictures import open_pictures
 from logs.reader import read_true_track
-from logs.records import DecisionRecord, EntryRecord, entry_of, knowing, read_records
+from logs.records import DecisionRecord, EntryRecord, entry_of, knowing
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
 from logs.timeline import Timeline
@@ -191,12 +191,11 @@ class RecordedRun:
 
     def decisions(self) -> Iterator[DecisionRecord]:
         """Every decision, in order: what was seen, who could act, who was chosen, what changed. Raises BadInput."""
-        return read_records(self._files.journal)
+        return Timeline(self._files.journal).decisions()
 
     def records(self) -> Iterator[EntryRecord[Any]]:
         """Every change of every entry, in order, observed ones too. Raises BadInput."""
-        for decision in self.decisions():
-            yield from (*decision.observed, *decision.made)
+        return (record for decision in self.decisions() for record in decision.changes)
 
     @overload
     def entries(self, kind: type[T]) -> Iterator[Entry[T]]: ...

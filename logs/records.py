@@ -14,7 +14,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache, cached_property
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeGuard, TypeVar, cast, get_args
 
@@ -39,15 +38,12 @@ from blackboard import (
     brief,
     decode,
 )
-from logs.disk import MOST_JOURNAL_BYTES
 from logs.mjpeg_file import Pictures
-from logs.run_directory import check_version
 from logs.run_errors import BadInput
 from world_models import words
 from world_models.building.locale_frame import FrameReference, FrameRequest, LocaleFrame
 from world_models.entries import CameraPicture
 from world_models.entries.entry_kinds import KINDS
-from world_models.files.regular_files import open_regular
 
 if TYPE_CHECKING:  # an explanation starts fast only where no world is imported that it does not need
     from world_models.frame_store import FrameStore
@@ -263,34 +259,6 @@ ARRAYS: Decoders = MappingProxyType({np.ndarray: _array})
 def as_line(data: Any) -> str:
     """JSON types as one line, as the journal writes them; equal lines mean equal values to the last bit."""
     return json.dumps(data, separators=(",", ":"))
-
-
-def read_records(path: Path) -> Iterator[DecisionRecord]:
-    """The decisions of a journal, one by one. A last line that was cut off in the middle of writing is left out.
-
-    Every cycle has its line, also where a run was cut off and went on: line 42 is cycle 42.
-
-    Raises:
-        BadInput: the file cannot be read, or a line is not the decision that follows on the line before; names both.
-    """
-    check_version(path.parent)
-    try:
-        with open_regular(path, MOST_JOURNAL_BYTES) as file:
-            for number, line in enumerate(file, 1):
-                if not line.endswith(b"\n"):
-                    return
-                decision = decision_at(line, f"{path}:{number}")
-                check_step(path, number, decision.cycle)
-                yield decision
-    except OSError as error:
-        raise BadInput(f"{path}: expected a readable journal, got: {error.strerror}") from None
-
-
-def check_step(path: Path, line: int, cycle: int) -> None:
-    """Raises BadInput where a line has not the cycle that has to stand there."""
-    if cycle != line:
-        why = "a line is missing before it" if cycle > line else "a line is there twice, or was moved"
-        raise BadInput(f"{path}:{line}: expected cycle {line}, got {cycle} ({why})")
 
 
 def decision_at(line: bytes, where: str) -> DecisionRecord:

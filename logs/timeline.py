@@ -14,14 +14,14 @@ import math
 import re
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from blackboard import Blackboard, Change, Entry, Retracted, View
 from logs.disk import MOST_JOURNAL_BYTES
-from logs.records import Candidate, DecisionRecord, EntryRecord, check_step, decision_at, is_a
+from logs.records import Candidate, DecisionRecord, EntryRecord, decision_at, is_a
 from logs.run_directory import check_version
 from logs.run_errors import BadInput
 from world_models.building.locale_frame import FrameReference, LocaleFrame
@@ -29,11 +29,10 @@ from world_models.entries import Hypothesis, Outcome, Tracks
 from world_models.files.regular_files import read_regular
 
 K = TypeVar("K")
-PLAIN = re.compile(rb'\{"cycle":(\d{1,15}),"')
-"""How a line begins as the scheduler writes it; a line that begins otherwise is read in full."""
-CHANGE = re.compile(rb'\{"change":"(\w+)","entry":"([^"\\]+)"')
-"""How a change begins there. Inside a text every quotation mark has a backslash before it, so no text looks like it."""
-CLOSES = ord("}")
+CYCLE = re.compile(rb'\{"cycle": ?(\d{1,15}),')
+"""How a line begins; a line that begins otherwise is read in full."""
+CHANGE = re.compile(rb'\{"change": ?"(\w+)", ?"entry": ?"([^"\\]+)"')
+"""How a change begins. Inside a text every quotation mark has a backslash before it, so no text looks like it."""
 FAR, REVISIONS, TIMED_WITHIN = 3000, 2000, 100
 """So many entries are looked at for the nearest of a kind, so many revisions of a belief for where it began, so many
 decisions for a time."""
@@ -54,7 +53,6 @@ class Timeline:
         self._path = path
         self._ends = [match.start() for match in re.finditer(rb"\n", self._data)]
         self._read: dict[int, DecisionRecord] = {}
-        self._line_of: dict[int, int] = {}
         self._entries, self._retracted = dict[bytes, int](), dict[bytes, int]()
         self._sweep()
 
@@ -62,6 +60,11 @@ class Timeline:
     def source(self) -> str:
         """Where it is read from."""
         return str(self._path)
+
+    @property
+    def whole_bytes(self) -> int:
+        """Length of the journal up to the end of its last whole line."""
+        return self._ends[-1] + 1 if self._ends else 0
 
     @cached_property
     def newest(self) -> Mapping[str, str]:
@@ -75,12 +78,12 @@ class Timeline:
 
     @cached_property
     def cycles(self) -> Sequence[int]:
-        """Of the decisions, in their order."""
-        return tuple(self._line_of)
+        """Of the decisions, in their order: each cycle has its line."""
+        return tuple(range(1, len(self._ends) + 1))
 
     def entry(self, ref: str) -> EntryRecord[Any] | None:
         """What the journal says of a revision; None where it says nothing."""
-        return self._find(ref, self._entries.get(ref.encode(errors="replace")), retracted=False)
+        return self._find(ref, self._entries, retracted=False)
 
     def cycle_of_ref(self, ref: str) -> int:
         """In which cycle a revision came about; 0 where the journal says nothing of it."""
@@ -89,12 +92,11 @@ class Timeline:
 
     def retraction(self, ref: str) -> EntryRecord[Any] | None:
         """How a revision was retracted; None where it was not."""
-        return self._find(ref, self._retracted.get(ref.encode(errors="replace")), retracted=True)
+        return self._find(ref, self._retracted, retracted=True)
 
     def cycle_of(self, cycle: int) -> DecisionRecord | None:
         """The decision of a cycle; None where the run has no such cycle."""
-        line = self._line_of.get(cycle)
-        return None if line is None else self._decision(line)
+        return self._decision(cycle - 1) if 0 < cycle <= len(self._ends) else None
 
     def naming(self, ref: str) -> Iterator[DecisionRecord]:
         """The decisions that name a revision anywhere, in their order; some that do not may be among them."""
@@ -108,23 +110,14 @@ class Timeline:
 
     def verify(self) -> None:
         """Read every line. Raises BadInput for the first that is no decision."""
-        for line in range(len(self._ends)):
-            self._decision(line)
+        for _ in self.decisions():
+            pass
 
     def expect_decisions(self) -> None:
         """Raises BadInput where the journal has no decision."""
         if not self.cycles:
             self.verify()
             raise BadInput(f"{self.source}: expected at least one decision, got none")
-
-    def count_common_lines(self, other: Timeline) -> int:
-        """How many of the first lines are the same to the byte."""
-        start = 0
-        for line, (end, there) in enumerate(zip(self._ends, other._ends, strict=False)):
-            if end != there or self._data[start:end] != other._data[start:end]:
-                return line
-            start = end + 1
-        return min(len(self._ends), len(other._ends))
 
     def of_kind(self, *kinds: type[K], until: int | None = None) -> Iterator[EntryRecord[K]]:
         """All revisions of some kinds, up to a cycle, in the order in which they came about."""
@@ -158,11 +151,16 @@ class Timeline:
         raise BadInput(f"--at: expected a cycle of the run, which has {have}, got {cycle}")
 
     def decisions(self) -> Iterator[DecisionRecord]:
-        """All of them, in their order."""
-        return (self.decision(cycle) for cycle in self.cycles)
+        """All of them, in their order; none is kept. Raises BadInput where a line is no decision."""
+        return (self._read.get(line) or self._parse(line) for line in range(len(self._ends)))
+
+    def line(self, cycle: int) -> bytes:
+        """A decision as it stands in the journal, without its newline."""
+        return self._data[self._ends[cycle - 2] + 1 if cycle > 1 else 0 : self._ends[cycle - 1]]
 
     def candidates(self, cycle: int) -> tuple[Candidate, ...]:
-        """Among whom a cycle chose: what was pending or new, and not dropped; the chosen first, then the best rated.
+        """Among whom a cycle chose: what was pending or new, and not dropped; the chosen first, then the best
+        rated, then the oldest.
 
         Raises BadInput where the run has no such cycle.
         """
@@ -178,7 +176,8 @@ class Timeline:
             found.update((c.number, c) for c in past.activated if c.number not in gone)
             if len(found) >= wanted:
                 break
-        return ranked(found.values(), decision.chosen)
+        first = decision.chosen.number if decision.chosen else None
+        return tuple(sorted(found.values(), key=lambda c: (c.number != first, -c.rating, c.number)))
 
     def time_at(self, cycle: int) -> float | None:
         """The newest time of any observation by a cycle [s]; None where there was none lately."""
@@ -281,65 +280,46 @@ class Timeline:
         return None
 
     def near(self, text: str) -> list[str]:
-        """Names like one that is not there: of the same kind with near numbers, else of a kind that is spelt alike."""
-        numbers: dict[str, list[int]] = {}
-        for head, _, number in (id.rpartition("-") for id in self.newest):
-            numbers.setdefault(head, []).extend([int(number)] if number.isdecimal() else [])
-        kinds = {kind.lower(): kind for kind in numbers}
-        kind, _, rest = text.rpartition("-")
-        alike = difflib.get_close_matches((kind or text).lower(), sorted(kinds), n=2, cutoff=0.6)
-        if not alike:
-            return [*self.newest][:1] + [*self.newest][-1:]
-        wanted = int(rest.partition(".")[0]) if rest.partition(".")[0].isdecimal() else 1
-        return [f"{kinds[name]}-{n}" for name in alike
-                for n in sorted(numbers[kinds[name]], key=lambda n: (abs(n - wanted), n))[:2]]
+        """Names like one that is not there: first and last of each kind that is spelt alike, else of all."""
+        kinds = dict[str, list[str]]()
+        for id in self.newest:
+            kinds.setdefault(id.rpartition("-")[0].lower(), []).append(id)
+        alike = difflib.get_close_matches((text.rpartition("-")[0] or text).lower(), sorted(kinds), n=2, cutoff=0.6)
+        ends = [kinds[kind] for kind in alike] or [list(self.newest)]
+        return list(dict.fromkeys(id for ids in ends for id in (*ids[:1], *ids[-1:])))
 
     def _sweep(self) -> None:
-        """Note where each cycle and each entry stands. What stands in an unusual line is read from it.
-
-        Raises BadInput where a line is not the cycle that follows on the line before.
-        """
-        start, unusual = 0, False
+        """Note where each entry stands. Raises BadInput where a line is not the cycle that has to stand there."""
+        start = 0
         for line, end in enumerate(self._ends):
-            plain = PLAIN.match(self._data, start)
-            unusual |= plain is None or self._data[end - 1] != CLOSES
-            cycle = int(plain[1]) if plain else self._decision(line).cycle
-            check_step(self._path, line + 1, cycle)
-            self._line_of[cycle] = line
+            begins = CYCLE.match(self._data, start)
+            cycle = int(begins[1]) if begins else self._parse(line).cycle
+            if cycle != line + 1:
+                why = "a line is missing before it" if cycle > line else "a line is there twice, or was moved"
+                raise BadInput(f"{self._path}:{line + 1}: expected cycle {line + 1}, got {cycle} ({why})")
             start = end + 1
-        for line in range(len(self._ends)) if unusual else ():
-            for record in self._decision(line).changes:
-                where = self._retracted if record.is_gone else self._entries
-                where[record.ref.encode(errors="replace")] = self._ends[line] - 1
-        for change in () if unusual else CHANGE.finditer(self._data, 0, self._ends[-1] if self._ends else 0):
+        for change in CHANGE.finditer(self._data, 0, start):
             kind, ref = change.groups()
             (self._retracted if kind == b"Retracted" else self._entries)[ref] = change.start()
 
-    def _find(self, ref: str, offset: int | None, *, retracted: bool) -> EntryRecord[Any] | None:
-        """The newest change of that name; where the index is wrong, every line is searched."""
-        if offset is None:
-            return None
-        for line in range(self._line_at(offset), -1, -1):
-            found = [one for one in self._decision(line).changes if one.ref == ref and one.is_gone is retracted]
-            if found:
-                return found[-1]
-        return None
+    def _find(self, ref: str, index: Mapping[bytes, int], *, retracted: bool) -> EntryRecord[Any] | None:
+        """The newest change of that name."""
+        at = index.get(ref.encode(errors="replace"))
+        changes = () if at is None else self._decision(self._line_at(at)).changes
+        found = [one for one in changes if one.ref == ref and one.is_gone is retracted]
+        return found[-1] if found else None
 
     def _line_at(self, offset: int) -> int:
         return bisect_right(self._ends, offset - 1)
 
     def _decision(self, line: int) -> DecisionRecord:
-        """Raises BadInput where the line is no decision; names file and line."""
         if line not in self._read:
-            start = self._ends[line - 1] + 1 if line else 0
-            self._read[line] = decision_at(self._data[start : self._ends[line]], f"{self._path}:{line + 1}")
+            self._read[line] = self._parse(line)
         return self._read[line]
 
-
-def ranked(candidates: Iterable[Candidate], chosen: Candidate | None) -> tuple[Candidate, ...]:
-    """The chosen one first, then the best rated, then the oldest."""
-    first = chosen.number if chosen else None
-    return tuple(sorted(candidates, key=lambda c: (c.number != first, -c.rating, c.number)))
+    def _parse(self, line: int) -> DecisionRecord:
+        """Raises BadInput where the line is no decision; names file and line."""
+        return decision_at(self.line(line + 1), f"{self._path}:{line + 1}")
 
 
 def read_time_s(get: Callable[[str], Any]) -> float | None:

@@ -12,12 +12,12 @@ from rerun.chunk import RrdReader
 from logs.reader import read_series
 from logs.recording.loggers.decisions import RECORD
 from logs.recording.paths import RECORDS
-from logs.records import read_records
+from logs.timeline import Timeline
 
 
 def read_journal(path: Path) -> Iterator[Mapping[str, Any]]:
     """Each whole line as JSON types, after it was read as a decision."""
-    return (record.data for record in read_records(path))
+    return (record.data for record in Timeline(path).decisions())
 
 
 def read_decisions(recording: Path) -> list[dict[str, Any]]:

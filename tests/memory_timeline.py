@@ -49,5 +49,8 @@ class MemoryTimeline(Timeline):
     def naming(self, ref: str) -> Iterator[DecisionRecord]:
         return iter(self._decisions.values())
 
-    def verify(self) -> None:
-        """They were read already."""
+    def line(self, cycle: int) -> bytes:
+        return self._decisions[cycle].line.encode()
+
+    def decisions(self) -> Iterator[DecisionRecord]:
+        return iter(self._decisions.values())

@@ -34,11 +34,11 @@ from logs.records import (
     as_line,
     cycle_of_writing,
     effect_of,
-    read_records,
     ref_of,
 )
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
+from logs.timeline import Timeline
 
 KINDS = load_kinds()
 TRACED = frozenset(kind for kind in KINDS.values() if kind_of(kind).traced)
@@ -129,7 +129,7 @@ def open_board(run: RunDirectory) -> RebuiltBoard:
 def rebuild(run: RunDirectory) -> Iterator[tuple[RebuiltBoard, DecisionRecord]]:
     """Each decision of a run in which somebody acted, with the board as the act saw it."""
     rebuilt = open_board(run)
-    for decision in read_records(run.journal):
+    for decision in Timeline(run.journal).decisions():
         for record in decision.observed:
             rebuilt.put(record)
         if decision.chosen is not None:

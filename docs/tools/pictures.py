@@ -67,7 +67,7 @@ class Run:
     @cached_property
     def lines(self) -> Mapping[str, Mapping[str, Any]]:
         """Lines by picture: found, expected and agreed."""
-        return data._lines(self.history, data.Lenses(self.head.model(self.world).camera))
+        return data.list_lines(self.history, self.head.model(self.world).camera)
 
     def of_kind(self, kind: type[Any]) -> Iterator[Any]:
         """Its records that say something, in their order."""

@@ -22,7 +22,7 @@ from experiments.generated.missions import HALLWAY, OFFICE, fault
 from experiments.report import Cell, Report
 from experiments.trials import campaign_folder, run_trials
 from harvey.simulation.body_replay import find_interrupted
-from logs.records import read_records
+from logs.timeline import Timeline
 
 CHILD = (sys.executable, "-m", "experiments.robustness.crash_child")
 MAX_CHILD_S = 600.0
@@ -199,7 +199,7 @@ def _compare(journal: Path, logs: Sequence[Path]) -> tuple[int, str]:
     """Count interrupted commands, and describe how journal and body disagree ("" if they do not)."""
     commands: list[tuple[str, list[float]]] = []
     interrupted: set[str] = set()
-    for decision in read_records(journal):
+    for decision in Timeline(journal).decisions():
         interrupted |= find_interrupted(decision.observed)
         commands += [(record.ref, [record.fields["turn_rad"], record.fields["move_m"]])
                      for record in decision.made if record.type == "MotorCommand"]

@@ -6,8 +6,8 @@ import json
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
-from itertools import islice
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
@@ -59,7 +59,7 @@ def _run_why(args: Namespace) -> int:
     if of_the_end and history.cut_off is not None:
         print(_describe_unfinished(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
     if args.json:
-        print(json.dumps([_record(one) for one in stories], indent=2))
+        print(json.dumps([asdict(one) for one in stories], indent=2))
         return 0
     parts = [[*opening(run, history)]] * of_the_end
     if args.at is not None and args.entry is None:
@@ -93,11 +93,6 @@ def _stories(run: RunDirectory, history: Timeline, args: Namespace) -> Iterator[
         yield from (milestone_story(history, id, world) for id in milestones(history, args.milestone))
     else:
         yield from stories_of(history, args.entry if args.at is None else args.at, world)
-
-
-def _record(one: Story) -> dict[str, Any]:
-    steps = [{"label": step.label, "text": step.text, "entries": step.refs} for step in one.steps]
-    return {"entry": one.ref, "headline": one.headline, "decided": one.decided, "steps": steps}
 
 
 def _print_check(history: Timeline, as_json: bool) -> int:
@@ -158,15 +153,13 @@ def _add_story_arguments(parser: ArgumentParser) -> None:
 
 def _run_story(args: Namespace) -> int:
     from logs.explain.story import story_lines, tell_run
-    from logs.records import read_records
     from logs.timeline import Timeline
 
     run = open_run(args.run)
-    for _ in read_records(run.journal):
-        pass  # a line that is no decision is said first, also where the story has no need of it
     history = Timeline(run.journal)
+    history.verify()  # a line that is no decision is said first, also where the story has no need of it
     story = tell_run(run, history)
-    print(json.dumps(story.record(), indent=2) if args.json else "\n".join(story_lines(story)))
+    print(json.dumps(asdict(story), indent=2) if args.json else "\n".join(story_lines(story)))
     if history.cut_off is not None and not is_being_written(run.journal):
         raise BadInput(
             f"{run.path}: the run was cut off in cycle {history.cut_off}, before it had an outcome; harvey"
@@ -203,6 +196,8 @@ def _run_diff(args: Namespace) -> int:
     first, second = open_run(args.first), open_run(args.second)
     heads = RunHead.read(first.path), RunHead.read(second.path)
     ours, theirs = Timeline(first.journal), Timeline(second.journal)
+    for history in (ours, theirs):
+        history.verify()
     print(f"first:  {_title(first)}\nsecond: {_title(second)}")
     for name, head in zip(("first", "second"), heads, strict=True):
         if elsewhere := head.decided_elsewhere():
@@ -210,9 +205,7 @@ def _run_diff(args: Namespace) -> int:
     set_differently = tuple(settings(*heads))
     if set_differently:
         print(f"set differently: {'; '.join(set_differently)}")
-    alike = ours.count_common_lines(theirs)
-    more, one, other = first_difference(*(islice(h.decisions(), alike, None) for h in (ours, theirs)))
-    agreed = alike + more
+    agreed, one, other = first_difference(ours, theirs)
     if one is None or other is None:
         print("\n".join(describe(agreed, one, other)))
     else:

@@ -59,11 +59,11 @@ def _write_picture(run: RunDirectory, cycle: int, name: str | None, *, plain: bo
 
 def _find_lines(run: RunDirectory, picture: str) -> dict[str, Any]:
     """What was found in a picture, and what was expected there."""
-    from harvey.report.data import Lenses, list_lines
+    from harvey.report.data import list_lines
     from harvey.report.page import find_known
     from logs.timeline import Timeline
 
-    return list_lines(Timeline(run.journal), Lenses(find_known(run)[1])).get(picture, {})
+    return list_lines(Timeline(run.journal), find_known(run)[1]).get(picture, {})
 
 
 def _whole(run: RunDirectory) -> Path:

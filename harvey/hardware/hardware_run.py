@@ -16,7 +16,6 @@ from typing import Any, Protocol, runtime_checkable
 from blackboard import Effect, Entry, Post, Sink
 from harvey.agent import build_agent
 from harvey.agent_settings import Pairs
-from harvey.errors import BadInput
 from harvey.hardware.drivers.base_driver import Base
 from harvey.hardware.drivers.video_camera import VideoCamera
 from harvey.hardware.hardware_body import CameraPort, HardwareBody, WatchedCamera
@@ -28,10 +27,11 @@ from harvey.runner.result import MissionResult
 from harvey.runner.resume import Remains, continue_run
 from harvey.runner.run import Run
 from harvey.runner.teller import LiveTeller, Tell, tell_each, tell_nothing
-from logs.records import EntryRecord, read_records
+from logs.pictures import open_pictures
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import Extent, RunRecorder
+from logs.timeline import Timeline, read_time_s
 from world_models.building.world import World
 from world_models.entries import GO_ON, BodyFault, CameraPicture
 from world_models.robot import RobotModel
@@ -117,13 +117,14 @@ def _hardware_run(
 
 def time_of_last_observation(files: RunDirectory) -> float:
     """When the last thing was observed, by the run's clock; 0 in a run without observations [s]. Raises BadInput."""
-    return max((_time_s(files, seen) for seen in _observations(files)), default=0.0)
+    decisions = Timeline(files.journal).decisions() if files.journal.is_file() else ()
+    times = (read_time_s(seen.field) for decision in decisions for seen in decision.observed)
+    return max((time_s for time_s in times if time_s is not None), default=0.0)
 
 
 def count_pictures(files: RunDirectory) -> int:
     """How many pictures of a run were numbered. Raises BadInput."""
-    frames = (seen for seen in _observations(files) if seen.kind is CameraPicture)
-    return max((_number(files, frame) + 1 for frame in frames), default=0)
+    return max(open_pictures(files), default=-1) + 1 if files.journal.is_file() else 0
 
 
 class NumberingCamera:
@@ -158,27 +159,3 @@ class UnknownMotion:
         self._run.port.remember(request)
         what = "the process that drove ended in mid-move"
         yield Post(BodyFault("base", "link lost", what, request.id, self._clock()), (request,))
-
-
-def _observations(files: RunDirectory) -> Iterator[EntryRecord[Any]]:
-    for record in read_records(files.journal) if files.journal.is_file() else ():
-        yield from record.observed
-
-
-def _time_s(files: RunDirectory, seen: EntryRecord[Any]) -> float:
-    value = seen.fields if isinstance(seen.fields, dict) else {}
-    try:
-        return max(float(value.get(key, 0.0)) for key in ("sim_time_s", "when_s"))
-    except (TypeError, ValueError):
-        raise _build_error(files, seen, "when it was observed") from None
-
-
-def _number(files: RunDirectory, frame: EntryRecord[Any]) -> int:
-    try:
-        return int(frame.fields["number"])
-    except (KeyError, TypeError, ValueError):
-        raise _build_error(files, frame, "a picture's number") from None
-
-
-def _build_error(files: RunDirectory, seen: EntryRecord[Any], expected: str) -> BadInput:
-    return BadInput(f"{files.journal}: {seen.ref}: expected {expected}, got {seen.fields!r}")

@@ -25,25 +25,19 @@ from harvey.runner.teller import PAGE, USER
 from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.simulation.simulated_run import SimulatedRun, rebuild_stage
 from logs.explain.phrases import sentence
-from logs.records import WHAT_IF, DecisionRecord, EntryRecord, Originals, as_line, decision_of, effect_of, read_records
+from logs.records import WHAT_IF, DecisionRecord, EntryRecord, Originals, as_line, decision_of, effect_of
 from logs.run_directory import RunDirectory, make_room
 from logs.run_head import SIMULATOR, RunHead
 from logs.run_recorder import RunRecorder
+from logs.timeline import Timeline
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import CameraPicture, MotionReport, Outcome, Redirection, RideReport, UserReport
 from world_models.words import count, listed
 
-
-@dataclass(frozen=True, slots=True)
-class RequestParting:
-    """Where the changed agent asked its body for something else; None where one of them asked for nothing any more.
-
-    ``requests`` names the kinds of entries that ask the body for something.
-    """
-
-    then: DecisionRecord | None
-    now: DecisionRecord | None
-    requests: tuple[type[Any], ...]
+REQUESTS: tuple[type[Any], ...] = tuple(BodyPort.acts_on)
+"""The kinds of entries that ask the body for something."""
+Pair = tuple[DecisionRecord | None, DecisionRecord | None]
+"""A decision as recorded, and as it is decided; None where there is none any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +50,8 @@ class Answer:
         then, now: that one, as recorded and as decided; None where there is none.
         revised: what was revised to ask the question, as ``LocaleFrame-3.1``.
         answered: how many decisions had their requests to the body answered by the record.
-        parting: where the record could no longer answer; None where it could to the end.
+        parting: where the agent asked its body for something else, so that the record could no longer answer; None
+            where it could to the end.
         outcome: how it ends; kind ``unfinished`` where it was left at the parting.
         result: in the simulator: how it went, by the truth.
     """
@@ -66,7 +61,7 @@ class Answer:
     now: DecisionRecord | None
     revised: tuple[str, ...]
     answered: int
-    parting: RequestParting | None
+    parting: Pair | None
     outcome: Outcome
     result: MissionResult | None
 
@@ -146,16 +141,15 @@ class _Player:
 
     def __init__(self, run: RunDirectory, agent: Agent) -> None:
         self.originals = open_originals(run, agent.store)
-        self.records = list(read_records(run.journal))
-        self._requests = tuple(BodyPort.acts_on)
-        self._steps = _steps(self.records, self._requests)
+        self.records = list(Timeline(run.journal).decisions())
+        self._steps = _steps(self.records)
         self._agreed = 0
         self._as_recorded, self._as_decided = AsRecorded(), AsRecorded()
         self._first: tuple[DecisionRecord | None, DecisionRecord] | None = None
         self._answered = 0
         self.last: Decision | None = None
         self.open: tuple[Change, ...] = ()
-        self.parting: RequestParting | None = None
+        self.parting: Pair | None = None
 
     def compare(self, decision: Decision) -> None:
         """Sink: compares with the record until the first difference."""
@@ -202,7 +196,7 @@ class _Player:
         if step is None or step.asked != tuple(as_line(plain(change.entry.value)) for change in made):
             self.open = made
             now = decision_of(decision_record(self.last)) if self.last else None
-            self.parting = RequestParting(None if step is None else step.decision, now, self._requests)
+            self.parting = None if step is None else step.decision, now
             raise _PartedError
         self._answered += 1
         live(made, step.answers)
@@ -214,13 +208,13 @@ class _Player:
 
 def is_body_request(change: Change) -> bool:
     """Whether the body acts on a change. What is asked of the world is answered by the world, now as then."""
-    return isinstance(change.entry.value, BodyPort.acts_on)
+    return isinstance(change.entry.value, REQUESTS)
 
 
-def _steps(records: Sequence[DecisionRecord], requests: Sequence[type[Any]]) -> list[_Step]:
+def _steps(records: Sequence[DecisionRecord]) -> list[_Step]:
     steps = []
     for decision, after in zip(records, [*records[1:], None], strict=True):
-        asked = tuple(as_line(entry.fields) for entry in decision.made if entry.kind in requests)
+        asked = tuple(as_line(entry.fields) for entry in decision.made if entry.kind in REQUESTS)
         if asked and after is not None:
             answers = tuple(entry for entry in after.observed if entry.author in (BodyPort.name, RESUME))
             steps.append(_Step(decision, asked, answers))
@@ -334,18 +328,18 @@ def _parting(answer: Answer) -> Iterator[str]:
         return
     held = count(answer.answered, "request")
     yield f"What was observed holds for {held} to the body, which are the same. Then it asks for something else:"
-    yield f"  as recorded:              {_describe_requests(answer.parting.then, answer.parting.requests)}"
-    yield f"  as it would have been:    {_describe_requests(answer.parting.now, answer.parting.requests)}"
+    for who, decision in zip(("as recorded:          ", "as it would have been:"), answer.parting, strict=True):
+        yield f"  {who}    {_describe_requests(decision)}"
     if answer.outcome.kind == UNFINISHED:
         yield "From there the record cannot tell what it would have observed."
     else:
         yield "From there the record cannot tell what it would have observed; the simulated robot went on by itself."
 
 
-def _describe_requests(decision: DecisionRecord | None, requests: Sequence[type[Any]]) -> str:
+def _describe_requests(decision: DecisionRecord | None) -> str:
     if decision is None:
         return "nothing any more"
-    asked = "; ".join(f"{entry.ref}, {sentence(entry)}" for entry in decision.made if entry.kind in requests)
+    asked = "; ".join(f"{entry.ref}, {sentence(entry)}" for entry in decision.made if entry.kind in REQUESTS)
     return f"cycle {decision.cycle}: {asked}"
 
 

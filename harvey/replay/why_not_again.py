@@ -65,31 +65,31 @@ def in_cycle(history: Timeline, source: str, cycle: int) -> tuple[Occasion, ...]
     Raises BadInput where the run has no such cycle.
     """
     decision = history.decision(cycle)
-    found = [Occasion(cycle, Fate.DROPPED, c.trigger, _tell_drop(c)) for c in decision.obviated if c.source == source]
-    for c in history.candidates(cycle):
-        if c.source == source:
-            is_chosen = decision.chosen is not None and c.number == decision.chosen.number
-            fate, why = _act(decision) if is_chosen else (Fate.OUTRANKED, _tell_ranking(c, decision))
-            why = f"it was the best there was, rated {c.rating:.2f}" if fate is Fate.ACTED else why
-            found.append(Occasion(cycle, fate, c.trigger, why))
-    return tuple(found)
+    waiting = (c for c in history.candidates(cycle) if c.source == source and c != decision.chosen)
+    return (*_had_its_turn(decision, source),
+            *(Occasion(cycle, Fate.OUTRANKED, c.trigger, _tell_ranking(c, decision)) for c in waiting))
 
 
 def in_run(history: Timeline, source: str) -> tuple[Occasion, ...]:
     """Every time in a run that a knowledge source was woken, and what came of it in the end."""
-    open_: dict[int, Candidate] = {}
-    ended, last = list[Occasion](), 0
-    for decision in history.decisions():
-        last = decision.cycle
-        open_ |= {c.number: c for c in decision.activated if c.source == source}
-        ended += [Occasion(last, Fate.DROPPED, c.trigger, _tell_drop(c)) for c in decision.obviated
-                  if open_.pop(c.number, None) is not None]
-        chosen = decision.chosen
-        if decision.asks is None and chosen is not None and open_.pop(chosen.number, None) is not None:
-            ended.append(Occasion(last, _act(decision)[0], chosen.trigger, _act(decision)[1]))
-    ended += [Occasion(last, Fate.OUTRANKED, c.trigger, "it was still waiting when the run ended")
-              for c in open_.values()]
+    ended = [one for decision in history.decisions() for one in _had_its_turn(decision, source)
+             if one.fate is not Fate.ASKED]
+    for last in history.cycles[-1:]:
+        chosen = None if (end := history.decision(last)).asks is not None else end.chosen
+        ended += [Occasion(last, Fate.OUTRANKED, c.trigger, "it was still waiting when the run ended")
+                  for c in history.candidates(last) if c.source == source and c != chosen]
     return tuple(ended)
+
+
+def _had_its_turn(decision: DecisionRecord, source: str) -> Iterator[Occasion]:
+    """What a knowledge source was dropped from in a cycle, and what came of its act."""
+    for c in decision.obviated:
+        if c.source == source:
+            yield Occasion(decision.cycle, Fate.DROPPED, c.trigger, _tell_drop(c))
+    if (chosen := decision.chosen) is not None and chosen.source == source:
+        fate, why = _act(decision)
+        why = f"it was the best there was, rated {chosen.rating:.2f}" if fate is Fate.ACTED else why
+        yield Occasion(decision.cycle, fate, chosen.trigger, why)
 
 
 def _act(decision: DecisionRecord) -> tuple[Fate, str]:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import base64
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from io import BytesIO
 from itertools import groupby
 from typing import Any, Literal
@@ -83,26 +82,27 @@ MOST = 700
 """So many pictures are kept at the most: all that were judged, and of the others each so many'th."""
 
 
-@dataclass(frozen=True, slots=True)
-class Lenses:
-    """Where pixels of the rectified picture, which the robot reasons in, lie in the camera's own."""
+def place_in_picture(segments_px: Any, camera: Camera | None) -> list[list[float]]:
+    """Segments of the rectified picture, which the robot reasons in, as they lie in the camera's own.
 
-    camera: Camera | None
+    Args:
+        segments_px: (n, 2, 2).
 
-    def place(self, segments_px: Any) -> list[list[float]]:
-        """(n, 2, 2) segments as rows of u0, v0, u1, v1, from the picture's upper left corner."""
-        points = np.asarray(segments_px, float).reshape(-1, 2, 2)
-        if self.camera is not None and self.camera.pinhole is not self.camera and len(points):
-            points = self.camera.project(self.camera.pinhole.rays(points))
-        rows: list[list[float]] = np.round(points + 0.5, 1).reshape(-1, 4).tolist()
-        return rows
+    Returns:
+        rows of u0, v0, u1, v1, from the picture's upper left corner.
+    """
+    points = np.asarray(segments_px, float).reshape(-1, 2, 2)
+    if camera is not None and camera.pinhole is not camera and len(points):
+        points = camera.project(camera.pinhole.rays(points))
+    rows: list[list[float]] = np.round(points + 0.5, 1).reshape(-1, 4).tolist()
+    return rows
 
 
 def read_pictures(
     history: Timeline, pictures: Mapping[int, bytes], camera: Camera | None
 ) -> Iterator[dict[str, Any]]:
     """The pictures that are kept, each since the cycle in which it was seen, with its lines."""
-    lines = list_lines(history, Lenses(camera))
+    lines = list_lines(history, camera)
     frames = list(history.of_kind(CameraPicture))
     for record in _chosen(frames, lines):
         number = record.fields.get("number")
@@ -139,21 +139,22 @@ def shrink(jpeg: bytes, kind: Literal["JPEG", "WEBP"] = "JPEG") -> tuple[str, tu
     return base64.b64encode(out.getvalue()).decode("ascii"), size
 
 
-def list_lines(history: Timeline, lenses: Lenses) -> dict[str, dict[str, Any]]:
+def list_lines(history: Timeline, camera: Camera | None) -> dict[str, dict[str, Any]]:
     """By picture, rows of u0, v0, u1, v1 [px]: what was found, what was expected of a milestone, and what agreed with
     it.
     """
     found: dict[str, dict[str, Any]] = {}
     for record in history.of_kind(Segments):
-        found[record.value.frame] = {"found": lenses.place(record.value.segments_px)}
+        found[record.value.frame] = {"found": place_in_picture(record.value.segments_px, camera)}
     for fix in history.of_kind(PoseFix):
         match, seen = history.chain(fix, LineMatch, Segments)
         if match is None or seen is None:
             continue
         frame, agreed = seen.value.frame, fix.value.inliers
-        found[frame]["agreed"] = lenses.place(match.value.segments_px[agreed])
+        found[frame]["agreed"] = place_in_picture(match.value.segments_px[agreed], camera)
         if (milestone := history.because(match, Milestone)) is not None:
-            found[frame] |= {"expected": lenses.place(milestone.expected_px), "milestone": milestone.name()}
+            found[frame] |= {"expected": place_in_picture(milestone.expected_px, camera),
+                             "milestone": milestone.name()}
     return found
 
 

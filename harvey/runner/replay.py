@@ -14,8 +14,9 @@ from typing import Any
 from blackboard import Change, Decision, Scheduler, decision_line
 from harvey.errors import BadInput
 from logs.pictures import open_pictures
-from logs.records import DecisionRecord, EntryRecord, Originals, effect_of, read_records
+from logs.records import DecisionRecord, EntryRecord, Originals, effect_of
 from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from world_models.frame_store import FrameStore
 
 Live = Callable[[Sequence[Change], Sequence[EntryRecord[Any]]], None]
@@ -58,14 +59,15 @@ def replay(
         BadInput: the journal cannot be read, or an observation cannot be decoded.
     """
     made: Sequence[Change] = ()
-    for recorded, line in zip(read_records(run.journal), _lines(run), strict=False):
+    history = Timeline(run.journal)
+    for recorded in history.decisions():
         live(made, recorded.observed)
         for observation in recorded.observed:
             scheduler.post([effect_of(observation, originals, scheduler.view, scheduler.kinds)], observation.author)
         before()
         decision = scheduler.step()
         made = () if decision is None else decision.made
-        yield ReplayedDecision(recorded, line, decision)
+        yield ReplayedDecision(recorded, history.line(recorded.cycle), decision)
 
 
 def check_same(run: RunDirectory, decision: ReplayedDecision) -> ReplayedDecision:
@@ -79,8 +81,3 @@ def check_same(run: RunDirectory, decision: ReplayedDecision) -> ReplayedDecisio
 def open_originals(run: RunDirectory, store: FrameStore) -> Originals:
     """What the journal of a run names only by reference. Raises BadInput and RecordingError as for its pictures."""
     return Originals(open_pictures(run), store)
-
-
-def _lines(run: RunDirectory) -> Iterator[bytes]:
-    with run.journal.open("rb") as lines:
-        yield from (line.removesuffix(b"\n") for line in lines)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Protocol
 
 from blackboard import Change, Decision, Effect, Entry, Post, Posted, Retracted
@@ -19,9 +18,9 @@ from harvey.runner.replay import Live, check_same, open_originals, replay
 from harvey.runner.run import Run
 from logs.mjpeg_file import Pictures
 from logs.pictures import camera_bytes, open_pictures
-from logs.records import read_records
 from logs.run_directory import RunDirectory
 from logs.run_recorder import Extent
+from logs.timeline import Timeline
 from world_models.entries import Course, MotorCommand, Outcome, Resumed
 
 RESUME = "resume"
@@ -48,19 +47,21 @@ class Remains:
 def find_remains(run: RunDirectory) -> Remains:
     """Look at a run without touching it. Raises BadInput where it cannot be used at all."""
     there = camera_bytes(run)
-    decisions, outcome = _count_decisions(run) if run.journal.is_file() else (0, None)
+    history = Timeline(run.journal) if run.journal.is_file() else None
+    decisions = 0 if history is None else len(history.cycles)
     if decisions == 0:
         _check_not_lost(run, there)
-    if not run.journal.is_file():
+    if history is None:
         return Remains(Extent(), 0, None, ())
-    whole, pictures = _whole_lines(run.journal), open_pictures(run)
+    history.verify()
+    whole, pictures = history.whole_bytes, open_pictures(run)
     end = pictures.end if isinstance(pictures, Pictures) else 0
     dropped = []
     if run.journal.stat().st_size > whole:
         dropped.append(f"decision {decisions + 1}, which was cut off while it was written")
     if there > end:
         dropped.append(f"{there - end} bytes of a picture that no decision had seen")
-    return Remains(Extent(whole, end), decisions, outcome, tuple(dropped))
+    return Remains(Extent(whole, end), decisions, _find_outcome(history), tuple(dropped))
 
 
 def _check_not_lost(run: RunDirectory, pictures: int) -> None:
@@ -134,21 +135,8 @@ def is_command(change: Change) -> bool:
     return isinstance(change, Posted) and isinstance(change.entry.value, MotorCommand)
 
 
-def _count_decisions(run: RunDirectory) -> tuple[int, Outcome | None]:
-    """How many decisions there are, and the outcome, if it was seen."""
-    decisions, seen, outcome = 0, False, None
-    for record in read_records(run.journal):
-        decisions += 1
-        ends = [entry.fields for entry in record.changes if entry.kind is Outcome]
-        outcome = Outcome(str(ends[0].get("kind")), str(ends[0].get("reason"))) if ends else outcome
-        seen = seen or any(ref.startswith(f"{Outcome.__name__}-") for ref in record.seen)
-    return decisions, outcome if seen else None
-
-
-def _whole_lines(path: Path) -> int:
-    """Length of a file up to the end of its last whole line [bytes]."""
-    whole = 0
-    with path.open("rb") as file:
-        for line in file:
-            whole += len(line) if line.endswith(b"\n") else 0
-    return whole
+def _find_outcome(history: Timeline) -> Outcome | None:
+    """The outcome, if it was seen."""
+    last = history.last(Outcome)
+    was_seen = last is not None and any(last.ref in decision.seen for decision in history.naming(last.ref))
+    return last.value if last is not None and was_seen else None

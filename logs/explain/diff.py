@@ -4,9 +4,9 @@ that it comes from; and how far apart they went."""
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from itertools import islice, zip_longest
+from itertools import islice, takewhile, zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from logs.explain.phrases import sentence
@@ -41,16 +41,11 @@ class _Absent:
 ABSENT = _Absent()
 
 
-def first_difference(
-    ours: Iterable[DecisionRecord], theirs: Iterable[DecisionRecord]
-) -> tuple[int, DecisionRecord | None, DecisionRecord | None]:
-    """How many decisions agree, and the pair that does not; (n, None, None) where all do."""
-    agreed = 0
-    for one, other in zip_longest(ours, theirs):
-        if one is None or other is None or one.line != other.line:
-            return agreed, one, other
-        agreed += 1
-    return agreed, None, None
+def first_difference(ours: Timeline, theirs: Timeline) -> tuple[int, DecisionRecord | None, DecisionRecord | None]:
+    """How many decisions agree, to the byte, and the pair that does not; (n, None, None) where all do."""
+    lines = zip(*(map(history.line, history.cycles) for history in (ours, theirs)), strict=False)
+    agreed = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], lines))
+    return agreed, ours.cycle_of(agreed + 1), theirs.cycle_of(agreed + 1)
 
 
 def agreement(agreed: int) -> str:
@@ -114,30 +109,22 @@ class Parting(NamedTuple):
         observation: ref of the first entry from outside that is not the same in both; "" where all are.
         decision: cycle of the first decision that does something else; 0 where none does.
         motion: the first motor command that differs; "" where none does.
-        source: cycle of the first decision in which another knowledge source acts, or the same on something else; 0:
-            there is none.
     """
 
     observation: str
     decision: int
     motion: str
-    source: int
 
 
 def parting(ours: Timeline, theirs: Timeline, agreed: int) -> Parting:
     """Where two runs part that agree in their first ``agreed`` decisions."""
-    def pairs() -> Iterator[tuple[DecisionRecord, DecisionRecord]]:
-        return zip(islice(ours.decisions(), agreed, None), islice(theirs.decisions(), agreed, None), strict=False)
-
-    def motions(decision: DecisionRecord) -> Records:
-        return [record for record in decision.made if record.kind is MotorCommand]
-
-    return Parting(
-        next((ref for a, b in pairs() if (ref := _first(a.observed, b.observed))), ""),
-        next((a.cycle for a, b in pairs() if _acted(a) != _acted(b) or _first(a.made, b.made)
-              or a.refused != b.refused), 0),
-        next((ref for a, b in pairs() if (ref := _first(motions(a), motions(b)))), ""),
-        next((a.cycle for a, b in pairs() if _acted(a) != _acted(b)), 0))
+    observation, decision, motion = "", 0, ""
+    for a, b in islice(zip(ours.decisions(), theirs.decisions(), strict=False), agreed, None):
+        observation = observation or _first(a.observed, b.observed)
+        if not decision and (_acted(a) != _acted(b) or a.refused != b.refused or _first(a.made, b.made)):
+            decision = a.cycle
+        motion = motion or _first(*([one for one in d.made if one.kind is MotorCommand] for d in (a, b)))
+    return Parting(observation, decision, motion)
 
 
 def _first(ours: Records, theirs: Records) -> str:
@@ -213,8 +200,6 @@ def because(ours: Timeline, theirs: Timeline, agreed: int, settings: tuple[str, 
     if where.motion and where.motion != where.observation:
         yield from _tell_entry(ours, theirs, where.motion, "motion")
         yield from _tell_grounds(ours, theirs, where.motion)
-    if where.source and where.source != where.decision:
-        yield from _others(ours, theirs, where.source)
 
 
 def _cycle(ours: Timeline, theirs: Timeline, ref: str) -> int:
@@ -236,12 +221,13 @@ def _both(a: Maybe, b: Maybe) -> Iterator[str]:
 
 def _tell_decision(ours: Timeline, theirs: Timeline, where: Parting, settings: tuple[str, ...]) -> Iterator[str]:
     one, other = ours.decision(where.decision), theirs.decision(where.decision)
-    head = "The first decision that differs is in cycle"
+    head = f"The first decision that differs is in cycle {where.decision}"
     if _acted(one) != _acted(other):
-        yield from _others(ours, theirs, where.decision, head)
+        yield f"{head}:"
+        yield from _acts(one, other)
     else:
         ref = _first(one.made, other.made)
-        yield f"{head} {where.decision}, of the {words.source(_acted(one)[0])}: {ref or 'nothing'}"
+        yield f"{head}, of the {words.source(_acted(one)[0])}: {ref or 'nothing'}"
         yield from _both(*(next((r for r in d.made if r.ref == ref), None) for d in (one, other)))
         if one.refused != other.refused:
             yield f"  refused in the {'first' if one.refused else 'second'}: {(one.refused or other.refused).strip()}"
@@ -264,13 +250,6 @@ def _tell_grounds(ours: Timeline, theirs: Timeline, ref: str) -> Iterator[str]:
     for a, b in list(grounds(ours, theirs, ref))[1:]:
         yield f"  because of {a.ref}" + (", which came from outside" if a.observed else "") + ":"
         yield from (f"  {line}" for line in _both(a, b))
-
-
-def _others(
-    ours: Timeline, theirs: Timeline, cycle: int, head: str = "They take other steps for the first time in cycle"
-) -> Iterator[str]:
-    yield f"{head} {cycle}:"
-    yield from _acts(ours.decision(cycle), theirs.decision(cycle))
 
 
 def _acts(one: DecisionRecord, other: DecisionRecord) -> Iterator[str]:

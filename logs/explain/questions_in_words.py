@@ -164,16 +164,17 @@ def _story(asked: Asked, record: Record, head: str, steps: Iterable[Sentence] = 
     return Story(head, tuple(steps), record.ref, describe_decision(asked.history, record))
 
 
-def _by_entry(asked: Asked, records: list[Record]) -> list[list[Record]]:
+def _by_entry(records: list[Record]) -> list[list[Record]]:
     """The revisions of each entry, in the order in which the entries came about."""
-    number = {id: number for number, id in enumerate(asked.history.newest)}
-    in_order = sorted(records, key=lambda record: number[record.id])
-    return [list(revisions) for _, revisions in groupby(in_order, key=lambda record: record.id)]
+    found = dict[str, list[Record]]()
+    for record in records:
+        found.setdefault(record.id, []).append(record)
+    return list(found.values())
 
 
 def _tell_things(asked: Asked, records: list[Record]) -> Iterator[Story]:
     """Each thing in the way, as it was known last, and how it came to be known."""
-    for revisions in _by_entry(asked, records):
+    for revisions in _by_entry(records):
         last = revisions[-1]
         steps = (*_tell_sights(asked.history, revisions), *_tell_consequences(asked, last.value.name))
         yield _story(asked, last, headline(last), steps)
@@ -283,7 +284,7 @@ def _beside(ahead: Sequence[Subgoal], thing: Obstacle) -> str:
 
 def _tell_doors(asked: Asked, records: list[Record]) -> Iterator[Story]:
     """Each door that pictures were asked about, or those that the question names."""
-    doors = _by_entry(asked, records)
+    doors = _by_entry(records)
     named = [revisions for revisions in doors if revisions[-1].value.door in asked.question]
     others = [name for name in sorted(_find_passages(asked.history)) if name in asked.question]
     if others and not named:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -118,13 +118,6 @@ class RunStory:
     turning_points: tuple[TurningPoint, ...]
     sections: tuple[Story, ...]
     milestones: tuple[MilestoneRow, ...]
-
-    def record(self) -> dict[str, Any]:
-        """As JSON types."""
-        keys = "text", "cycle", "time_s", "refs"
-        return asdict(self) | {"sections": [
-            {"title": one.headline, "sentences": [{key: getattr(step, key) for key in keys} for step in one.steps]}
-            for one in self.sections]}
 
 
 def run_name(run: RunDirectory) -> str:

@@ -9,8 +9,8 @@ import pytest
 
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import resume_mission, run_mission
-from logs.records import read_records
 from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from recorded_runs import cut_off, is_decided_again
 from sim.scenario import parse_scenario, with_settings
 from sim.stage import Stage, build_stage
@@ -50,7 +50,7 @@ def run(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
 def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_again_to_the_byte(
     run: RunDirectory,
 ) -> None:
-    records = list(read_records(run.journal))
+    records = list(Timeline(run.journal).decisions())
     courses = [e for r in records for e in r.made if e.type == "Course"]
     assert courses[0].change == "Posted" and len(courses) > 40
     assert len({e.fields["curvature_per_m"] for e in courses}) > 0.9 * (len(courses) - 2)
@@ -63,12 +63,12 @@ def test_each_picture_on_the_move_corrects_the_course_and_all_of_it_is_decided_a
 
 def test_a_run_that_is_cut_off_on_the_move_goes_on(run: RunDirectory, stage: Stage, tmp_path: Path) -> None:
     """The robot has come to a stand by then; what the wheels claim of that is told, and it sets off again."""
-    rolling = [r.cycle for r in read_records(run.journal) if any(e.type == "Course" for e in r.made)]
+    rolling = [r.cycle for r in Timeline(run.journal).decisions() if any(e.type == "Course" for e in r.made)]
     cut = cut_off(run, tmp_path / "cut", rolling[30], tail=0)
     assert resume_mission(cut, find_remains(cut), stage=stage).outcome == "reached"
-    told = next(e for r in read_records(cut.journal) for e in r.observed if e.type == "Resumed")
-    assert told.fields["interrupted"] == [next(
-        e.ref for r in read_records(cut.journal) if r.cycle == rolling[30] for e in r.made if e.type == "Course")]
+    told = next(e for r in Timeline(cut.journal).decisions() for e in r.observed if e.type == "Resumed")
+    last = Timeline(cut.journal).decision(rolling[30])
+    assert told.fields["interrupted"] == [next(e.ref for e in last.made if e.type == "Course")]
     assert is_decided_again(cut)
 
 
@@ -79,7 +79,7 @@ def test_who_is_carried_off_on_the_move_stops_at_once(tmp_path: Path) -> None:
     result = run_mission(stage, SEED, out=run.path)
     assert result.outcome == "reached" and result.collisions == 0 and result.milestones["false_accepts"] == 0
     assert result.camera == (), "the camera was not turned: somebody carried the robot"
-    records = list(read_records(run.journal))
+    records = list(Timeline(run.journal).decisions())
     at = next(i for i, r in enumerate(records) for e in r.made if e.type == "Discrepancy" and e.author
               == "correlator_tracker" and e.fields["magnitude"] in ("inf", float("inf")))
     after = [e for r in records[at + 1: at + 4] for e in r.made if e.type in ("Course", "MotorCommand")]

@@ -7,7 +7,7 @@ import numpy as np
 from blackboard import Decision
 from experiments.generated.missions import HALLWAY, fault
 from harvey.simulation.simulated_run import run_mission
-from logs.records import read_records
+from logs.timeline import Timeline
 from recorded_runs import Recorded
 from sim.faults.built_in_faults import Occlusion
 from sim.scenario import parse_scenario
@@ -45,5 +45,5 @@ def test_it_finds_what_is_before_its_camera_and_looks_past_it() -> None:
 
 
 def test_where_nothing_is_hidden_nobody_asks_what_is(recorded: Recorded) -> None:
-    chosen = {record.chosen.source for record in read_records(recorded("office").journal) if record.chosen}
+    chosen = {record.chosen.source for record in Timeline(recorded("office").journal).decisions() if record.chosen}
     assert "milestone_judge" in chosen and "obstruction_finder" not in chosen

@@ -9,7 +9,7 @@ import pytest
 
 from harvey.simulation.simulated_run import run_mission
 from knowledge_sources.settings import DEFAULT
-from logs.records import read_records
+from logs.timeline import Timeline
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
 
@@ -28,7 +28,7 @@ def test_a_first_milestone_far_from_where_expected_is_verified(
     roughly_put_down: Stage, seed: int, tmp_path: Path
 ) -> None:
     run_mission(roughly_put_down, seed, out=tmp_path)
-    made = [entry for record in read_records(tmp_path / "journal.jsonl") for entry in record.made]
+    made = [entry for record in Timeline(tmp_path / "journal.jsonl").decisions() for entry in record.made]
     first = next(entry.fields for entry in made if entry.type == "Certificate")
     assert first["deviation_px"] > DEFAULT.plan.max_deviation_px
     assert first["verdict"] == "verified", first["reason"]

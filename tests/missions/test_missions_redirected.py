@@ -15,8 +15,8 @@ from harvey.runner.result import MissionResult
 from harvey.runner.resume import find_remains
 from harvey.runner.teller import PAGE, LiveTeller
 from harvey.simulation.simulated_run import resume_mission, run_mission
-from logs.records import read_records
 from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from recorded_runs import cut_off
 from sim.scenario import ScenarioError
 from sim.stage import Stage
@@ -87,14 +87,14 @@ def test_by_the_missions_file_it_is_asked_at_its_time_and_once_after_a_crash(tmp
     result, _ = drive(stage, Asks(12, "Go to the attic"), tmp_path / "whole")
     assert result.outcome == "reached" and result.error_m < 0.0254
     whole = RunDirectory(tmp_path / "whole")
-    told = [entry.fields for record in read_records(whole.journal) for entry in record.observed
+    told = [entry.fields for record in Timeline(whole.journal).decisions() for entry in record.observed
             if entry.type in ("UserReport", "Redirection")]
     assert [one.get("text", one.get("what")) for one in told] == ["Go to the attic", "north-door", BACK]
-    cycles = [record.cycle for record in read_records(whole.journal)
+    cycles = [record.cycle for record in Timeline(whole.journal).decisions()
               if any(entry.type == "UserReport" for entry in record.observed)]
     run = cut_off(whole, tmp_path / "cut", cycles[0] + 2, tail=0)
     assert resume_mission(run, find_remains(run), stage=stage).outcome == "reached"
-    again = [entry.fields for record in read_records(run.journal) for entry in record.observed
+    again = [entry.fields for record in Timeline(run.journal).decisions() for entry in record.observed
              if entry.type in ("UserReport", "Redirection")]
     assert again == told
 
@@ -108,8 +108,8 @@ def test_what_if_it_had_been_otherwise_hears_the_page_again(tmp_path: Path, caps
     assert answer.result is not None and answer.result.outcome == "reached" and answer.result.error_m < 0.15
     out = RunDirectory(tmp_path / "other")
     what_if(RunDirectory(tmp_path / "run"), ["parlour/picture-1"], (), out=out)
-    told = [(entry.author, entry.fields["text"]) for record in read_records(out.journal) for entry in record.observed
-            if entry.type == "Redirection"]
+    told = [(entry.author, entry.fields["text"]) for record in Timeline(out.journal).decisions()
+            for entry in record.observed if entry.type == "Redirection"]
     assert told == [(PAGE, BACK)]
 
 

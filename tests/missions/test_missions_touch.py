@@ -18,7 +18,7 @@ from journals import logged
 from logs.explain.turning_points import read_turning_points
 from logs.explain.why import tell_stories
 from logs.recording.paths import CONTACTS, RANGES
-from logs.records import EntryRecord, read_records
+from logs.records import EntryRecord
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline
 from sim.scenario import parse_scenario
@@ -50,7 +50,7 @@ def touched(stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> tuple[Mis
 
 
 def observed(out: Path, kind: str) -> list[EntryRecord]:
-    records = read_records(RunDirectory(out).journal)
+    records = Timeline(RunDirectory(out).journal).decisions()
     return [entry for record in records for entry in record.observed if entry.type == kind]
 
 

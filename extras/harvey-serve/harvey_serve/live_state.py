@@ -9,7 +9,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
 from blackboard import Change, Decision, Discrepancy, Entry, Level, Retracted, highest
-from harvey.report.data import Lenses, placed, shrink
+from harvey.report.data import place_in_picture, placed, shrink
 from world_models import words
 from world_models.building.world import World
 from world_models.camera import Camera
@@ -45,7 +45,7 @@ class LiveState:
     """
 
     def __init__(self, world: World, camera: Camera) -> None:
-        self._world, self._lenses = world, Lenses(camera)
+        self._world, self._camera = world, camera
         self._new: SimpleQueue[Decision | Shown | str] = SimpleQueue()
         self._decisions: deque[Shown] = deque(maxlen=DECISIONS)
         self._milestones: dict[str, Milestone] = {}
@@ -146,7 +146,7 @@ class LiveState:
         elif isinstance(value, Segments):
             self._segments = entry
             if self._shows(value.frame):
-                self._lines = {"found": self._lenses.place(value.segments_px)}
+                self._lines = {"found": place_in_picture(value.segments_px, self._camera)}
         elif isinstance(value, LineMatch):
             self._match = entry
         elif isinstance(value, PoseFix):
@@ -172,7 +172,7 @@ class LiveState:
         match, seen = self._match, self._segments
         if (match is not None and seen is not None and fix.match == match.id and match.value.segments == seen.id
                 and self._shows(seen.value.frame)):
-            self._lines["agreed"] = self._lenses.place(match.value.segments_px[fix.inliers])
+            self._lines["agreed"] = place_in_picture(match.value.segments_px[fix.inliers], self._camera)
 
     def _shows(self, frame: str) -> bool:
         return self._frame is not None and self._frame.id == frame

@@ -36,9 +36,10 @@ from harvey.wiring import load_kinds
 from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.reads import find_building, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from logs.records import EntryRecord, decision_of, effect_of, read_records
+from logs.records import EntryRecord, decision_of, effect_of
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
+from logs.timeline import Timeline
 from sim.scenario import parse_scenario
 from sim.stage import Stage, build_stage
 from strategies import Note
@@ -82,8 +83,8 @@ def check_asked_for(decisions: Iterable[Mapping[str, Any]], left: Mapping[int, I
 
 
 def test_a_frame_that_nobody_asked_for_is_never_on_the_board(told_run: RunDirectory, lost_run: RunDirectory) -> None:
-    assert check_asked_for(record.data for record in read_records(told_run.journal)) == 3
-    assert check_asked_for(record.data for record in read_records(lost_run.journal)) > 8
+    assert check_asked_for(record.data for record in Timeline(told_run.journal).decisions()) == 3
+    assert check_asked_for(record.data for record in Timeline(lost_run.journal).decisions()) > 8
 
 
 @given(st.integers(0, 2**32))
@@ -92,7 +93,7 @@ def test_the_order_in_which_frames_arrive_does_not_change_decisions(lost_run: Ru
     """What the world answered in one cycle comes in another order, so the entries have other names."""
     agent = build_agent(RunHead.read(lost_run.path))
     originals, scheduler, random = open_originals(lost_run, agent.store), agent.scheduler(), Random(seed)
-    records, decided, most = list(read_records(lost_run.journal)), list[Any](), 0
+    records, decided, most = list(Timeline(lost_run.journal).decisions()), list[Any](), 0
     for record in records:
         frames = [i for i, entry in enumerate(record.observed) if entry.type == LocaleFrame.__name__]
         most = max(most, len(frames))

@@ -36,8 +36,9 @@ from harvey.simulation.simulated_run import resume_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, build
 from hidden_reasons import HidingView, describe, find_named, list_unnamed
 from knowledge_sources.settings import DEFAULT
-from logs.records import read_records, ref_of
+from logs.records import ref_of
 from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from rebuilt_board import CHANGES, SOURCES, copy_of, rebuild
 from recorded_runs import Recorded, cut_off
 from sim.stage import Stage
@@ -93,7 +94,7 @@ class Act(NamedTuple):
 def list_acts(name: str, run: RunDirectory, left: Counter[str]) -> Iterator[Act]:
     """Two acts of each source of which any are ``left`` to ask for."""
     by_source: dict[str, list[int]] = {}
-    for decision in read_records(run.journal):
+    for decision in Timeline(run.journal).decisions():
         if decision.chosen is not None:
             by_source.setdefault(decision.chosen.source, []).append(decision.cycle)
     asked = {cycles[k * len(cycles) // 2] for cycles in by_source.values() for k in range(2)}
@@ -116,7 +117,7 @@ def list_acts(name: str, run: RunDirectory, left: Counter[str]) -> Iterator[Act]
 def resumed(recorded: Recorded, short_stage: Stage, tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
     """A run that was cut off while a motor command was under way, and went on."""
     whole = recorded("office")
-    commands = [d.cycle for d in read_records(whole.journal) if any(e.type == "MotorCommand" for e in d.made)]
+    commands = [d.cycle for d in Timeline(whole.journal).decisions() if any(e.type == "MotorCommand" for e in d.made)]
     run = cut_off(whole, tmp_path_factory.mktemp("resumed") / "run", commands[2])
     run.recording.write_bytes(whole.recording.read_bytes()[:5000])
     assert resume_mission(run, find_remains(run), stage=short_stage).outcome == "reached"

@@ -164,7 +164,7 @@ def test_a_cycle_tells_all_that_is_pending_and_nothing_else(lines: list[str]) ->
 @LAWS
 @given(journals(), journals())
 def test_diff_finds_the_first_line_that_differs(ours: list[str], theirs: list[str]) -> None:
-    agreed, one, other = first_difference(iter(read(ours)), iter(read(theirs)))
+    agreed, one, other = first_difference(*(MemoryTimeline(read(lines)) for lines in (ours, theirs)))
     assert ours[:agreed] == theirs[:agreed]
     if one is None and other is None:
         assert ours == theirs

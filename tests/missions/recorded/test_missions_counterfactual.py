@@ -15,8 +15,9 @@ from harvey.errors import BadInput
 from harvey.replay.counterfactual import what_if
 from harvey.simulation.simulated_run import build_head, run_mission
 from knowledge_sources.settings import list_rows
-from logs.records import DecisionRecord, read_records
+from logs.records import DecisionRecord
 from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from recorded_runs import Recorded
 from sim.stage import Stage
 
@@ -38,7 +39,7 @@ def rests_on(records: list[DecisionRecord], landmark: str) -> int:
 @pytest.mark.parametrize("landmark", [SEEN, BEHIND, FAR])
 def test_without_a_landmark_only_decisions_change_that_rest_on_it(run: RunDirectory, landmark: str) -> None:
     """Law: before the first decision that names it all are the same to the byte; one never named changes none."""
-    records = list(read_records(run.journal))
+    records = list(Timeline(run.journal).decisions())
     answer = what_if(run, [landmark], (), go_on=False)
     assert answer.agreed >= rests_on(records, landmark)
     if rests_on(records, landmark) == len(records):
@@ -48,7 +49,7 @@ def test_without_a_landmark_only_decisions_change_that_rest_on_it(run: RunDirect
 
 
 def test_one_landmark_is_rested_on_and_two_are_not(run: RunDirectory) -> None:
-    records = list(read_records(run.journal))
+    records = list(Timeline(run.journal).decisions())
     waits = [record.cycle for record in records[:8] if any(e.type == "FrameRequest" for e in record.made)]
     assert rests_on(records, SEEN) == 3 + len(waits) == 8  # that it is looked for, what is expected, and the verdict
     assert rests_on(records, BEHIND) == rests_on(records, FAR) == len(records)
@@ -70,7 +71,7 @@ def test_a_setting_set_to_its_default_changes_nothing(run: RunDirectory, name: s
     ("plan.max_leg_m", "1.5"), ("action.creep_speed_m_per_s", "0.05")])
 def test_a_setting_of_any_room_changes_decisions(run: RunDirectory, name: str, value: str) -> None:
     answer = what_if(run, (), [(name, value)], go_on=False)
-    assert answer.now is not None and answer.agreed < len(list(read_records(run.journal)))
+    assert answer.now is not None and answer.agreed < len(list(Timeline(run.journal).decisions()))
 
 
 def test_a_run_with_other_settings_is_decided_again_with_them(
@@ -96,7 +97,7 @@ def test_without_an_expert_the_simulated_robot_goes_on_by_itself(
         colours = set(map(tuple, np.asarray(picture.convert("RGB")).reshape(-1, 3).tolist()))
     assert {(0x00, 0x63, 0xA0), (0xB3, 0x24, 0x0F)} <= colours
     assert "as recorded:              reached" in printed and "the simulated robot went on by itself" in printed
-    records, others = (list(read_records(d / "journal.jsonl")) for d in (run.path, out))
+    records, others = (list(Timeline(d / "journal.jsonl").decisions()) for d in (run.path, out))
     assert not any(e.author == "correlator_tracker" for record in others for e in record.made)
     same = next(n for n, (a, b) in enumerate(zip(records, others, strict=False)) if a.line != b.line)
     assert same > 3
@@ -142,9 +143,8 @@ def test_nothing_is_lost_where_the_question_cannot_be_answered(
 def test_where_it_parts_the_record_no_longer_answers(run: RunDirectory) -> None:
     answer = what_if(run, (), [("action.creep_speed_m_per_s", "0.05")], go_on=False)
     assert answer.outcome.kind == "unfinished"
-    assert answer.parting is not None and answer.parting.now is not None and answer.parting.then is not None
-    parted = answer.parting.then, answer.parting.now
-    then, now = ([e.fields for e in d.made if e.type == "MotorCommand"] for d in parted)
+    assert answer.parting is not None
+    then, now = ([e.fields for e in d.made if e.type == "MotorCommand"] for d in answer.parting if d is not None)
     assert then != now
 
 

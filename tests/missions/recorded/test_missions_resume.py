@@ -22,8 +22,9 @@ from journals import read_decisions
 from logs import disk
 from logs.pictures import open_pictures
 from logs.reader import damage_of, read_frames
-from logs.records import DecisionRecord, read_records
+from logs.records import DecisionRecord
 from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from recorded_runs import Recorded, cut_off, is_decided_again
 from sim.stage import Stage
 
@@ -54,21 +55,21 @@ def made_by(records: list[DecisionRecord], kind: str, which: int) -> int:
 
 def answered(run: RunDirectory) -> list[str]:
     """The motor commands, once for each report on them."""
-    return [record.because[0] for decision in read_records(run.journal) for record in decision.observed
+    return [record.because[0] for decision in Timeline(run.journal).decisions() for record in decision.observed
             if record.type == "MotionReport"]
 
 
 def test_where_no_motion_was_broken_off_it_is_as_if_nothing_had_been(
     whole: RunDirectory, short_stage: Stage, tmp_path: Path
 ) -> None:
-    records = list(read_records(whole.journal))
+    records = list(Timeline(whole.journal).decisions())
     before = made_by(records, "PictureRequest", 2)
     run = cut(whole, tmp_path / "run", before)
     assert go_on(run, short_stage).outcome == "reached"
-    first, second = ([r.data for r in read_records(d.journal)] for d in (whole, run))
+    first, second = ([r.data for r in Timeline(d.journal).decisions()] for d in (whole, run))
     assert first[:before] == second[:before]
     assert first[before + 1:] == second[before + 1:]
-    told = [e for e in read_records(run.journal) for e in e.observed if e.type == "Resumed"]
+    told = [e for e in Timeline(run.journal).decisions() for e in e.observed if e.type == "Resumed"]
     assert [(e.cycle, e.author, e.fields["interrupted"]) for e in told] == [(before + 1, "resume", [])]
     assert run.camera.read_bytes() == whole.camera.read_bytes()
     assert is_decided_again(run)
@@ -80,10 +81,10 @@ def test_a_motion_that_nobody_reported_on_is_not_carried_out_again(
     whole: RunDirectory, short_stage: Stage, tmp_path: Path
 ) -> None:
     """Cut off twice, each time while a motor command is under way: the wheels are asked how far it went."""
-    before = made_by(list(read_records(whole.journal)), "MotorCommand", 2)
+    before = made_by(list(Timeline(whole.journal).decisions()), "MotorCommand", 2)
     run = cut(whole, tmp_path / "once", before)
     assert go_on(run, short_stage).outcome == "reached"
-    records = list(read_records(run.journal))
+    records = list(Timeline(run.journal).decisions())
     command = next(e for e in records[before - 1].made if e.type == "MotorCommand")
     resumed, report = records[before].observed
     assert (resumed.type, resumed.fields["interrupted"], resumed.because) == ("Resumed", [command.ref], (command.ref,))
@@ -95,7 +96,7 @@ def test_a_motion_that_nobody_reported_on_is_not_carried_out_again(
 
     again = cut(run, tmp_path / "twice", made_by(records, "MotorCommand", 4))
     assert go_on(again, short_stage).outcome == "reached"
-    assert sum(e.type == "Resumed" for r in read_records(again.journal) for e in r.observed) == 2
+    assert sum(e.type == "Resumed" for r in Timeline(again.journal).decisions() for e in r.observed) == 2
     assert len(answered(again)) == len(set(answered(again)))
     assert is_decided_again(again)
 
@@ -157,7 +158,7 @@ def test_the_disk_is_forced_where_a_port_is_real_or_it_is_asked_for(
     stage = replace(short_stage, scenario=replace(scenario, limits=replace(scenario.limits, max_cycles=24)))
     run_mission(stage, SEED, out=tmp_path / "run", body=body, sync=sync)
     assert bool(forced) == forces
-    made_by(list(read_records(tmp_path / "run" / "journal.jsonl")), "MotorCommand", 0)
+    made_by(list(Timeline(tmp_path / "run" / "journal.jsonl").decisions()), "MotorCommand", 0)
 
 
 def test_two_processes_do_not_write_one_run(

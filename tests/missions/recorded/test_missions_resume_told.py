@@ -8,8 +8,9 @@ import pytest
 
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import resume_mission
-from logs.records import DecisionRecord, read_records
+from logs.records import DecisionRecord
 from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from recorded_runs import TOLD, Recorded, cut_off, is_decided_again
 from sim.stage import Stage
 from two_doors import two_doors
@@ -26,7 +27,7 @@ def whole(recorded: Recorded) -> RunDirectory:
 
 
 def records_of(run: RunDirectory) -> list[DecisionRecord]:
-    return list(read_records(run.journal))
+    return list(Timeline(run.journal).decisions())
 
 
 def told_in(records: list[DecisionRecord]) -> list[tuple[int, str]]:

@@ -6,6 +6,7 @@ import json
 import math
 import re
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -149,7 +150,7 @@ def test_the_story_of_a_replayed_run_is_the_same(told: tuple[str, Path], story: 
 
 def test_as_json_it_is_whole(told: tuple[str, Path], story: RunStory, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["story", str(told[1]), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(story.record()))
+    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(asdict(story)))
 
 
 def test_what_it_says_of_the_truth_comes_from_the_result_alone(told: tuple[str, Path], tmp_path: Path) -> None:

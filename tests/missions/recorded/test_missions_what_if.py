@@ -12,8 +12,9 @@ from harvey.cli import main
 from harvey.replay.counterfactual import Answer, what_if
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import build_head, resume_mission, run_mission
-from logs.records import EntryRecord, read_records
+from logs.records import EntryRecord
 from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from recorded_runs import Recorded
 from sim.stage import Stage
 
@@ -34,7 +35,8 @@ def without(run: RunDirectory, tmp_path_factory: pytest.TempPathFactory) -> tupl
 
 def told(run: RunDirectory) -> list[EntryRecord]:
     """What the run was told by what if."""
-    return [entry for record in read_records(run.journal) for entry in record.observed if entry.author == "what if"]
+    return [entry for record in Timeline(run.journal).decisions() for entry in record.observed
+            if entry.author == "what if"]
 
 
 def is_replayed(run: RunDirectory, capsys: pytest.CaptureFixture[str]) -> bool:
@@ -54,16 +56,17 @@ def test_a_landmark_that_is_taken_away_is_a_revision_of_its_locales_frame(
     assert revision.fields["locale"] == "allens-office"
     assert revision.fields["changes"] == [
         {"what": "removed", "name": DESK, "by": "what if", "footprint": [], "height_m": 0.0}]
-    observed = next(r.observed for r in read_records(other.journal) if revision in r.observed)
+    observed = next(r.observed for r in Timeline(other.journal).decisions() if revision in r.observed)
     assert f"{frame}.0" in [entry.ref for entry in observed]
-    expects = [json.dumps(e.fields) for r in read_records(other.journal) for e in r.made if e.type == "Milestone"]
+    expects = [json.dumps(e.fields) for r in Timeline(other.journal).decisions() for e in r.made
+               if e.type == "Milestone"]
     assert expects and not any(DESK in text for text in expects)
     assert not told(run)
 
 
 def test_acts_use_the_revision_and_never_the_frame_before_it(without: tuple[RunDirectory, Answer]) -> None:
     (revision,) = told(without[0])
-    used = {ref for record in read_records(without[0].journal) for ref in record.used}
+    used = {ref for record in Timeline(without[0].journal).decisions() for ref in record.used}
     assert revision.ref in used and f"{revision.id}.0" not in used
 
 
@@ -81,7 +84,7 @@ def test_it_is_resumed(
     """Cut off before the frame was there, after it was asked for, and long after that."""
     whole, cut = without[0], RunDirectory(tmp_path / "cut")
     cut.path.mkdir()
-    pictures = sum(entry.fields["jpeg"]["bytes"] for record in list(read_records(whole.journal))[:decisions]
+    pictures = sum(entry.fields["jpeg"]["bytes"] for record in list(Timeline(whole.journal).decisions())[:decisions]
                    for entry in record.observed if entry.type == "CameraPicture")
     (cut.path / "run.json").write_bytes((whole.path / "run.json").read_bytes())
     (cut.path / "camera.mjpeg").write_bytes((whole.path / "camera.mjpeg").read_bytes()[:pictures])
@@ -105,7 +108,7 @@ def test_another_question_is_asked_of_it(without: tuple[RunDirectory, Answer]) -
     """What was taken away already stays away, and is no difference."""
     answer = what_if(without[0], ["allens-office/bookshelf-1"], (), go_on=False)
     assert (answer.then, answer.now, answer.outcome.kind) == (None, None, "reached")
-    assert answer.agreed == len(list(read_records(without[0].journal)))
+    assert answer.agreed == len(list(Timeline(without[0].journal).decisions()))
 
 
 def test_a_camera_that_is_believed_to_be_tilted_makes_another_run(
@@ -119,7 +122,7 @@ def test_a_camera_that_is_believed_to_be_tilted_makes_another_run(
     (revision,) = told(out)
     assert (revision.ref, revision.cycle, revision.because) == ("CameraState-1.1", 1, ("CameraState-1.0",))
     assert revision.fields["mount"]["tilt_rad"] == pytest.approx(math.radians(0.3))
-    used = {ref for record in read_records(out.journal) for ref in record.used}
+    used = {ref for record in Timeline(out.journal).decisions() for ref in record.used}
     assert "CameraState-1.1" in used and "CameraState-1.0" not in used
     assert json.loads((out.path / "run.json").read_text("utf-8"))["constants"] == [["camera.tilt_deg", "0.3"]]
     assert is_replayed(out, capsys)
@@ -141,5 +144,6 @@ def test_what_is_set_of_a_new_run_changes_what_is_believed_and_not_what_is_true(
     assert [entry.ref for entry in told(out)] == ["Wheels-1.1", "Footprint-1.1"]
     (then, now) = (json.loads((one.path / "run.json").read_text("utf-8")) for one in (run, out))
     assert (then["scenario"], then["robot"]) == (now["scenario"], now["robot"])
-    longest = max(e.fields["move_m"] for r in read_records(out.journal) for e in r.made if e.type == "MotorCommand")
+    longest = max(e.fields["move_m"] for r in Timeline(out.journal).decisions() for e in r.made
+                  if e.type == "MotorCommand")
     assert longest <= 0.5 / (228.3 / 240.0) + 1e-9

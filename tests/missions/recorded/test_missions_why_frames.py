@@ -120,7 +120,7 @@ def test_what_was_pending_is_known_where_acts_wait(history: Timeline) -> None:
         assert len(found) == decision.pending + (chosen is not None and decision.asks is None)
         assert chosen is None or found[0].number == chosen.number
     acted = [one for one in in_run(history, "interpreter") if one.fate is Fate.ACTED]
-    assert [one.why for one in acted] == ["it made Hypothesis-1.0, Goal-1.0"]
+    assert [one.why for one in acted] == ["it was the best there was, rated 1.00"]
 
 
 def test_a_sketch_drawn_anew_goes_back_to_what_was_told(run: RunDirectory, history: Timeline) -> None:

@@ -171,9 +171,9 @@ def test_the_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> Non
     (b"\xff\xfe", "journal.jsonl:2"),
     ('{"cycle": 2}', "'focus'"),
     (json.dumps({**DECISION, "cycle": "two"}), "cycle"),
-    (json.dumps({**DECISION, "made": [3]}), "'change'"),
-    (json.dumps({**DECISION, "seen": [3]}), "seen"),
-    (json.dumps({**DECISION, "chosen": {"number": 1}}), "'source'"),
+    (json.dumps({**DECISION, "cycle": 2, "made": [3]}), "'change'"),
+    (json.dumps({**DECISION, "cycle": 2, "seen": [3]}), "seen"),
+    (json.dumps({**DECISION, "cycle": 2, "chosen": {"number": 1}}), "'source'"),
     ("[" * 100_000, "journal.jsonl:2"),
 ])
 def test_a_corrupt_line_of_a_journal_is_named(

@@ -25,7 +25,8 @@ from journals import read_decisions, read_journal
 from logs.decided_by import arithmetic, deciding_code
 from logs.disk import Appended
 from logs.explain.phrases import sentence
-from logs.records import entry_of, read_records
+from logs.records import entry_of
+from logs.timeline import Timeline
 from world_models import words
 from world_models.files.toml.mission import ROOT
 from world_models.frames import Pose2
@@ -90,7 +91,7 @@ def test_an_unknown_entry_is_answered_with_near_ones(run: Path, capsys: pytest.C
 
 
 def test_every_kind_of_entry_has_its_own_sentence(run: Path) -> None:
-    records = [r for d in read_records(run / "journal.jsonl") for r in (*d.observed, *d.made)]
+    records = [r for d in Timeline(run / "journal.jsonl").decisions() for r in (*d.observed, *d.made)]
     assert len({r.type for r in records}) >= 15
     for record in records:
         said = words.sentence(entry_of(record, load_kinds()).value)
@@ -159,7 +160,7 @@ def test_a_run_that_was_cut_off_says_so_first(run: Path, tmp_path: Path, capsys:
     assert main(["why", cut, "--json"]) == 0
     told = capsys.readouterr()
     assert "cut off in cycle 20" in told.err
-    assert json.loads(told.out)[0]["entry"]
+    assert json.loads(told.out)[0]["ref"]
     for asked in ([str(run)], [cut, "CameraPicture-1"], [cut, "--at", "3"]):
         assert main(["why", *asked]) == 0
         assert "cut off" not in "".join(capsys.readouterr())
@@ -288,7 +289,7 @@ def test_the_check_foresees_the_milestones_that_come(run: Path, capsys: pytest.C
     rows = [line for line in out.splitlines() if line.endswith("clear")]
     assert len(rows) >= 10
     assert "ends: reached" in out
-    came = [r.fields for d in read_records(run / "journal.jsonl") for r in d.made
+    came = [r.fields for d in Timeline(run / "journal.jsonl").decisions() for r in d.made
             if r.type == "Milestone" and r.fields["status"] == "verified"]
     assert len(came) >= 2
     for row, milestone in zip(rows, came, strict=False):
