@@ -190,8 +190,7 @@ def _read(content: str | bytes, path: Path) -> str:
 
 
 def _compile_world(folder: Path) -> bytes:
-    (folder / "sound.toml").write_text(SMALL, encoding="utf-8")
-    compile_file(folder / "sound.toml", folder / "sound.world")
+    compile_file(Path(__file__).with_name("malformed_small.toml"), folder / "sound.world")
     return (folder / "sound.world").read_bytes()
 
 
