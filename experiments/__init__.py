@@ -51,6 +51,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
     "robustness": {
         "crash": "Missions killed at random moments and resumed",
         "imported-building": "Missions between the rooms of a house from IFC",
+        "integrity": "One fault a mission: is a pose as near as it says?",
         "kidnap": "Kidnaps to anywhere on generated floors of 40 rooms",
         "malformed-worlds": "World and building files with errors put in",
         "missions": "1,000 missions without trouble and 1,000 with",

@@ -6,14 +6,18 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Self, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, Self, TypeVar
 
 from blackboard import Decision, Sink
 from experiments.report import Cell, Claim, Report
 from experiments.trials import RESULTS, at_least, at_most, campaign_folder, judge_rare, judge_share, run_trials
+from harvey.agent import build_agent
 from harvey.campaign.mission_task import Task, run_task
 from harvey.runner.result import MissionResult
+from harvey.simulation.simulated_run import SimulatedRun
 from knowledge_sources.methods.belief import to_probability
+from logs.run_recorder import RunRecorder
+from sim.body.simulated_body import SimulatedBody
 from sim.ground_truth.table import TrueDoor
 from world_models.entries import DoorState
 
@@ -66,6 +70,25 @@ def drive_task(task: Task, *sinks: Sink) -> Mission:
     """Drive a mission in the simulator, which alone knows the truth."""
     beliefs = DoorBeliefs(task.load().truth.doors)
     return Mission(run_task(task, sinks=[*sinks, beliefs]), beliefs.shut)
+
+
+class Beside(Protocol):
+    """A sink that is given the body, and with it the truth, before the first decision."""
+
+    body: SimulatedBody | None
+
+    def __call__(self, decision: Decision, /) -> None: ...
+
+
+def drive_beside(task: Task, witness: Beside) -> Mission:
+    """Drive a mission with somebody who compares what is decided with the truth."""
+    stage = task.stage()
+    head, beliefs = task.head(stage), DoorBeliefs(stage.scenario.truth.doors)
+    agent = build_agent(head)
+    recorder = RunRecorder(None, head, agent.world, agent.robot)
+    with SimulatedRun(stage, head, agent, recorder, [witness, beliefs]) as driving:
+        witness.body = driving.simulated_body
+        return Mission(driving.drive(None), beliefs.shut)
 
 
 @dataclass(frozen=True, slots=True)

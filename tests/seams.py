@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from experiments.generated.scenes import box_room
+from box_rooms import box_room
 from fake_cases import fake_cases, work_on
 from harvey.campaign.workers import CaseAnswer, ClusterWorkers, Killed
 from harvey.commands.command import CliCommand, add_parser

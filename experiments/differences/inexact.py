@@ -17,14 +17,11 @@ import numpy as np
 
 from blackboard import Decision
 from experiments import drives
-from experiments.drives import DoorBeliefs, Driven, End, Mission, Trial
+from experiments.drives import Driven, End, Trial
 from experiments.generated.missions import WHEELS_WORSE, write_inexact_mission
 from experiments.report import Cell, Claim, Report
 from experiments.trials import at_most, judge_rare
-from harvey.agent import build_agent
 from harvey.campaign.mission_task import Task
-from harvey.simulation.simulated_run import SimulatedRun, build_head
-from logs.run_recorder import RunRecorder
 from sim.body.simulated_body import SimulatedBody
 from sim.ground_truth.inexact import EXACT, TrueInexact
 from world_models.entries import Certificate, PoseFix
@@ -99,16 +96,10 @@ def drive(trial: Trial) -> InexactEnd:
     with TemporaryDirectory() as folder:
         path = write_inexact_mission(Path(folder), trial.seed, TRUTHS[trial.row], stated_m=sigma_m,
                                      more="" if sigma_m else WHEELS_WORSE)
-        stage = Task(str(path), (), trial.seed).stage()
-        head, beliefs = build_head(stage, trial.seed), DoorBeliefs(stage.scenario.truth.doors)
-        agent = build_agent(head)
-        recorder = RunRecorder(None, head, agent.world, agent.robot)
-        with SimulatedRun(stage, head, agent, recorder, [witness, beliefs]) as driving:
-            witness.body = driving.simulated_body
-            result = driving.drive(None)
+        mission = drives.drive_beside(Task(str(path), (), trial.seed), witness)
     most_m = math.hypot(MAX_ERROR_M, MODEL_SIGMAS * sigma_m)
     wrong = sum(off_m > most_m or (turn > MAX_ERROR_RAD and chi2 > CHI2_9999) for off_m, turn, chi2 in witness.errors)
-    return InexactEnd.of(trial, Mission(result, beliefs.shut), chi2=[chi2 for *_, chi2 in witness.errors], wrong=wrong)
+    return InexactEnd.of(trial, mission, chi2=[chi2 for *_, chi2 in witness.errors], wrong=wrong)
 
 
 def _held(ends: Sequence[InexactEnd]) -> tuple[int, int]:

@@ -238,14 +238,10 @@ class Witness:
     def _note_motion(self, value: PictureRequest | MotorCommand) -> None:
         if isinstance(value, PictureRequest) and value.purpose != "floor":
             return
-        motion = "look" if isinstance(value, PictureRequest) else _name_motion(value)
+        motion = "look" if isinstance(value, PictureRequest) else "creep" if value.is_creeping else "go"
         needless = motion != "go" and self._at is not None and self.lacking.is_needless(*self._at)
         self.motions.append(motion)
         self.needless.append(motion if needless else "go")
-
-
-def _name_motion(command: MotorCommand) -> str:
-    return "creep" if command.is_creeping else "go"
 
 
 def drive(trial: Trial) -> ObstacleEnd:

@@ -42,7 +42,9 @@ def run(quick: bool, seed: int) -> Report:
     sigmas = np.array([c.deviations for c in calibrations])
     relative = errors / sigmas
     shares = [float(np.mean(np.abs(relative) <= k)) for k in (1, 2, 3)]
-    rows = [_row(*cells) for cells in zip(PARAMETERS, truth, errors.T, sigmas.T, relative.T, strict=False)]
+    rows: list[tuple[Cell, ...]] = [
+        (name, float(true), float(np.mean(error)), float(np.mean(sigma)), float(_rms(off)))
+        for name, true, error, sigma, off in zip(PARAMETERS, truth, errors.T, sigmas.T, relative.T, strict=False)]
     rows += [(f"within {k} sigma", f"{100 * n:.1f} %", f"{100 * s:.1f} %", None, None)
              for k, n, s in zip((1, 2, 3), NORMAL, shares, strict=True)]
     noise = float(np.mean([c.rms_px for c in calibrations]) / math.sqrt(2.0))
@@ -77,10 +79,6 @@ def _calibrate(renderer: Renderer, optics: Optics, seed: int) -> Calibration:
         if isinstance(view, BoardView):
             views.append(view)
     return calibrate(views, PATTERN, (CAMERA.width, CAMERA.height))
-
-
-def _row(name: str, true: float, errors: Floats, sigma: Floats, relative: Floats) -> tuple[Cell, ...]:
-    return name, float(true), float(np.mean(errors)), float(np.mean(sigma)), float(_rms(relative))
 
 
 def _rms(values: Floats) -> Floats:

@@ -114,8 +114,8 @@ def _compute_coverage(model: Array, segments: Array) -> float:
 
 def _rows(test: Perturbation, trials: Sequence[Trial]) -> list[tuple[Cell, ...]]:
     recovered = [t for t in trials if t.recovered]
-    theirs = f"{_share([t.peer_recovered for t in trials]):.1%}" if Peer.find() else NOT_INSTALLED
-    papers = f"{_share([t.paper_recovered for t in trials]):.1%}"
+    theirs = f"{np.mean([t.peer_recovered for t in trials]):.1%}" if Peer.find() else NOT_INSTALLED
+    papers = f"{np.mean([t.paper_recovered for t in trials]):.1%}"
     median = tuple(float(np.median([getattr(t, name) for t in trials])) for name in ("shift_steps", "turn_rad"))
     missed = len(trials) - len(recovered)
     known = f"{missed - sum(1 for t in trials if t.is_false_accept)} of {missed}"
@@ -123,14 +123,10 @@ def _rows(test: Perturbation, trials: Sequence[Trial]) -> list[tuple[Cell, ...]]
         (f"{test.name}: recovered", papers, theirs, f"{len(recovered) / len(trials):.1%} of {len(trials)}"),
         (f"{test.name}: median error", None, None, f"{median[0]:.4f} step, {math.degrees(median[1]):.3f} deg"),
         (f"{test.name}: recovered and verified", None, None,
-         f"{_share([t.recovered and t.is_verified for t in trials]):.1%}"),
+         f"{np.mean([t.recovered and t.is_verified for t in trials]):.1%}"),
         (f"{test.name}: failures not verified", None, None, known),
-        (f"{test.name}: wrong and verified", None, None, f"{_share([t.is_false_accept for t in trials]):.2%}"),
+        (f"{test.name}: wrong and verified", None, None, f"{np.mean([t.is_false_accept for t in trials]):.2%}"),
     ]
-
-
-def _share(held: Sequence[bool]) -> float:
-    return sum(1 for h in held if h) / len(held)
 
 
 def _notes(data: Corridor, seed: int, folder: Path) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,16 +132,16 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
 def _row(name: str, found: Sequence[CaseResult]) -> tuple[Cell, ...]:
     unique = [r for r in found if r.is_unique]
     return (
-        name, len(found), _count(r.is_silently_wrong for r in found), len(unique),
-        _count(r.is_verified for r in unique), _count(r.is_verified for r in found),
-        _count(r.verdict == PoseVerdict.NOT_TESTABLE.value for r in found),
-        _count(_is_refuted_though_right(r) for r in found))
+        name, len(found), sum(r.is_silently_wrong for r in found), len(unique),
+        sum(r.is_verified for r in unique), sum(r.is_verified for r in found),
+        sum(r.verdict == PoseVerdict.NOT_TESTABLE.value for r in found),
+        sum(_is_refuted_though_right(r) for r in found))
 
 
 def _claims(found: Sequence[CaseResult], *, quick: bool) -> tuple[Claim, ...]:
     """What must hold; few cases cannot show how many unique ones are verified."""
-    wrong, unique = _count(r.is_silently_wrong for r in found), [r for r in found if r.is_unique]
-    refuted, verified = _count(_is_refuted_though_right(r) for r in found), _count(r.is_verified for r in unique)
+    wrong, unique = sum(r.is_silently_wrong for r in found), [r for r in found if r.is_unique]
+    refuted, verified = sum(_is_refuted_though_right(r) for r in found), sum(r.is_verified for r in unique)
     claims: list[Claim] = [
         (f"silently wrong at most 0.1%: {wrong} of {len(found)}, with 95 % confidence below"
          f" {at_most(wrong, len(found)):.2%}", judge_rare(wrong, len(found), MAX_WRONG)),
@@ -174,7 +174,3 @@ def _notes(seed: int, results: str) -> tuple[str, ...]:
 
 def _is_refuted_though_right(result: CaseResult) -> bool:
     return result.verdict == PoseVerdict.REFUTED.value and result.is_right
-
-
-def _count(held: Iterable[bool]) -> int:
-    return sum(1 for h in held if h)

@@ -26,7 +26,6 @@ import numpy as np
 from tqdm import tqdm
 
 from experiments.report import Report
-from experiments.robustness.malformed_texts import GML, IFC, SMALL
 from harvey.campaign.workers import Killed, map_cases
 from harvey.errors import BadInput
 from world_models.building.checks import check_world
@@ -38,6 +37,9 @@ CHUNK, QUICK_CHUNK = 100, 20
 """Files per trial of a worker."""
 IFC_EVERY = 50
 """One file of this many is IFC: reading one takes a process of its own."""
+SMALL, GML, IFC = (Path(__file__).with_name(f"malformed_small.{kind}").read_text("utf-8")
+                   for kind in ("toml", "gml", "ifc"))
+"""Small valid files that use what the loader and the importers read: a world, an IndoorGML and an IFC building."""
 LIMIT_S = 30.0
 """Time limit of a file, generous for a busy machine."""
 
@@ -188,8 +190,7 @@ def _read(content: str | bytes, path: Path) -> str:
 
 
 def _compile_world(folder: Path) -> bytes:
-    (folder / "sound.toml").write_text(SMALL, encoding="utf-8")
-    compile_file(folder / "sound.toml", folder / "sound.world")
+    compile_file(Path(__file__).with_name("malformed_small.toml"), folder / "sound.world")
     return (folder / "sound.world").read_bytes()
 
 

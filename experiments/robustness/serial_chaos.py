@@ -272,32 +272,28 @@ def run_trial(protocol: str, rng: np.random.Generator, findings: Findings, comma
 
 def _report(findings: dict[str, Findings], seed: int) -> Report:
     each = [findings[protocol] for protocol in PROTOCOLS]
-    rows = (
-        _row("messages, both ways", [f.frames for f in each]),
-        _row("of them with errors", [sum(f.noise.values()) for f in each]),
-        _row("line broken; host died; base lost power", [f"{f.cuts}; {f.deaths}; {f.blackouts}" for f in each]),
-        _row("different states in which the line broke", [len(f.states) for f in each]),
-        _row("motions commanded; reported done", [f"{f.asked}; {f.done}" for f in each]),
-        _row("faults raised", [sum(f.faults.values()) for f in each]),
-        _row("commands accepted but never sent", [f.forged for f in each]),
-        _row("motions more than 2 cm or 2 degrees beyond the command", [f.strays for f in each]),
-        _row("largest excess over a command [m]", [f.beyond_m for f in each]),
-        _row("largest excess over a command [degrees]", [math.degrees(f.beyond_rad) for f in each]),
-        _row("reports overtaken by a late command", [f.overtaken for f in each]),
-        _row("restarted by noise after a stop", [f.restarted for f in each]),
-        _row("stops required; not in time", [f"{f.stops}; {f.late}" for f in each]),
-        _row("of them, base unreachable", [f.unreachable for f in each]),
-        _row("largest distance it ran on then, in 1 s and until reached [m]", [f.ran_on_m for f in each]),
-        _row("set to another baud rate by noise", [f.deafened for f in each]),
-        _row("longest call [s]", [f.longest_s for f in each]),
-        _row("recovered when the line was good again", [f"{f.resumed} of {f.ended}" for f in each]),
+    rows: tuple[tuple[Cell, ...], ...] = (
+        ("messages, both ways", *[f.frames for f in each]),
+        ("of them with errors", *[sum(f.noise.values()) for f in each]),
+        ("line broken; host died; base lost power", *[f"{f.cuts}; {f.deaths}; {f.blackouts}" for f in each]),
+        ("different states in which the line broke", *[len(f.states) for f in each]),
+        ("motions commanded; reported done", *[f"{f.asked}; {f.done}" for f in each]),
+        ("faults raised", *[sum(f.faults.values()) for f in each]),
+        ("commands accepted but never sent", *[f.forged for f in each]),
+        ("motions more than 2 cm or 2 degrees beyond the command", *[f.strays for f in each]),
+        ("largest excess over a command [m]", *[f.beyond_m for f in each]),
+        ("largest excess over a command [degrees]", *[math.degrees(f.beyond_rad) for f in each]),
+        ("reports overtaken by a late command", *[f.overtaken for f in each]),
+        ("restarted by noise after a stop", *[f.restarted for f in each]),
+        ("stops required; not in time", *[f"{f.stops}; {f.late}" for f in each]),
+        ("of them, base unreachable", *[f.unreachable for f in each]),
+        ("largest distance it ran on then, in 1 s and until reached [m]", *[f.ran_on_m for f in each]),
+        ("set to another baud rate by noise", *[f.deafened for f in each]),
+        ("longest call [s]", *[f.longest_s for f in each]),
+        ("recovered when the line was good again", *[f"{f.resumed} of {f.ended}" for f in each]),
     )
     return Report("Drivers of bases over bad serial lines", ("what", *PROTOCOLS), rows, _notes(seed),
                   _claims(findings) + tuple((violation, False) for f in each for violation in f.violations[:5]))
-
-
-def _row(what: str, cells: list[int] | list[str] | list[float]) -> tuple[Cell, ...]:
-    return (what, *cells)
 
 
 def _notes(seed: int) -> tuple[str, ...]:

@@ -150,8 +150,7 @@ SETTINGS = CliCommand(
 
 def _add_experiment_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("experiment", metavar="NAME", help="which one; harvey list names them")
-    parser.add_argument("--quick", action="store_true",
-                        help="a small version, of seconds to two minutes; it claims only what it can show")
+    parser.add_argument("--quick", action="store_true", help="a small one, of seconds to minutes: claims what it can")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.add_argument("--seed", metavar="N", type=whole, default=0, help="of all random numbers (0)")
     parser.add_argument("--out", metavar="FILE.json", help="also write the claims there, with date, commit and options")
@@ -196,9 +195,10 @@ EXPERIMENT = CliCommand(
     "Exit code 0 if no claim fails, else 1. With --json one object is printed: title, rows (the cells by\n"
     "their columns; beside them paper, peer and ours: a figure, several by name, or null), notes and claims.\n\n"
     "Long ones keep their results and pictures in runs/experiments/NAME/; one that was interrupted continues there.\n"
-    "Peers (PoseLib, CLIPS, py_trees) are installed by pip install '.[peers]'; buildings of other programs need\n"
-    "pip install ./extras/harvey-buildings. Photographs and buildings by\n"
-    "others are not shipped: HARVEY_DATA=FOLDER names a folder with corridor/ and buildings/.\n\n"
+    "Peers (PoseLib, CLIPS, py_trees): pip install '.[peers]'; for others' buildings ./extras/harvey-buildings.\n"
+    "Photographs and buildings by others are not shipped: HARVEY_DATA=FOLDER has corridor/ and buildings/.\n\n"
+    "Of integrity: PL, protection level: no further off, says a pose. AL, alert limit: what a mission can bear.\n"
+    "MI, misleading: error > PL. HMI, hazardously so: error > AL >= PL. Available: PL <= AL.\n\n"
     "Names, by what is asked (harvey list says more):\n"
     + "\n".join(fill(", ".join(group), 100, initial_indent=f"  {folder:<12}", subsequent_indent=" " * 14,
                      break_on_hyphens=False)

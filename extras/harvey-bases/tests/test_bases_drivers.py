@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from experiments.generated.scenes import box_room
+from box_rooms import box_room
 from harvey.hardware.bases import base_kinds
 from harvey.simulation.serial_body import emulator_kinds
 from harvey_bases import p2os_emulator

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.robustness.malformed_texts import GML
-from experiments.robustness.malformed_worlds import CORRUPTIONS, judge_file
+from experiments.robustness.malformed_worlds import CORRUPTIONS, GML, judge_file
 
 
 def test_the_text_is_sound_before_it_is_spoilt(tmp_path: Path) -> None:

@@ -14,9 +14,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from experiments.generated.floors import ScanNoise, write_floor_map
 from harvey.cli import main
 from harvey_buildings import BuildingError, import_building, read_plan
+from harvey_buildings.experiments.scanned_map import ScanNoise, write_floor_map
 from harvey_buildings.ros_map import find_wall_turn, make_grid
 from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN, MapFile, read_cells, read_map_yaml
 from world_models.building.checks import check_world

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from experiments.robustness.malformed_texts import GML, IFC
+from experiments.robustness.malformed_worlds import GML, IFC
 from harvey_buildings import BuildingError, import_building
 from harvey_buildings.ifc import ReadingProgress, await_answer
 from world_models.building.checks import check_world

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from experiments.generated.scenes import Patch, PatchFace, box_faces, box_room
+from box_rooms import box_faces, box_room
+from experiments.generated.scenes import Patch, PatchFace
 from harvey_light.baked import BAKED, find_panes
 from harvey_light.irradiance import SUN_COLOUR, compute_irradiance
 from harvey_light.light_map import lay_light_map

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from experiments.generated.scenes import Patch, PatchFace, box_faces
+from box_rooms import box_faces
+from experiments.generated.scenes import Patch, PatchFace
 from harvey_light.baked import BAKED
 from knowledge_sources.methods.floor.model_floor import STEP_PX, ModelFloor, build_floor_grid
 from knowledge_sources.methods.floor.relief import TwoPictures, find_relief

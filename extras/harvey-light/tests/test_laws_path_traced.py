@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from experiments.generated.scenes import box_room
+from box_rooms import box_room
 from harvey_light.baked import BakedRenderers
 from sim.render.lighting import Lighting
 from sim.render.lights import Room, hang_lamps

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from experiments.generated.scenes import box_room
+from box_rooms import box_room
 from knowledge_sources.methods.features import Rectifier
 from sim.render.optics import Optics, distort, undistort
 from sim.render.renderer import Renderer

@@ -10,7 +10,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.generated.scenes import generate_house
+from box_rooms import generate_house
 from harvey.campaign.workers import return_memory
 from knowledge_sources.methods.verification.predicted_colors import _build_surfaces, _find_surfaces
 from logs.run_head import load_known_world

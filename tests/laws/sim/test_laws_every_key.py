@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from experiments.generated.scenes import box_room
+from box_rooms import box_room
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import Helper, SimulatedBuilding
 from sim.faults.built_in_faults import Bump, Kidnap

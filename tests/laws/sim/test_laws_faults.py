@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 
 import pytest
 
-from experiments.generated.scenes import box_room
+from box_rooms import box_room
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding

@@ -14,7 +14,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.generated.scenes import box_room
+from box_rooms import box_room
 from sim.render.auto_exposure import MAX_GAIN, MIN_GAIN, TARGET, AutoExposure, vignette
 from sim.render.lighting import GAMMA, UNEVEN, Lighting
 from sim.render.lights import Lights, Room, hang_lamps

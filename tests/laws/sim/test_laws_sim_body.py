@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.generated.scenes import box_room
+from box_rooms import box_room
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
 from sim.body.wheel_errors import ActuatorParameters, arc_displacement, arc_steps

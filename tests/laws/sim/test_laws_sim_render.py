@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from experiments.generated.scenes import Patch, PatchFace, box_faces, box_room
+from box_rooms import box_faces, box_room
+from experiments.generated.scenes import Patch, PatchFace
 from sim.render.mesh import Mesh, Pinhole, build_mesh, project_mesh
 from sim.render.pieces import split_pieces
 from sim.render.rasterizer import find_visible_patches, sample_offsets

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Blackboard, Effect, Entry, Post, Posted
-from experiments.generated.scenes import box_room
+from box_rooms import box_room
 from harvey.runner.ports import BodyPort
 from sim.body.faulty_body import FaultyBody
 from sim.body.senses import Bumper

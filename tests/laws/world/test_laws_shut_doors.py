@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from experiments.generated.scenes import generate_house
+from box_rooms import generate_house
 from knowledge_sources.methods.verification import predict_face_colors
 from world_models.actuator import ActuatorModel
 from world_models.building.changes import build_shut_faces, shut_door

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.robustness.malformed_texts import SMALL
-from experiments.robustness.malformed_worlds import CORRUPTIONS, judge_file, judge_files
+from experiments.robustness.malformed_worlds import CORRUPTIONS, SMALL, judge_file, judge_files
 from world_models.files.world_files import compile_file
 
 

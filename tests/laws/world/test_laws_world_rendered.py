@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from experiments.generated.scenes import generate_house
+from box_rooms import generate_house
 from sim.render.mesh import Pinhole, build_mesh, project_mesh
 from sim.render.rasterizer import find_visible_patches, sample_offsets
 from world_models.building.checks import check_world

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Decision, Post, Quiescence
-from experiments.generated.scenes import generate_house
+from box_rooms import generate_house
 from harvey.dry_run import build_dry_run
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World

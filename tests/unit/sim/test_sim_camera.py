@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from experiments.generated.scenes import Patch, PatchFace, box_room
+from box_rooms import box_room
+from experiments.generated.scenes import Patch, PatchFace
 from sim.render.mesh import build_mesh
 from sim.render.rasterizer import sample_offsets
 from sim.render.renderer import Renderer, illumination

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from experiments.generated.scenes import Patch, PatchFace, box_faces
+from box_rooms import box_faces
+from experiments.generated.scenes import Patch, PatchFace
 from sim.body.collision import Obstacles
 from sim.truth import Truth, cross_track_m, score
 from world_models.frames import Pose2

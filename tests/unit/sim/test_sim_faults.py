@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blackboard import Blackboard, Post
-from experiments.generated.scenes import box_room
+from box_rooms import box_room
 from harvey.runner.ports import MUST_CHANGE_M, STANDS_STILL, BodyPort, StillCamera
 from sim.body.faulty_body import FaultyBody
 from sim.body.simulated_body import SimulatedBody

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.generated.scenes import box_room
+from box_rooms import box_room
 from harvey.cli import main
 from sim.body.collision import Obstacles
 from sim.body.simulated_body import SimulatedBody

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.generated.floors import ScanNoise, generated_floor, write_floor_map
+from experiments.generated.floors import generated_floor
 from experiments.report import Cell, Report, count_kinds
 from experiments.shared_data import MAP_PLANS, data_path, describe_absence
 from experiments.trials import at_least, campaign_folder, run_trials
@@ -30,6 +30,7 @@ from harvey_buildings.experiments.rosmaps_scores import (
     draw_rooms,
     read_truth,
 )
+from harvey_buildings.experiments.scanned_map import ScanNoise, write_floor_map
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.files.world_files import load_world
