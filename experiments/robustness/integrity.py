@@ -29,11 +29,9 @@ from sim.ground_truth.inexact import EXACT
 from sim.render.sensor import SensorParameters
 from sim.scenario_names import SCENARIOS
 from world_models import entries
+from world_models.entries import ALERT_LIMIT_M, RISK
 from world_models.frames import Pose2
 
-ALERT_LIMIT_M = 0.1
-RISK, SIGMAS = 1e-4, 3.89
-"""Stated risk that an error is beyond the protection level; so many standard deviations are that, of a Gaussian."""
 MIN_AVAILABLE, MIN_NAMED = 0.95, 0.95
 DOUBTS = ("refuted", "not testable", "lost", "no way on")
 """Words of the board that warn and name no fault."""
@@ -158,11 +156,9 @@ class Flight:
 
 
 def protection_level(entry: Entry[Any]) -> float:
-    """How far off a pose on the board may be [m]: as it says, or by the largest axis of its covariance."""
-    if (said := getattr(entry.value, "protection_m", None)) is not None:
-        return float(said)
-    place = np.asarray(entry.value.covariance, float)[:2, :2]
-    return SIGMAS * math.sqrt(max(0.0, float(np.linalg.eigvalsh(place)[-1])))
+    """How far off a pose on the board may be, as it says [m]."""
+    value = entry.value
+    return float(value.protection.place_m if isinstance(value, entries.PoseFix) else value.protection_m)
 
 
 def list_words(value: Any) -> Iterator[str]:
@@ -268,10 +264,10 @@ def run(quick: bool, seed: int) -> Report:
         "Integrity: is a pose ever further off than it says?", COLUMNS,
         tuple(_row(kind, [f for f in flights if f.kind == kind]) for kind in KINDS),
         notes=(
-            f"AL: alert limit, {ALERT_LIMIT_M} m. PL: protection level, as the pose says or {SIGMAS} standard"
-            f" deviations, a risk of {RISK:g}. MI: misleading, error > PL. HMI: hazardously misleading, error > AL"
-            " >= PL. First of certified fixes, then of beliefs on which a motion was commanded; what is said while the"
-            " robot says that it is lost misleads nobody. available: fixes with PL <= AL.",
+            f"AL: alert limit, {ALERT_LIMIT_M} m. PL: protection level, as the pose says, at a risk of {RISK:g}. MI:"
+            " misleading, error > PL. HMI: hazardously misleading, error > AL >= PL. First of certified fixes, then of"
+            " beliefs on which a motion was commanded; what is said while the robot says that it is lost misleads"
+            " nobody. available: fixes with PL <= AL.",
             "named: missions in which the board named the fault, of those where it is above twice its least size."
             " alert: time from the fault to its name or the first doubt of the place, median and worst; never: missions"
             " without. named otherwise: what was named and is none. Without a fault all of these are false alerts.",

@@ -25,6 +25,7 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose.camera_kernel import measure_lines
 from knowledge_sources.methods.pose.with_camera import FREE, POSE, UNKNOWNS, build_information
+from world_models import words
 from world_models.camera import Camera, CameraMount
 from world_models.entries import ALERT_LIMIT_M, SHARED_SIGMA_M, Protection, count_sigmas
 from world_models.frames import Pose2
@@ -98,7 +99,7 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
 
 def tell_unavailable(protection: Protection) -> str:
     """That a place may be further off than the alert limit, in words."""
-    return (f"it may be {100.0 * protection.place_m:.0f} cm off if {protection.doubted} is not as it seems: the"
+    return (f"it may be {100.0 * protection.place_m:.0f} cm off if {words.landmark(protection.doubted)} is not as it seems: the"
             f" protection level is above the alert limit of {100.0 * ALERT_LIMIT_M:.0f} cm")
 
 

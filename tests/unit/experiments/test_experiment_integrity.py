@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,8 @@ from blackboard import Entry
 from experiments.robustness import integrity
 from experiments.robustness.integrity import KINDS, NO_FAULT, PLACES, Flight, Point, Trial
 from sim.scenario import load_scenario
-from world_models.entries import BodyFault, Obstruction
+from world_models.entries import BodyFault, Hypothesis, Obstruction, PoseFix, Protection, diagonal
+from world_models.frames import Pose2
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -25,14 +25,13 @@ def test_every_fault_makes_a_scenario(kind: str, tmp_path: Path) -> None:
         assert scenario.faults or "[[faults]]" not in KINDS[kind].text
 
 
-def test_a_pose_says_its_protection_level_or_its_covariance_does() -> None:
-    def level(**value: Any) -> float:
-        return integrity.protection_level(Entry("PoseFix-1", 0, SimpleNamespace(**value), "test", 1))
-
-    covariance = np.diag([0.01**2, 0.02**2, 1.0])
-    assert level(covariance=covariance) == pytest.approx(3.89 * 0.02)
-    assert level(covariance=covariance, protection_m=None) == pytest.approx(3.89 * 0.02)
-    assert level(covariance=covariance, protection_m=0.5) == 0.5
+def test_a_fix_and_a_belief_say_their_protection_level() -> None:
+    belief = Hypothesis("hall", Pose2(0.0, 0.0, 0.0), diagonal(0.01, 0.01), "milestone").protected(
+        Protection(0.07, 0.01, "a wall"))
+    assert integrity.protection_level(Entry("Hypothesis-1", 0, belief, "test", 1)) == pytest.approx(0.07)
+    fix = PoseFix("LineMatch-1", Pose2(0.0, 0.0, 0.0), np.eye(3), np.zeros(0, bool), np.zeros((0, 2)), (),
+                  protection=Protection(0.09, 0.01, "a wall"))
+    assert integrity.protection_level(Entry("PoseFix-1", 0, fix, "test", 1)) == 0.09
 
 
 def test_what_is_further_off_than_it_says_misleads() -> None:
