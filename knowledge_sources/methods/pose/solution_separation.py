@@ -99,8 +99,9 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
 
 def tell_unavailable(protection: Protection) -> str:
     """That a place may be further off than the alert limit, in words."""
-    return (f"it may be {100.0 * protection.place_m:.0f} cm off if {words.landmark(protection.doubted)} is not as it seems: the"
-            f" protection level is above the alert limit of {100.0 * ALERT_LIMIT_M:.0f} cm")
+    doubted = words.landmark(protection.doubted)
+    return (f"it may be {words.metres(protection.place_m)} off if {doubted} is not as it seems: the protection level is"
+            f" above the alert limit of {words.metres(ALERT_LIMIT_M)}")
 
 
 def _estimate_variance(distances: Floats) -> float:
