@@ -37,6 +37,7 @@ from knowledge_sources.reads import (
 from knowledge_sources.reads.place_believed import MAX_P_RIVAL
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import (
+    ALERT_LIMIT_M,
     CameraPicture,
     Certificate,
     Hypothesis,
@@ -129,12 +130,13 @@ class MilestoneJudge(RobotKnowledgeSource):
     def _hold_against_single_lies(self, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:
         """What would be verified is looked at once more where one false thing may have moved the pose too far.
 
-        But for a last look, and while the camera is hardly known: it is this picture that tells of it.
+        But for a last look; where the belief may be as far off, so that the pose is no worse; and while the camera is
+        hardly known: it is this picture that tells of it.
         """
-        protection = case.fix.value.protection
+        protection, before_m = case.fix.value.protection, case.belief.value.protection_m
         if verdict.kind != "verified" or protection.is_available:
             return verdict
         reason = f"{verdict.reason}; but {tell_unavailable(protection)}"
-        if is_last_look(case.milestone.value) or not weighed.is_camera_known:
+        if is_last_look(case.milestone.value) or before_m > ALERT_LIMIT_M or not weighed.is_camera_known:
             return verdict._replace(reason=reason)
         return verdict._replace(kind="not testable", reason=reason)

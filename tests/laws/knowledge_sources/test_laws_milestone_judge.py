@@ -527,22 +527,27 @@ def test_in_doubt_more_is_asked_than_without_landmarks_and_there_more_than_with_
     assert P_WRONG_FOLLOWED < P_WRONG_UNFOLLOWED < P_WRONG_IN_DOUBT
 
 
-@given(st.floats(0.0, 0.5), st.sampled_from(("verified", "refuted", "not testable")), st.integers(1, 4), st.booleans())
+@given(st.floats(0.0, 0.5), st.floats(0.0, 0.5), st.sampled_from(("verified", "refuted", "not testable")),
+       st.integers(1, 4), st.booleans())
 def test_a_place_that_may_be_off_by_more_than_the_alert_limit_is_looked_at_once_more(
-    place_m: float, kind: MilestoneVerdict, look: int, is_camera_known: bool
+    place_m: float, before_m: float, kind: MilestoneVerdict, look: int, is_camera_known: bool
 ) -> None:
-    """Not after the last look, and not while the picture has to tell of the camera; but it is always said."""
+    """Not after the last look, not where the belief is no better, not while the picture has to tell of the camera.
+
+    But it is always said.
+    """
     milestone = Milestone("PlanSketch-1", 0, "M1", 0.0, tried=(0.0,) * (look - 1))
     case: Any = SimpleNamespace(
         fix=SimpleNamespace(value=SimpleNamespace(protection=Protection(place_m, 0.01, "hall/north-wall"))),
-        milestone=SimpleNamespace(value=milestone))
+        milestone=SimpleNamespace(value=milestone),
+        belief=SimpleNamespace(value=SimpleNamespace(protection_m=before_m)))
     weighed: Any = SimpleNamespace(is_camera_known=is_camera_known)
     before = Verdict(kind, "as it is", 0.001, 0.01)
     after = MilestoneJudge(DEFAULT)._hold_against_single_lies(case, weighed, before)
     if place_m <= ALERT_LIMIT_M or kind != "verified":
         assert after == before
         return
-    is_asked_again = is_camera_known and not is_last_look(milestone)
+    is_asked_again = is_camera_known and before_m <= ALERT_LIMIT_M and not is_last_look(milestone)
     assert after.kind == ("not testable" if is_asked_again else "verified")
     assert "alert limit" in after.reason and "north-wall" in after.reason
     assert (after.p_wrong, after.most_p_wrong) == (before.p_wrong, before.most_p_wrong)

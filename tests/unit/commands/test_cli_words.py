@@ -49,7 +49,8 @@ def say(value: Any) -> str:
      "1 of 1 landmark found again; in CameraPicture-4; door-frame 4.2 px left and 1.5 px below its prediction"
      " (correlation 0.97)"),
     (Hypothesis("hallway", Pose2(1.0, 2.0, math.pi / 2), diagonal(0.02, 0.01), "tracks"),
-     "held: in hallway at (1.00, 2.00) m, heading 90.0 degrees; sigma 20 mm, 0.6 degrees, by tracks"),
+     "held: in hallway at (1.00, 2.00) m, heading 90.0 degrees; sigma 20 mm, 0.6 degrees, protection level"
+     " 83 mm, by tracks"),
     (Discrepancy(Level.ACTION, "a bump", 5.0, (3.0, 9.0), "px"),
      "a bump: 5.00 px; discrepancy at the action level, where up to 3.00 px may be corrected; open"),
     (Discrepancy(Level.GOAL, "lost", math.inf, (3.0, 9.0), "px"),

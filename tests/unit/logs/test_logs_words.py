@@ -117,7 +117,7 @@ def test_the_story_says_what_it_wants_expects_sees_doubts_and_does() -> None:
     assert told.startswith("### Looking for a milestone")
     assert "**Goal:** from kitchen (1.00, 1.00) m to parlour (2.00, 2.00) m; active." in told
     assert ("**It believes** that it stands at (1.00, 1.00) m of kitchen, heading 0.0 degrees "
-            "(within 20 mm and 0.6 degrees, one sigma), by command.") in told
+            "(within 20 mm and 0.6 degrees, one sigma; protection level 83 mm), by command.") in told
     assert "**Milestone** the door is expected; " in told and "should show 2 model lines of kitchen-door." in told
     assert "**It sees** 3 line segments found; 2 segments paired with model lines; 1 of 2" in told
     assert "**It doubts:** nothing now." in told
