@@ -36,6 +36,8 @@ LINE_SIGMA_FREEDOM = 10.0
 """Weight of that, in degrees of freedom."""
 STATED_FACTOR = 4.0
 """Factor on a belief's covariance where something else is taken as false: beliefs have longer tails than stated."""
+LEAST = np.diag(np.square([1e-4, 1e-4, 1e-5]))
+"""Covariance of a belief that is stated to have none: a tenth of a millimetre, a hundredth of a milliradian."""
 NOISE, BELIEF = "noise alone", "the belief before"
 LEFT, RIGHT, NEAR, FAR = "what is on the left", "what is on the right", "what is near", "what is far"
 
@@ -78,7 +80,7 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
     gradients = np.einsum("nea,ne->na", slopes, distances) / variance
     offset = np.concatenate([pose.minus(rests.belief), rests.step])[FREE]
     stated, loosened = (build_information(prior, rests.camera_covariance)[np.ix_(FREE, FREE)]
-                        for prior in (STATED_FACTOR * rests.covariance, rests.loosened))
+                        for prior in (STATED_FACTOR * rests.covariance + LEAST, rests.loosened))
     camera = np.array(loosened)
     camera[:POSE, :POSE] = 0.0
     everything = np.ones(len(distances), bool)

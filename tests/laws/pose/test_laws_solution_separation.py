@@ -180,6 +180,14 @@ def test_a_pose_by_one_wall_alone_is_no_surer_than_the_belief() -> None:
     assert protect(found, rests).place_m < level.place_m
 
 
+def test_a_belief_without_any_doubt_is_a_belief_too() -> None:
+    """Put down exactly: what is seen is held against that, and nothing is infinite."""
+    found, rests, _ = look(1)
+    sure = protect(found, rests._replace(covariance=np.zeros((3, 3))))
+    assert math.isfinite(sure.place_m) and math.isfinite(sure.heading_rad)
+    assert sure.place_m >= protect(found, rests._replace(covariance=1e-6 * np.eye(3))).place_m * 0.9
+
+
 def test_nothing_seen_leaves_what_is_stated() -> None:
     found, rests, _ = look(1)
     none = rests._replace(lines_world=np.zeros((0, 2, 3)), segments_px=np.zeros((0, 2, 2)), landmarks=[])
