@@ -260,7 +260,7 @@ def _new_worker() -> ProcessPoolExecutor:
 
 
 def _become_worker() -> None:
-    """The parent decides when to stop, and whoever has none any more stops."""
+    """A worker ignores Ctrl-C, which is its parent's to answer, and ends with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda _number, _frame: sys.exit(STOPPED_BY_SIGNAL))
     threading.Thread(target=_end_with_parent, daemon=True).start()

@@ -76,19 +76,19 @@ class MedRAndT(RobotKnowledgeSource):
         if learnt is not None:
             spread = learnt.covariance if moves else known
             covariance = covariance + learnt.pose_slopes @ spread @ learnt.pose_slopes.T
-        camera_step = np.zeros(len(known)) if learnt is None or not moves else learnt.step
+        moved = learnt if moves else None
         near = np.asarray(found.inliers, bool)
         rests = Rests(
             match.value.lines_world[near], match.value.segments_px[near],
-            [m.landmarks[m.landmark_of[i]] for i in match.value.pairs[near, 0]], robot.camera, robot.mount, camera_step,
-            here, belief.covariance, prior, known)
+            [m.landmarks[m.landmark_of[i]] for i in match.value.pairs[near, 0]], robot.camera, robot.mount,
+            np.zeros(len(known)) if moved is None else moved.step, here, belief.covariance, prior, known)
         yield Post(
             PoseFix(
                 match.id, found.world_from_robot, frozen(covariance), near, frozen(found.residuals_px),
                 tuple(reason or "" for reason in found.rejected),
-                () if learnt is None or not moves else tuple(learnt.step.tolist()),
-                () if learnt is None or not moves else to_tuples(learnt.covariance),
-                0.0 if learnt is None or not moves else learnt.prior_chi2,
+                () if moved is None else tuple(moved.step.tolist()),
+                () if moved is None else to_tuples(moved.covariance),
+                0.0 if moved is None else moved.prior_chi2,
                 compute_protection(found.world_from_robot, covariance, rests),
             ),
             (match, milestone, belief.entry),

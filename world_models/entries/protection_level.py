@@ -11,10 +11,10 @@ from world_models import words
 RISK = 1e-4
 """Probability that a pose is further off than its protection level."""
 ALERT_LIMIT_M = 0.10
-"""A place that may be further off is not available: no certificate is given for it while another look may be taken."""
+"""A place that may be further off is not available: where the belief is surer, another look is taken if it may be."""
 SHARED_SIGMA_M = 0.0077
 """Deviation of what a model, a camera and a matcher share in all pictures of a mission, so that no covariance of one
-picture has it (measured on 13,061 beliefs of honest missions)."""
+picture has it: added in squares, it bounds how far beliefs are off in missions without a fault."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
