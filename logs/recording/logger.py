@@ -41,7 +41,7 @@ NEAR = rrb.archetypes.TimeAxis(view_range=TimeRange(
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class TrueDifference:
     """How a building truly differs from its model: faces that are there besides, and faces that are not."""
 
     added: tuple[Face, ...] = ()
@@ -81,7 +81,7 @@ class Moment:
     held: Held | None = None
     truth: Pose2 | None = None
     contacts: Sequence[Place] = ()
-    differences: Sequence[Difference] = ()
+    differences: Sequence[TrueDifference] = ()
     happened: Sequence[str] = ()
 
     @cached_property

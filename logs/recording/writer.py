@@ -9,7 +9,7 @@ from pathlib import Path
 
 from blackboard import Decision, decision_line
 from logs.recording import loggers as built_in
-from logs.recording.logger import Difference, Held, Logger, Moment, Subject, blueprint
+from logs.recording.logger import TrueDifference, Held, Logger, Moment, Subject, blueprint
 from logs.recording.stream import LIVE_PORT, RecordingStream
 from logs.run_errors import RecordingError
 from logs.timeline import Mirror, find_belief
@@ -67,7 +67,7 @@ class RecordingWriter:
         self._world, self._mirror, self._sim_time_s = world, Mirror(), 0.0
         self._held: Held | None = None
         self._truth: Pose2 | None = None
-        self._contacts, self._differences, self._happened = list[Place](), list[Difference](), list[str]()
+        self._contacts, self._differences, self._happened = list[Place](), list[TrueDifference](), list[str]()
         for logger in self._loggers:
             logger.begin(self._stream)
 
@@ -82,7 +82,7 @@ class RecordingWriter:
 
     def true_building(self, added: tuple[Face, ...], gone: tuple[Face, ...]) -> None:
         """How the building truly differs from its model from now on; drawn with the next decision."""
-        self._differences.append(Difference(added, gone))
+        self._differences.append(TrueDifference(added, gone))
 
     def __call__(self, decision: Decision) -> None:
         """Draw one decision, as long as the recording can be written."""

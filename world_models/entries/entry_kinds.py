@@ -3,7 +3,19 @@
 from blackboard import kinds_in
 from world_models import obstruction
 from world_models.building import locale_frame
-from world_models.entries import body, door_state, floor, location, obstacle, percepts, robot_state, task, user_reports
+from world_models.entries import (
+    body,
+    difference,
+    door_state,
+    floor,
+    location,
+    obstacle,
+    percepts,
+    robot_state,
+    task,
+    user_reports,
+)
 
 KINDS = kinds_in(
-    locale_frame, user_reports, robot_state, body, task, percepts, location, obstacle, obstruction, floor, door_state)
+    locale_frame, user_reports, robot_state, body, task, percepts, location, obstacle, obstruction, floor, door_state,
+    difference)

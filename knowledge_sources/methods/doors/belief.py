@@ -122,7 +122,7 @@ def _name_state(log_odds: float, count: int, known: DoorState | None) -> DoorCon
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Explanation:
+class ExplainedPicture:
     """A picture as seen from a pose.
 
     Attributes:
@@ -142,7 +142,7 @@ class Explanation:
 
 def explain_picture(
     robot: RobotModel, belief: Pose2, covariance: Floats, segments_px: Floats, jpeg: bytes
-) -> Explanation | None:
+) -> ExplainedPicture | None:
     """Find the pose near a belief from which a picture was taken; None where no line is expected.
 
     Args:
@@ -158,7 +158,7 @@ def explain_picture(
     pairs = np.asarray(found.pairs, np.int64).reshape(-1, 2)
     if len(np.unique(pairs[:, 0])) < MIN_MATCHED_LINES:
         agreed = check_lines(robot, lines.lines_world, segments_px, belief)
-        return Explanation(belief, covariance, 1.0, agreed.agreement.matched, len(lines), is_solved=False)
+        return ExplainedPicture(belief, covariance, 1.0, agreed.agreement.matched, len(lines), is_solved=False)
     fix = planar_from_lines(
         lines.lines_world[pairs[:, 0]], segments_px[pairs[:, 1]], robot.camera, mount, belief,
         prior_covariance=covariance, landmark_ids=[int(lines.landmark[i]) for i in pairs[:, 0]],
@@ -167,10 +167,10 @@ def explain_picture(
     agreed = check_lines(robot, lines.lines_world, segments_px, pose)
     faces = check_colors(robot, pose, read_picture(jpeg).quarter, predict_face_colors(robot, pose))
     weight = compute_evidence(pose, fix.covariance, belief, covariance, agreed, faces)
-    return Explanation(pose, fix.covariance, POSE_CONFIDENCE.p_false(weight), agreed.agreement.matched, len(lines))
+    return ExplainedPicture(pose, fix.covariance, POSE_CONFIDENCE.p_false(weight), agreed.agreement.matched, len(lines))
 
 
-def is_explained(shut: Explanation, opened: Explanation | None, *, is_sure: bool) -> bool:
+def is_explained(shut: ExplainedPicture, opened: ExplainedPicture | None, *, is_sure: bool) -> bool:
     """Whether a picture tells the place with the door shut, and does not with it open.
 
     Where too few lines are in view to tell the place by, the belief must be sure (``is_sure``), and these lines be

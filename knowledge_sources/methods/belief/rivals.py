@@ -1,0 +1,64 @@
+"""Rivals: the explanations of one difference share the odds of what they all explain.
+
+Each rival has a prior, by how often such a thing happens, and the log likelihood ratios of the evidence. Looks that are
+not independent count once (``odds``), for each rival by itself. What nobody has thought of stands at log odds 0 and is
+never left out: so no rival is surer than the evidence for it, and one rival more never makes another surer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from knowledge_sources.methods.belief.odds import Alike, Look, add_looks
+from world_models.entries import Difference, Evidence, Rival
+from world_models.entries.difference import RivalKind
+from world_models.frames import Pose2
+
+PRIORS: Mapping[RivalKind, float] = {
+    "chance": 3.0, "thing": 0.0, "door": 0.0, "leaf": -1.0, "jamb": 0.0, "wall": 0.0, "dirt": -1.0,
+    "still camera": -4.0, "late pictures": -4.0, "exposure": -2.0, "lens": -4.0, "focal length": -2.0,
+    "mounting": -2.0, "wheels": -2.0, "bumper": -4.0, "report": -2.0, "elsewhere": -3.0,
+}
+"""Log odds of a rival before any evidence, against what nobody has thought of: what is ordinary first."""
+MAX_COUNTED = 12
+"""So much evidence of one difference is kept: the strongest."""
+
+
+def weigh_rivals(about: str, evidence: Sequence[Evidence], priors: Mapping[RivalKind, float] = PRIORS) -> Difference:
+    """The difference that evidence of one name makes, in whatever order it came."""
+    kept = sorted(sorted(evidence, key=_strength, reverse=True)[:MAX_COUNTED], key=_when)
+    sums = {kind: priors[kind] + _add(kind, kept) for kind in _list_kinds(kept)}
+    most = max(0.0, *sums.values())
+    total = math.exp(-most) + math.fsum(math.exp(log_odds - most) for log_odds in sums.values())
+    rivals = [_tell(kind, kept, log_odds, math.exp(log_odds - most) / total) for kind, log_odds in sums.items()]
+    rivals.sort(key=lambda rival: (-rival.log_odds, rival.kind))
+    return Difference(about, tuple(rivals), tuple(kept), max(one.seen_s for one in evidence))
+
+
+def _list_kinds(evidence: Sequence[Evidence]) -> tuple[RivalKind, ...]:
+    named = {e.kind for one in evidence for e in one.explanations}
+    return tuple(kind for kind in PRIORS if kind in named)
+
+
+def _add(kind: RivalKind, evidence: Sequence[Evidence]) -> float:
+    """The log odds that all evidence adds to a rival; what is nearest apart decides what is independent."""
+    looks = [(Look(Pose2(one.x_m, one.y_m, one.heading_rad), e.log_ratio), one)
+             for one in evidence for e in one.explanations if e.kind == kind]
+    alike = Alike(max(one.apart_m for _, one in looks), max(one.apart_rad for _, one in looks))
+    return add_looks([look for look, _ in looks], alike)
+
+
+def _tell(kind: RivalKind, evidence: Sequence[Evidence], log_odds: float, p: float) -> Rival:
+    """A rival in the words of the evidence that is strongest for it, the newest of equals."""
+    said = [e for one in evidence for e in one.explanations if e.kind == kind]
+    best = max(reversed(said), key=lambda e: e.log_ratio)
+    return Rival(kind, best.what, log_odds, p, best.off, best.sigma)
+
+
+def _strength(one: Evidence) -> tuple[float, ...]:
+    return max(abs(e.log_ratio) for e in one.explanations), *_when(one)
+
+
+def _when(one: Evidence) -> tuple[float, ...]:
+    return one.seen_s, one.x_m, one.y_m, one.heading_rad
