@@ -9,7 +9,7 @@ from pathlib import Path
 
 from blackboard import Decision, decision_line
 from logs.recording import loggers as built_in
-from logs.recording.logger import TrueDifference, Held, Logger, Moment, Subject, blueprint
+from logs.recording.logger import Held, Logger, Moment, Subject, TrueDifference, blueprint
 from logs.recording.stream import LIVE_PORT, RecordingStream
 from logs.run_errors import RecordingError
 from logs.timeline import Mirror, find_belief
