@@ -9,7 +9,7 @@ import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -95,7 +95,8 @@ def _end(
     why = f"the recording ends; {said}"
     onlooker.close(why)
     print(f"{why}: {onlooker.pictures} pictures checked, {certified} certified, lost {events.lost} times\n"
-          f"{_tell_times(took_s)}\n\nopen it with    harvey view {out}\nhave it told    harvey story {out}\n"
+          f"{_tell_protection(onlooker.protection_m if certified else ())}{_tell_times(took_s)}\n\n"
+          f"open it with    harvey view {out}\nhave it told    harvey story {out}\n"
           f"for others      harvey export {out} --mcap {path.stem}.mcap")
     return 0 if knows else 1
 
@@ -291,6 +292,18 @@ class _Events:
                 self.lost += status.level == 2
                 self._said = status.message
                 print(f"{item.time_s:8.1f} s  {status.message}", file=sys.stderr, flush=True)
+
+
+def _tell_protection(levels_m: Sequence[float]) -> str:
+    """How far off the certified places may be, as a line; "" where there are none."""
+    if not levels_m:
+        return ""
+    from world_models.entries import ALERT_LIMIT_M
+    from world_models.words import metres
+
+    available = sum(level_m <= ALERT_LIMIT_M for level_m in levels_m)
+    return (f"protection level {metres(statistics.median(levels_m))} in the median; within the alert limit of"
+            f" {metres(ALERT_LIMIT_M)} in {available} of {len(levels_m)}\n")
 
 
 def _tell_times(took_s: list[float]) -> str:

@@ -111,7 +111,8 @@ class Onlooker:
     Attributes:
         scheduler: its board, and who sits round it.
         messages: what is told of it; whether its belief is certified, and why it is lost.
-        pictures: how many were checked; certified: how many of them vouched for the place.
+        pictures: how many were checked; certified: how many of them vouched for the place; protection_m: how far off
+            the place may be after each of these.
         lens_fault: what is wrong with the lens by all of them, which makes none of them count; "" where nothing is.
         heard_s: when something last came of it, be it of use or not [s, of the run].
     """
@@ -141,6 +142,7 @@ class Onlooker:
         self._moved, self._last_s, self._glimpsed = Pose2(0.0, 0.0, 0.0), -math.inf, Pose2(math.inf, 0.0, 0.0)
         self._reported_s = self._seen_s = self.heard_s = 0.0
         self.pictures = self.certified = 0
+        self.protection_m = list[float]()
         self.lens_fault = ""
         self._still, self._lag = StillCamera(), PictureLag()
         self._vouched_m, self._vouched_s, self._verdict = math.inf, -math.inf, ""
@@ -235,6 +237,7 @@ class Onlooker:
             self._compare_with_wheels(time_s)
         if self._verdict == "verified" and self.messages.is_certified:
             self.certified, self._vouched_m, self._vouched_s = self.certified + 1, 0.0, time_s
+            self.protection_m.append(HELD.of(self.scheduler.view).value.protection_m)
         if not self.is_lost:
             self._glimpsed = Pose2(math.inf, 0.0, 0.0)
         self.tell_pose()

@@ -21,7 +21,16 @@ from harvey_ros2.middleware import LATCHED, SENSOR, Delivery, Topic, full_name
 from harvey_ros2.robot_file import FrameNames
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries import BodyFault, CameraPicture, Certificate, Hypothesis, Milestone, MotionReport, PlanSketch
+from world_models.entries import (
+    ALERT_LIMIT_M,
+    BodyFault,
+    CameraPicture,
+    Certificate,
+    Hypothesis,
+    Milestone,
+    MotionReport,
+    PlanSketch,
+)
 from world_models.frames import Pose2
 
 CAMERA_FRAME = "camera_optical"
@@ -82,6 +91,7 @@ class RunMessages:
         self.odometry = Pose2(0.0, 0.0, 0.0)
         self.is_certified, self.lost, self.time_s, self.epoch_s = False, "", 0.0, 0.0
         self._reason = "nothing was verified yet"
+        self._protection = dict[str, str]()
         self._doubts: dict[str, str] = {}
 
     def begin(self) -> Iterator[TimedMessage]:
@@ -103,8 +113,9 @@ class RunMessages:
         elif isinstance(value, CameraPicture):
             self.time_s = max(self.time_s, value.sim_time_s)
             yield from self._tell_picture(value)
-        elif isinstance(value, Hypothesis):
-            if value.is_held and self._counts:  # else who has the odometry tells the pose
+        elif isinstance(value, Hypothesis) and value.is_held:
+            yield from self._tell_protection(value)
+            if self._counts:  # else who has the odometry tells the pose
                 yield from self._tell_belief(value)
         elif isinstance(value, Certificate):
             yield from self._tell_verdict(value)
@@ -146,12 +157,14 @@ class RunMessages:
             yield self.diagnosis()
 
     def diagnosis(self) -> TimedMessage:
-        """Whether it knows where it is, and by what."""
+        """Whether it knows where it is, by what, and how far off it may be: the protection level of its place."""
         level, said = (ERROR, f"lost: {self.lost}") if self.lost else (
             (OK, "certified") if self.is_certified else (
                 WARN, f"not certified: {self.unsure}" if self.unsure else "not certified"))
+        stated = {"verdict": self._reason, **(self._protection if self.is_certified else {})}
         status = {"level": level, "name": "harvey: place", "message": said, "hardware_id": "harvey",
-                  "values": [self._types.build("diagnostic_msgs/msg/KeyValue", key="verdict", value=self._reason)]}
+                  "values": [self._types.build("diagnostic_msgs/msg/KeyValue", key=key, value=value)
+                             for key, value in stated.items()]}
         return self._out("/diagnostics", header=self._header(""), status=[status])
 
     def _transform(self, parent: str, child: str, there: Pose2, height_m: float = 0.0) -> TimedMessage:
@@ -178,6 +191,14 @@ class RunMessages:
             distortion_model="plumb_bob", d=lens, k=c.matrix.ravel(), r=np.eye(3).ravel(),
             p=np.hstack([c.matrix, np.zeros((3, 1))]).ravel())
 
+    def _tell_protection(self, belief: Hypothesis) -> Iterator[TimedMessage]:
+        """How far off a place may be that a picture has just vouched for."""
+        self._protection = {"protection level [m]": f"{belief.protection_m:.4f}",
+                            "protection level [rad]": f"{belief.protection_rad:.5f}",
+                            "alert limit [m]": f"{ALERT_LIMIT_M:g}"}
+        if self.is_certified and belief.basis == "milestone":
+            yield self.diagnosis()
+
     def _tell_belief(self, belief: Hypothesis) -> Iterator[TimedMessage]:
         there, height_m = belief.world_from_robot(self._world), self._world.floor_m(belief.locale)
         yield self.pose(there, belief.covariance_world(self._world), height_m)
@@ -185,7 +206,7 @@ class RunMessages:
             yield self.transform(there, self.odometry, height_m)
 
     def _tell_verdict(self, verdict: Certificate) -> Iterator[TimedMessage]:
-        self._reason = f"{verdict.verdict}: {verdict.reason}"
+        self._reason, self._protection = f"{verdict.verdict}: {verdict.reason}", {}
         vouched = self.is_certified and verdict.p_wrong < DOUBTFUL and verdict.verdict != "refuted"
         self.is_certified = (vouched or verdict.verdict == "verified") and not (self.lost or self._doubts)
         yield self.diagnosis()

@@ -63,7 +63,7 @@ def test_pictures_are_followed_from_one_to_the_next_and_each_certain_pose_is_rig
              "--calibration", str(calibration), "--start", START]
     assert main([*shown, "--out", str(tmp_path / "run")]) == 0
     said = capsys.readouterr().out
-    assert "it knows where it is" in said and "lost 0 times" in said
+    assert "it knows where it is" in said and "lost 0 times" in said and "protection level" in said
     assert main(["replay", str(tmp_path / "run")]) == 0
     told = follow(pictures, calibration)
     checked = len(list(pictures.iterdir()))

@@ -72,7 +72,11 @@ def test_a_run_is_read_back_as_it_was(recorded: Any, tmp_path: Path) -> None:
     here = latest["odom"] @ latest["base_link"]
     assert np.allclose(here[:2, 2], (pose.pose.pose.position.x, pose.pose.pose.position.y), atol=1e-9)
     assert pose.pose.covariance[0] < 0.1 and seconds(pose.header.stamp) > 0.0
-    assert found["/diagnostics"][-1][1].status[0].message == "certified"
+    status = found["/diagnostics"][-1][1].status[0]
+    stated = {pair.key: pair.value for pair in status.values}
+    corrected = [belief for belief in held if belief.basis == "milestone"][-1]
+    assert status.message == "certified"
+    assert float(stated["protection level [m]"]) == pytest.approx(corrected.protection_m, abs=1e-4)
     marker = found["/harvey/landmarks"][0][1].markers[0]
     assert marker.type == 5 and len(marker.points) % 2 == 0 and len(found["/harvey/plan"][0][1].poses) >= 2
 
