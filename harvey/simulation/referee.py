@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from blackboard import Decision
 from harvey.runner.result import MissionResult
-from harvey.simulation.contacts import ContactWatch
-from harvey.simulation.happenings import HappeningWatch
+from harvey.simulation.happenings import ContactWatch, HappeningWatch
 from logs.explain.turning_points import Collision, Happening
 from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage

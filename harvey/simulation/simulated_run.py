@@ -18,8 +18,7 @@ from harvey.runner.resume import Remains, continue_run, find_remains, replay_run
 from harvey.runner.run import Run
 from harvey.runner.teller import Tell, tell_nothing
 from harvey.simulation.body_replay import BodyReplay
-from harvey.simulation.contacts import ContactWatch
-from harvey.simulation.happenings import HappeningWatch
+from harvey.simulation.happenings import ContactWatch, HappeningWatch
 from harvey.simulation.referee import Referee
 from harvey.simulation.serial_body import IN_PROCESS, open_body
 from harvey.wiring import knowledge_sources

@@ -40,6 +40,7 @@ from world_models.entries import (
     ALERT_LIMIT_M,
     CameraPicture,
     Certificate,
+    Difference,
     Hypothesis,
     LineMatch,
     Milestone,
@@ -90,7 +91,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         weighed = self.weigh(view, case)
         verdict = self._hold_against_others(view, case, weighed, judge_place(weighed))
         verdict = self._hold_against_single_lies(case, weighed, verdict)
-        because = case.fix, milestone, *find_followed(view), *view.all(Travel)
+        because = case.fix, milestone, *find_followed(view), *view.all(Travel), *view.all(Difference)
         certificate = Post(certify((milestone.id, case.fix.id), weighed, verdict, case.fix.value), because)
         yield certificate
         yield Revise(milestone, replace(milestone.value, status=verdict.kind), (certificate,))
@@ -119,13 +120,18 @@ class MilestoneJudge(RobotKnowledgeSource):
         return weigh_picture(robot, seen, before, s)
 
     def _hold_against_others(self, view: View, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:
-        """What would be verified is not testable where the picture may have been taken elsewhere."""
-        alias = find_alias(view, case.fix, case.belief, weighed) if verdict.kind == "verified" else None
-        if alias is None or alias.p <= MAX_P_RIVAL:
+        """What would be verified is not testable where it may have been taken elsewhere, or by a sense that lies."""
+        if verdict.kind != "verified":
             return verdict
-        odds = alias.p, MAX_P_RIVAL
-        reason = f"{verdict.reason}; but {alias.said}: {tell_odds(*odds)}"
-        return Verdict("not testable", reason, *odds, p_alias=alias.p)
+        wrong = view.latest(Difference, lambda d: d.p_misled > MAX_P_RIVAL)
+        rival = find_alias(view, case.fix, case.belief, weighed)
+        p, said = (0.0, "") if rival is None else (rival.p, rival.said)
+        if wrong is not None:
+            p, said = wrong.value.p_misled, f"{wrong.value.about} differs, {wrong.value.odds_in_words()}"
+        if p <= MAX_P_RIVAL:
+            return verdict
+        reason = f"{verdict.reason}; but {said}: {tell_odds(p, MAX_P_RIVAL)}"
+        return Verdict("not testable", reason, p, MAX_P_RIVAL, p_alias=p)
 
     def _hold_against_single_lies(self, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:
         """What would be verified is looked at once more where one false thing may have moved the pose too far.

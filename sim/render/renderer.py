@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.render.mesh import FaceLike, Mesh, MeshView, Pinhole, build_mesh, join_meshes, project_mesh
-from sim.render.noise_table import build_noise_table
 from sim.render.pieces import split_pieces
 from sim.render.rasterizer import find_visible_patches, sample_offsets
-from sim.render.textures import shade
+from sim.render.textures import build_noise_table, shade
 from world_models.camera import Camera
 from world_models.frames import Pose
 

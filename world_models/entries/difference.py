@@ -21,6 +21,9 @@ SENSES: frozenset[RivalKind] = frozenset({
     "report"})
 """Rivals by which not the building or the belief is wrong, but a sense is."""
 
+MISLEADING: frozenset[RivalKind] = frozenset({"still camera", "late pictures", "lens"})
+"""Senses that tell wrong places, of which nothing is learnt on the way."""
+
 SURE = 0.95
 """A rival that is so probable is what the difference is taken for."""
 
@@ -121,6 +124,11 @@ class Difference:
     def is_of_sense(self) -> bool:
         """Whether a sense is surely what is wrong."""
         return self.is_sure and self.leader.kind in SENSES
+
+    @property
+    def p_misled(self) -> float:
+        """The probability that a sense tells wrong places."""
+        return math.fsum(rival.p for rival in self.rivals if rival.kind in MISLEADING)
 
     def find(self, kind: RivalKind) -> Rival | None:
         """The rival of a kind; None where nothing spoke of it."""

@@ -21,8 +21,8 @@ from harvey_light.sun_patches import SunPatch, find_sun_patches
 from sim.render.lighting import GAMMA, Lighting
 from sim.render.lights import Lamp, Room
 from sim.render.mesh import FaceLike, Mesh, build_mesh, join_meshes, plane_of
-from sim.render.noise_table import build_noise_table
 from sim.render.rasterizer import sample_offsets
+from sim.render.textures import build_noise_table
 
 Floats = NDArray[np.float64]
 FLAT_SCALE_M = 1e6

@@ -22,7 +22,6 @@ MOST_GAP_S = 2.0
 
 if TYPE_CHECKING:
     from harvey_ros2.bag_reader import Bag, BagItem
-    from harvey_ros2.lens_watch import LensWatch
     from harvey_ros2.onlooker import FirstGuess, Onlooker
     from harvey_ros2.run_messages import TimedMessage
     from world_models.building.world import World
@@ -57,7 +56,6 @@ def _arguments(parser: ArgumentParser) -> None:
 def _run(args: Namespace) -> int:
     from harvey_ros2.bag_reader import Bag
     from harvey_ros2.film_reader import is_film
-    from harvey_ros2.lens_watch import LensWatch
     from harvey_ros2.messages import message_types
     from harvey_ros2.onlooker import Onlooker, build_onlooker_head
     from harvey_ros2.run_messages import RunMessages
@@ -79,23 +77,18 @@ def _run(args: Namespace) -> int:
         guess, events = _guess(args, known), _Events()
         messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
         onlooker = Onlooker(build_onlooker_head(path.stem, world, robot, guess), out, events.hear, messages=messages)
-        watch = LensWatch()
-        took_s = follow_bag(bag.items(), onlooker, bag.left_out, watch)
+        took_s = follow_bag(bag.items(), onlooker, bag.left_out)
         for line in bag.tell():
             print(line)
-    return _end(onlooker, watch, events, took_s, path, out)
+    return _end(onlooker, events, took_s, path, out)
 
 
-def _end(
-    onlooker: Onlooker, watch: LensWatch, events: _Events, took_s: list[float], path: Path, out: Path
-) -> int:
-    onlooker.lens_fault = watch.find_fault()
+def _end(onlooker: Onlooker, events: _Events, took_s: list[float], path: Path, out: Path) -> int:
     knows, said = onlooker.judge()
-    certified = 0 if onlooker.lens_fault else onlooker.certified
     why = f"the recording ends; {said}"
     onlooker.close(why)
-    print(f"{why}: {onlooker.pictures} pictures checked, {certified} certified, lost {events.lost} times\n"
-          f"{_tell_protection(onlooker.protection_m if certified else ())}{_tell_times(took_s)}\n\n"
+    print(f"{why}: {onlooker.pictures} pictures checked, {onlooker.certified} certified, lost {events.lost} times\n"
+          f"{_tell_protection(onlooker.protection_m)}{_tell_times(took_s)}\n\n"
           f"open it with    harvey view {out}\nhave it told    harvey story {out}\n"
           f"for others      harvey export {out} --mcap {path.stem}.mcap")
     return 0 if knows else 1
@@ -103,7 +96,6 @@ def _end(
 
 def _run_film(args: Namespace, path: Path, world: Path, out: Path) -> int:
     from harvey_ros2.film_reader import Film
-    from harvey_ros2.lens_watch import LensWatch
     from harvey_ros2.messages import message_types
     from harvey_ros2.onlooker import Onlooker, build_onlooker_head
     from harvey_ros2.run_messages import RunMessages
@@ -115,14 +107,13 @@ def _run_film(args: Namespace, path: Path, world: Path, out: Path) -> int:
     messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
     onlooker = Onlooker(build_onlooker_head(path.stem, world, robot, guess), out, events.hear, messages=messages,
                         counts=False)
-    watch = LensWatch()
-    took_s = follow_film(film.items(), onlooker, watch)
+    took_s = follow_film(film.items(), onlooker)
     for what, number in sorted(film.left_out.items()):
         print(f"left out: {number} {what}")
-    return _end(onlooker, watch, events, took_s, path, out)
+    return _end(onlooker, events, took_s, path, out)
 
 
-def follow_film(items: Iterable[BagItem], onlooker: Onlooker, watch: LensWatch | None = None) -> list[float]:
+def follow_film(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
     """Show pictures without odometry to an onlooker; returns how long each took [s]."""
     took_s: list[float] = []
     for item in items:
@@ -131,8 +122,6 @@ def follow_film(items: Iterable[BagItem], onlooker: Onlooker, watch: LensWatch |
             then = time.perf_counter()
             onlooker.look(item.jpeg, item.time_s)
             took_s.append(time.perf_counter() - then)
-            if watch is not None:
-                watch.take(onlooker.scheduler.view)
     return took_s
 
 
@@ -154,7 +143,7 @@ def _run_live(args: Namespace) -> int:
 
 
 def follow_bag(
-    items: Iterable[BagItem], onlooker: Onlooker, left_out: Counter[str] | None = None, watch: LensWatch | None = None
+    items: Iterable[BagItem], onlooker: Onlooker, left_out: Counter[str] | None = None
 ) -> list[float]:
     """Show a recording to an onlooker; returns how long each picture took [s]. ``left_out``: what is not shown."""
     took_s: list[float] = []
@@ -177,8 +166,6 @@ def follow_bag(
             then = time.perf_counter()
             onlooker.look(jpeg, time_s - began_s)
             took_s.append(time.perf_counter() - then)
-            if watch is not None:
-                watch.take(onlooker.scheduler.view)
         else:
             onlooker.pass_by(time_s - began_s)
     onlooker.heard_s = newest_s - (newest_s if began_s is None else began_s)

@@ -30,6 +30,7 @@ from knowledge_sources.milestone.matcher import Matcher
 from knowledge_sources.milestone.med_r_and_t import MedRAndT
 from knowledge_sources.milestone.milestone_judge import MilestoneJudge
 from knowledge_sources.milestone.plan_adjuster import plan_adjuster
+from knowledge_sources.model.rival_weigher import rival_weigher
 from knowledge_sources.reads import HELD, LOST, OPEN_FAULT, find_camera
 from knowledge_sources.relocalizer.alias_monitor import AliasMonitor
 from knowledge_sources.relocalizer.localizer import Localizer
@@ -38,6 +39,7 @@ from knowledge_sources.relocalizer.pose_adopter import pose_adopter
 from knowledge_sources.robot.camera_calibrator import CameraCalibrator
 from knowledge_sources.robot.travel_breaker import travel_breaker
 from knowledge_sources.robot.yaw_calibrator import YawCalibrator
+from knowledge_sources.senses.lens_monitor import LensMonitor
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import RunRecorder
@@ -49,8 +51,8 @@ from world_models.frames import Pose2
 from world_models.plugins import GUESTS_GROUP, list_plugins
 from world_models.robot import RobotModel
 
-SEATED = (interpreter, LineFinder, Matcher, MedRAndT, MilestoneJudge, CameraCalibrator, AliasMonitor, plan_adjuster,
-          YawCalibrator, travel_breaker, PanoramaBuilder, Localizer, pose_adopter)
+SEATED = (interpreter, LineFinder, Matcher, MedRAndT, LensMonitor, rival_weigher, MilestoneJudge, CameraCalibrator,
+          AliasMonitor, plan_adjuster, YawCalibrator, travel_breaker, PanoramaBuilder, Localizer, pose_adopter)
 """The sources of a mission that are wanted here too."""
 GUESTS = ("claim_reckoner", "view_expecter", "loss_declarer", "place_confirmer")
 AUTHOR = "onlooker"
@@ -113,7 +115,6 @@ class Onlooker:
         messages: what is told of it; whether its belief is certified, and why it is lost.
         pictures: how many were checked; certified: how many of them vouched for the place; protection_m: how far off
             the place may be after each of these.
-        lens_fault: what is wrong with the lens by all of them, which makes none of them count; "" where nothing is.
         heard_s: when something last came of it, be it of use or not [s, of the run].
     """
 
@@ -143,7 +144,6 @@ class Onlooker:
         self._reported_s = self._seen_s = self.heard_s = 0.0
         self.pictures = self.certified = 0
         self.protection_m = list[float]()
-        self.lens_fault = ""
         self._still, self._lag = StillCamera(), PictureLag()
         self._vouched_m, self._vouched_s, self._verdict = math.inf, -math.inf, ""
 
@@ -155,12 +155,10 @@ class Onlooker:
         """Whether it knows where the robot is, by certificates, and that in words."""
         if self.is_lost:
             return False, "lost"
-        if self.lens_fault:
-            return False, f"it does not know where it is: {self.lens_fault}"
-        if not self.certified:
-            return False, f"was told where it is; 0 of {self.pictures} pictures said so"
         if self.messages.unsure:
             return False, f"it does not know where it is: {self.messages.unsure}"
+        if not self.certified:
+            return False, f"was told where it is; 0 of {self.pictures} pictures said so"
         if not self.messages.is_certified:
             return False, "it does not know where it is: the last pictures do not say so"
         if self.heard_s - (self._seen_s if self._counts else self._vouched_s) > BLIND_S:

@@ -19,6 +19,7 @@ from harvey_ros2.localizer_sources import WheelCheck
 from harvey_ros2.messages import MessageTypes, stamp
 from harvey_ros2.middleware import LATCHED, SENSOR, Delivery, Topic, full_name
 from harvey_ros2.robot_file import FrameNames
+from knowledge_sources.reads.place_believed import MAX_P_RIVAL
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import (
@@ -26,6 +27,7 @@ from world_models.entries import (
     BodyFault,
     CameraPicture,
     Certificate,
+    Difference,
     Hypothesis,
     Milestone,
     MotionReport,
@@ -39,7 +41,8 @@ UNKNOWN = 1e6
 DOUBTFUL = 0.5
 """A picture by which the place is wrong with this probability ends the certainty until the next that verifies it."""
 KINDS: tuple[type[Any], ...] = (
-    MotionReport, CameraPicture, Hypothesis, Certificate, Milestone, PlanSketch, Discrepancy, WheelCheck, BodyFault)
+    MotionReport, CameraPicture, Hypothesis, Certificate, Milestone, PlanSketch, Discrepancy, WheelCheck, Difference,
+    BodyFault)
 """What is told of."""
 OK, WARN, ERROR = 0, 1, 2
 COLOURS: Mapping[str, tuple[float, float, float]] = {
@@ -127,6 +130,9 @@ class RunMessages:
             yield from self._tell_plan(value)
         elif isinstance(value, WheelCheck):
             yield from self.doubt("wheels", value.excess)
+        elif isinstance(value, Difference):
+            is_misled = value.p_misled > MAX_P_RIVAL
+            yield from self.doubt(value.about, f"{value.about} differs, {value.odds_in_words()}" if is_misled else "")
         elif isinstance(value, BodyFault) and value.what == STANDS_STILL:
             yield from self.doubt("camera", f"the {value.what}: {value.detail}" if value.is_open else "")
 

@@ -14,7 +14,6 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from harvey_ros2.bag_reader import Bag
 from harvey_ros2.follow_command import build_robot, follow_bag
-from harvey_ros2.lens_watch import LensWatch
 from harvey_ros2.messages import message_types
 from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
 from harvey_ros2.robot_emulator import RobotEmulator, write_camera_info, write_mount, write_picture
@@ -23,6 +22,7 @@ from sim.faults.fault import Fault
 from sim.scenario import load_scenario
 from sim.stage import build_stage
 from world_models.camera import CameraMount
+from world_models.entries import Difference
 from world_models.files.toml.mission import named_file
 from world_models.files.toml.source import WORLDS
 from world_models.frames import Pose2, wrap_angle
@@ -86,10 +86,9 @@ def follow(bag: Path, guess: FirstGuess, out: Path | None = None) -> tuple[list[
         known, robot = build_robot(recording, WORLD, OPTIONS)
         messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
         onlooker = Onlooker(build_onlooker_head("bag", WORLD, robot, guess), out, told.extend, messages=messages)
-        watch = LensWatch()
-        follow_bag(recording.items(), onlooker, recording.left_out, watch)
+        follow_bag(recording.items(), onlooker, recording.left_out)
         onlooker.close("the recording ends")
-    assert watch.find_fault() == "" and watch.offs  # each lens is as it is told
+    assert not onlooker.scheduler.view.where(Difference, lambda d: d.is_of_sense)  # each sense is as it is told
     return told, onlooker
 
 

@@ -1,21 +1,22 @@
 """Camera calibration: intrinsics, lens distortion and mounting; and what is learnt of the camera on the way."""
 
-from knowledge_sources.methods.calibration.calibration_picture import draw_calibration
+from knowledge_sources.methods.calibration.camera_rivals import Opened, SeenLines, explain, open_rivals
 from knowledge_sources.methods.calibration.camera_state import (
-    LEAST_SIGMA_CENTRE_PX, LEAST_SIGMA_FOCAL, LEAST_SIGMA_M, LEAST_SIGMA_RAD, MAX_COUNTED,
+    LEAST_SIGMA_CENTRE_PX, LEAST_SIGMA_FOCAL, LEAST_SIGMA_M, LEAST_SIGMA_RAD, MAX_COUNTED, MIN_MOVE_M, MIN_TURN_RAD,
     RIGID_DISTANCE_M, SIGMA_CENTRE_PX, SIGMA_FOCAL, SIGMA_HEIGHT_M, SIGMA_ROLL_RAD, SIGMA_TILT_RAD, SIGMA_YAW_RAD,
     add_yaw, compute_camera_covariance, compute_knocked_covariance, has_counted, is_camera_known, learn, loosen,
     to_tuples, widen,
 )
 from knowledge_sources.methods.calibration.intrinsics import (
-    BoardView, Calibration, PARAMETERS, Pattern, calibrate, find_board,
+    BoardView, Calibration, PARAMETERS, Pattern, calibrate, draw_calibration, find_board,
 )
 from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
 
 __all__ = [
-    "LEAST_SIGMA_CENTRE_PX", "LEAST_SIGMA_FOCAL", "LEAST_SIGMA_M", "LEAST_SIGMA_RAD", "MAX_COUNTED", "PARAMETERS",
-    "RIGID_DISTANCE_M", "SIGMA_CENTRE_PX", "SIGMA_FOCAL", "SIGMA_HEIGHT_M", "SIGMA_ROLL_RAD", "SIGMA_TILT_RAD",
-    "SIGMA_YAW_RAD", "BoardView", "Calibration", "Mounting", "Pattern", "add_yaw", "calibrate",
-    "compute_camera_covariance", "compute_knocked_covariance", "draw_calibration", "estimate_mounting", "find_board",
-    "has_counted", "is_camera_known", "learn", "loosen", "to_tuples", "widen",
+    "LEAST_SIGMA_CENTRE_PX", "LEAST_SIGMA_FOCAL", "LEAST_SIGMA_M", "LEAST_SIGMA_RAD", "MAX_COUNTED", "MIN_MOVE_M",
+    "MIN_TURN_RAD", "PARAMETERS", "RIGID_DISTANCE_M", "SIGMA_CENTRE_PX", "SIGMA_FOCAL", "SIGMA_HEIGHT_M",
+    "SIGMA_ROLL_RAD", "SIGMA_TILT_RAD", "SIGMA_YAW_RAD", "BoardView", "Calibration", "Mounting", "Opened", "Pattern",
+    "SeenLines", "add_yaw", "calibrate", "compute_camera_covariance", "compute_knocked_covariance", "draw_calibration",
+    "estimate_mounting", "explain", "find_board", "has_counted", "is_camera_known", "learn", "loosen", "open_rivals",
+    "to_tuples", "widen",
 ]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats, Image
+from knowledge_sources.methods.features import Rectifier
 from world_models.camera import Camera
 
 MARKERS = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_250)
@@ -24,6 +25,7 @@ MAGNIFIED = 2  # times, where markers are not read
 MIN_CORNERS = 8  # fewest corners of a view that is used
 MIN_VIEWS = 4  # least number of views of the board (Zhang 2000)
 MAX_VIEW_RMS_RATIO = 3.0  # largest RMS error of a view over that of the median view before it is left out
+CORNER = (40, 40, 210)  # blue, green, red of a corner that was seen
 STEPS = cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-10  # of the calibration
 
 PARAMETERS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
@@ -165,3 +167,14 @@ def _fit_camera(
         raise ValueError("expected views that a camera explains, got none that fits")
     camera = Camera(float(m[0, 0]), float(m[1, 1]), float(m[0, 2]), float(m[1, 2]), *size, tuple(map(float, k)))
     return Calibration(camera, sigmas[: 9 if with_k3 else 8], tuple(views), np.ravel(view_rms), float(rms), rejected)
+
+
+def draw_calibration(calibration: Calibration, grey: Image) -> bytes:
+    """One view (h, w) with the corners of all views, and next to it the same view rectified, as PNG bytes."""
+    camera = calibration.camera
+    raw = np.ascontiguousarray(grey)
+    seen, rectified = (cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+                       for image in (raw, Rectifier(camera, camera.pinhole).rectify(raw)))
+    for x, y in np.concatenate([view.corners_px for view in calibration.views]):
+        cv2.circle(seen, (round(16 * x), round(16 * y)), 32, CORNER, -1, cv2.LINE_AA, 4)
+    return bytes(cv2.imencode(".png", np.hstack([seen, rectified]))[1])

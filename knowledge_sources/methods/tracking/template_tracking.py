@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
@@ -21,12 +22,14 @@ from knowledge_sources.methods.features import (
     read_picture,
 )
 from knowledge_sources.methods.pose import compute_point_jacobian, planar_from_points
+from knowledge_sources.settings import DEFAULT, Settings
 from world_models.camera import NEAR_PLANE_M, Camera
-from world_models.entries import Anchor, Track
+from world_models.entries import Anchor, Hypothesis, Track
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_points
 
+TOLERANCE_SIGMAS = 3.0  # standard deviations of the believed pose that the action level may correct (§3.2)
 TEMPLATE_HALF_PX = 10  # half-width of a landmark's template (experiment table1)
 MAX_TRACKS = 14  # largest number of landmarks followed at a time (experiment table1)
 MIN_SPACING_PX = 28.0  # least distance in the picture between landmarks
@@ -204,3 +207,20 @@ def _compute_anchor_covariance(pose: Pose2, seen: list[Track], anchors: tuple[An
         lever[0, 2], lever[1, 2] = -(pose.y_m - anchor.y_m), pose.x_m - anchor.x_m
         parts.append(lever @ np.array(anchor.covariance) @ lever.T)
     return np.asarray(np.mean(parts, axis=0))
+
+
+def action_px(robot: RobotModel, belief: Hypothesis, points_world: Floats, settings: Settings = DEFAULT) -> float:
+    """The action level's tolerance [px]: how far landmarks may be off by the uncertainty of the believed pose (§3.2).
+
+    An error of the heading moves the image by the focal length times the error; an error of the place by the focal
+    length times the error over the distance ahead of the landmarks, ``points_world`` (n, 3). Without landmarks only the
+    heading counts. ``min_tolerance_px`` is added for the error of correlation itself; the plan level's bound is the
+    largest tolerance.
+    """
+    pose = belief.world_from_robot(robot.world)
+    ahead_m = robot.on_floor_of(belief.locale).camera_from_world(pose).apply(points_world.reshape(-1, 3))[:, 2]
+    near = ahead_m[ahead_m > NEAR_PLANE_M]
+    spread = math.hypot(belief.sigma_rad, belief.sigma_m / float(np.median(near)) if len(near) else 0.0)
+    action = settings.action
+    return min(action.min_tolerance_px + TOLERANCE_SIGMAS * robot.camera.fx * spread,
+               settings.plan.max_deviation_px)

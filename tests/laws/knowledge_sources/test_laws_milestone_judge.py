@@ -67,10 +67,13 @@ from world_models.camera import YAW
 from world_models.entries import (
     ALERT_LIMIT_M,
     Certificate,
+    Difference,
     Hypothesis,
     Milestone,
     MilestoneVerdict,
     Protection,
+    Rival,
+    RivalKind,
     Segments,
     Track,
     Tracks,
@@ -478,6 +481,19 @@ def test_where_as_much_agrees_at_a_candidate_of_a_search_nothing_is_verified(jud
         assert said.verdict == ("not testable" if there == "here" else "verified")
         assert there == "far" or (said.p_false == 0.5 and "Hypothesis-" in said.reason and "50%" in said.reason)
     assert asked > 0
+
+
+@pytest.mark.parametrize(("kind", "p", "verdict"), [
+    ("lens", MAX_P_RIVAL, "verified"), ("lens", MAX_P_RIVAL + SMALL, "not testable"), ("dirt", 1.0, "verified")])
+def test_where_a_sense_may_tell_wrong_places_nothing_is_verified(
+    judged: list[Judged], kind: RivalKind, p: float, verdict: str
+) -> None:
+    for one in (one for one in judged if effect_on(judge_on(one)[2], Certificate).value.verdict == "verified"):
+        board = copy_of(one.board)
+        differs = Difference("camera", (Rival(kind, "another", 1.0, p),), (), 0.0)
+        board.apply([Post(differs)], author="test", cycle=10**6)
+        said = effect_on(judge_on(Judged(board, one.trigger))[2], Certificate).value
+        assert said.verdict == verdict and ("camera differs, another" in said.reason) == (verdict != "verified")
 
 
 @pytest.mark.parametrize("margin", [-9.0, -1.0, 0.0, 1.0, 9.0])

@@ -15,7 +15,7 @@ from blackboard import Blackboard, Decision, Effect, Level, Post, Revise, decisi
 from harvey.campaign.summary import ProgressLine, format_result
 from harvey.errors import BadInput
 from harvey.runner.result import MissionResult, RunCounts
-from harvey.simulation.contacts import ContactWatch
+from harvey.simulation.happenings import ContactWatch
 from logs.explain.phrases import describe_decision, headline
 from logs.explain.story import HAPPENED, levels_off, tell_part
 from logs.explain.turning_points import (
