@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Retract, Revised, View, Watch
 from knowledge_sources.methods import localization
+from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.localization import MAX_FAR_PROBES
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
@@ -89,7 +90,8 @@ class Localizer(RobotKnowledgeSource):
         far = localization.find_far_action(robots[which], result, looked, rooms, touched)
         if far is not None:
             result = replace(result, status=localization.LocalizationStatus.PROBE, next_action=far)
-        said = localization.describe(result, is_far=far is not None) if odds is None else odds.sentence()
+        said = odds.sentence() if odds is not None else localization.describe(
+            result, is_far=far is not None, looks=len(looks))
         step = result.next_action if result.status is localization.LocalizationStatus.PROBE else None
         probe = None if step is None else (step.turn_rad, step.move_m)
         because = (panorama, doubt, held.entry, *candidates, *contacts, *(() if hidden is None else (hidden,)))
@@ -101,6 +103,9 @@ class Localizer(RobotKnowledgeSource):
         is_found = result.status is localization.LocalizationStatus.FOUND
         for c in result.candidates[:1] if is_found else result.candidates:
             there = held.moved_to(c.world_from_robot, c.covariance, "relocalization", locale=c.room)
+            if is_found:
+                there = there.protected(localization.protect_place(
+                    robots[which], looks, c.world_from_robot, c.covariance, compute_camera_covariance(cameras[0])))
             place = replace(there, status="candidate", weight=c.weight, evidence=str(c.likelihood))
             yield Post(place, (found, panorama, held.entry))
 

@@ -12,8 +12,10 @@ Where may the robot be?
 Which of these poses is it, and what to look at next?
 
 * :mod:`next_view`: the turn, move or way whose view separates the hypotheses best (active localization).
+* :mod:`none_of_these`: a place against being at none of those that are searched.
 * :mod:`global_localization`: all of the above: found, look again, or ambiguous.
 * :mod:`place_odds`: the prior odds of where it was told to be, or was tracked to.
+* :mod:`place_protection`: how far off the place that was found may be although nothing says so.
 
 Could a known pose be another one that looks the same?
 
@@ -35,25 +37,22 @@ from knowledge_sources.methods.localization.place_odds import (
     LOST_AGAIN_ODDS, MAX_ALIKE_LOG_RATIO, MIN_P_SURE, P_STATED, StatedPlace, compute_prior, weigh_alias_odds,
     weigh_prior,
 )
+from knowledge_sources.methods.localization.place_protection import protect_place
 from knowledge_sources.methods.localization.place_search import (
     MAX_FAR_PROBES, MAX_FLOOR_DIFFERENCE_M, MAX_ROOMS, Search, describe, find_far_action, find_odds_used,
     list_rooms, prefer_reachable, search,
 )
 from knowledge_sources.methods.localization.pose_candidates import DISTINCT, are_distinct, get_visibility_map
-from knowledge_sources.methods.localization.refinement import (
-    ALIKE_LOG_NOISE, MIN_EXPLAINED_FRACTION, MIN_FRACTION_SUM, MIN_MATCHED_FRACTION, MIN_PLACE_LINES,
-    MIN_VIEW_FRACTION, SURE_LOG_LIKELIHOOD, SURE_MATCHED_FRACTION, compute_pose_likelihood,
-)
+from knowledge_sources.methods.localization.refinement import ALIKE_LOG_NOISE, compute_pose_likelihood
 from knowledge_sources.methods.localization.views import CameraView, propagate_pose, update_obstruction
 
 __all__ = [
-    "ALIKE_LOG_NOISE", "CAMERA_LINE_SIGMA_PX", "DISTINCT", "LOST_AGAIN_ODDS", "MAX_ALIKE_LOG_RATIO", "MAX_FAR_PROBES",
-    "MAX_FLOOR_DIFFERENCE_M", "MAX_HYPOTHESES", "MAX_ROOMS", "MAX_SEARCHED_VIEWS", "MIN_CAMERA_LINES",
-    "MIN_EXPLAINED_FRACTION", "MIN_FRACTION_SUM", "MIN_LOG_LIKELIHOOD", "MIN_MATCHED_FRACTION", "MIN_NEW_VIEW_RAD",
-    "MIN_PLACE_LINES", "MIN_P_SURE", "MIN_P_TRACKED", "MIN_VIEWS", "MIN_VIEW_FRACTION", "MOVE_M", "P_STATED",
-    "REFUTING_LOG_RATIO", "SURE_LOG_LIKELIHOOD", "SURE_MATCHED_FRACTION", "CameraView", "LocalizationStatus", "Search",
-    "StatedPlace", "are_distinct", "compare_places", "compute_pose_likelihood", "compute_prior", "describe",
-    "find_far_action", "find_odds_used", "find_repetitions", "get_visibility_map", "list_aliases", "list_rooms",
-    "make_alias_test", "match_with_camera", "precompute_views", "prefer_reachable", "propagate_pose", "rate_match",
+    "ALIKE_LOG_NOISE", "CAMERA_LINE_SIGMA_PX", "DISTINCT", "LOST_AGAIN_ODDS", "MAX_ALIKE_LOG_RATIO",
+    "MAX_FAR_PROBES", "MAX_FLOOR_DIFFERENCE_M", "MAX_HYPOTHESES", "MAX_ROOMS", "MAX_SEARCHED_VIEWS",
+    "MIN_CAMERA_LINES", "MIN_LOG_LIKELIHOOD", "MIN_NEW_VIEW_RAD", "MIN_P_SURE", "MIN_P_TRACKED", "MIN_VIEWS",
+    "MOVE_M", "P_STATED", "REFUTING_LOG_RATIO", "CameraView", "LocalizationStatus", "Search", "StatedPlace",
+    "are_distinct", "compare_places", "compute_pose_likelihood", "compute_prior", "describe", "find_far_action",
+    "find_odds_used", "find_repetitions", "get_visibility_map", "list_aliases", "list_rooms", "make_alias_test",
+    "match_with_camera", "precompute_views", "prefer_reachable", "propagate_pose", "protect_place", "rate_match",
     "search", "update_obstruction", "weigh_alias_odds", "weigh_prior",
 ]

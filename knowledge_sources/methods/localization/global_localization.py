@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
+from itertools import islice
 
 import shapely
 
@@ -25,6 +26,7 @@ from knowledge_sources.methods.localization.next_view import (
     make_view_predictor,
     normalize_log_likelihoods,
 )
+from knowledge_sources.methods.localization.none_of_these import MIN_P_PLACE, compute_p_place
 from knowledge_sources.methods.localization.pose_candidates import (
     FINE_CLIMB_M,
     FINE_CLIMB_RAD,
@@ -53,6 +55,9 @@ MAX_HYPOTHESES = 6  # most hypotheses that are kept
 MIN_P_TRACKED = 0.8  # smallest probability, against all places that look alike, of a place that is not doubted
 MAX_VIEWS_OF_SEARCH = 8  # most views, the last, by which the floor is searched; what is found is refined by all
 MAX_CANDIDATES = 14  # most candidates of a floor that are refined
+MIN_CANDIDATES = 4  # and fewest, however many views each is refined by
+MAX_REFINED_VIEWS = MAX_CANDIDATES * MAX_VIEWS_OF_SEARCH
+"""Bound of a search's work: so many views of candidates are refined, and again as many of what looks like the best."""
 BUMP_REACH_M = 2.0  # so far from where it was believed a robot may be that nobody kidnapped
 MIN_ALIAS_SCORE = 0.6  # another place shows at least this part of what agrees at the one that is kept
 
@@ -67,8 +72,8 @@ class PlaceCandidate:
     Attributes:
         room, world_from_robot, covariance: where; (3, 3) over (x, y, heading), world.
         likelihood: how well the views support it.
-        is_accepted: whether this is enough to accept it where it stands alone.
-        weight: its share among all that are kept.
+        is_accepted: whether it may be believed where it stands alone, by its odds against none of these.
+        weight: its probability, against all that are kept and none of these.
     """
 
     room: str
@@ -111,7 +116,7 @@ class LocalizationResult:
 def localize(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str],
     guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (),
-    touched: Sequence[Floats] = (), p_guess: float = 0.0,
+    touched: Sequence[Floats] = (), p_guess: float = 0.0, *, is_searched: bool = True,
 ) -> LocalizationResult:
     """Find the robot in these rooms by its views, the last of which was taken from where it is now.
 
@@ -120,15 +125,17 @@ def localize(
         p_guess: how likely it was there, before these views.
         followed: the candidates of the last localization, moved as the robot moved since: they are tried too.
         touched: where something was touched, (2,) [m] in the robot's frame now: no move leads there.
+        is_searched: whether the floor is; else only the places that are followed are weighed, with their aliases.
     """
     aligned = align_headings(views, robot.camera, robot.mount.camera_from_robot)
-    candidates = find_candidates(robot, aligned, rooms, guess, followed, p_guess)
+    candidates = find_candidates(robot, aligned, rooms, guess, followed, p_guess, is_searched=is_searched)
     return decide(robot, candidates, [view.now_from_then for view in aligned], touched)
 
 
 def find_candidates(
     robot: RobotModel, views: Sequence[CameraView], rooms: Sequence[str],
     guess: tuple[str, Pose2] | None = None, followed: Sequence[tuple[str, Pose2]] = (), p_guess: float = 0.0,
+    *, is_searched: bool = True,
 ) -> tuple[PlaceCandidate, ...]:
     """Find the places in these rooms that explain all views (with aligned headings), the likeliest first.
 
@@ -145,7 +152,8 @@ def find_candidates(
     if sum(bool(c.is_accepted) for c in (*found, *known)) >= 2:
         return rank_candidates([*found, *known], are_aliases, len(views), found[0] if found else None)
     pictures = PictureSearch.from_views(robot, views[-MAX_VIEWS_OF_SEARCH:])
-    searched, likely = [*found], choose_rooms(robot, rooms, guess, found, p_guess, len(views))
+    searched = [*found]
+    likely = choose_rooms(robot, rooms, guess, found, p_guess, len(views)) if is_searched else []
     for candidate in _find_refined(robot, views, likely, pictures):
         _keep_likelier(searched, candidate)
     first = None
@@ -158,7 +166,8 @@ def find_candidates(
         return kept
     aliases = find_aliases(robot, views, kept[0].world_from_robot, rooms, likely)
     beside = [_build_candidate(robot, views, c.room, c.world_from_robot) for c in aliases]
-    repeated = _sift(pictures, kept[0].room, kept[0].world_from_robot, _list_repetitions(robot, kept[0], rooms))
+    repeated = _sift(pictures, kept[0].room, kept[0].world_from_robot, _list_repetitions(robot, kept[0], rooms),
+                     count_refined(len(views)))
     beside += _build_distinct(robot, views, repeated, [*kept, *beside])
     rivals = [_polish(robot, views, c) for c in (*kept, *beside)]
     return rank_candidates(rivals, are_aliases, len(views), rivals[0])
@@ -186,17 +195,24 @@ def choose_rooms(
     return [room for room in rooms if shapely.Polygon(robot.world.outline(room)).distance(here) <= BUMP_REACH_M]
 
 
+def count_refined(looks: int) -> int:
+    """How many places a search refines by so many looks: the more looks, the fewer."""
+    return max(MIN_CANDIDATES, min(MAX_CANDIDATES, MAX_REFINED_VIEWS // max(looks, 1)))
+
+
 def _sift(
-    pictures: PictureSearch | None, room: str, pose: Pose2, places: Iterable[tuple[str, Pose2]]
-) -> Iterator[tuple[str, Pose2]]:
-    """Of the places where the plan repeats itself those that show about as much of the pictures as a pose in a room."""
+    pictures: PictureSearch | None, room: str, pose: Pose2, places: Iterable[tuple[str, Pose2]], most: int,
+) -> list[tuple[str, Pose2]]:
+    """Of the places where the plan repeats itself those that show about as much of the pictures as a pose in a room.
+
+    The best of them, in the order in which they were given.
+    """
     if pictures is None:
-        yield from places
-        return
+        return [*islice(places, most)]
     least = MIN_ALIAS_SCORE * pictures.rate(room, pose)
-    for there, other in places:
-        if pictures.rate(there, other) >= least:
-            yield there, other
+    rated = [(rate, k, place) for k, place in enumerate(places) if (rate := pictures.rate(*place)) >= least]
+    best = sorted(rated, key=lambda one: (-one[0], one[1]))[:most]
+    return [place for _, _, place in sorted(best, key=lambda one: one[1])]
 
 
 def _build_distinct(
@@ -260,7 +276,8 @@ def find_aliases(
         if is_alias(refined.world_from_robot):
             found.append(refined)
     here = _find_room(robot, rooms[0], pose)
-    for room, other in _sift(pictures, here, pose, find_repetitions(robot.world, here, pose, rooms)):
+    repeated = find_repetitions(robot.world, here, pose, rooms)
+    for room, other in _sift(pictures, here, pose, repeated, count_refined(len(views))):
         if is_alias(other):
             found.append(_build_candidate(robot, predicted, room, other))
     return tuple(found)
@@ -299,7 +316,8 @@ def rank_candidates(
         kept[MAX_HYPOTHESES - 1] = first
     kept = kept[:MAX_HYPOTHESES]
     weights = normalize_log_likelihoods([c.likelihood.log_likelihood for c in kept])
-    return tuple(replace(c, weight=weight) for c, weight in zip(kept, weights, strict=True))
+    p_any = max((compute_p_place(c.likelihood) for c in kept), default=0.0)
+    return tuple(replace(c, weight=p_any * weight) for c, weight in zip(kept, weights, strict=True))
 
 
 def _is_refuted(one: PoseLikelihood, best: PoseLikelihood, log_ratio: float) -> bool:
@@ -335,7 +353,7 @@ def _find_refined(
 ) -> list[PlaceCandidate]:
     """The best candidates by the last views, refined by all; not the same pose twice."""
     found = list[PlaceCandidate]()
-    for rough in () if pictures is None else pictures.find(rooms, MAX_CANDIDATES):
+    for rough in () if pictures is None else pictures.find(rooms, count_refined(len(views))):
         new = _build_candidate(robot, views, rough.room, rough.world_from_robot)
         pose = new.world_from_robot
         if all(pose.distance_to(other.world_from_robot) > FINE_CLIMB_M
@@ -350,7 +368,7 @@ def _build_candidate(
 ) -> PlaceCandidate:
     """A candidate from a rough pose, found in a room: refined, where that makes it likelier."""
     pose, covariance, likelihood = refine_to_likelier(robot, views, rough)
-    is_accepted = likelihood.is_sufficient()
+    is_accepted = compute_p_place(likelihood) >= MIN_P_PLACE
     return PlaceCandidate(_find_room(robot, room, pose), pose, covariance, likelihood, is_accepted)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, islice
 from typing import NamedTuple
 
 import networkx as nx
@@ -45,6 +45,8 @@ FAR_LEG_M = 1.2  # longest move on the way there; then another look is taken
 FAR_ARRIVED_M = 0.15  # distance from such a position from which the robot only turns
 FAR_COARSE_M = 0.03  # to this the free floor's outline is simplified
 TOUCHED_PART = 0.95  # of the robot's radius that it keeps from what it touched: it stands at one radius from it
+MIN_FAR_PART = 0.02  # of the likeliest's weight that such a place has at least: what tells of others is no news
+MAX_FAR_LOOKS = 240  # most looks there that one search compares, the nearest first
 FAR_HYPOTHESES = 3  # most places, the likeliest, that a far view is to tell apart
 
 PredictView = Callable[[Pose2], Floats]
@@ -250,20 +252,24 @@ def choose_far_action(
     free = find_common_floor(robot, hypotheses, rooms)
     if touched and not free.is_empty:
         free = _keep_off(free, touched, robot.radius_m)
-    compared = hypotheses[:FAR_HYPOTHESES]
+    compared = [h for h in hypotheses[:FAR_HYPOTHESES] if h.weight >= MIN_FAR_PART * hypotheses[0].weight]
     weights = [h.weight for h in compared]
+    for way, look in islice(_list_far_looks(free, looked), MAX_FAR_LOOKS):
+        views = [predict(h.world_from_robot @ look) for h in compared]
+        if any(are_distinguishable([one], [other], clearly=CLEAR_DIFFERENCE)
+               for one, other in combinations(views, 2)):
+            return _begin(way, look, compute_separation(views, weights))
+    return None
+
+
+def _list_far_looks(free: shapely.Geometry, looked: Sequence[Pose2]) -> Iterator[tuple[_Way, Pose2]]:
+    """The ways over the free floor with the new looks at their ends, the nearest first."""
     for way in _list_ways(free, FAR_STEP_M):
         x_m, y_m = way.points[-1].tolist()
-        arriving = _find_last_heading(way)
         for turn in (0.0, 0.5 * math.pi, -0.5 * math.pi, math.pi):
-            look = Pose2(x_m, y_m, wrap_angle(arriving + turn))
-            if _was_looked(look, looked):
-                continue
-            views = [predict(h.world_from_robot @ look) for h in compared]
-            if any(are_distinguishable([one], [other], clearly=CLEAR_DIFFERENCE)
-                   for one, other in combinations(views, 2)):
-                return _begin(way, look, compute_separation(views, weights))
-    return None
+            look = Pose2(x_m, y_m, wrap_angle(_find_last_heading(way) + turn))
+            if not _was_looked(look, looked):
+                yield way, look
 
 
 def find_common_floor(

@@ -29,7 +29,6 @@ from knowledge_sources.methods.localization.global_localization import (
     LocalizationStatus,
     PlaceCandidate,
 )
-from knowledge_sources.methods.localization.refinement import SURE_LOG_LIKELIHOOD
 from world_models.frames import Pose2
 
 P_STATED = 0.98  # probability that the robot is where it was told to be at the start
@@ -37,8 +36,9 @@ LOST_AGAIN_ODDS = 0.2  # factor on the odds of that for every time that it was b
 MAX_ALIKE_LOG_RATIO = 3.0
 """Largest log likelihood ratio of the pictures between places that look alike by the model: more is chance."""
 MIN_P_SURE = 0.999  # smallest probability of a place that is believed although another look could tell more
-LOG_PLACES = 12.0
-"""Logarithm of the number of distinct poses on a floor of forty rooms, 0.45 m or 10 degrees apart."""
+FAR_FROM_CHANCE_LOG = 18.0
+"""Log likelihood from which only the same place shows so much, though an inexact model lacks many lines: it is one
+place, not the best of a floor, which chance has so many trials to be."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,8 +67,8 @@ def weigh_prior(
 
     The stated place is found if it is accepted and so likely that it is believed: ``min_p_sure``, or ``min_p_believed``
     where no look within reach tells more, after ``min_views`` of ``looks``. After ``max_searched_views`` it need not be
-    accepted by its share of lines, if that many are not found by chance. Nothing changes where the pictures alone have
-    found a place, or where no candidate is the stated place.
+    accepted as the best of a floor, if so many lines are not found by chance. Nothing changes where the pictures alone
+    have found a place, or where no candidate is the stated place.
     """
     is_stated = [stated.includes(c) for c in result.candidates]
     if result.status is LocalizationStatus.FOUND or not any(is_stated):
@@ -77,25 +77,16 @@ def weigh_prior(
     aliased = [are_aliases(best.world_from_robot, c.world_from_robot) for c in result.candidates]
     log_likelihoods = [c.likelihood.log_likelihood for c in result.candidates]
     odds = compute_place_odds(log_likelihoods, is_stated, aliased, stated.p_prior)
-    weighed = tuple(sorted((replace(c, weight=p) for c, p in zip(result.candidates, odds, strict=True)),
-                           key=lambda c: -c.weight))
-    likeliest = weighed[0]
+    p_any = min(1.0, math.fsum(c.weight for c in result.candidates))
+    order = sorted(zip(odds, result.candidates, strict=True), key=lambda weighed: -weighed[0])
+    p_most, likeliest = order[0]
     is_tied = result.status is LocalizationStatus.AMBIGUOUS or result.next_action is None
     enough = MIN_P_BELIEVED if is_tied else MIN_P_SURE
     is_confirmed = likeliest.is_accepted and looks >= MIN_VIEWS
-    is_confirmed |= looks >= MAX_SEARCHED_VIEWS and _is_far_from_chance(likeliest)
-    is_settled = is_confirmed and likeliest.weight >= enough
-    if is_settled and stated.includes(likeliest):
-        return LocalizationResult(LocalizationStatus.FOUND, (likeliest,))
-    return replace(result, candidates=weighed)
-
-
-def _is_far_from_chance(candidate: PlaceCandidate) -> bool:
-    """Whether so much agrees that only the same place shows it, though a model that is inexact lacks many lines.
-
-    It is one place, not the best of a floor, which chance has so many trials to be.
-    """
-    return candidate.likelihood.log_likelihood >= SURE_LOG_LIKELIHOOD - LOG_PLACES
+    is_confirmed |= looks >= MAX_SEARCHED_VIEWS and likeliest.likelihood.log_likelihood >= FAR_FROM_CHANCE_LOG
+    if is_confirmed and p_most >= enough and stated.includes(likeliest):
+        return LocalizationResult(LocalizationStatus.FOUND, (replace(likeliest, weight=p_most),))
+    return replace(result, candidates=tuple(replace(c, weight=p_any * p) for p, c in order))
 
 
 def compute_place_odds(

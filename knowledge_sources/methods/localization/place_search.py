@@ -11,14 +11,25 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.localization.global_localization import (
+    MAX_CANDIDATES,
     MAX_SEARCHED_VIEWS,
     MIN_VIEWS,
+    REFUTING_LOG_RATIO,
     LocalizationResult,
     LocalizationStatus,
+    PlaceCandidate,
+    count_refined,
+    decide,
     localize,
 )
-from knowledge_sources.methods.localization.next_view import SensingAction, choose_far_action, make_view_predictor
+from knowledge_sources.methods.localization.next_view import (
+    SensingAction,
+    choose_far_action,
+    make_view_predictor,
+    normalize_log_likelihoods,
+)
 from knowledge_sources.methods.localization.place_odds import StatedPlace
+from knowledge_sources.methods.localization.pose_candidates import are_distinct
 from knowledge_sources.methods.localization.views import CameraView
 from world_models.building.building import Building
 from world_models.entries import PlaceOdds
@@ -28,6 +39,7 @@ from world_models.robot import RobotModel
 
 MAX_FAR_PROBES = 20
 """So many looks are taken when lost and places fit: it turns, and drives to views that tell them apart."""
+LEAST_P_SAID = 0.005  # least probability of none of these that is said
 MAX_ROOMS = 80  # most rooms that are searched, the nearest to the last belief first
 MAX_FLOOR_DIFFERENCE_M = 0.5  # rooms whose floors differ by less are on one floor
 
@@ -53,11 +65,45 @@ class Search(NamedTuple):
 
 
 def search(robots: Iterable[RobotModel], what: Search) -> tuple[LocalizationResult, int]:
-    """The result of the robot, camera and building, in which the best place fits best, and which it is."""
-    tried = [localize(robot, what.looks, what.rooms, what.here, what.followed, what.touched, what.p_here)
-             for robot in robots]
-    best = max(range(len(tried)), key=lambda k: _measure_fit(tried[k]))  # of equals the first
-    return tried[best], best
+    """The result of the robot, camera and building, in which the best place fits best, and which it is.
+
+    The floor is searched once, with the first robot; another one weighs the places that were found, and those that look
+    like them. It searches by itself only where enough looks have found no place to believe. What two robots tell
+    otherwise is not found.
+    """
+    asked = [*robots]
+    results = [_localize(asked[0], what)]
+    for robot in asked[1:]:
+        found = [c for result in results for c in result.candidates]
+        if any(c.is_accepted for c in found):
+            places = [(c.room, c.world_from_robot) for c in found]
+            results.append(_localize(robot, what._replace(followed=(*places, *what.followed)), is_searched=False))
+        elif len(what.looks) >= MIN_VIEWS:
+            results.append(_localize(robot, what))
+    which = max(range(len(results)), key=lambda k: _measure_fit(results[k]))  # of equals the first
+    best = results[which]
+    rivals = _list_rivals(best, results)
+    if best.status is LocalizationStatus.FOUND and rivals:
+        both = (*best.candidates, *rivals)
+        odds = normalize_log_likelihoods([c.likelihood.log_likelihood for c in both])
+        weighed = [replace(c, weight=p * best.candidates[0].weight) for c, p in zip(both, odds, strict=True)]
+        best = decide(asked[which], weighed, [look.now_from_then for look in what.looks], what.touched)
+    return best, which
+
+
+def _localize(robot: RobotModel, what: Search, *, is_searched: bool = True) -> LocalizationResult:
+    return localize(robot, what.looks, what.rooms, what.here, what.followed, what.touched, what.p_here,
+                    is_searched=is_searched)
+
+
+def _list_rivals(best: LocalizationResult, results: Sequence[LocalizationResult]) -> list[PlaceCandidate]:
+    """Other places that another camera or building explains so well that the best does not refute them, each once."""
+    rivals: list[PlaceCandidate] = []
+    for c in (c for result in results for c in result.candidates):
+        is_near = _measure_fit(best) - c.likelihood.log_likelihood < REFUTING_LOG_RATIO
+        if is_near and all(are_distinct(c.world_from_robot, o.world_from_robot) for o in (*best.candidates, *rivals)):
+            rivals.append(c)
+    return rivals
 
 
 def _measure_fit(result: LocalizationResult) -> float:
@@ -132,9 +178,17 @@ def _distance(outline: object, here: Pose2) -> float:
     return float(np.min(np.hypot(corners[:, 0] - here.x_m, corners[:, 1] - here.y_m)))
 
 
-def describe(result: LocalizationResult, *, is_far: bool) -> str:
-    """What a search came to, in words; ``is_far``: the next action is on the way to a view that tells."""
+def describe(result: LocalizationResult, *, is_far: bool, looks: int = 0) -> str:
+    """What a search came to, in words; ``is_far``: the next action is on the way to a view that tells.
+
+    ``looks``: so many that a search may have come to the bound of its work.
+    """
+    if (refined := count_refined(looks)) < MAX_CANDIDATES and result.status is not LocalizationStatus.FOUND:
+        return f"{describe(result, is_far=is_far)}; by so many looks only the best {refined} places are weighed"
     places = " or ".join(f"{c.room} ({c.weight:.0%})" for c in result.candidates)
+    p_none = 1.0 - math.fsum(c.weight for c in result.candidates)
+    if places and p_none >= LEAST_P_SAID:
+        places += f" or none of these ({p_none:.0%})"
     if result.status is LocalizationStatus.FOUND:
         return f"it is {places}, which stands alone"
     if result.status is LocalizationStatus.AMBIGUOUS:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -21,6 +21,7 @@ from knowledge_sources.methods.localization.views import CameraView, find_lever,
 from knowledge_sources.methods.pose import planar_from_lines, to_pose2
 from knowledge_sources.methods.verification import (
     DISPLACEMENT_M,
+    LINE_INDEPENDENCE,
     LINE_TOLERANCE_PX,
     LINE_TOLERANCE_RAD,
     check_lines,
@@ -38,25 +39,6 @@ from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines
 
-MIN_PLACE_LINES = 12  # fewest matched lines of an accepted pose (checked with harvey experiment kidnap)
-MIN_MATCHED_FRACTION = 0.6
-"""Smallest part of the predicted lines that an accepted pose matches (checked with harvey experiment kidnap)."""
-MIN_VIEW_FRACTION = 0.35
-"""Smallest part of the predicted lines that an accepted pose matches in any view (checked with harvey experiment
-kidnap)."""
-MIN_EXPLAINED_FRACTION = 0.35
-"""Smallest part of the segments that an accepted pose explains (checked with harvey experiment kidnap)."""
-MIN_FRACTION_SUM = 1.15
-"""Smallest sum of matched and explained parts: a pose nearby has a little of both (rough-day, seed 91)."""
-SURE_LOG_LIKELIHOOD = 30.0
-"""Log likelihood from which segments need no explanation: the model lacks what is on full shelves (own floors, plain
-and textured, and development floors of miniworld: the best place in rooms where it is not)."""
-SURE_MATCHED_FRACTION = 0.75
-"""Part of the predicted lines from which, at that likelihood, segments need no explanation (checked with harvey
-experiment kidnap)."""
-CLEAR_LOG_LIKELIHOOD = 80.0
-"""Log likelihood from which a single view may show nothing of what should be seen: it may be hidden (miniworld's
-development floors)."""
 ALIKE_LOG_NOISE = 2.0
 """Log likelihood ratio of one picture between places that look alike by the model that is noise (generated floors of
 seeds 0 to 2)."""
@@ -74,7 +56,6 @@ TURN_SEARCH_SIGMAS = 2.5  # reach of the search for an uncertain turn, in standa
 MAX_VIEW_SURPRISE = 11.3
 """Largest squared normalized error of a view by the others, with which they still agree; three unknowns, 99 %."""
 MIN_VIEW_LINES = 8  # fewest predicted lines by which a single view counts
-MIN_P_LOOKS = 0.05  # least probability of the look that shows the fewest lines, of all looks at a pose
 MIN_EXPLAINED_LENGTH_PX = 25.0  # shortest segment that should be explained by the model
 EXPLAINED_TOLERANCE_PX = 3.0  # distance of a segment from the model line that explains it
 MIN_EXPLAINING_LENGTH_PX = 4.0  # shortest model line that explains a segment
@@ -236,6 +217,22 @@ def _solve(
     return (then if posterior is prior else solved), posterior
 
 
+class Pairs(NamedTuple):
+    """Model lines (n, 2, 3) [m, world], the segments (n, 2, 2) that agree with them, and n landmarks."""
+
+    lines_world: Floats
+    segments_px: Floats
+    names: list[str]
+
+
+def list_pairs(robot: RobotModel, view: CameraView, then: Pose2) -> Pairs:
+    """What agrees in one view from a precise pose, without what is in a pattern."""
+    segments, lines = take_distinct(view.segments_px), predict_lines(robot, then)
+    model, data = _pair(lines.segments_px, segments, FINE_GATE_PX).T
+    names = list_names(lines)
+    return Pairs(lines.lines_world[model], segments[data], [names[int(i)] for i in model])
+
+
 def _pair(lines_px: Floats, segments_px: Floats, gate_px: float) -> Ints:
     """(p, 2) indices of lines (m, 2, 2) and segments (k, 2, 2): each segment along a line, with the nearest one."""
     nearest = _find_nearest(
@@ -279,7 +276,6 @@ class PoseLikelihood:
             those in a pattern that the model does not have.
         log_likelihood: logarithm of the likelihood ratio of this pose to one drawn by chance.
         explained: part of the length of long segments that lies on a model line, 0..1.
-        weakest_view: smallest matched part of the predicted lines of a view that has enough of them, 0..1.
         looks: of each view the lines in view, those that are found, and the log likelihood.
     """
 
@@ -287,7 +283,6 @@ class PoseLikelihood:
     matched: int
     log_likelihood: float
     explained: float
-    weakest_view: float
     looks: tuple[tuple[int, int, float], ...] = ()
 
     def is_refuted_by_a_look(self, other: PoseLikelihood, log_ratio: float) -> bool:
@@ -295,29 +290,16 @@ class PoseLikelihood:
         return any(_is_half_missing(visible, matched) and there - here >= log_ratio
                    for (visible, matched, here), (_, _, there) in zip(self.looks, other.looks, strict=True))
 
-    def contradicts_itself(self) -> bool:
-        """Whether half of the lines of one look are missing, though others show more, as they do not among bricks."""
-        return any(_is_half_missing(visible, matched) and compute_p_share(
-            matched, visible, self.matched - matched, self.visible - visible) < MIN_P_LOOKS / len(self.looks)
-            for visible, matched, _ in self.looks)
+    def compute_p_weakest_look(self) -> float:
+        """The probability that some look shows as few lines as the weakest does, if the others are right.
 
-    def is_sufficient(self) -> bool:
-        """Whether the pose can be accepted.
-
-        Enough lines must be matched, in every view as in the others, and the segments be explained, or else the log
-        likelihood be so large that the model may lack much of what is seen, as bricks and planks: the larger it is, the
-        more lines may be missing, and in a single view all of them, where an occlusion hides them.
+        Of looks of which half is missing: as few among bricks, where all looks show little, are no surprise. Lines of
+        one thing are missed together, as where two walls of a corner are alike.
         """
-        fraction = self.matched / max(self.visible, 1)
-        enough = SURE_LOG_LIKELIHOOD
-        is_sure = (self.log_likelihood >= enough
-                   and fraction >= SURE_MATCHED_FRACTION * enough / self.log_likelihood)
-        is_explained = self.explained >= max(MIN_EXPLAINED_FRACTION, MIN_FRACTION_SUM - fraction)
-        is_clear = (self.log_likelihood >= CLEAR_LOG_LIKELIHOOD
-                    or (self.weakest_view >= MIN_VIEW_FRACTION and not self.contradicts_itself()))
-        return (self.matched >= MIN_PLACE_LINES
-                and self.matched >= MIN_MATCHED_FRACTION * self.visible
-                and is_clear and (is_explained or is_sure))
+        shares = [compute_p_share(found := round(LINE_INDEPENDENCE * matched), found + round(
+            LINE_INDEPENDENCE * (visible - matched)), self.matched - matched, self.visible - visible)
+            for visible, matched, _ in self.looks if _is_half_missing(visible, matched)]
+        return min(1.0, len(self.looks) * min(shares)) if shares else 1.0
 
     def __str__(self) -> str:
         return (f"{self.matched} of {self.visible} model lines that should be seen from there are in the pictures,"
@@ -348,7 +330,7 @@ def compute_pose_likelihood(
     """Compute the likelihood of the robot's pose now by all views; lines of an inexact model are displaced as they fit.
     """
     visible, matched, looks = 0, 0, list[tuple[int, int, float]]()
-    weakest, lengths, explained = 1.0, 0.0, 0.0
+    lengths, explained = 0.0, 0.0
     for view in views:
         then = view.pose_then(world_from_now)
         shown = predict_lines(robot, then)
@@ -364,12 +346,10 @@ def compute_pose_likelihood(
         found, expected = agreement.matched, agreement.visible
         visible, matched = visible + expected, matched + found
         looks.append((expected, found, compute_log_ratio(found, expected, agreement.chance)))
-        if agreement.visible >= MIN_VIEW_LINES:
-            weakest = min(weakest, agreement.matched / agreement.visible)
         length, part = _explain(robot, view, then)
         lengths, explained = lengths + length, explained + part
     part = explained / lengths if lengths > 0.0 else 0.0
-    return PoseLikelihood(visible, matched, math.fsum(look[2] for look in looks), part, weakest, tuple(looks))
+    return PoseLikelihood(visible, matched, math.fsum(look[2] for look in looks), part, tuple(looks))
 
 
 def _is_half_missing(visible: int, matched: int) -> bool:

@@ -50,6 +50,7 @@ class Rests(NamedTuple):
         camera, mount: as it was solved for; step: (7,) from what was believed of it.
         belief: before; covariance: (3, 3) of it over (x, y, heading), as stated; loosened: as the prior of the pose.
         camera_covariance: (7, 7) of what was believed of the camera.
+        seen_from: where the robot was when it saw each line, as looks of one turn round; none: at the pose itself.
     """
 
     lines_world: Floats
@@ -62,19 +63,14 @@ class Rests(NamedTuple):
     covariance: Floats
     loosened: Floats
     camera_covariance: Floats
+    seen_from: Sequence[Pose2] = ()
 
 
 def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protection:
     """The protection level of a pose with a stated covariance (3, 3), world frame; linear near the pose."""
     if not len(rests.lines_world):
         return _measure(NOISE, np.zeros(POSE), covariance, count_sigmas(1))
-    state = np.array([*pose.vector, *np.zeros(UNKNOWNS - POSE)])
-    c, m = rests.camera, rests.mount
-    distances, slopes = measure_lines(
-        np.ascontiguousarray(rests.lines_world), np.ascontiguousarray(rests.segments_px),
-        np.array([c.fx, c.fy, c.cx, c.cy]), np.array([m.height_m, m.forward_m, m.tilt_rad, m.roll_rad, m.yaw_rad]),
-        state)
-    slopes = slopes[..., FREE]
+    distances, slopes = _measure_lines(pose, rests)
     variance = _estimate_variance(distances)
     hessians = np.einsum("nea,neb->nab", slopes, slopes) / variance
     gradients = np.einsum("nea,ne->na", slopes, distances) / variance
@@ -97,6 +93,25 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
         levels.append(_measure(name, step, without[:POSE, :POSE], factor))
     worst = max(levels)
     return Protection(worst.place_m, max(level.heading_rad for level in levels), worst.doubted)
+
+
+def _measure_lines(pose: Pose2, rests: Rests) -> tuple[Floats, Floats]:
+    """Distances (n, 2) of the lines' ends [px], and their slopes (n, 2, u) by the pose and what is open of the camera.
+    """
+    n, c, m = len(rests.lines_world), rests.camera, rests.mount
+    lens = np.array([c.fx, c.fy, c.cx, c.cy])
+    mounted = np.array([m.height_m, m.forward_m, m.tilt_rad, m.roll_rad, m.yaw_rad])
+    seen_from = rests.seen_from or (pose,) * n
+    distances, slopes = np.zeros((n, 2)), np.zeros((n, 2, UNKNOWNS))
+    for there in dict.fromkeys(seen_from):
+        of = [one == there for one in seen_from]
+        state = np.array([*there.vector, *np.zeros(UNKNOWNS - POSE)])
+        distances[of], slopes[of] = measure_lines(np.ascontiguousarray(rests.lines_world[of]),
+                                                  np.ascontiguousarray(rests.segments_px[of]), lens, mounted, state)
+        lever = np.eye(POSE)  # of the pose there by the one now, to which it is fixed
+        lever[0, 2], lever[1, 2] = pose.y_m - there.y_m, there.x_m - pose.x_m
+        slopes[of, :, :POSE] = slopes[of, :, :POSE] @ lever
+    return distances, np.asarray(slopes[..., FREE])
 
 
 def tell_unavailable(protection: Protection) -> str:

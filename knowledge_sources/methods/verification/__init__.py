@@ -14,9 +14,10 @@ In reading order:
 
 from knowledge_sources.methods.verification.color_check import check_colors, predict_color_check
 from knowledge_sources.methods.verification.line_check import (
-    Agreement, DISPLACEMENT_M, LINE_TOLERANCE_PX, LINE_TOLERANCE_RAD, MAX_LINE_WEIGHT_PX, MIN_COVERED_FRACTION,
-    MIN_MATCHED_LINES, check_lines, compute_agreement, compute_coverage, compute_log_ratio, compute_p_false,
-    compute_p_share, compute_view_quality, find_distinct, find_errors, list_names, predict_lines, take_distinct,
+    Agreement, DISPLACEMENT_M, LINE_INDEPENDENCE, LINE_TOLERANCE_PX, LINE_TOLERANCE_RAD, MAX_LINE_WEIGHT_PX,
+    MIN_COVERED_FRACTION, MIN_MATCHED_LINES, check_lines, compute_agreement, compute_coverage, compute_log_ratio,
+    compute_p_false, compute_p_share, compute_view_quality, find_distinct, find_errors, list_names, predict_lines,
+    take_distinct,
 )
 from knowledge_sources.methods.verification.pose_confidence import (
     EVIDENCE_NAMES, EvidenceWeights, MOTION_TOLERANCE_SIGMAS, POSE_CONFIDENCE, PoseConfidence, PoseEvidence, TERMS,
@@ -34,7 +35,8 @@ from knowledge_sources.methods.verification.weigh import (
 )
 
 __all__ = [
-    "CHECK_TOLERANCE_M", "DISPLACEMENT_M", "EVIDENCE_NAMES", "LINE_TOLERANCE_PX", "LINE_TOLERANCE_RAD",
+    "CHECK_TOLERANCE_M", "DISPLACEMENT_M", "EVIDENCE_NAMES", "LINE_INDEPENDENCE", "LINE_TOLERANCE_PX",
+    "LINE_TOLERANCE_RAD",
     "LOOK_TURNS_RAD", "MAX_FOLLOWED_PX", "MAX_INEXACT_LOOKS", "MAX_LINE_WEIGHT_PX", "MAX_MILESTONE_LOOKS",
     "MAX_SIGMA_PART", "MAX_SIGMA_RAD", "MIN_COVERED_FRACTION", "MIN_LINES", "MIN_MATCHED_LINES",
     "MOTION_TOLERANCE_SIGMAS", "POSE_CONFIDENCE", "P_WRONG_FOLLOWED", "P_WRONG_IN_DOUBT", "P_WRONG_STANDING",

@@ -21,6 +21,7 @@ from knowledge_sources.methods.localization import (
 )
 from knowledge_sources.methods.localization.global_localization import LocalizationResult, PlaceCandidate
 from knowledge_sources.methods.localization.next_view import SensingAction
+from knowledge_sources.methods.localization.none_of_these import MIN_P_PLACE
 from knowledge_sources.methods.localization.refinement import PoseLikelihood
 from knowledge_sources.methods.verification import predict_lines
 from knowledge_sources.model.model_reviser import ModelReviser
@@ -85,6 +86,8 @@ def test_by_two_looks_it_finds_where_it_is_whatever_it_believed(off: Pose2) -> N
     assert [effect.entry for effect in effects if isinstance(effect, Retract)] == [old]
     assert reasons(effects[0]) == {"Panorama-1", "Discrepancy-1", "Hypothesis-1", old.id}
     assert made(effects, PlaceOdds) == []  # the pictures alone told
+    assert found.weight >= MIN_P_PLACE  # against none of these too
+    assert pose.distance_to(in_world(TRUTH)) < found.protection_m and found.excess_m > 0.0
 
 
 def test_by_one_look_it_asks_for_another() -> None:
@@ -122,7 +125,7 @@ ACTION = SensingAction(1.0, 0.3, 2.0)
 
 def candidate(pose: Pose2, log_likelihood: float, weight: float = 0.5) -> PlaceCandidate:
     """A place that the looks confirm, and the robot's pose in its room."""
-    fits = PoseLikelihood(20, 18, log_likelihood, 0.9, 0.9)
+    fits = PoseLikelihood(20, 18, log_likelihood, 0.9)
     return PlaceCandidate(ROOM, in_world(pose), np.diag([1e-3, 2e-3, 1e-4]), fits, True, weight)
 
 
