@@ -21,6 +21,8 @@ SENSES: frozenset[RivalKind] = frozenset({
     "report"})
 """Rivals by which not the building or the belief is wrong, but a sense is."""
 
+MODEL = "the model of the building"
+"""What differs where walls and doors stand elsewhere in general, or the camera makes it seem so."""
 SURE = 0.95
 """A rival that is so probable is what the difference is taken for."""
 
