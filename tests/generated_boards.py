@@ -214,6 +214,10 @@ class Bench:
         return command, self.put(MotionReport(turn_rad, move_m, 1.0, 1.0), command)
 
 
+INEXACT: Mapping[str, Any] = {"expected": (((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),), "displacement_modes": ("wall",),
+                              "displacements": ((0.0, 0.0, 0.05, 0.0, 0.0),)}
+"""Fields of a milestone whose one line may be displaced by 5 cm."""
+
 LACKING: Mapping[str, Callable[[Bench], object]] = {
     "belief": lambda bench: bench.revise(bench.view["Hypothesis-1"], status="candidate"),
     "doubt": lambda bench: bench.revise(bench.view["Discrepancy-1"], status="corrected"),

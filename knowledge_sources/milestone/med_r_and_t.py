@@ -9,31 +9,40 @@ import numpy as np
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.methods.calibration import (
     add_yaw,
     compute_camera_covariance,
     compute_knocked_covariance,
+    find_model_evidence,
     has_counted,
+    is_strange,
     loosen,
     to_tuples,
     widen,
 )
 from knowledge_sources.methods.features import SIGMA_ACROSS_PX
-from knowledge_sources.methods.localization import CAMERA_LINE_SIGMA_PX, MIN_CAMERA_LINES
+from knowledge_sources.methods.localization import MIN_CAMERA_LINES
 from knowledge_sources.methods.pose import (
     CameraEstimate,
+    Given,
     PlanarEstimate,
     Rests,
     compute_protection,
-    estimate_camera_and_pose,
+    fit_jointly,
     planar_from_lines,
+    to_camera_estimate,
 )
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, find_camera, find_robot
+from knowledge_sources.reads import HELD, find_camera, find_robot, tell_time_s
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import LineMatch, Milestone, PoseFix
+from world_models.building.model_errors import INEXACT_M, LineErrors
+from world_models.entries import CameraState, Difference, Evidence, LineMatch, Milestone, PoseFix
+from world_models.entries.difference import MODEL
 from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
+
+MIN_P_DOUBTED = 0.5  # where the model is inexact more probably than not, a pose is solved for as if it were
 
 Matched = tuple[Entry[LineMatch], Entry[Milestone]]
 
@@ -43,14 +52,16 @@ class MedRAndT(RobotKnowledgeSource):
 
     The mounting of the camera is known (§3.2), so three of the six unknowns of §6.2 are left. Subsets of lines propose
     poses, the median residual of all lines chooses one, and the inliers refine it. How well the camera is known is
-    known too: what the lines say of it is posted with the pose, and its uncertainty is part of the
-    pose's covariance. Where the model is inexact, its errors are integrated out, and nothing is learnt of the camera.
+    known too: what the lines say of it, but for what the model's errors may have done, is posted with the pose, and its
+    uncertainty is part of the pose's covariance. Whether the model is inexact where it does not say so is weighed
+    against a camera that is otherwise. Where it likely is, or is stated to be, its errors are integrated out, and
+    nothing is learnt of the camera.
     """
 
     level, priority = Level.PLAN, Priority.SEE
     on = (Watch(LineMatch, (Posted,)),)
     needs = (HELD,)
-    writes = (PoseFix,)
+    writes = (PoseFix, Evidence)
 
     def bind(self, view: View, trigger: Change) -> Matched | None:
         """The lines that were matched, and the milestone that expected them."""
@@ -65,12 +76,16 @@ class MedRAndT(RobotKnowledgeSource):
         if match.value.is_camera_open:
             opened = compute_knocked_covariance(camera)
             prior, known = add_yaw(prior, opened, known), opened
-        learnt = None if m.displacement_modes else self._learn(robot, match.value, here, prior, known)
+        errors = m.errors.take(match.value.pairs[:, 0])
+        evidence, is_doubted = self._weigh_model(view, match, camera, here, prior, errors)
+        if is_doubted:
+            errors = errors.restate(INEXACT_M)
+        learnt = self._learn(robot, match.value, here, prior, known, errors) if errors.is_exact else None
         moves = learnt is not None and (
             match.value.is_camera_open or not has_counted(camera, learnt.world_from_robot))
         if learnt is not None and moves:
             robot = find_robot(view, camera.moved(tuple(learnt.step.tolist()))).on_floor_of(belief.locale)
-        found = self._solve(robot, match.value, here, prior, m)
+        found = self._solve(robot, match.value, here, prior, m, errors)
         covariance = found.covariance
         learnt = learnt and replace(learnt, covariance=widen(learnt, here, belief.covariance))
         if learnt is not None:
@@ -93,20 +108,37 @@ class MedRAndT(RobotKnowledgeSource):
             ),
             (match, milestone, belief.entry),
         )
+        if evidence is not None:
+            yield Post(evidence, (match, milestone, belief.entry))
+
+    def _weigh_model(
+        self, view: View, match: Entry[LineMatch], camera: CameraState, here: Pose2, prior: Floats, errors: LineErrors
+    ) -> tuple[Evidence | None, bool]:
+        """What is new of whether the model is inexact, where it is not known, and whether that is likelier than not."""
+        if not errors.is_exact or match.value.is_camera_open or len(match.value.pairs) < MIN_CAMERA_LINES:
+            return None, False
+        known = view.latest(Difference, lambda d: d.about == MODEL)
+        evidence = find_model_evidence(
+            match.value.lines_world, match.value.segments_px, errors, camera, here, prior, tell_time_s(view))
+        if known is None and not is_strange(evidence):
+            return None, False
+        counted = () if known is None else known.value.counted
+        wall = weigh_rivals(MODEL, (*counted, evidence)).find("wall")
+        return evidence, wall is not None and wall.p > MIN_P_DOUBTED
 
     def _learn(
-        self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, known: Floats
+        self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, known: Floats, errors: LineErrors
     ) -> CameraEstimate | None:
         """The camera's state; None where the lines say too little."""
         if len(match.pairs) < MIN_CAMERA_LINES:
             return None
-        found = estimate_camera_and_pose(
-            match.lines_world, match.segments_px, robot.camera, robot.mount, here, prior, known,
-            sigma_px=CAMERA_LINE_SIGMA_PX)
-        return found if np.count_nonzero(found.inliers) >= MIN_CAMERA_LINES else None
+        given = Given(match.lines_world, match.segments_px, robot.camera, robot.mount, here, prior)
+        found = fit_jointly(given, known, errors, here)
+        return to_camera_estimate(found, known) if np.count_nonzero(found.near) >= MIN_CAMERA_LINES else None
 
     def _solve(
-        self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, milestone: Milestone
+        self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, milestone: Milestone,
+        errors: LineErrors,
     ) -> PlanarEstimate:
         """The pose with a camera that is taken as it is."""
         return planar_from_lines(
@@ -118,5 +150,5 @@ class MedRAndT(RobotKnowledgeSource):
             prior_covariance=prior,
             landmark_ids=[milestone.landmark_of[i] for i in match.pairs[:, 0]],
             sigma_px=SIGMA_ACROSS_PX,
-            errors=milestone.errors.take(match.pairs[:, 0]),
+            errors=errors,
         )

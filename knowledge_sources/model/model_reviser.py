@@ -7,13 +7,14 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
-from blackboard import Change, Effect, Entry, Level, Posted, Revise, View, Watch
-from knowledge_sources.methods.floor import revise_by_door, revise_by_report, revise_by_thing
+from blackboard import Change, Effect, Entry, Level, Posted, Revise, Revised, View, Watch
+from knowledge_sources.methods.floor import revise_by_difference, revise_by_door, revise_by_report, revise_by_thing
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import find_building, find_frames
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locale_frame import LocaleFrame
-from world_models.entries import DoorState, Obstacle, UserReport
+from world_models.entries import Difference, DoorState, Obstacle, UserReport
+from world_models.entries.difference import MODEL
 
 
 class Statement(NamedTuple):
@@ -41,7 +42,7 @@ class Case(NamedTuple):
 
 
 class ModelReviser(RobotKnowledgeSource):
-    """Alone revises what is known of locales: by things on the floor, by doors, and by what somebody says.
+    """Alone revises what is known of locales: by things, doors, a model found inexact, and what somebody says.
 
     Of two that say otherwise the newer counts. All that is new of a locale comes into its frame at once, so that who
     reads why it was revised finds all of it. A door is in the frames of both its rooms. A frame is revised only where a
@@ -50,7 +51,8 @@ class ModelReviser(RobotKnowledgeSource):
     """
 
     level, priority = Level.ACTION, Priority.ENTER
-    on = (Watch(UserReport, (Posted,)), Watch(Obstacle), Watch(DoorState))
+    on = (Watch(UserReport, (Posted,)), Watch(Obstacle), Watch(DoorState),
+          Watch(Difference, (Posted, Revised), lambda d: d.about == MODEL))
     writes = (LocaleFrame, UserReport)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
@@ -93,6 +95,9 @@ class ModelReviser(RobotKnowledgeSource):
             yield Statement(entry, (entry.value.locale,), revise)
         for door in view.all(DoorState):
             yield Statement(door, door.value.between, partial(revise_by_door, door=door.value, by=door.author))
+        for found in view.where(Difference, lambda d: d.about == MODEL):
+            yield Statement(found, (find_building(view).root,),
+                            partial(revise_by_difference, found=found.value, by=found.author))
         for from_user in view.where(UserReport, lambda report: not report.answer):
             by_report = partial(revise_by_report, report=from_user.value, by=from_user.author)
             try:

@@ -15,7 +15,9 @@ from knowledge_sources.reads.conditions import (
 from knowledge_sources.reads.doors_in_view import (
     MAX_SIGMA_M, MAX_SIGMA_RAD, Watched, find_door_state, list_doors_in_view, with_door_open, with_door_shut,
 )
-from knowledge_sources.reads.floor_ahead import FloorAhead, SEEN_MARGIN_M, find_known_free, find_swept_next
+from knowledge_sources.reads.floor_ahead import (
+    FloorAhead, SEEN_MARGIN_M, find_known_free, find_swept_next, tell_time_s,
+)
 from knowledge_sources.reads.followed_landmarks import (
     Following, Renewed, find_missing_floors, find_near_frames, post_or_revise, rectify, take_new, tell_worst,
     with_anchors,
@@ -50,6 +52,7 @@ __all__ = [
     "is_standing", "is_up_to_date", "last_motion", "list_contacts", "list_doors_in_view", "list_locales",
     "list_log_odds", "list_planners", "list_views", "locate_contact", "name_obstacles", "open_discrepancies",
     "open_discrepancy", "open_impasse", "open_milestone", "place_of", "post_or_revise", "rectify", "rests_on",
-    "rolling_course", "supersede", "take_new", "tell_missed", "tell_worst", "unmeasured_doubt", "with_anchors",
+    "rolling_course", "supersede", "take_new", "tell_missed", "tell_time_s", "tell_worst", "unmeasured_doubt",
+    "with_anchors",
     "with_door_open", "with_door_shut",
 ]

@@ -370,7 +370,7 @@ def _find_scans(view: View, belief: Entry[Hypothesis], settings: ActionSettings)
     """What the robot saw of the floor that it is on, the oldest first; only since it was last found, as it was seen
     from elsewhere before.
     """
-    now_s = _tell_time_s(view)
+    now_s = tell_time_s(view)
     ride, found = view.latest(RideReport), _find_last_search(view)
     since_s = max(now_s - settings.max_seen_age_s, -math.inf if ride is None else ride.value.sim_time_s)
     since = -1 if found is None else found.cycle
@@ -389,7 +389,7 @@ def _is_of(scan: Entry[FreeFloor], belief: Entry[Hypothesis]) -> bool:
     return not beliefs or belief.id in beliefs
 
 
-def _tell_time_s(view: View) -> float:
+def tell_time_s(view: View) -> float:
     frame, report = view.latest(CameraPicture), view.latest(MotionReport)
     return max(0.0 if frame is None else frame.value.sim_time_s, 0.0 if report is None else report.value.sim_time_s)
 

@@ -51,7 +51,7 @@ class YawCalibrator(RobotKnowledgeSource):
     def bind(self, view: View, trigger: Change) -> Measured | None:
         """What a way tells of the yaw: more than is known, or it is spent, so that another begins."""
         travel, camera, milestone = WAY.of(view), CAMERA.of(view), view.latest(Milestone)
-        if milestone is not None and milestone.value.displacement_modes:  # an inexact model bends the way
+        if milestone is not None and milestone.value.is_inexact:  # an inexact model bends the way
             return None
         measured = self._measure(camera.value, travel.value, HELD.of(view))
         known = compute_camera_covariance(camera.value)[YAW, YAW]

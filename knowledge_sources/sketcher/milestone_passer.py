@@ -57,7 +57,7 @@ class MilestonePasser(RobotKnowledgeSource):
             reason = f"{milestone.value.what} is not testable, where a search has found it"
             yield Post(Impasse("blocked", reason, goal.id), (milestone, sketch, *found))
             return
-        if not has_missed(view, belief.value, s, is_inexact=bool(milestone.value.displacement_modes)):
+        if not has_missed(view, belief.value, s, is_inexact=milestone.value.is_inexact):
             passed = replace(s, status="done") if s.at_end else replace(s, adjustments=0)
             yield Revise(sketch, replace(passed, verified=True), (milestone, belief, *found))
             return

@@ -22,7 +22,7 @@ from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, PlanSketch
 from world_models.frames import frozen
 
-ChangeKind = Literal["shut", "gone", "removed", "extra"]
+ChangeKind = Literal["shut", "gone", "removed", "extra", "inexact"]
 UNDONE: Mapping[str, ChangeKind] = {"open": "shut", "there": "gone"}
 """What takes back which change."""
 RequestStatus = Literal["asked", "answered"]
@@ -37,9 +37,9 @@ class FrameChange:
     """What is believed of a locale otherwise than its file says.
 
     Attributes:
-        what: shut (a door), gone (a thing), removed (a landmark's lines, or a face), or extra (something stands there
-            that the file lacks).
-        name: of the door, thing, landmark or face.
+        what: shut (a door), gone (a thing), removed (a landmark's lines, or a face), extra (something stands there
+            that the file lacks), or inexact (the whole building: its walls and doors stand centimetres elsewhere).
+        name: of the door, thing, landmark, face or building.
         by: who said so.
         footprint: of what is extra: the corners, counter-clockwise, of what it takes of the floor [m, world].
         height_m: of what is extra: up to here it hides what is behind it; 0 where nothing tells how high it is.
@@ -52,7 +52,8 @@ class FrameChange:
     height_m: float = 0.0
 
     def sentence(self) -> str:
-        said = {"shut": "is shut", "gone": "is gone", "removed": "is left out", "extra": "stands in the way"}[self.what]
+        said = {"shut": "is shut", "gone": "is gone", "removed": "is left out", "extra": "stands in the way",
+                "inexact": "is known to centimetres only"}[self.what]
         return f"{self.name} {said} ({self.by})"
 
 
@@ -161,6 +162,8 @@ class LocaleFrame:
             parts = shut_door(self.parts, door, self.extent.reach[2])
             doorways = tuple(d for d in self.doorways if d is not door)
             return replace(self, parts=parts, doorways=doorways, changes=changes, filed=filed, memo={})
+        if change.what == "inexact":
+            return replace(self, changes=changes, filed=filed, memo={})
         if change.what == "gone":
             parts, things = remove_thing(self.parts, self.things, change.name)
             return replace(self, parts=parts, things=things, changes=changes, filed=filed, memo={})

@@ -4,7 +4,8 @@ A world file may state a standard deviation (``sigma_cm``) for all of it, a loca
 together is wrong together, so the errors are not one a line but one a *mode*: a wall is displaced along its normal with
 all that is on it, the two sides of a wall with a door as one; a door along its wall, with the ends that it cuts the
 wall's lines to; a thing along and up its wall, or on the floor in both directions. The modes are independent and
-normal. Without a stated deviation the model counts as exact, and there are none.
+normal. No model is exact: one of which nothing is stated counts as measured, and what is found to be displaced by more
+says so itself.
 """
 
 from __future__ import annotations
@@ -31,6 +32,10 @@ MIN_LIFT_M = 0.3
 """Things on a wall that begin lower stand on the floor: their height is known [m]."""
 JAMB_M = 0.2
 """What of a wall lies whole within this of a jamb ends at the door, and is displaced with it [m]."""
+MEASURED_M = 0.01
+"""Deviation of a model of which nothing is stated: as of what is measured by hand with a tape [m]."""
+INEXACT_M = 0.05
+"""Deviation of a model that is found to be inexact: as of a plan that was traced [m]."""
 MAX_MARKS = 4096
 """Landmarks whose modes are kept."""
 
@@ -49,7 +54,13 @@ class LineErrors:
 
     @property
     def is_exact(self) -> bool:
-        return not self.displacement_modes
+        """Whether its lines are where the model says, to what can be measured."""
+        return not np.any(np.linalg.norm(self.displacements, axis=2) > 1.001 * MEASURED_M)
+
+    def restate(self, sigma_m: float) -> LineErrors:
+        """The same modes, each with this deviation [m]."""
+        sizes = np.linalg.norm(self.displacements, axis=2).max(axis=1, initial=1e-12)
+        return LineErrors(self.displacement_modes, sigma_m * self.displacements / sizes[:, None, None])
 
     def take(self, lines: Sequence[int] | NDArray[np.int64]) -> LineErrors:
         """Those of some of the lines, which may be repeated."""
@@ -79,36 +90,46 @@ def unpack_errors(modes: tuple[str, ...], packed: Sequence[Sequence[float]], cou
     return LineErrors(modes, shifts)
 
 
-def find_line_errors(building: Building, marks: Sequence[Landmark], line: Sequence[int]) -> LineErrors:
-    """The errors of n model lines, as far as the world file states them.
+def find_line_errors(
+    building: Building, marks: Sequence[Landmark], line: Sequence[int], unstated_m: float = 0.0
+) -> LineErrors:
+    """The errors of n model lines, as far as the world file states them, or it was found that they are inexact.
 
     Args:
         marks: the landmark of each line. line: its number in the landmark.
+        unstated_m: the deviation of what nothing is stated of.
     """
     rows: dict[str, Floats] = {}
     for i, (mark, number) in enumerate(zip(marks, line, strict=True)):
-        for name, shifts in _find_modes(building, mark).items():
+        for name, shifts in _find_modes(building, mark, unstated_m).items():
             if np.any(shifts[number]):
                 rows.setdefault(name, np.zeros((len(marks), 3)))[i] = shifts[number]
     return LineErrors(tuple(rows), np.array(list(rows.values()), float).reshape(len(rows), len(marks), 3))
 
 
 def find_sigma_m(building: Building, locale: str, name: str = "") -> float:
-    """The stated deviation of a door or thing of a locale, or else of what is in it; 0 where nothing is stated."""
+    """The stated deviation of a door or thing of a locale, or else of what is in it; 0 where nothing is stated.
+
+    Where the whole building was found to be inexact, it is no less than that.
+    """
     properties = building.locale(locale).properties
     sigmas: Mapping[str, float] = properties.get(SIGMAS, {})
-    return float(sigmas.get(name, properties.get(SIGMA, 0.0)))
+    found_m = INEXACT_M * any(change.what == "inexact" for change in building.root_frame().changes)
+    return float(max(sigmas.get(name, properties.get(SIGMA, 0.0)), found_m))
 
 
-def _find_modes(building: Building, mark: Landmark) -> Mapping[str, Floats]:
+def _find_modes(building: Building, mark: Landmark, unstated_m: float) -> Mapping[str, Floats]:
     """For each mode of a landmark, by name, the displacement (lines, 3) of its lines [m, world]."""
-    if not find_sigma_m(building, mark.locale, mark.name) and not find_sigma_m(building, mark.locale):
+    own_m, walls_m = (find_sigma_m(building, mark.locale, name) or unstated_m for name in (mark.name, ""))
+    if not own_m and not walls_m:
         return {}
-    return building.cached("model errors", MAX_MARKS, mark.name, lambda: _compute_modes(building, mark))
+    return building.cached("model errors", MAX_MARKS, (mark.name, unstated_m),
+                           lambda: _compute_modes(building, mark, own_m, walls_m, unstated_m))
 
 
-def _compute_modes(building: Building, mark: Landmark) -> dict[str, Floats]:
-    own_m, walls_m = find_sigma_m(building, mark.locale, mark.name), find_sigma_m(building, mark.locale)
+def _compute_modes(
+    building: Building, mark: Landmark, own_m: float, walls_m: float, unstated_m: float
+) -> dict[str, Floats]:
     walls, origins, inward = _list_walls(building, mark.locale)
     lines, doors = mark.lines_world, {door.name: door for door in building.doorways_of(mark.locale)}
     flat = lines[..., :2]
@@ -120,7 +141,7 @@ def _compute_modes(building: Building, mark: Landmark) -> dict[str, Floats]:
             jambs = door.threshold_of(mark.locale)
             cut = np.linalg.norm(flat[:, None] - jambs[:, None], axis=3).max(axis=2).min(axis=1) <= JAMB_M
             if np.any(cut):
-                door_m = find_sigma_m(building, mark.locale, door.name)
+                door_m = find_sigma_m(building, mark.locale, door.name) or unstated_m
                 found[f"{door.name} along"] = door_m * cut[:, None] * _find_along(door)
         return found
     thing = next((t for t in building.things_of(mark.locale) if t.name == mark.name), None)

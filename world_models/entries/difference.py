@@ -24,6 +24,8 @@ SENSES: frozenset[RivalKind] = frozenset({
 MISLEADING: frozenset[RivalKind] = frozenset({"still camera", "late pictures", "lens"})
 """Senses that tell wrong places, of which nothing is learnt on the way."""
 
+MODEL = "the model of the building"
+"""What differs where walls and doors stand elsewhere in general, or the camera makes it seem so."""
 SURE = 0.95
 """A rival that is so probable is what the difference is taken for."""
 

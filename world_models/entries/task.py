@@ -249,7 +249,7 @@ class Milestone:
         landmark_of: for each line, its index in ``landmarks``.
         face_colors: of each face that should be seen its colour (red, green, blue; 0..1) and points [m, world].
         tried: headings of earlier views in which it was not testable [rad, world].
-        displacement_modes: what of the model may be displaced as one: walls, doors, things; none where it is exact.
+        displacement_modes: what of the model may be displaced as one: walls, doors, things.
         displacements: by how much a standard deviation of a mode displaces a line: (mode, line, x, y, z [m, world]).
         log_odds_so_far: of a wrong place, by each of these looks; 0 where one said nothing.
         status: turning (not yet looking there), expected, verified, refuted, not testable, or withdrawn (what is
@@ -279,6 +279,11 @@ class Milestone:
     def errors(self) -> LineErrors:
         """How well the model knows its lines."""
         return unpack_errors(self.displacement_modes, self.displacements, len(self.expected))
+
+    @property
+    def is_inexact(self) -> bool:
+        """Whether its lines may be displaced by more than what is measured."""
+        return not self.errors.is_exact
 
     def name(self) -> str:
         """``M1 of the route``, or ``the place where it believes to be``; without the reason for a check."""

@@ -57,6 +57,13 @@ def compute_first_covariance(camera: CameraState) -> Floats:
     return np.asarray(np.diag(np.square(sigmas)))
 
 
+def compute_least_covariance() -> Floats:
+    """(7, 7) of a camera that is known as well as lines can tell."""
+    sigmas = (LEAST_SIGMA_RAD, LEAST_SIGMA_RAD, LEAST_SIGMA_RAD, LEAST_SIGMA_M, LEAST_SIGMA_FOCAL,
+              LEAST_SIGMA_CENTRE_PX, LEAST_SIGMA_CENTRE_PX)
+    return np.asarray(np.diag(np.square(sigmas)))
+
+
 def compute_knocked_covariance(camera: CameraState) -> Floats:
     """(7, 7) of a camera that may have been knocked: its directions are open again, height and lens as they were."""
     covariance = compute_camera_covariance(camera)
@@ -117,9 +124,7 @@ def learn(
     camera: CameraState, step: tuple[float, ...], covariance: Floats, pose: Pose2
 ) -> CameraState:
     """The state after a picture from a pose (world); no covariance below the floor of what lines have in common."""
-    floors = np.array([LEAST_SIGMA_RAD, LEAST_SIGMA_RAD, LEAST_SIGMA_RAD, LEAST_SIGMA_M, LEAST_SIGMA_FOCAL,
-                       LEAST_SIGMA_CENTRE_PX, LEAST_SIGMA_CENTRE_PX])
-    raised = covariance + np.diag(np.maximum(floors**2 - np.diag(covariance), 0.0))
+    raised = covariance + np.maximum(compute_least_covariance() - np.diag(np.diag(covariance)), 0.0)
     looks = (*camera.counted, (pose.x_m, pose.y_m, pose.heading_rad))[-MAX_COUNTED:]
     return replace(camera.moved(step), covariance=to_tuples(raised), counted=looks)
 

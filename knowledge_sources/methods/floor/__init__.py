@@ -16,7 +16,9 @@ from knowledge_sources.methods.floor.footprints import (
 from knowledge_sources.methods.floor.found_things import MIN_OBSTACLE_CERTAINTY, doubt_thing, may_be_there, move_thing
 from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.methods.floor.relief import TYPICAL_M
-from knowledge_sources.methods.floor.revise_frame import revise_by_door, revise_by_report, revise_by_thing
+from knowledge_sources.methods.floor.revise_frame import (
+    revise_by_difference, revise_by_door, revise_by_report, revise_by_thing,
+)
 from knowledge_sources.methods.floor.see_floor import (
     FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD, MotionBetween, Seen, see_free_floor,
 )
@@ -35,6 +37,6 @@ __all__ = [
     "Sweep", "build_free_floor", "build_polygon", "choose_look", "doubt_thing", "enclose", "find_fixed",
     "find_floor", "find_touched", "is_behind", "is_telling", "list_corners", "locate_touch", "may_be_there",
     "measure_approach_m", "measure_blind_end_m", "measure_first_seen_m", "measure_free_m", "move_thing",
-    "revise_by_door", "revise_by_report", "revise_by_thing", "sample_sweep", "see_free_floor", "see_ranges",
-    "take_as_jamb", "touch_again", "touch_first",
+    "revise_by_difference", "revise_by_door", "revise_by_report", "revise_by_thing", "sample_sweep", "see_free_floor",
+    "see_ranges", "take_as_jamb", "touch_again", "touch_first",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from knowledge_sources.methods.floor.footprints import measure_change_m
 from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
-from world_models.entries import DOOR_STATES, DoorState, Obstacle, UserReport
+from world_models.entries import DOOR_STATES, Difference, DoorState, Obstacle, UserReport
 
 MIN_HEIGHT_CHANGE_M = 0.15  # a thing in a frame is revised where its top is so much higher or lower
 
@@ -36,6 +36,14 @@ def revise_by_door(frame: LocaleFrame, door: DoorState, by: str) -> LocaleFrame:
     if door.state == "shut" and not is_shut:
         return frame.changed(FrameChange("shut", door.door, by))
     return frame.restored("shut", door.door) if door.state == "open" and is_shut else frame
+
+
+def revise_by_difference(frame: LocaleFrame, found: Difference, by: str) -> LocaleFrame:
+    """The building's frame, once its model is surely inexact; what was found is not taken back."""
+    is_known = any(change.what == "inexact" for change in frame.changes)
+    if is_known or not found.is_sure or found.leader.kind != "wall":
+        return frame
+    return frame.changed(FrameChange("inexact", frame.name, by))
 
 
 def revise_by_report(frame: LocaleFrame, report: UserReport, by: str) -> LocaleFrame:

@@ -66,9 +66,10 @@ def predict_lines(
     )
 
 
-def find_errors(robot: RobotModel, lines: VisibleLines) -> LineErrors:
-    """How well the model knows lines that it predicts."""
-    return find_line_errors(robot.world, [lines.marks[int(i)] for i in lines.landmark], lines.line.tolist())
+def find_errors(robot: RobotModel, lines: VisibleLines, unstated_m: float = 0.0) -> LineErrors:
+    """How well the model knows lines that it predicts; ``unstated_m``: those of which nothing is stated."""
+    marks = [lines.marks[int(i)] for i in lines.landmark]
+    return find_line_errors(robot.world, marks, lines.line.tolist(), unstated_m)
 
 
 def list_names(lines: VisibleLines) -> list[str]:

@@ -17,7 +17,7 @@ from knowledge_sources.methods.verification.line_check import (
     predict_lines,
 )
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
-from world_models.building.model_errors import pack_errors
+from world_models.building.model_errors import MEASURED_M, pack_errors
 from world_models.entries import Milestone
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
@@ -80,7 +80,7 @@ def predict_milestone(
     """The milestone with the lines and colours that should be seen from a pose, without those of ``car``."""
     lines = _predict_clear_lines(robot, pose, car)
     marks = sorted({int(i) for i in lines.landmark})
-    errors = find_errors(robot, lines)
+    errors = find_errors(robot, lines, MEASURED_M)
     return replace(
         milestone,
         landmarks=tuple(lines.marks[i].name for i in marks),

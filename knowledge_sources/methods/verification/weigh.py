@@ -177,7 +177,7 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     lines, errors = lines[tested], milestone.errors.take(np.flatnonzero(tested))
     agreed = check_lines(robot, lines, segments_px, pose, errors,
                          [milestone.landmarks[i] for i in np.array(milestone.landmark_of, np.intp)[tested]])
-    plain_px = agreed.projected_px if not milestone.displacement_modes else check_lines(
+    plain_px = agreed.projected_px if errors.is_exact else check_lines(
         robot, lines, segments_px, pose).projected_px
     faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors)
     evidence = compute_evidence(pose, fix.covariance, before.pose, before.covariance, agreed, faces)
@@ -216,7 +216,7 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         shift_px=_median_shift(expected_px, plain_px),
         tolerance_px=tolerance_px,
         is_weak=before.in_doubt or not followed,
-        is_inexact=bool(milestone.displacement_modes),
+        is_inexact=milestone.is_inexact,
         camera_chi2=fix.camera_chi2,
         is_camera_known=before.is_camera_known,
     )
@@ -279,7 +279,7 @@ def judge_place(w: Weighed) -> Verdict:
 
 def is_last_look(milestone: Milestone) -> bool:
     """Whether so many views were tried that no other one may be."""
-    most = MAX_INEXACT_LOOKS if milestone.displacement_modes else MAX_MILESTONE_LOOKS
+    most = MAX_INEXACT_LOOKS if milestone.is_inexact else MAX_MILESTONE_LOOKS
     return len(milestone.tried) + 1 >= most
 
 

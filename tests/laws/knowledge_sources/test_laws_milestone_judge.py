@@ -155,10 +155,10 @@ def test_a_verdict_says_one_count_of_lines_and_the_bound_that_decided(
         assert said.p_wrong >= said.most_p_wrong
 
 
-@pytest.mark.parametrize(("modes", "most"), [((), MAX_MILESTONE_LOOKS), (("wall",), MAX_INEXACT_LOOKS)])
-def test_it_looks_again_as_often_as_it_may(modes: tuple[str, ...], most: int) -> None:
+@pytest.mark.parametrize(("is_inexact", "most"), [(False, MAX_MILESTONE_LOOKS), (True, MAX_INEXACT_LOOKS)])
+def test_it_looks_again_as_often_as_it_may(is_inexact: bool, most: int) -> None:
     for tried in range(most + 2):
-        milestone: Any = SimpleNamespace(displacement_modes=modes, tried=(0.0,) * tried)
+        milestone: Any = SimpleNamespace(is_inexact=is_inexact, tried=(0.0,) * tried)
         assert is_last_look(milestone) is (tried + 1 >= most)
 
 
@@ -285,7 +285,7 @@ def test_where_no_other_view_is_left_all_looks_together_need_only_be_believed(ju
             for wanted in (0.9 * POSE_CONFIDENCE.accept, 0.9 * believed, 1.1 * believed):
                 told = (to_log_odds(wanted) - alone, *(0.0,) * (tried - 1))
                 behind = tuple(plain.look_heading_rad + math.pi + k for k in range(tried))
-                value = replace(plain, tried=behind, log_odds_so_far=told, displacement_modes=())
+                value = replace(plain, tried=behind, log_odds_so_far=told, displacement_modes=(), displacements=())
                 looked: Any = SimpleNamespace(value=value)
                 weighed = MilestoneJudge().weigh(view, case._replace(milestone=looked))
                 assert weighed.p_wrong == pytest.approx(wanted, rel=1e-6)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from blackboard import Discrepancy, Effect, Level, Post, Posted, Retract, Revise, Revised
-from generated_boards import Bench, all_reasons, plain_robot, reasons, wakes
+from generated_boards import INEXACT, Bench, all_reasons, plain_robot, reasons, wakes
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.reads import has_missed
 from knowledge_sources.reads.sketches import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS, MAX_ADJUSTMENTS
@@ -65,7 +65,7 @@ def decide_all(
     goal = bench.put(Goal(FROM, TO))
     steps = way or (Subgoal(FROM, replace(TO, heading_rad=heading), primitive=True, tolerance_m=TOLERANCE_M),)
     sketch = bench.put(PlanSketch(goal.id, (), "", steps, at=at, adjustments=adjustments, is_look=is_look))
-    expected = bench.await_milestone(sketch.id, at, displacement_modes=modes)
+    expected = bench.await_milestone(sketch.id, at, **(INEXACT if modes else {}))
     effects = bench.ask(MilestonePasser(DEFAULT), bench.revise(expected, status="verified"))
     assert effects is not None
     return effects

@@ -12,11 +12,15 @@ from hypothesis import strategies as st
 
 from acting import answer
 from blackboard import Post, Posted, Retracted, Revise, Revised
+from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.model.model_reviser import ModelReviser
+from knowledge_sources.reads import find_building
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall
 from world_models.building.locale_frame import FRAME_OF, FrameChange, LocaleFrame
-from world_models.entries import DoorPicture, DoorState, Obstacle, UserReport
+from world_models.building.model_errors import INEXACT_M, find_sigma_m
+from world_models.entries import DoorPicture, DoorState, Evidence, Explanation, Obstacle, UserReport
+from world_models.entries.difference import MODEL
 
 SOURCE = ModelReviser()
 DOOR, ROOMS = "archive-north-door", ("archive", HALL)
@@ -134,6 +138,21 @@ def test_all_that_is_new_of_a_room_comes_into_its_frame_at_once() -> None:
     assert {entry.id for entry in effect.because} >= {first.id, second.id}
     hall.apply(*effects)
     assert answer(SOURCE, hall.board.view, Posted(second)) is None  # it is said already
+
+
+@given(st.lists(st.tuples(st.sampled_from(("wall", "chance", "mounting")), st.floats(0.0, 4.6)), max_size=6))
+@settings(max_examples=20, deadline=None)
+def test_a_model_that_is_surely_inexact_is_so_from_then_on_in_every_room(drawn: Sequence[tuple[Any, float]]) -> None:
+    hall, is_inexact, evidence = Hall((SOURCE,)), False, list[Evidence]()
+    for number, (kind, log_ratio) in enumerate(drawn):
+        told = Explanation("chance", "", 0.0), Explanation(kind, "", log_ratio)
+        evidence.append(Evidence(MODEL, "", told[kind == "chance":], 2.0 * number, 0.0, 0.0, 1.0, 0.3, float(number)))
+        difference = weigh_rivals(MODEL, evidence)
+        tell(hall, difference)
+        is_inexact = is_inexact or (difference.is_sure and difference.leader.kind == "wall")
+        world = find_building(hall.board.view)
+        assert [c.what for c in changes(hall, world.root)] == ["inexact"] * is_inexact
+        assert {find_sigma_m(world, room) for room in ("archive", HALL)} == {INEXACT_M if is_inexact else 0.0}
 
 
 def test_what_the_model_has_not_is_answered_and_revises_nothing() -> None:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Effect, Entry, Posted, Revised
-from generated_boards import Bench, effect_on, house, made, plain_robot, reasons, wakes
+from generated_boards import INEXACT, Bench, effect_on, house, made, plain_robot, reasons, wakes
 from knowledge_sources.methods.calibration import (
     LEAST_SIGMA_RAD,
     SIGMA_CENTRE_PX,
@@ -72,7 +72,7 @@ def come(
     if has_drift:
         bench.put(Drift(0.001, 0.004, course_rad))
     if modes:
-        bench.await_milestone(status="verified", displacement_modes=modes)
+        bench.await_milestone(status="verified", **(INEXACT if modes else {}))
     there = Pose2(began.x_m + length_m * math.cos(course_rad + off_rad),
                   began.y_m + length_m * math.sin(course_rad + off_rad), course_rad + turn_rad)
     belief = bench.put(Hypothesis.of_world(house(), "hall", there, np.array(covariance), "milestone"))

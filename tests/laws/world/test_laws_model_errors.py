@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from experiments.generated.floors import generated_floor
-from world_models.building.model_errors import find_line_errors, find_sigma_m, pack_errors, unpack_errors
+from world_models.building.model_errors import MEASURED_M, find_line_errors, find_sigma_m, pack_errors, unpack_errors
 from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
@@ -17,13 +17,17 @@ def read(first_line: str = "") -> World:
     return read_world(Source.parse(f"{first_line}\n{FLOOR.text}", "floor"))
 
 
-def test_an_unstated_model_is_exact() -> None:
+def test_an_unstated_model_is_right_as_measured() -> None:
     world = read()
     marks = [mark for mark in world.landmarks for _ in mark.lines_world]
     numbers = [i for mark in world.landmarks for i in range(len(mark.lines_world))]
     errors = find_line_errors(world, marks, numbers)
     assert errors.is_exact and errors.displacements.shape == (0, len(marks), 3)
     assert pack_errors(errors) == ()
+    measured = find_line_errors(world, marks, numbers, MEASURED_M)
+    assert measured.is_exact and np.all(np.any(measured.displacements != 0.0, axis=(0, 2)))
+    assert not measured.restate(0.03).is_exact
+    assert np.allclose(measured.restate(0.03).displacements, 3.0 * measured.displacements)
 
 
 def test_stated_errors_are_shared_by_a_wall_and_by_a_thing() -> None:
