@@ -99,6 +99,7 @@ class _Reader:
     last_thing: Description | None = None
     wants_orient: bool = False
     side_before: bool = False
+    goes_on: bool = False
 
     def read(self, clause: Clause) -> None:
         """Add the acts of one clause."""
@@ -106,7 +107,12 @@ class _Reader:
         verbs = {part.meaning for part in parts if part.sort == "verb"}
         things, ways, wheres = self._collect(parts, verbs)
         begun = len(self.acts)
-        if self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
+        if self.goes_on and not verbs and things and self.acts[-1].past and self.acts[-1].until is None:
+            self.acts[-1] = replace(self.acts[-1], past=(*self.acts[-1].past, things[0]))
+            wheres = [pair for pair in wheres if pair[1].heads or pair[1].names]
+            if wheres:
+                self._go([], [], wheres)
+        elif self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
             self._orient(things, ways, wheres)
         elif "exit" in verbs:
             self._exit(things, ways, wheres)
@@ -123,9 +129,10 @@ class _Reader:
         elif "enter" in verbs or "take" in verbs:
             self._enter(things, ways, wheres)
         elif verbs & {"be", "see"}:
-            self._state(things, ways, wheres)
+            self._state(things, ways, wheres, verbs)
         else:
             self._terse(things, ways, wheres)
+        self.goes_on = clause.end == "and" and bool(self.acts) and self.acts[-1].sort == "go"
         self.wants_orient = clause.end == "so"
         self.side_before = bool(parts) and parts[-1].sort == "where" and bool(parts[-1].side) and clause.end == "and"
         if parts:
@@ -186,7 +193,7 @@ class _Reader:
     def _exit(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
         by = [one for meaning, one in wheres
               if one.is_door and "door" in one.heads and meaning in ("past", "along", "to")]
-        own = [thing for thing in things if not ({"door"} & thing.heads and not thing.names)]
+        own = [thing for thing in things if thing.is_door and not ({"door"} & thing.heads and not thing.names)]
         if not any(act.sort == "exit" for act in self.acts[-1:]):
             self.acts.append(Act("exit", what=own[0] if own else None, along=by[0] if by else None))
         self.acts += [Act("turn", way) for way in ways if way not in ("ahead", "behind")]
@@ -269,14 +276,17 @@ class _Reader:
                     self.acts.append(Act("orient", what=replace(one, side="behind")))
             elif one.heads or one.names or one.count:
                 ends.append(one)
+        if not (ends or passed or along or units or metres or things or ways) and self.acts and self.acts[
+                -1].sort in ("orient", "see"):
+            ends = [replace(self._it(), side="")]  # "go there"
         end = ends[0] if ends else None
         if end is not None and end.is_door and not end.heads & {"end", "crossing", "corner", "hall"}:
             if along or passed or units:
                 self.acts.append(Act("go", past=tuple(passed), along=along, units=units, metres=metres))
-            self.acts.append(Act("find", what=end))
+            self.acts.append(Act("find", what=_at_end(replace(end, count=end.count), wheres)))
         else:
             self.acts.append(Act("go", until=end, past=tuple(passed), along=along, units=units, metres=metres))
-        for more in ends[1:]:
+        for more in [one for one in ends[1:] if not (end and end.is_door and "end" in one.heads)]:
             self.acts.append(Act("find", what=more) if more.is_door else Act("see", what=more))
 
     def _enter(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
@@ -292,21 +302,25 @@ class _Reader:
         side = next((way for way in ways if way in SIDES), "")
         goal = replace(what[0], side=what[0].side or side, relations=(
             *what[0].relations, *((meaning, one) for meaning, one in wheres if meaning in RELATIONS)))
-        past = tuple(one for meaning, one in wheres if meaning == "past" and one is not what[0])
-        if past and not any(meaning == "past" for meaning, _ in goal.relations):
-            self.acts.append(Act("go", past=past))
-        self.acts.append(Act("find", what=goal, enters=True))
+        self.acts.append(Act("find", what=_at_end(goal, wheres), enters=True))
 
-    def _state(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+    def _state(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]],
+               verbs: set[str]) -> None:
         """A sentence that says what is where."""
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS)
         side = next((one.side for _, one in wheres if one.side), ways[0] if ways else "")
         doors = [thing for thing in things if thing.is_door or (thing.count and not thing.heads and not thing.names)]
+        if doors or not things:
+            doors += [one for meaning, one in wheres if meaning in ("in", "at") and one.is_door]
         if doors:
             goal = _merge(doors)
+            goal = _at_end(goal, wheres)
             goal = replace(goal, side=goal.side or (side if side in SIDES else ""),
                            relations=(*goal.relations, *related))
             self.acts.append(Act("find", what=goal))
+        elif "see" in verbs and things and not self.acts:
+            self._orient(things, ways, wheres)
+            return
         elif not things and (related or side) and self.acts and self.acts[-1].sort == "find":
             self._amend(related, side)
         elif not things and (related or side):
@@ -315,7 +329,7 @@ class _Reader:
             if thing not in doors:
                 self.acts.append(Act("see", what=replace(thing, side=thing.side or (side if side in SIDES else ""))))
         places = [one for meaning, one in wheres if meaning in ("at", "in", "on", "to") and (one.heads or one.names)]
-        self.acts += [Act("see", what=one) for one in places if not (doors and one.is_stretch)]
+        self.acts += [Act("see", what=one) for one in places if not (doors and (one.is_stretch or one in doors)) and "end" not in one.heads]
 
     def _terse(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
         """No verb: ``second door on the right``, ``left``, ``past the machine room``."""
@@ -354,6 +368,13 @@ def _merge(things: Sequence[Description]) -> Description:
                             first.side or other.side, (*first.relations, *other.relations),
                             f"{first.text} {other.text}")
     return first
+
+
+def _at_end(goal: Description, wheres: Sequence[tuple[str, Description]]) -> Description:
+    """``The door at the end``: the one ahead, or the last on its side."""
+    if not any("end" in one.heads for meaning, one in wheres if meaning in ("at", "in", "on")):
+        return goal
+    return replace(goal, count=goal.count or "last") if goal.side in ("left", "right") else replace(goal, side="ahead")
 
 
 def read_acts(clauses: Sequence[Clause]) -> list[Act]:

@@ -21,6 +21,8 @@ UNSAID_TURN, UNSAID_BACK, UNSAID_WALK, UNSAID_EXIT = -2.0, -2.6, -1.5, -0.3
 NO_WAY, MISSED, NOT_SEEN = -2.0, -3.0, -2.5
 """A turn to a wall; a count or a place that there is not; a thing that is not where it should be."""
 WRONG_RANK, WRONG_SIDE = -4.0, -4.0
+SHUT = -0.8
+"""A shut door without a name, as a goal: people are sent to rooms."""
 NEAR_M, PASSED_M, BESIDE_M, HERE_M = 2.6, 0.4, 6.0, 1.3
 """What is at a place; how far beyond what was passed one stands; what is beside a thing; what is the same place."""
 LEAST_WAY_M = 1.0
@@ -42,6 +44,7 @@ class State:
         senses: what the writer's words mean.
         misfits: numbers of the acts that fitted badly.
         way: the places on the way.
+        begun: where the walk began about whose end nothing is said; came: the door by which one came out here.
     """
 
     locale: str
@@ -54,6 +57,7 @@ class State:
     misfits: tuple[int, ...] = ()
     way: tuple[tuple[str, float, float], ...] = ()
     begun: Point | None = None
+    came: str = ""
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -182,8 +186,8 @@ class Follower:
             new = replace(state, heading=way)
             turn = math.remainder(way - state.heading, math.tau)
             cost = 0.0 if abs(turn) < 0.8 else UNSAID_BACK if abs(turn) > 2.3 else UNSAID_TURN
-            if not fits_now:
-                cost = -0.4 if abs(turn) < 2.3 else -0.9
+            if not fits_now and abs(turn) < 2.3:
+                cost = -0.4
             if along is not None and (along.names or along.side in COMPASS):
                 fit, senses = self._match.fit_area(along, self.hall_ahead(new), state.senses)
                 if along.side in COMPASS:
@@ -217,7 +221,7 @@ class Follower:
                 else:
                     at = moved(at, heading, 0.5)
                 yield replace(state, locale=area.name, at=at, heading=heading, odds=state.odds + fit, senses=senses,
-                              moving=False, door="", begun=at,
+                              moving=False, door="", begun=at, came=feature.name,
                               way=(*state.way, (area.name, round(at[0], 2), round(at[1], 2))))
 
     def _turn(self, state: State, act: Act) -> Iterator[State]:
@@ -263,7 +267,7 @@ class Follower:
         for sight in self.nodes(state):
             there = self.stand(state, sight)
             if any(is_along(way, state.heading + turn) for way in self.ways(there)):
-                cost = (0.0 if state.moving else UNSAID_WALK) + AGAIN * rank
+                cost = (0.0 if state.moving else UNSAID_WALK + NO_WAY * can) + AGAIN * rank
                 yield from self._turn_to(there, state.heading + turn, act, cost)
                 rank += 1
 
@@ -413,7 +417,8 @@ class Follower:
             return
         for facing in self._facings(state, None):
             doors = [sight for sight in self.sights(facing) if sight.feature is not None
-                     and sight.feature.sort == "door" and sight.side != "behind" and sight.ahead_m > -0.2]
+                     and sight.feature.sort == "door" and sight.side != "behind" and sight.ahead_m > -0.2
+                     and not (sight.feature.name == state.came and sight.ahead_m < 0.3)]
             for sight in doors:
                 cost, senses = self._weigh_door(facing, sight, doors, what)
                 if cost > WORST:
@@ -425,6 +430,8 @@ class Follower:
         """Words, side, rank and relations of a door, together."""
         assert sight.feature is not None
         cost, senses = self._match.fit(what, sight.feature, state.senses)
+        if not what.names and not sight.feature.is_open:
+            cost += SHUT
         side = self._side_of(state, what.side)
         sided = side in ("left", "right") or what.side == "ahead"
         if sided and sight.side != (side or "ahead"):
@@ -483,7 +490,7 @@ class Follower:
             else:
                 fit += -max(abs(gap) - 1.5, 0.0) / 2.0
             best = max(best, fit)
-        if relation == "across" and not (other.heads or other.names):
+        if relation == "across" and not other.names:
             best = max(best, -abs(sight.ahead_m) / 2.0)
         return best
 

@@ -133,13 +133,14 @@ class Lexicon:
         if not SHORT - 1 <= len(word) <= 20:
             return word
         most = 2 if len(word) >= LONG - 1 else 1
+        likely = {known for phrase, (sort, _) in self.phrases.items() if sort != "SEP" for known in phrase}
         lengths = range(len(word) - most, len(word) + most + 1)
-        near = [(distance, known[0] != word[0], known)
+        near = [(distance, known[0] != word[0], known not in likely, known)
                 for length in lengths for known in self._spellings.get(length, ())
                 if (distance := edit_distance(word, known, most)) <= most]
         if not near or (len(word) < SHORT and min(near)[1]):
             return word
-        return min(near)[2]
+        return min(near)[-1]
 
 
 def split_text(text: str) -> list[str]:

@@ -12,6 +12,8 @@ from harvey_words.acts import Description
 from harvey_words.lexicon import Word
 from harvey_words.word_map import COLOUR_REACH, Area, Feature, WordMap
 
+NEUTRAL = frozenset(("long", "colored", "frame", "north", "south", "east", "west"))
+"""Words by which things are hardly told apart, and points of the compass, which are no part of a thing."""
 Senses = frozenset[tuple[str, str]]
 """Words with what this writer means by them."""
 MISFIT, UNKNOWN_HEAD, RELATED, UNKNOWN_MODIFIER = -4.0, -2.0, -1.2, -0.8
@@ -71,7 +73,7 @@ class Matcher:
                kind: str) -> tuple[float, str]:
         """The log odds, and the sense that the word takes where it is not the model's own."""
         lexicon = self._plan.lexicon
-        if word.meaning in meanings or word.meaning in ("long", "tiny", "plain", "colored", "frame"):
+        if word.meaning in meanings or (word.meaning in NEUTRAL and word.meaning not in self._plan.vocabulary):
             return 0.0, ""
         if word.meaning in lexicon.colours and colours:
             off = min(math.dist(lexicon.colours[word.meaning], colour) for colour in colours)

@@ -36,6 +36,11 @@ class WordLexer(Lexer):
             yield token
 
 
+COMPASS = ("north", "south", "east", "west")
+STARTS = frozenset(("go", "turn", "take", "face"))
+"""Verbs with which another clause begins, also where nothing stands between."""
+
+
 @cache
 def parser() -> Lark:
     """The parser of the grammar."""
@@ -74,7 +79,7 @@ def read_clauses(words: Sequence[Word]) -> tuple[Tree[Any], list[Clause]]:
     """The tree of a text, and its clauses."""
     kept = list(_mend(words))
     tree = parser().parse(kept)
-    clauses = []
+    clauses: list[Clause] = []
     for node in tree.children:
         assert isinstance(node, Tree)
         clause = Clause()
@@ -82,6 +87,10 @@ def read_clauses(words: Sequence[Word]) -> tuple[Tree[Any], list[Clause]]:
             part = _read_part(child)
             if part.sort == "sep":
                 clause.end = part.meaning
+            elif part.meaning in STARTS and part.sort == "verb" and any(
+                    one.sort in ("thing", "where", "way") or one.meaning == "exit" for one in clause.parts):
+                clauses.append(clause)
+                clause = Clause([part])
             else:
                 clause.parts.append(part)
         clauses.append(clause)
@@ -93,6 +102,13 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
     nouns = ("HEAD", "THING", "MOD", "NAME", "STRANGE", "COUNT")
     joined, pair = False, 0
     for index, word in enumerate(words):
+        after = words[index + 1] if index + 1 < len(words) else None
+        if word.text == "once" and (after is None or after.sort == "SEP"):
+            yield Word("COUNT", "1", word.text, word.place)
+            continue
+        if word.meaning in COMPASS and after is not None and after.sort == "HEAD":
+            yield Word("NAME", word.meaning, word.text, word.place)
+            continue
         if word.meaning == "between":
             pair = index + 6
         if word.meaning == "and" and index < pair:
@@ -101,7 +117,6 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
             continue
         if word.meaning == "of" and word.sort == "PREP":
             before = words[index - 1] if index else None
-            after = words[index + 1] if index + 1 < len(words) else None
             if joined or not before or not after or before.sort not in nouns or after.sort not in nouns:
                 continue
             joined = True
