@@ -24,6 +24,9 @@ STEP_M = 0.03
 MAX_FLUSH_M = 0.06
 """A thing that protrudes from its wall by no more than this is no obstacle: the robot keeps clear of the wall."""
 
+WORDS, WORDS_OF = "words", "words_of"
+"""Properties of a locale: what people call it, and by name what they call its doors and things."""
+
 EXTRA_KIND = "obstacle"
 """The kind of a thing that the file lacks."""
 

@@ -12,16 +12,17 @@ from numpy.typing import NDArray
 
 from world_models.building.geometry.faces import Finish
 from world_models.building.geometry.outlines import is_simple
+from world_models.building.locales import WORDS
 from world_models.building.model_errors import SIGMA
 from world_models.files.construction.specs import ROOM_HEIGHTS_M, LocaleSpec, RoomFinishes
-from world_models.files.toml.placements import SharedParts
+from world_models.files.toml.placements import SharedParts, read_words
 from world_models.files.toml.source import Node
 from world_models.frames import Pose
 
 RECTANGLE_WALLS = ("south", "east", "north", "west")
 FINISH_KEYS = ("walls", "floor", "ceiling", "baseboard", "moulding", "frame", "leaf", "threshold")
 LOCALE_KEYS = ("kind", "in", "at", "turn", "size", "outline", "height", "wall_heights", "sky", "like", "things",
-               "properties", "survey", "sigma_cm", *FINISH_KEYS[:5])
+               "properties", "survey", "sigma_cm", "words", *FINISH_KEYS[:5])
 DEFAULT_KEYS = (*FINISH_KEYS, "kind", "in", "height", "door_width", "door_height")
 MAX_SIGMA_CM = 100.0
 GREY_WALL, GREY_FLOOR, WHITE_CEILING = Finish((0.8, 0.8, 0.76)), Finish((0.5, 0.5, 0.5)), Finish((0.9, 0.9, 0.9))
@@ -52,6 +53,9 @@ class LocaleReader:
             raise node.fail("the key 'kind'", f"keys {', '.join(node.value) or 'none'}")
         outline, walls = self._read_outline(node)
         height_m = self.length(node, "height", *ROOM_HEIGHTS_M, 2.7)
+        unused = next((node[key] for key in FINISH_KEYS[:5] if outline is None and key in node), None)
+        if unused is not None:
+            raise unused.fail("a finish only in a locale with walls", f"one in {name}, which only contains others")
         finishes = self._read_finishes(node, walls)
         properties = read_properties(node.get("properties"))
         if "sky" in node and node["sky"].flag():
@@ -59,6 +63,8 @@ class LocaleReader:
             properties["sky"] = True
         if "sigma_cm" in node:
             properties[SIGMA] = read_sigma(node)
+        if words := self._read_all_words(node):
+            properties[WORDS] = words
         survey_m, survey_rad = self._read_survey(node.get("survey"))
         return LocaleSpec(
             name, kind.text(), self._read_container(name, node, world_name), self.read_pose(node), outline, walls,
@@ -97,6 +103,12 @@ class LocaleReader:
         turn_deg = node["turn"].number(-360.0, 360.0) if "turn" in node else 0.0
         x, y, z = (*at, 0.0)[:3]
         return pose_at((x, y, z), turn_deg, self.shared.unit_m)
+
+    def _read_all_words(self, node: Node) -> str:
+        """What people call a locale: its own words, and those of the finishes that its table names."""
+        named = [self._given(node, key) for key in ("floor", "walls")] if "size" in node or "outline" in node else []
+        values = [value for given in named if given is not None for value in _texts(given.value)]
+        return ", ".join(filter(None, [read_words(node), *(self.shared.words.get(v) for v in dict.fromkeys(values))]))
 
     def _given(self, node: Node, key: str) -> Node | None:
         """The value of a key of this table, or else of the defaults."""
@@ -168,6 +180,11 @@ def pose_at(at: tuple[float, float, float], turn_deg: float, unit_m: float = 1.0
 def read_sigma(node: Node) -> float:
     """How well a table's part of the building is known: a standard deviation [m]."""
     return 0.01 * node["sigma_cm"].number(0.0, MAX_SIGMA_CM)
+
+
+def _texts(value: Any) -> list[str]:
+    """The names of finishes: one, or one a wall in a list or a table."""
+    return [value] if isinstance(value, str) else list(value.values() if isinstance(value, dict) else value)
 
 
 def read_properties(node: Node | None) -> dict[str, Any]:

@@ -22,11 +22,12 @@ MIN_LENGTH_M = 0.001
 
 @dataclass
 class SharedParts:
-    """Finishes and parts read so far, by name, and the unit of length of the file being read [m]."""
+    """Finishes, parts and words of finishes read so far, by name, and the unit of length of the file being read [m]."""
 
     unit_m: float = 1.0
     finishes: dict[str, Finish] = field(default_factory=dict)
     parts: dict[str, tuple[Box, ...]] = field(default_factory=dict)
+    words: dict[str, str] = field(default_factory=dict)
 
     def read(self, root: Node) -> None:
         """Add the finishes and parts of a file, and take its unit; raises WorldError for a name given before."""
@@ -34,14 +35,15 @@ class SharedParts:
         for name, node in root.entries_of("finishes"):
             _check_new(name, node, self.finishes)
             self.finishes[name] = self._read_finish(node)
+            self.words[name] = read_words(node)
         for name, node in root.entries_of("parts"):
             _check_new(name, node, self.parts)
             self.parts[name] = self.read_boxes(node, None)
 
     def _read_finish(self, node: Node) -> Finish:
-        node.table(("colour",), ("texture", "scale"))
+        node.table(("colour",), ("texture", "scale", "words"))
         if node["colour"].value == "unknown":
-            node.table(("colour",))
+            node.table(("colour",), ("words",))
             return UNKNOWN
         red, green, blue = node["colour"].numbers((3,), 0.0, 1.0)
         texture = node["texture"].choice(*TEXTURES) if "texture" in node else "plain"
@@ -107,6 +109,14 @@ class SharedParts:
         return MAX_COORDINATE_M / self.unit_m
 
 
+def read_words(node: Node) -> str:
+    """What people call what a table describes: a text, or several; nothing where it does not say."""
+    if "words" not in node:
+        return ""
+    words = node["words"]
+    return words.text() if isinstance(words.value, str) else ", ".join(item.text() for item in words.items(min_count=1))
+
+
 def _check_new(name: str, node: Node, known: dict[str, Any]) -> None:
     if name in known:
         raise node.fail("a new name", f"{name!r}, which the world file has already")
@@ -114,8 +124,8 @@ def _check_new(name: str, node: Node, known: dict[str, Any]) -> None:
 
 MAX_PLACES = 1000
 """Largest number of places from one step."""
-THING_KEYS = ("part", "boxes", "finish", "name", "wall", "along", "up", "at", "turn", "sigma_cm")
-ROW_KEYS = ("finish", "up", "turn", "sigma_cm")
+THING_KEYS = ("part", "boxes", "finish", "name", "wall", "along", "up", "at", "turn", "sigma_cm", "kind", "words")
+ROW_KEYS = ("finish", "up", "turn", "sigma_cm", "kind", "words")
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +133,7 @@ class Placement:
     """One thing at a place.
 
     Attributes:
-        kind: the part's name, or "detail".
+        kind: where it is given; else the part's name, or "detail".
         boxes: what it is made of.
         node: where the file places it.
         wall, name: of the wall and of the thing, where given.
@@ -131,6 +141,7 @@ class Placement:
         turn_deg: its direction on the floor, counter-clockwise.
         up_m: its height on a wall.
         sigma_m: how well its place is known, where the file says so of it.
+        words: what people call it.
     """
 
     kind: str
@@ -143,6 +154,7 @@ class Placement:
     turn_deg: float = 0.0
     up_m: float = 0.0
     sigma_m: float | None = None
+    words: str = ""
 
 
 def read_placements(node: Node, shared: SharedParts) -> list[Placement]:
@@ -174,7 +186,8 @@ def _read_steps(node: Node, shared: SharedParts) -> list[float]:
 def _read_table(node: Node, shared: SharedParts) -> Placement:
     against = "wall" in node.table((), THING_KEYS)
     place = ("wall", "along") if against else ("at",)
-    node.table(place, ("part", "boxes", "finish", "name", "sigma_cm", *(("up",) if against else ("turn",))))
+    own = ("part", "boxes", "finish", "name", "sigma_cm", "kind", "words")
+    node.table(place, (*own, "up" if against else "turn"))
     if ("part" in node) == ("boxes" in node):
         raise node.fail("either a part or boxes", "both" if "part" in node else "neither")
     thing = _read_thing(node, node.get("part"), node, shared)
@@ -187,14 +200,16 @@ def _read_table(node: Node, shared: SharedParts) -> Placement:
 def _read_thing(place: Node, part: Node | None, options: Node, shared: SharedParts) -> Placement:
     """A thing without its position yet."""
     finish = shared.finish(options["finish"]) if "finish" in options else None
+    kind = options.get("kind") or part
     boxes = shared.part(part) if part else shared.read_boxes(options["boxes"], finish)
     if finish and part:
         boxes = tuple(replace(box, finish=finish) for box in boxes)
     return Placement(
-        part.text() if part else "detail", boxes, place, None, options.get("name"), 0.0,
+        kind.text() if kind else "detail", boxes, place, None, options.get("name"), 0.0,
         turn_deg=options["turn"].number(-360.0, 360.0) if "turn" in options else 0.0,
         up_m=shared.coordinate(options["up"]) if "up" in options else 0.0,
         sigma_m=0.01 * options["sigma_cm"].number(0.0, 100.0) if "sigma_cm" in options else None,
+        words=read_words(options),
     )
 
 

@@ -8,6 +8,7 @@ from itertools import combinations, count
 from pathlib import Path
 
 from world_models.building.geometry.faces import Finish
+from world_models.building.locales import WORDS_OF
 from world_models.building.model_errors import SIGMA, SIGMAS
 from world_models.files.construction.specs import DOOR_SIZES_M, DoorSpec, LinkSpec, LocaleSpec, ThingSpec, WorldSpec
 from world_models.files.toml.locale_reader import LOCALE_KEYS, LocaleReader, pose_at, read_properties, read_sigma
@@ -18,11 +19,11 @@ from world_models.files.toml.other_files import (
     read_included,
     rename_locales,
 )
-from world_models.files.toml.placements import Placement, read_coordinates, read_placements
+from world_models.files.toml.placements import Placement, read_coordinates, read_placements, read_words
 from world_models.files.toml.source import Node, Source
 
 SHARED_KEYS = ("include", "finishes", "parts", "defaults")
-DOOR_KEYS = ("width", "height", "open", "frame", "leaf", "threshold", "panel", "sigma_cm")
+DOOR_KEYS = ("width", "height", "open", "frame", "leaf", "threshold", "panel", "sigma_cm", "kind", "words")
 DOOR_FINISH = Finish((0.45, 0.33, 0.22))
 
 
@@ -46,19 +47,22 @@ class WorldReader:
     links: list[LinkSpec] = field(default_factory=list)
     _sigma_m: float | None = None
     _sigmas_m: dict[str, dict[str, float]] = field(default_factory=dict)
+    _words: dict[str, dict[str, str]] = field(default_factory=dict)
     _thing_names: dict[str, set[str]] = field(default_factory=dict)
 
     def spec(self) -> WorldSpec:
         """All that has been read."""
-        locales = {name: self._with_sigmas(spec) for name, spec in self.locales.items()}
+        locales = {name: self._with_sayings(spec) for name, spec in self.locales.items()}
         return WorldSpec(self.name, f"{self.base.name}:1", locales, tuple(self.doors), tuple(self.things),
                          tuple(self.links))
 
-    def _with_sigmas(self, spec: LocaleSpec) -> LocaleSpec:
-        """A locale with what the file says of how well it, its doors and its things are known."""
+    def _with_sayings(self, spec: LocaleSpec) -> LocaleSpec:
+        """A locale with what the file says of how well its doors and things are known, and of what they are called."""
         stated = {} if self._sigma_m is None else {SIGMA: self._sigma_m}
         own = self._sigmas_m.get(spec.name)
         more = {SIGMAS: {**spec.properties.get(SIGMAS, {}), **own}} if own else {}
+        if spec.name in self._words:
+            more[WORDS_OF] = {**spec.properties.get(WORDS_OF, {}), **self._words[spec.name]}
         return replace(spec, properties={**stated, **spec.properties, **more}) if stated or more else spec
 
     # -- files -----------------------------------------------------------------------------------------------------
@@ -185,6 +189,9 @@ class WorldReader:
         if "sigma_cm" in node:
             for room in between:
                 self._sigmas_m.setdefault(room, {}).update(dict.fromkeys((name, f"{room}/{name}"), read_sigma(node)))
+        said = ", ".join(filter(None, [node["kind"].text() if "kind" in node else "", read_words(node)]))
+        for room in between if said else ():
+            self._words.setdefault(room, {})[name] = said
         casing = self.reader.finish_or_none(node, "frame", DOOR_FINISH)
         leaf, threshold = (self.reader.finish(node, key, DOOR_FINISH) for key in ("leaf", "threshold"))
         return DoorSpec(
@@ -237,6 +244,8 @@ class WorldReader:
         for item in things.items():
             for place in read_placements(item, self.reader.shared):
                 self.things.append(self._build_thing(locale, place))
+                if place.words:
+                    self._words.setdefault(locale, {})[self.things[-1].name] = place.words
                 if place.sigma_m is not None:
                     name = f"{locale}/{self.things[-1].name}"
                     self._sigmas_m.setdefault(locale, {})[name] = place.sigma_m

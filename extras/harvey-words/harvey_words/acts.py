@@ -1,0 +1,399 @@
+"""From clauses to acts: what a text asks to do and to see, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+from harvey_words.lexicon import Word
+from harvey_words.phrases import Clause, Part
+
+SIDES = ("left", "right", "ahead", "behind", "north", "south", "east", "west")
+COMPASS = ("north", "south", "east", "west")
+RELATIONS = ("past", "before", "across", "between", "next-to")
+DOORS = frozenset(("door", "room"))
+ROOMS = frozenset(("office", "laboratory", "toilet", "kitchen", "closet", "stairs", "elevator", "conference", "mail"))
+STRETCHES = frozenset(("hall", "turning"))
+POINTS = frozenset(("end", "crossing", "corner"))
+LENGTHS_M = {"metre": 1.0, "foot": 0.3048}
+
+
+@dataclass(frozen=True)
+class Description:
+    """A thing, door, room, hall, crossing or end as a text describes it.
+
+    Attributes:
+        heads: ``door``, ``room``, ``hall``, ``crossing``, ``corner``, ``end``, ``wall``, ``unit``, ... that are named.
+        names: all other words, with what they mean.
+        count: ``1`` to ``9``, ``last``, ``only``, ``other``, ``same``, or nothing.
+        side: where it is said to be.
+        relations: by what it is told apart, as (``past``, another description).
+        text: its words as they stand.
+    """
+
+    heads: frozenset[str] = frozenset()
+    names: tuple[Word, ...] = ()
+    count: str = ""
+    side: str = ""
+    relations: tuple[tuple[str, Description], ...] = ()
+    text: str = ""
+
+    @property
+    def is_door(self) -> bool:
+        """Whether it may be a door or what lies behind one."""
+        return bool(self.heads & DOORS) or any(word.meaning in ROOMS for word in self.names) or (
+            not self.heads and any(word.sort == "NAME" for word in self.names))
+
+    @property
+    def number(self) -> int:
+        """Its place in a row; 0 where it has none."""
+        return int(self.count) if self.count.isdigit() else 0
+
+    @property
+    def is_stretch(self) -> bool:
+        """Whether it is a hall, or known by its floor."""
+        return bool(self.heads & STRETCHES and not self.heads & POINTS) or (
+            not self.heads and bool(self.names) and all(word.sort == "MOD" for word in self.names))
+
+
+def describe(words: Sequence[Word], side: str = "") -> Description:
+    """What a row of words describes."""
+    heads = frozenset(word.meaning for word in words if word.sort == "HEAD")
+    counts = [word.meaning for word in words if word.sort == "COUNT"]
+    names = tuple(word for word in words if word.sort not in ("HEAD", "COUNT") and word.meaning != "&")
+    return Description(heads, names, counts[0] if counts else "", side, (), " ".join(word.text for word in words))
+
+
+@dataclass(frozen=True)
+class Act:
+    """One thing to do or to see.
+
+    Attributes:
+        sort: ``exit``, ``turn``, ``go``, ``find`` (the goal, or a door to go in at), ``see``, ``orient``.
+        way: left, right, back, or a point of the compass, of a turn.
+        what: that is found, seen, faced or left.
+        until: where a walk or a turn ends; past: what is passed before; along: the hall that is taken.
+        units: crossings to go; metres: length to go.
+        enters: whether a door is said to be gone in at.
+        place, end: numbers of its first word in the text and of the word after its last.
+    """
+
+    sort: str
+    way: str = ""
+    what: Description | None = None
+    until: Description | None = None
+    past: tuple[Description, ...] = ()
+    along: Description | None = None
+    units: int = 0
+    metres: float = 0.0
+    enters: bool = False
+    place: int = 0
+    text: str = ""
+
+
+@dataclass
+class _Reader:
+    """Turns clauses into acts, one clause after the other."""
+
+    acts: list[Act] = field(default_factory=list)
+    last_thing: Description | None = None
+    wants_orient: bool = False
+    side_before: bool = False
+    goes_on: bool = False
+
+    def read(self, clause: Clause) -> None:
+        """Add the acts of one clause."""
+        parts = clause.parts
+        verbs = {part.meaning for part in parts if part.sort == "verb"}
+        things, ways, wheres = self._collect(parts, verbs)
+        begun = len(self.acts)
+        if self.goes_on and not verbs and things and self.acts[-1].past and self.acts[-1].until is None:
+            self.acts[-1] = replace(self.acts[-1], past=(*self.acts[-1].past, things[0]))
+            wheres = [pair for pair in wheres if pair[1].heads or pair[1].names]
+            if wheres:
+                self._go([], [], wheres)
+        elif self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
+            self._orient(things, ways, wheres)
+        elif "exit" in verbs:
+            self._exit(things, ways, wheres)
+        elif self._is_posture(parts, verbs):
+            self._posture(things, wheres)
+        elif "face" in verbs or (verbs & {"turn"} and not ways and wheres and wheres[0][0] in ("to", "away")):
+            self._face(things, ways, wheres)
+        elif verbs & {"turn", "take"} and (ways or any(thing.is_stretch for thing in things)):
+            self._turn(things, ways, wheres)
+        elif "reach" in verbs and "be" not in verbs:
+            self._go(things, ways, wheres, until=True)
+        elif verbs & {"go", "pass"} and not (verbs & {"be"} and any(thing.is_door for thing in things)):
+            self._go(things, ways, wheres, passing="pass" in verbs and "go" not in verbs)
+        elif "enter" in verbs or "take" in verbs:
+            self._enter(things, ways, wheres)
+        elif verbs & {"be", "see"}:
+            self._state(things, ways, wheres, verbs)
+        else:
+            self._terse(things, ways, wheres)
+        self.goes_on = clause.end == "and" and bool(self.acts) and self.acts[-1].sort == "go"
+        self.wants_orient = clause.end == "so"
+        self.side_before = bool(parts) and parts[-1].sort == "where" and bool(parts[-1].side) and clause.end == "and"
+        if parts:
+            text = " ".join(word.text for part in parts for word in part.words) or " ".join(verbs)
+            place = min(part.place for part in parts)
+            self.acts[begun:] = [replace(act, place=place, text=text) for act in self.acts[begun:]]
+
+    def _collect(self, parts: Sequence[Part], verbs: set[str]) -> tuple[
+            list[Description], list[str], list[tuple[str, Description]]]:
+        """Things, ways, and prepositions with their things; sides belong to the thing before them."""
+        things: list[Description] = []
+        ways: list[str] = []
+        wheres: list[tuple[str, Description]] = []
+        target: list[Description] | None = None
+        turning = bool(verbs & {"turn", "take"}) and not verbs & {"be"}
+        for part in parts:
+            side = part.side or (part.meaning if part.sort == "way" else "")
+            if part.sort == "thing" and not (describe(part.words).count and things and not things[-1].heads
+                                             and not things[-1].names):
+                things.append(describe(part.words))
+                target = things
+            elif part.sort == "thing":
+                things[-1] = replace(describe(part.words), count=things[-1].count)
+            elif part.sort == "where" and not part.side:
+                if part.meaning in RELATIONS and target is things and things and (verbs & {"be", "see"}) and things[
+                        -1].is_door:
+                    things[-1] = replace(things[-1], relations=(
+                        *things[-1].relations, *self._relation(part.meaning, part.words)))
+                else:
+                    wheres.append((part.meaning, describe(part.words) if part.words else self._it()))
+                    target = None
+            elif side in SIDES and target and (part.sort == "where" or (target[-1].is_door and not turning)
+                                               or "be" in verbs):
+                target[-1] = replace(target[-1], side=side)
+            elif part.sort == "where" and side in SIDES and (turning or verbs & {"go"}):
+                ways.append(side)
+            elif part.sort == "where" and side:
+                wheres.append(("on", Description(side=side)))
+            elif part.sort == "way":
+                ways.append(side)
+        for thing in (*things, *(one for _, one in wheres)):
+            if thing.names or thing.heads - {"side", "unit", "end"}:
+                self.last_thing = thing
+        return things, ways, wheres
+
+    def _it(self) -> Description:
+        return self.last_thing or Description()
+
+    def _relation(self, meaning: str, words: Sequence[Word]) -> Iterable[tuple[str, Description]]:
+        """A relation to a description; ``between`` is one to each of two."""
+        cut = [index for index, word in enumerate(words) if word.meaning == "&"]
+        if meaning == "between" and cut:
+            return ((meaning, describe(words[:cut[0]])), (meaning, describe(words[cut[0] + 1:])))
+        return ((meaning, describe(words)),) if words else ()
+
+    # -- the sorts of clauses ----------------------------------------------------------------------------------------
+
+    def _exit(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+        by = [one for meaning, one in wheres
+              if one.is_door and "door" in one.heads and meaning in ("past", "along", "to")]
+        own = [thing for thing in things if thing.is_door and not ({"door"} & thing.heads and not thing.names)]
+        if not any(act.sort == "exit" for act in self.acts[-1:]):
+            self.acts.append(Act("exit", what=own[0] if own else None, along=by[0] if by else None))
+        self.acts += [Act("turn", way) for way in ways if way not in ("ahead", "behind")]
+        rest = [(meaning, one) for meaning, one in wheres if one not in by and meaning not in ("on", "at", "in", "away")
+                and not (meaning == "to" and one.is_stretch)]
+        if rest:
+            self._go([], [], rest)
+
+    def _is_posture(self, parts: Sequence[Part], verbs: set[str]) -> bool:
+        """``(with) your back to the wall``."""
+        back = [index for index, part in enumerate(parts) if part.meaning in ("back", "behind")]
+        return bool(back) and not verbs & {"turn", "take", "go"} and any(
+            part.words and part.sort in ("where", "thing") for part in parts[back[0]:])
+
+    def _posture(self, things: list[Description], wheres: list[tuple[str, Description]]) -> None:
+        towards = [one for meaning, one in wheres if meaning in ("to", "away", "at", "on", "next-to")]
+        if towards or things:
+            self.acts.append(Act("orient", what=replace((towards or things)[0], side="behind")))
+        rest = [(meaning, one) for meaning, one in wheres if one not in towards]
+        if rest:
+            self._go([], [], rest)
+
+    def _orient(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+        all_things = [*things, *(one for _, one in wheres)]
+        side = next((one.side for one in all_things if one.side), ways[0] if ways else "ahead")
+        side = "behind" if side == "back" else side
+        what = next((one for one in all_things if one.names or one.heads), None)
+        if what is not None:
+            self.acts.append(Act("orient", what=replace(what, side=what.side or side)))
+
+    def _face(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+        turns = [way for way in ways if way in ("left", "right", *COMPASS)]
+        self.acts += [Act("turn", way) for way in turns]
+        away = any(meaning == "away" for meaning, _ in wheres)
+        what = [*things, *(one for _, one in wheres)]
+        if what and not turns:
+            self.acts.append(Act("orient", what=replace(what[0], side="behind" if away else "ahead")))
+
+    def _turn(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+        halls = [thing for thing in things if thing.is_stretch]
+        onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch]
+        at = [one for meaning, one in wheres if meaning in ("at", "to", "on") and not one.is_stretch
+              and (one.heads or one.names)]
+        past = tuple(one for meaning, one in wheres if meaning in ("past", "before"))
+        way = next((way for way in ways if way not in ("ahead", "behind")), "")
+        number = next((thing.number for thing in things if thing.number), 0)
+        hall = next(iter((*halls, *onto)), None)
+        if way == "" and hall is not None:
+            way = next((one for one in (hall.side,) if one not in ("ahead", "")), "")
+        self.acts.append(Act("turn", way, along=hall, until=at[0] if at and way else None, past=past if way else (),
+                             units=number if not halls else 0))
+        rest = [(meaning, one) for meaning, one in wheres
+                if one is not hall and not (way and (one in at or one in past))
+                and meaning in ("to", "past", "along", "at") and one.text]
+        if rest:
+            self._go([], [], rest)
+
+    def _go(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]], *,
+            until: bool = False, passing: bool = False) -> None:
+        self.acts += [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
+        units, metres = 0, 0.0
+        ends: list[Description] = []
+        passed: list[Description] = []
+        along: Description | None = None
+        for meaning, one in [*(("", thing) for thing in things), *wheres]:
+            if one.heads & {"unit"} or (one.count.isdigit() and not one.heads and not one.names and not one.side):
+                units = one.number or 1
+                if one.names or one.heads - {"unit"}:
+                    along = along or replace(one, heads=frozenset(("hall",)), count="")
+            elif one.heads & set(LENGTHS_M):
+                metres = one.number * LENGTHS_M[next(iter(one.heads & set(LENGTHS_M)))]
+            elif meaning in ("past", "across") or (meaning == "" and passing):
+                passed.append(one)
+            elif not one.heads & POINTS and (
+                    (meaning in ("along", "on", "in") and (one.is_stretch or not one.is_door))
+                    or (meaning == "" and one.is_stretch and not until)):
+                along = along or one
+            elif meaning == "away":
+                if not one.is_door:
+                    self.acts.append(Act("orient", what=replace(one, side="behind")))
+            elif one.heads or one.names or one.count:
+                ends.append(one)
+        if not (ends or passed or along or units or metres or things or ways) and self.acts and self.acts[
+                -1].sort in ("orient", "see"):
+            ends = [replace(self._it(), side="")]  # "go there"
+        end = ends[0] if ends else None
+        if end is not None and end.is_door and not end.heads & {"end", "crossing", "corner", "hall"}:
+            if along or passed or units:
+                self.acts.append(Act("go", past=tuple(passed), along=along, units=units, metres=metres))
+            self.acts.append(Act("find", what=_at_end(replace(end, count=end.count), wheres)))
+        else:
+            self.acts.append(Act("go", until=end, past=tuple(passed), along=along, units=units, metres=metres))
+        for more in [one for one in ends[1:] if not (end and end.is_door and "end" in one.heads)]:
+            self.acts.append(Act("find", what=more) if more.is_door else Act("see", what=more))
+
+    def _enter(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+        what = [thing for thing in things if not thing.is_stretch]
+        what += [one for meaning, one in wheres if meaning in ("to", "at", "in", "on") and one.is_door]
+        halls = [one for one in (*things, *(one for _, one in wheres)) if one.is_stretch]
+        if halls and not (what and what[0].is_door):
+            self._turn(halls, ways, [(meaning, one) for meaning, one in wheres if one is not halls[0]])
+            return
+        if not what:
+            self._terse(things, ways, wheres)
+            return
+        side = next((way for way in ways if way in SIDES), "")
+        goal = replace(what[0], side=what[0].side or side, relations=(
+            *what[0].relations, *((meaning, one) for meaning, one in wheres if meaning in RELATIONS)))
+        self.acts.append(Act("find", what=_at_end(goal, wheres), enters=True))
+
+    def _state(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]],
+               verbs: set[str]) -> None:
+        """A sentence that says what is where."""
+        related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS)
+        side = next((one.side for _, one in wheres if one.side), ways[0] if ways else "")
+        doors = [thing for thing in things if thing.is_door or (thing.count and not thing.heads and not thing.names)]
+        if doors or not things:
+            doors += [one for meaning, one in wheres if meaning in ("in", "at") and one.is_door]
+        if doors:
+            goal = _merge(doors)
+            goal = _at_end(goal, wheres)
+            goal = replace(goal, side=goal.side or (side if side in SIDES else ""),
+                           relations=(*goal.relations, *related))
+            self.acts.append(Act("find", what=goal))
+        elif "see" in verbs and things and not self.acts:
+            self._orient(things, ways, wheres)
+            return
+        elif not things and (related or side) and self.acts and self.acts[-1].sort == "find":
+            self._amend(related, side)
+        elif not things and (related or side):
+            self.acts.append(Act("find", what=Description(frozenset(("door",)), side=side, relations=related)))
+        for thing in things:
+            if thing not in doors:
+                self.acts.append(Act("see", what=replace(thing, side=thing.side or (side if side in SIDES else ""))))
+        places = [one for meaning, one in wheres if meaning in ("at", "in", "on", "to") and (one.heads or one.names)]
+        self.acts += [Act("see", what=one) for one in places if not (doors and (one.is_stretch or one in doors)) and "end" not in one.heads]
+
+    def _terse(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+        """No verb: ``second door on the right``, ``left``, ``past the machine room``."""
+        related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS and one.text)
+        side = next((one.side for _, one in wheres if one.side), "")
+        last = self.acts[-1] if self.acts else None
+        if not things and last is not None and last.sort in ("find", "see") and (related or side) and not ways:
+            self._amend(related, side)
+        elif self.side_before and not things and last is not None:
+            return
+        elif things and ways and things[0].number and not things[0].heads and not things[0].names:
+            self.acts.append(Act("turn", ways[0], units=things[0].number))
+        elif things and (things[0].is_door or (things[0].count and things[0].side and not things[0].is_stretch)):
+            goal = _merge(things)
+            self.acts.append(Act("find", what=replace(goal, side=goal.side or next(iter(ways), ""), relations=related)))
+        elif things or any(one.heads or one.names for _, one in wheres):
+            self._go(things, ways, wheres)
+        else:
+            self.acts += [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
+            if "ahead" in ways:
+                self.acts.append(Act("go"))
+
+    def _amend(self, related: Iterable[tuple[str, Description]], side: str) -> None:
+        """What is said afterwards of the thing before."""
+        last = self.acts[-1]
+        assert last.what is not None
+        what = replace(last.what, side=last.what.side or side, relations=(*last.what.relations, *related))
+        self.acts[-1] = replace(last, what=what)
+
+
+def _merge(things: Sequence[Description]) -> Description:
+    """``Allen's office is the next door on the left``: two descriptions of one thing."""
+    first, *rest = things
+    for other in rest:
+        first = Description(first.heads | other.heads, first.names + other.names, first.count or other.count,
+                            first.side or other.side, (*first.relations, *other.relations),
+                            f"{first.text} {other.text}")
+    return first
+
+
+def _at_end(goal: Description, wheres: Sequence[tuple[str, Description]]) -> Description:
+    """``The door at the end``: the one ahead, or the last on its side."""
+    if not any("end" in one.heads for meaning, one in wheres if meaning in ("at", "in", "on")):
+        return goal
+    return replace(goal, count=goal.count or "last") if goal.side in ("left", "right") else replace(goal, side="ahead")
+
+
+def read_acts(clauses: Sequence[Clause]) -> list[Act]:
+    """The acts of a text in the order in which they are to be done."""
+    ordered: list[Clause] = []
+    behind: Clause | None = None
+    for clause in clauses:
+        if clause.end == "when" and clause.parts:
+            behind = clause
+            continue
+        ordered.append(clause)
+        if behind is not None and clause.parts:
+            ordered.append(Clause(behind.parts, ""))
+            behind = None
+    if behind is not None:
+        ordered.append(behind)
+    reader = _Reader()
+    for clause in ordered:
+        reader.read(clause)
+    last = max((index for index, act in enumerate(reader.acts) if act.sort in ("go", "turn", "exit")), default=-1)
+    return [replace(act, sort="see") if act.sort == "find" and index < last and not act.enters and reader.acts[
+        index + 1].sort != "exit" else act for index, act in enumerate(reader.acts)]

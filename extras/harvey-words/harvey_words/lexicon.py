@@ -1,0 +1,174 @@
+"""The words of people who tell a way: their classes and meanings, and which word a misspelt one is.
+
+The file of the language is ``lexicon.toml``; the model of a building adds what it names.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+CLASSES = ("VERB", "WAY", "PREP", "SEP", "NOT", "COUNT", "HEAD", "THING", "MOD")
+LONGEST = 4
+"""Words of the longest phrase."""
+MOST_WORDS = 600
+"""What comes after so many words of a text is not read: a way told by a person has some tens."""
+SHORT, LONG = 4, 8
+"""Letters of a word that may have one wrong, and two."""
+ARTICLES = frozenset(("the", "a", "an", "your", "this", "that", "of", "past", "to"))
+Phrase = tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A word or phrase of a text that means something for the way.
+
+    Attributes:
+        sort: its class in the lexicon, ``NAME`` for what only the model knows, ``STRANGE`` for what nobody does.
+        meaning: the lexicon's or the model's word for it.
+        text: as it stands in the text.
+        place: number of its first word in the text.
+        is_guess: whether it was misspelt.
+    """
+
+    sort: str
+    meaning: str
+    text: str
+    place: int
+    is_guess: bool = False
+
+
+class Lexicon:
+    """The words of a language, with the names of one building."""
+
+    def __init__(self, data: Mapping[str, Any], names: Iterable[str] = ()) -> None:
+        self.phrases: dict[Phrase, tuple[str, str]] = {
+            tuple(phrase.split()): (sort, meaning)
+            for sort in CLASSES for meaning, phrases in data[sort].items() for phrase in phrases}
+        self.phrases |= {(colour,): ("MOD", colour) for colour in data["COLOURS"]}
+        self.skipped = frozenset(tuple(text.split()) for text in data["SKIP"]["words"])
+        self.colours: Mapping[str, tuple[float, float, float]] = {
+            name: (rgb[0], rgb[1], rgb[2]) for name, rgb in data["COLOURS"].items()}
+        groups: list[list[str]] = list(data["RELATED"].values())
+        self.related = frozenset((one, other) for group in groups for one in group for other in group if one != other)
+        self.names = frozenset(name for name in names if not name.isdigit() and (name,) not in self.phrases)
+        self.names -= {word for (word, *more) in self.skipped if not more}
+        self._nearest: dict[str, str] = {}
+
+    @cached_property
+    def _spellings(self) -> dict[int, list[str]]:
+        """All single words of four letters and more, by length."""
+        known: dict[int, list[str]] = {}
+        words = {word for phrase in (*self.phrases, *self.skipped) for word in phrase} | self.names
+        for word in sorted(words):
+            if len(word) >= SHORT - 1 and word.isalpha():
+                known.setdefault(len(word), []).append(word)
+        return known
+
+    @cached_property
+    def _words(self) -> frozenset[str]:
+        return frozenset(word for phrase in (*self.phrases, *self.skipped) for word in phrase) | self.names
+
+    def read(self, text: str) -> list[Word]:
+        """The words of a text that mean something, in order; chatter is left out."""
+        pieces = split_text(text)
+        corrected = [piece if piece in self._words else self.nearest(piece) for piece in pieces]
+        found: list[Word] = []
+        place = 0
+        while place < len(pieces):
+            length, sort, meaning = self._longest(corrected, place)
+            own = pieces[place:place + length]
+            if sort == "STRANGE" and (place == 0 or pieces[place - 1] not in ARTICLES):
+                sort = ""
+            if sort:
+                guess = own != corrected[place:place + length]
+                found.append(Word(sort, meaning, " ".join(own), place, guess))
+            place += length
+        return found
+
+    def _longest(self, pieces: Sequence[str], place: int) -> tuple[int, str, str]:
+        """Words of the longest phrase that begins here, its class ('' for chatter) and meaning."""
+        for length in range(min(LONGEST, len(pieces) - place), 0, -1):
+            phrase = tuple(pieces[place:place + length])
+            if phrase in self.phrases:
+                return length, *self.phrases[phrase]
+            if phrase in self.skipped:
+                return length, "", ""
+        word = pieces[place]
+        if word in self.names:
+            return 1, "NAME", word
+        return 1, "STRANGE", word
+
+    def meaning(self, word: str) -> str:
+        """The lexicon's word for a single word of the model."""
+        found = self.phrases.get((word,))
+        return found[1] if found and found[0] in ("THING", "MOD", "HEAD") else word
+
+    def meanings(self, text: str) -> frozenset[str]:
+        """What the words of a name or a description in the model mean, phrases before single words."""
+        pieces = [piece for piece in split_text(text) if piece not in (".", ",") and not piece.isdigit()]
+        found: set[str] = set()
+        place = 0
+        while place < len(pieces):
+            length = next((n for n in range(min(LONGEST, len(pieces) - place), 1, -1)
+                           if self.phrases.get(tuple(pieces[place:place + n]), ("",))[0] in ("THING", "MOD")), 1)
+            own = pieces[place:place + length]
+            found |= {self.phrases[tuple(own)][1]} if length > 1 else {self.meaning(own[0])}
+            found |= {self.meaning(word) for word in own}
+            place += length
+        return frozenset(found)
+
+    def nearest(self, word: str) -> str:
+        """The known word that a misspelt one is, where exactly one is nearest; else itself."""
+        if word not in self._nearest:
+            self._nearest[word] = self._find_nearest(word) if word.isalpha() else word
+        return self._nearest[word]
+
+    def _find_nearest(self, word: str) -> str:
+        if not SHORT - 1 <= len(word) <= 20:
+            return word
+        most = 2 if len(word) >= LONG - 1 else 1
+        likely = {known for phrase, (sort, _) in self.phrases.items() if sort != "SEP" for known in phrase}
+        lengths = range(len(word) - most, len(word) + most + 1)
+        near = [(distance, known[0] != word[0], known not in likely, known)
+                for length in lengths for known in self._spellings.get(length, ())
+                if (distance := edit_distance(word, known, most)) <= most]
+        if not near or (len(word) < SHORT and min(near)[1]):
+            return word
+        return min(near)[-1]
+
+
+def split_text(text: str) -> list[str]:
+    """The words of a text in small letters, full stops and commas; at most ``MOST_WORDS``."""
+    plain = text[:40 * MOST_WORDS].lower().replace("’", "'")
+    plain = re.sub(r"'s\b", " s", plain)
+    pieces = re.findall(r"[a-z]+|\d+(?:st|nd|rd|th)?|[.,;:!?\n]", plain)[:MOST_WORDS]
+    return [{";": ".", ":": ",", "!": ".", "?": ".", "\n": "."}.get(piece, piece) for piece in pieces]
+
+
+def edit_distance(one: str, other: str, most: int) -> int:
+    """Letters to change, add, leave out or swap with the next; more than ``most`` is not counted further."""
+    before: list[int] = []
+    last = list(range(len(other) + 1))
+    for i, letter in enumerate(one, 1):
+        row = [i]
+        for j, wanted in enumerate(other, 1):
+            cost = min(last[j] + 1, row[j - 1] + 1, last[j - 1] + (letter != wanted))
+            if i > 1 and j > 1 and letter == other[j - 2] and one[i - 2] == wanted:
+                cost = min(cost, before[j - 2] + 1)
+            row.append(cost)
+        if min(row) > most:
+            return most + 1
+        before, last = last, row
+    return last[-1]
+
+
+@cache
+def lexicon_data() -> Mapping[str, Any]:
+    """The file of the language."""
+    return tomllib.loads(Path(__file__).with_name("lexicon.toml").read_text(encoding="utf-8"))

@@ -1,0 +1,77 @@
+"""``harvey parse``: what a text about a way means on a building."""
+
+from __future__ import annotations
+
+import json
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from harvey.commands.command import CliCommand
+from harvey.commands.world_command import load_file
+from harvey.errors import BadInput
+
+if TYPE_CHECKING:
+    from harvey_words.reading import End, Reading
+
+MOST_CHARACTERS = 10_000
+
+
+def _arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("text", metavar="TEXT", help="the way, in your words")
+    parser.add_argument("--world", metavar="W", required=True, help="a world file, or the name of one of the project")
+    parser.add_argument("--start", metavar="PLACE", required=True, help="a room, hall, door or thing, or X,Y in metres")
+    parser.add_argument("--heading", metavar="DEG", type=float,
+                        help="which way the body faces, counter-clockwise from the world's x (not known)")
+    parser.add_argument("--json", action="store_true", help="print all of the reading as JSON")
+
+
+def _run(args: Namespace) -> int:
+    from harvey_words.reading import RouteError, read_route
+
+    if len(args.text) > MOST_CHARACTERS:
+        raise BadInput(f"TEXT: expected at most {MOST_CHARACTERS} characters, got {len(args.text)}")
+    if args.heading is not None and not -720.0 <= args.heading <= 720.0:
+        raise BadInput(f"--heading: expected degrees from -720 to 720, got {args.heading}")
+    try:
+        reading = read_route(args.text, load_file(args.world, []), args.start, args.heading)
+    except RouteError as error:
+        raise BadInput(f"--start: {error}") from error
+    print(json.dumps(reading.as_data(), indent=1) if args.json else "\n".join(tell(reading)))
+    return 0 if reading.is_understood else 1
+
+
+def tell(reading: Reading) -> Iterator[str]:
+    """A reading in lines for a person; where it is not sure, what it would ask."""
+    if not reading.acts or reading.end is None:
+        yield "Which way? Nothing in this text tells of one."
+        return
+    for act in reading.acts:
+        yield f"  {act.sort:6} {act.way:6} {act.text}".rstrip()
+    end, rivals = reading.end, reading.ends[1:4]
+    yield f"{'It leads to' if reading.is_understood else 'Perhaps to'} {name_end(end)} ({end.odds:.0%})."
+    if rivals and not reading.is_understood:
+        yield f"Or is it {', or '.join(f'{name_end(rival)} ({rival.odds:.0%})' for rival in rivals)}?"
+    for phrase in reading.unused:
+        yield f"Did not fit: '{phrase}'."
+
+
+def name_end(end: End) -> str:
+    """A place in words."""
+    at = f"at ({end.x_m:.1f}, {end.y_m:.1f}), facing {end.heading_rad * 57.29578:.0f}°"
+    return f"{end.locale}, door {end.door}, {at}" if end.door else f"{end.locale}, {at}"
+
+
+COMMAND = CliCommand(
+    "parse", "read a route instruction on a building: where it leads, how sure that is, and what did not fit",
+    (
+        ('harvey parse "out of the lab, left, third door" --world research_center --start robot-laboratory',
+         "without a robot"),
+        ('harvey parse "go to the end of the hall" --world two_ways --start north-hall --heading 0 --json', "as JSON"),
+    ),
+    _arguments, _run,
+    "Each way in which the words may be meant is followed on the model of the building: which way the body faces\n"
+    "where nobody says so, turns and walks that are left out, a thing called by another's name. The odds of an end\n"
+    "are those of its best reading against all other ends, and against none of them.\n"
+    "Exit code 0: understood; 1: not sure enough, it asks; 2: the input cannot be used.",
+)

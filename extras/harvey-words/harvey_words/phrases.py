@@ -1,0 +1,148 @@
+"""From the words of a text to its clauses: a grammar over the classes of the words.
+
+The tree of lark is the reading of the text by itself; what it means on a building is found by following it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from lark import Lark, Token, Tree
+from lark.lexer import Lexer
+
+from harvey_words.lexicon import Word
+
+
+class WordLexer(Lexer):
+    """Hands the words on as tokens; made for lark, which calls it."""
+
+    def __init__(self, lexer_conf: Any) -> None:
+        """Nothing of lark's own lexer is used."""
+
+    def lex(self, data: Sequence[Word], parser_state: Any = None) -> Iterator[Token]:  # type: ignore[override]
+        """A token a word, with the word as its value."""
+        for word in data:
+            sort = word.sort
+            if sort == "HEAD" and word.meaning == "side":
+                sort = "SIDE"
+            elif sort == "PREP" and word.meaning == "of":
+                sort = "OF"
+            token = Token(sort, word.text)
+            token.value = word
+            yield token
+
+
+COMPASS = ("north", "south", "east", "west")
+STARTS = frozenset(("go", "turn", "take", "face"))
+"""Verbs with which another clause begins, also where nothing stands between."""
+
+
+@cache
+def parser() -> Lark:
+    """The parser of the grammar."""
+    grammar = Path(__file__).with_name("grammar.lark").read_text(encoding="utf-8")
+    return Lark(grammar, parser="lalr", lexer=WordLexer)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A verb, a way (left, right, ahead), a thing, or where: a preposition with what follows.
+
+    Attributes:
+        sort: ``verb``, ``way``, ``thing``, ``where``, ``not``, ``sep``.
+        meaning: of the verb, way or preposition.
+        words: those of the thing.
+        side: what stands for a thing: left, right, ahead.
+        place: number of the first word in the text.
+    """
+
+    sort: str
+    meaning: str = ""
+    words: tuple[Word, ...] = ()
+    side: str = ""
+    place: int = 0
+
+
+@dataclass
+class Clause:
+    """The parts of a clause, with the word that ends it: ``dot``, ``comma``, ``then``, ``when``, ..., or nothing."""
+
+    parts: list[Part] = field(default_factory=list)
+    end: str = ""
+
+
+def read_clauses(words: Sequence[Word]) -> tuple[Tree[Any], list[Clause]]:
+    """The tree of a text, and its clauses."""
+    kept = list(_mend(words))
+    tree = parser().parse(kept)
+    clauses: list[Clause] = []
+    for node in tree.children:
+        assert isinstance(node, Tree)
+        clause = Clause()
+        for child in node.children:
+            part = _read_part(child)
+            if part.sort == "sep":
+                clause.end = part.meaning
+            elif part.meaning in STARTS and part.sort == "verb" and any(
+                    one.sort in ("thing", "where", "way") or one.meaning == "exit" for one in clause.parts):
+                clauses.append(clause)
+                clause = Clause([part])
+            else:
+                clause.parts.append(part)
+        clauses.append(clause)
+    return tree, clauses
+
+
+def _mend(words: Sequence[Word]) -> Iterator[Word]:
+    """Leave out what the grammar has no place for: an ``of`` between no two things; ``between A and B`` is one part."""
+    nouns = ("HEAD", "THING", "MOD", "NAME", "STRANGE", "COUNT")
+    joined, pair = False, 0
+    for index, word in enumerate(words):
+        after = words[index + 1] if index + 1 < len(words) else None
+        if word.text == "once" and (after is None or after.sort == "SEP"):
+            yield Word("COUNT", "1", word.text, word.place)
+            continue
+        if word.meaning in COMPASS and after is not None and after.sort == "HEAD":
+            yield Word("NAME", word.meaning, word.text, word.place)
+            continue
+        if word.meaning == "between":
+            pair = index + 6
+        if word.meaning == "and" and index < pair:
+            pair = 0
+            yield Word("NAME", "&", word.text, word.place)
+            continue
+        if word.meaning == "of" and word.sort == "PREP":
+            before = words[index - 1] if index else None
+            if joined or not before or not after or before.sort not in nouns or after.sort not in nouns:
+                continue
+            joined = True
+        elif word.sort not in nouns:
+            joined = False
+        yield word
+
+
+def _read_part(node: Any) -> Part:
+    """A part from its branch of the tree."""
+    words = tuple(_words_of(node))
+    first = words[0]
+    if node.data == "where":
+        preps = [word for word in words if word.sort == "PREP"]
+        inner = next((child for child in node.children if isinstance(child, Tree)), None)
+        if inner is not None and inner.data == "side":
+            return Part("where", preps[-1].meaning, (), next(iter(_words_of(inner))).meaning, first.place)
+        things = tuple(_words_of(inner)) if inner is not None else ()
+        strong = [prep.meaning for prep in preps if prep.meaning not in ("along", "at", "on", "in")]
+        return Part("where", (strong or [preps[-1].meaning])[0], things, "", first.place)
+    if node.data == "thing":
+        return Part("thing", "", words, "", first.place)
+    return Part(str(node.data), first.meaning, words, "", first.place)
+
+
+def _words_of(node: Any) -> Iterator[Word]:
+    for token in node.scan_values(lambda value: isinstance(value, Token)):
+        if token.value.meaning != "of":
+            yield token.value
