@@ -315,17 +315,25 @@ def rank_candidates(
     if first in kept[MAX_HYPOTHESES:]:
         kept[MAX_HYPOTHESES - 1] = first
     kept = kept[:MAX_HYPOTHESES]
-    weights = normalize_log_likelihoods([c.likelihood.log_likelihood for c in kept])
+    weights = normalize_log_likelihoods([_get_log(c.likelihood, kept[0].likelihood) for c in kept])
     p_any = max((compute_p_place(c.likelihood) for c in kept), default=0.0)
     return tuple(replace(c, weight=p_any * weight) for c, weight in zip(kept, weights, strict=True))
 
 
+def _get_log(one: PoseLikelihood, best: PoseLikelihood) -> float:
+    """The log likelihood by which a candidate is weighed: no less than the likeliest, where a look refutes that one."""
+    return best.log_likelihood if best.is_refuted_by_a_look(one, REFUTING_LOG_RATIO) else one.log_likelihood
+
+
 def _is_refuted(one: PoseLikelihood, best: PoseLikelihood, log_ratio: float) -> bool:
-    """Whether the likeliest refutes a candidate: by one look, where that is one-sided, else by all together."""
+    """Whether the likeliest refutes a candidate: by one look, where that is one-sided, else by all together.
+
+    Where one look refutes each of them, neither pose is right: the sum of all looks does not decide between these.
+    """
     by_a_look = one.is_refuted_by_a_look(best, log_ratio)
-    if by_a_look is not best.is_refuted_by_a_look(one, log_ratio):
-        return by_a_look
-    return one.log_likelihood < best.log_likelihood - log_ratio
+    if best.is_refuted_by_a_look(one, log_ratio):
+        return False
+    return by_a_look or one.log_likelihood < best.log_likelihood - log_ratio
 
 
 def decide(
