@@ -22,16 +22,14 @@ from knowledge_sources.methods.calibration import (
     widen,
 )
 from knowledge_sources.methods.features import SIGMA_ACROSS_PX
-from knowledge_sources.methods.localization import MIN_CAMERA_LINES
+from knowledge_sources.methods.localization import CAMERA_LINE_SIGMA_PX, MIN_CAMERA_LINES
 from knowledge_sources.methods.pose import (
     CameraEstimate,
-    Given,
     PlanarEstimate,
     Rests,
     compute_protection,
-    fit_jointly,
+    estimate_camera_and_pose,
     planar_from_lines,
-    to_camera_estimate,
 )
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, find_camera, find_robot, tell_time_s
@@ -132,9 +130,10 @@ class MedRAndT(RobotKnowledgeSource):
         """The camera's state; None where the lines say too little."""
         if len(match.pairs) < MIN_CAMERA_LINES:
             return None
-        given = Given(match.lines_world, match.segments_px, robot.camera, robot.mount, here, prior)
-        found = fit_jointly(given, known, errors, here)
-        return to_camera_estimate(found, known) if np.count_nonzero(found.near) >= MIN_CAMERA_LINES else None
+        found = estimate_camera_and_pose(
+            match.lines_world, match.segments_px, robot.camera, robot.mount, here, prior, known,
+            sigma_px=CAMERA_LINE_SIGMA_PX, errors=errors)
+        return found if np.count_nonzero(found.inliers) >= MIN_CAMERA_LINES else None
 
     def _solve(
         self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, milestone: Milestone,
