@@ -9,13 +9,13 @@ import numpy as np
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.methods.calibration import (
     add_yaw,
     compute_camera_covariance,
     compute_knocked_covariance,
     find_model_evidence,
     has_counted,
+    is_model_doubted,
     is_strange,
     loosen,
     to_tuples,
@@ -39,8 +39,6 @@ from world_models.entries import CameraState, Difference, Evidence, LineMatch, M
 from world_models.entries.difference import MODEL
 from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
-
-MIN_P_DOUBTED = 0.5  # where the model is inexact more probably than not, a pose is solved for as if it were
 
 Matched = tuple[Entry[LineMatch], Entry[Milestone]]
 
@@ -121,8 +119,7 @@ class MedRAndT(RobotKnowledgeSource):
         if known is None and not is_strange(evidence):
             return None, False
         counted = () if known is None else known.value.counted
-        wall = weigh_rivals(MODEL, (*counted, evidence)).find("wall")
-        return evidence, wall is not None and wall.p > MIN_P_DOUBTED
+        return evidence, is_model_doubted((*counted, evidence))
 
     def _learn(
         self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, known: Floats, errors: LineErrors

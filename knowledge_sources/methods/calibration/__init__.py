@@ -10,7 +10,7 @@ from knowledge_sources.methods.calibration.camera_state import (
 from knowledge_sources.methods.calibration.intrinsics import (
     BoardView, Calibration, PARAMETERS, Pattern, calibrate, find_board,
 )
-from knowledge_sources.methods.calibration.model_evidence import find_model_evidence, is_strange
+from knowledge_sources.methods.calibration.model_evidence import find_model_evidence, is_model_doubted, is_strange
 from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
 
 __all__ = [
@@ -18,5 +18,6 @@ __all__ = [
     "RIGID_DISTANCE_M", "SIGMA_CENTRE_PX", "SIGMA_FOCAL", "SIGMA_HEIGHT_M", "SIGMA_ROLL_RAD", "SIGMA_TILT_RAD",
     "SIGMA_YAW_RAD", "BoardView", "Calibration", "Mounting", "Pattern", "add_yaw", "calibrate",
     "compute_camera_covariance", "compute_knocked_covariance", "draw_calibration", "estimate_mounting", "find_board",
-    "find_model_evidence", "has_counted", "is_camera_known", "is_strange", "learn", "loosen", "to_tuples", "widen",
+    "find_model_evidence", "has_counted", "is_camera_known", "is_model_doubted",
+    "is_strange", "learn", "loosen", "to_tuples", "widen",
 ]

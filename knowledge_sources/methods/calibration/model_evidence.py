@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.methods.calibration.camera_state import compute_first_covariance, compute_least_covariance
 from knowledge_sources.methods.pose import CameraEstimate, estimate_camera_and_pose
 from world_models.building.model_errors import INEXACT_M, MEASURED_M, LineErrors
@@ -24,6 +26,7 @@ MAX_LOG_RATIO = 4.6
 """Most that one picture says for one rival: one in a hundred is matched to other lines altogether."""
 MIN_STRANGE = 1.0
 """A picture is worth telling where another rival explains it so much better than chance."""
+MIN_P_DOUBTED = 0.5  # from here on a pose is solved for with a model that is inexact
 APART_M, APART_RAD = 1.0, float(np.radians(20.0))
 """Pictures from so far apart show other lines, or the same ones otherwise."""
 
@@ -58,6 +61,12 @@ def is_strange(evidence: Evidence) -> bool:
     """Whether chance explains it clearly less well than something else."""
     ratios = {e.kind: e.log_ratio for e in evidence.explanations}
     return max(ratios.values()) - ratios["chance"] > MIN_STRANGE
+
+
+def is_model_doubted(evidence: Sequence[Evidence]) -> bool:
+    """Whether the model is inexact more probably than not, so that a pose is solved for as if it were."""
+    wall = weigh_rivals(MODEL, evidence).find("wall")
+    return wall is not None and wall.p > MIN_P_DOUBTED
 
 
 def _explain(kind: RivalKind, found: CameraEstimate, log_ratio: float) -> Explanation:
