@@ -9,29 +9,27 @@ import numpy as np
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.methods.calibration import (
     add_yaw,
     compute_camera_covariance,
     compute_knocked_covariance,
     find_model_evidence,
     has_counted,
+    is_model_doubted,
     is_strange,
     loosen,
     to_tuples,
     widen,
 )
 from knowledge_sources.methods.features import SIGMA_ACROSS_PX
-from knowledge_sources.methods.localization import MIN_CAMERA_LINES
+from knowledge_sources.methods.localization import CAMERA_LINE_SIGMA_PX, MIN_CAMERA_LINES
 from knowledge_sources.methods.pose import (
     CameraEstimate,
-    Given,
     PlanarEstimate,
     Rests,
     compute_protection,
-    fit_jointly,
+    estimate_camera_and_pose,
     planar_from_lines,
-    to_camera_estimate,
 )
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, find_camera, find_robot, tell_time_s
@@ -41,8 +39,6 @@ from world_models.entries import CameraState, Difference, Evidence, LineMatch, M
 from world_models.entries.difference import MODEL
 from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
-
-MIN_P_DOUBTED = 0.5  # where the model is inexact more probably than not, a pose is solved for as if it were
 
 Matched = tuple[Entry[LineMatch], Entry[Milestone]]
 
@@ -123,8 +119,7 @@ class MedRAndT(RobotKnowledgeSource):
         if known is None and not is_strange(evidence):
             return None, False
         counted = () if known is None else known.value.counted
-        wall = weigh_rivals(MODEL, (*counted, evidence)).find("wall")
-        return evidence, wall is not None and wall.p > MIN_P_DOUBTED
+        return evidence, is_model_doubted((*counted, evidence))
 
     def _learn(
         self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, known: Floats, errors: LineErrors
@@ -132,9 +127,10 @@ class MedRAndT(RobotKnowledgeSource):
         """The camera's state; None where the lines say too little."""
         if len(match.pairs) < MIN_CAMERA_LINES:
             return None
-        given = Given(match.lines_world, match.segments_px, robot.camera, robot.mount, here, prior)
-        found = fit_jointly(given, known, errors, here)
-        return to_camera_estimate(found, known) if np.count_nonzero(found.near) >= MIN_CAMERA_LINES else None
+        found = estimate_camera_and_pose(
+            match.lines_world, match.segments_px, robot.camera, robot.mount, here, prior, known,
+            sigma_px=CAMERA_LINE_SIGMA_PX, errors=errors)
+        return found if np.count_nonzero(found.inliers) >= MIN_CAMERA_LINES else None
 
     def _solve(
         self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, milestone: Milestone,

@@ -10,7 +10,7 @@ from knowledge_sources.methods.calibration.camera_state import (
 from knowledge_sources.methods.calibration.intrinsics import (
     BoardView, Calibration, PARAMETERS, Pattern, calibrate, draw_calibration, find_board,
 )
-from knowledge_sources.methods.calibration.model_evidence import find_model_evidence, is_strange
+from knowledge_sources.methods.calibration.model_evidence import find_model_evidence, is_model_doubted, is_strange
 from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
 
 __all__ = [
@@ -18,7 +18,6 @@ __all__ = [
     "MIN_TURN_RAD", "PARAMETERS", "RIGID_DISTANCE_M", "SIGMA_CENTRE_PX", "SIGMA_FOCAL", "SIGMA_HEIGHT_M",
     "SIGMA_ROLL_RAD", "SIGMA_TILT_RAD", "SIGMA_YAW_RAD", "BoardView", "Calibration", "Mounting", "Opened", "Pattern",
     "SeenLines", "add_yaw", "calibrate", "compute_camera_covariance", "compute_knocked_covariance", "draw_calibration",
-    "estimate_mounting", "explain", "find_board",
-    "find_model_evidence", "has_counted", "is_camera_known", "is_strange", "learn", "loosen", "open_rivals",
-    "to_tuples", "widen",
+    "estimate_mounting", "explain", "find_board", "find_model_evidence", "has_counted", "is_camera_known",
+    "is_model_doubted", "is_strange", "learn", "loosen", "open_rivals", "to_tuples", "widen",
 ]

@@ -45,7 +45,6 @@ True
 (True, 'too far from the model line')
 """
 
-from knowledge_sources.methods.pose.camera_kernel import FOCAL, HEIGHT
 from knowledge_sources.methods.pose.displacements import MARGINAL_SPREAD, fit_displacements
 from knowledge_sources.methods.pose.estimate import (
     FEW_LINES, MAX_CHI2_SIGMAS, MAX_ITERATIONS, MAX_RESIDUAL_SIGMAS, MIN_LINES, Minimum, PlanarEstimate,
@@ -57,7 +56,6 @@ from knowledge_sources.methods.pose.line_set import (
     LandmarkIds, LineSet, MAX_BESIDE_PX, OUTLIER_SIGMAS, build_line_set, check_landmarks, compute_image_jacobian,
     compute_squared_distances, cross, invert_information, measure_lines,
 )
-from knowledge_sources.methods.pose.model_rivals import Given, JointFit, fit_jointly, fit_rivals, to_camera_estimate
 from knowledge_sources.methods.pose.planar import (
     POINT_OUTLIER_SIGMAS, compute_camera_poses, compute_point_jacobian, planar_from_points, to_pose2,
 )
@@ -69,14 +67,14 @@ from knowledge_sources.methods.pose.solution_separation import Rests, compute_pr
 from knowledge_sources.methods.pose.with_camera import CameraEstimate, compute_pose_slopes, estimate_camera_and_pose
 
 __all__ = [
-    "FEW_LINES", "FOCAL", "HEIGHT", "IMAGE", "MARGINAL_SPREAD", "MAX_BESIDE_PX", "MAX_CHI2_SIGMAS", "MAX_ITERATIONS",
+    "FEW_LINES", "IMAGE", "MARGINAL_SPREAD", "MAX_BESIDE_PX", "MAX_CHI2_SIGMAS", "MAX_ITERATIONS",
     "MAX_RESIDUAL_SIGMAS", "MIN_LINES", "MIN_NOISE_PART", "OUTLIER_SIGMAS", "PLANES", "POINT_OUTLIER_SIGMAS",
-    "SHARED_PX", "SUBSET_SIZE", "TINY", "CameraEstimate", "Given", "JointFit", "LandmarkIds", "LineSet", "Minimum",
+    "SHARED_PX", "SUBSET_SIZE", "TINY", "CameraEstimate", "LandmarkIds", "LineSet", "Minimum",
     "PlanarEstimate", "PoseEstimate", "Rests", "RigidMotion", "add_concentrated", "build_estimate", "build_line_set",
     "build_prior_estimate", "check_landmarks", "compute_camera_poses", "compute_covariance", "compute_image_jacobian",
     "compute_point_jacobian", "compute_pose_slopes", "compute_protection", "compute_squared_distances",
-    "compute_weak_information", "cross", "estimate_camera_and_pose", "fit_displacements", "fit_jointly", "fit_rivals",
+    "compute_weak_information", "cross", "estimate_camera_and_pose", "fit_displacements",
     "invert_information", "keep_possible", "knows_more", "measure_lines", "med_r_and_t", "minimise",
     "planar_from_lines", "planar_from_points", "r_and_t_ml", "reject_behind", "solve_from_subsets", "tell_unavailable",
-    "to_camera_estimate", "to_pose2",
+    "to_pose2",
 ]

@@ -23,8 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Mask
-from knowledge_sources.methods.pose.camera_kernel import measure_lines
-from knowledge_sources.methods.pose.with_camera import FREE, POSE, UNKNOWNS, build_information
+from knowledge_sources.methods.pose.with_camera import FREE, POSE, UNKNOWNS, build_information, measure_lines
 from world_models import words
 from world_models.camera import Camera, CameraMount
 from world_models.entries import ALERT_LIMIT_M, SHARED_SIGMA_M, Protection, count_sigmas

@@ -164,17 +164,17 @@ def test_the_camera_is_moved_by_a_picture_that_has_not_counted_and_adds_what_is_
         bench.revise(bench.view["CameraState-1"], counted=((pose.x_m, pose.y_m, pose.heading_rad),))
     match = bench.revise(match, is_camera_open=is_open)
     found: dict[str, Any] = {}
-    for name in ("fit_jointly", "to_camera_estimate", "planar_from_lines"):
+    for name in ("estimate_camera_and_pose", "planar_from_lines"):
         plain = getattr(med_r_and_t, name)
         monkeypatch.setattr(med_r_and_t, name, lambda *given, _n=name, _p=plain, **named: found.setdefault(
             _n, (given, _p(*given, **named)))[1])
     fix = solve(bench, match)
-    (given, _), (_, learnt), (used, planar) = found.values()
+    (given, learnt), (used, planar) = found["estimate_camera_and_pose"], found["planar_from_lines"]
     camera = bench.view["CameraState-1"].value
     known = compute_camera_covariance(camera)
     opened = known + np.diag(np.square((SIGMA_TILT_RAD, SIGMA_ROLL_RAD, SIGMA_YAW_RAD, 0.0, 0.0, 0.0, 0.0)))
-    assert np.allclose(given[1], opened if is_open else known)
-    assert given[0].covariance[2, 2] - loosen(bench.view["Hypothesis-1"].value.covariance_world(ROBOT.world))[2, 2] == (
+    assert np.allclose(given[6], opened if is_open else known)
+    assert given[5][2, 2] - loosen(bench.view["Hypothesis-1"].value.covariance_world(ROBOT.world))[2, 2] == (
         pytest.approx(SIGMA_YAW_RAD**2 if is_open else 0.0))
     moves = is_open or counted != "here"
     assert fix.camera_step == (tuple(learnt.step.tolist()) if moves else ())

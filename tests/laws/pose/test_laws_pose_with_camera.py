@@ -178,7 +178,7 @@ def test_a_covariance_of_another_shape_is_refused() -> None:
 def draw_problem(seed: int) -> tuple[_Problem, Array]:
     """Lines as seen by a camera that differs, and a state near the true one."""
     lines, segments, truth = observe(draw_step(seed), seed)
-    problem = _Problem(lines, segments, CAMERA, MOUNT, SIGMA_PX, np.eye(10), HERE)
+    problem = _Problem(lines, segments, CAMERA, MOUNT, SIGMA_PX, np.eye(10), HERE, np.zeros((0, len(lines), 3)))
     return problem, problem.start_at(truth) + np.r_[np.zeros(3), 0.3 * draw_step(seed)]
 
 
