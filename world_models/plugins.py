@@ -37,7 +37,8 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
     COMMANDS_GROUP: {"follow": "harvey-ros2", "parse": "harvey-words", "serve": "harvey-serve",
                      "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
     "harvey.experiments": {
-        "imported-building": "harvey-buildings", "other-worlds": "harvey-miniworld", "rosmaps": "harvey-buildings",
+        "imported-building": "harvey-buildings", "instructions": "harvey-words",
+        "other-worlds": "harvey-miniworld", "rosmaps": "harvey-buildings",
         "watchers": "harvey-serve"},
     PAGES_GROUP: {"live": "harvey-serve"}, WORKERS_GROUP: {"dask": "harvey-cluster"},
     RENDERERS_GROUP: {"lit": "harvey-light"},

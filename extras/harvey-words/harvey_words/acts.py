@@ -12,7 +12,8 @@ SIDES = ("left", "right", "ahead", "behind", "north", "south", "east", "west")
 COMPASS = ("north", "south", "east", "west")
 RELATIONS = ("past", "before", "across", "between", "next-to")
 DOORS = frozenset(("door", "room"))
-ROOMS = frozenset(("office", "laboratory", "toilet", "kitchen", "closet", "stairs", "elevator", "conference", "mail"))
+ROOMS = frozenset(("office", "laboratory", "toilet", "kitchen", "closet", "stairs", "elevator", "conference", "mail",
+                   "emergency-exit"))
 STRETCHES = frozenset(("hall", "turning"))
 POINTS = frozenset(("end", "crossing", "corner"))
 LENGTHS_M = {"metre": 1.0, "foot": 0.3048}
@@ -235,7 +236,7 @@ class _Reader:
     def _turn(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
         halls = [thing for thing in things if thing.is_stretch]
         onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch]
-        at = [one for meaning, one in wheres if meaning in ("at", "to", "on") and not one.is_stretch
+        at = [one for meaning, one in wheres if meaning in ("at", "on") and not one.is_stretch
               and (one.heads or one.names)]
         past = tuple(one for meaning, one in wheres if meaning in ("past", "before"))
         way = next((way for way in ways if way not in ("ahead", "behind")), "")
@@ -309,7 +310,8 @@ class _Reader:
         """A sentence that says what is where."""
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS)
         side = next((one.side for _, one in wheres if one.side), ways[0] if ways else "")
-        doors = [thing for thing in things if thing.is_door or (thing.count and not thing.heads and not thing.names)]
+        doors = [thing for thing in things if thing.is_door or (
+            thing.count and thing.side and not thing.heads and not thing.names)]
         if doors or not things:
             doors += [one for meaning, one in wheres if meaning in ("in", "at") and one.is_door]
         if doors:
@@ -325,11 +327,20 @@ class _Reader:
             self._amend(related, side)
         elif not things and (related or side):
             self.acts.append(Act("find", what=Description(frozenset(("door",)), side=side, relations=related)))
+        ended = next((one for meaning, one in wheres if meaning in ("at", "in") and "end" in one.heads), None)
+        if ended is not None and not doors:
+            self.acts.append(Act("go", until=ended))
         for thing in things:
-            if thing not in doors:
+            if thing.heads & {"unit"}:
+                self.acts.append(Act("go", units=thing.number or 1))
+        for thing in things:
+            if "end" in thing.heads and thing not in doors:
+                self.acts.append(Act("go", until=thing))
+            elif thing not in doors and not thing.heads & {"unit"}:
                 self.acts.append(Act("see", what=replace(thing, side=thing.side or (side if side in SIDES else ""))))
         places = [one for meaning, one in wheres if meaning in ("at", "in", "on", "to") and (one.heads or one.names)]
-        self.acts += [Act("see", what=one) for one in places if not (doors and (one.is_stretch or one in doors)) and "end" not in one.heads]
+        self.acts += [Act("see", what=one) for one in places
+                      if not (doors and (one.is_stretch or one in doors)) and "end" not in one.heads]
 
     def _terse(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
         """No verb: ``second door on the right``, ``left``, ``past the machine room``."""
@@ -338,13 +349,19 @@ class _Reader:
         last = self.acts[-1] if self.acts else None
         if not things and last is not None and last.sort in ("find", "see") and (related or side) and not ways:
             self._amend(related, side)
-        elif self.side_before and not things and last is not None:
-            return
+        elif (self.side_before and not things and last is not None) or (
+                last is not None and last.sort == "go" and (last.units or last.until) and not things and not ways
+                and all(meaning == "past" for meaning, _ in wheres)):
+            return  # it tells of the walk before
         elif things and ways and things[0].number and not things[0].heads and not things[0].names:
             self.acts.append(Act("turn", ways[0], units=things[0].number))
         elif things and (things[0].is_door or (things[0].count and things[0].side and not things[0].is_stretch)):
             goal = _merge(things)
-            self.acts.append(Act("find", what=replace(goal, side=goal.side or next(iter(ways), ""), relations=related)))
+            side = goal.side or next(iter(ways), "")
+            if last is not None and last.sort == "find" and last.what and last.what.names and not goal.names:
+                self._amend(related, side)  # "the library is opposite, one door to the left"
+            else:
+                self.acts.append(Act("find", what=replace(goal, side=side, relations=related)))
         elif things or any(one.heads or one.names for _, one in wheres):
             self._go(things, ways, wheres)
         else:

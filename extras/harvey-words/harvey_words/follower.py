@@ -17,14 +17,20 @@ from harvey_words.word_map import Area, Feature, Point, Sight, WordMap, is_along
 BEAM = 80
 AGAIN = -1.0
 """Of each further place that would do as well as the first."""
+UNTOLD = -4.0
+"""A goal out of sight to which no way is told."""
 UNSAID_TURN, UNSAID_BACK, UNSAID_WALK, UNSAID_EXIT = -2.0, -2.6, -1.5, -0.3
 NO_WAY, MISSED, NOT_SEEN = -2.0, -3.0, -2.5
 """A turn to a wall; a count or a place that there is not; a thing that is not where it should be."""
-WRONG_RANK, WRONG_SIDE = -4.0, -4.0
-SHUT = -0.8
+WRONG_RANK, WRONG_SIDE = -3.5, -4.0
+OPEN_ONLY = -1.8
+"""That only open doors were counted."""
+SHUT = -0.5
 """A shut door without a name, as a goal: people are sent to rooms."""
 NEAR_M, PASSED_M, BESIDE_M, HERE_M = 2.6, 0.4, 6.0, 1.3
 """What is at a place; how far beyond what was passed one stands; what is beside a thing; what is the same place."""
+OPPOSITE_M = 0.3
+"""What is hardly further along than the door one comes out of lies opposite, and is not counted."""
 LEAST_WAY_M = 1.0
 """A hall that goes on for less than this does not go on."""
 TURNS = {"left": math.pi / 2, "right": -math.pi / 2, "back": math.pi, "behind": math.pi, "ahead": 0.0}
@@ -346,7 +352,7 @@ class Follower:
                 if not self.plan.areas[sight.locale].is_tile:
                     yield replace(state, odds=state.odds - 0.5, moving=True)  # what follows may be short of the end
             if not last:
-                yield replace(state, odds=state.odds + (MISSED if not state.moving else -0.3), moving=False)
+                yield replace(state, odds=state.odds - 0.3, moving=False)  # it is here
             return
         found = False
         for sight, cost, senses in self._candidates(state, what):
@@ -407,23 +413,70 @@ class Follower:
 
     def _find(self, state: State, what: Description) -> Iterator[State]:
         """At each door, or thing, that may be meant."""
-        if what.heads & {"crossing", "corner"} and not what.heads & {"door", "room"}:
+        if what.heads & {"crossing", "corner", "end"} and not what.heads & {"door"}:
             for facing in self._facings(state, None):
-                yield from self._reach(facing, what)
+                if not what.names:
+                    yield from self._reach(facing, what)
+                for node in self.nodes(facing) if what.names else ():
+                    yield from self._named_crossing(replace(self.stand(facing, node), moving=False), what)
+            yield from self._anywhere(state, what)
             return
         if not self.area(state).is_hall:
             for out in self._leave(state, None):
                 yield from self._find(replace(out, odds=out.odds + UNSAID_EXIT), what)
             return
-        for facing in self._facings(state, None):
+        at_door = bool(state.came) and state.begun is not None and math.dist(state.begun, state.at) < 0.1
+        if at_door and what.side in ("left", "right") and not any(
+                is_along(way, state.heading) for way in self.ways(state)):
+            # come out of a door, what lies to the left lies in that direction, on either side of the hall
+            there = replace(state, heading=turned(state.heading, TURNS[what.side]), odds=state.odds - 0.5)
+            yield from self._find_from([there], replace(what, side=""))
+        yield from self._find_from(self._facings(state, None), what)
+        yield from self._anywhere(state, what)
+        yield replace(state, odds=state.odds + WORST)
+
+    def _anywhere(self, state: State, what: Description) -> Iterator[State]:
+        """What is named and out of sight, wherever it is: a goal without a way."""
+        if not what.names:
+            return
+        for area in self.plan.areas.values():
+            here = replace(state, locale=area.name, at=area.middle, odds=state.odds + UNTOLD, moving=False, door="")
+            here = replace(here, way=(*state.way, (area.name, round(area.middle[0], 2), round(area.middle[1], 2))))
+            if what.heads & {"crossing", "corner", "end"}:
+                if area.is_tile and (area.meanings & {"crossing", "corner"} or len(self.ways(here)) != 2):
+                    yield from self._named_crossing(here, what)
+                continue
+            for feature in area.features:
+                fit, senses = self._match.fit(what, feature, state.senses)
+                if fit > UNKNOWN_HEAD and feature.sort == "door" and area.is_hall:
+                    ahead = feature.outward if feature.outward is not None else 0.0
+                    before = replace(here, at=feature.at, heading=ahead)
+                    yield self._at_door(before, Sight(feature, 0.0, 0.0, "ahead", area.name), here.odds + fit, senses)
+
+    def _named_crossing(self, state: State, what: Description) -> Iterator[State]:
+        """A crossing or end of halls, each word of which is said of one that leaves here or of what stands here."""
+        ways = self.ways(state)
+        if (what.heads & {"end"} and len(ways) > 2) or (what.heads & {"corner"} and len(ways) != 2):
+            return
+        halls = [self.hall_ahead(replace(state, heading=way)) for way in ways]
+        odds, senses = state.odds, state.senses
+        for word in what.names:
+            fit, senses = self._best_here(replace(state, senses=senses), Description(names=(word,)), halls)
+            odds += fit
+        if odds > state.odds + WORST:
+            yield replace(state, odds=odds, senses=senses)
+
+    def _find_from(self, facings: Iterable[State], what: Description) -> Iterator[State]:
+        """The doors that may be meant from where one stands, along the ways that one may face."""
+        for facing in facings:
             doors = [sight for sight in self.sights(facing) if sight.feature is not None
-                     and sight.feature.sort == "door" and sight.side != "behind" and sight.ahead_m > -0.2
-                     and not (sight.feature.name == state.came and sight.ahead_m < 0.3)]
+                     and sight.feature.sort == "door" and sight.side != "behind"
+                     and sight.ahead_m > (OPPOSITE_M if facing.came and facing.begun == facing.at else -0.2)
+                     and not (sight.feature.name == facing.came and sight.ahead_m < 0.3)]
             for sight in doors:
                 cost, senses = self._weigh_door(facing, sight, doors, what)
                 if cost > WORST:
                     yield self._at_door(facing, sight, facing.odds + cost, senses)
-        yield replace(state, odds=state.odds + WORST)
 
     def _weigh_door(self, state: State, sight: Sight, doors: Sequence[Sight],
                     what: Description) -> tuple[float, Senses]:
@@ -441,8 +494,13 @@ class Follower:
             rank = row.index(sight) + 1
             opened = [one for one in row if one.feature is not None and one.feature.is_open]
             open_rank = opened.index(sight) + 1 if sight in opened else 0
-            cost += self._weigh_rank(what, rank, len(row), open_rank, len(opened), any(
-                word.meaning == "open" for word in what.names))
+            only_open = any(word.meaning == "open" for word in what.names)
+            own = self._weigh_rank(what, rank, len(row), open_rank, len(opened), only_open)
+            if not sided and what.count:
+                same = [one for one in row if one.side == sight.side]  # "the next" may be that of its side
+                rank = same.index(sight) + 1
+                own = max(own, self._weigh_rank(what, rank, len(same), 0, 0, only_open) - 0.5)
+            cost += own
         for relation, other in what.relations:
             cost += self._weigh_relation(state, sight, doors, relation, other)
         return cost, senses
@@ -458,18 +516,19 @@ class Follower:
                     only_open: bool) -> float:
         related = any(relation in ("past", "before", "across", "next-to", "between") for relation, _ in what.relations)
         if what.count == "last":
-            return 0.0 if rank == count else -0.9 if open_rank == open_count and open_rank else WRONG_RANK
+            return 0.0 if rank == count else OPEN_ONLY if open_rank == open_count and open_rank else WRONG_RANK
         number = what.number
         if number and not (related and number == 1):
             if only_open:
                 return 0.0 if open_rank == number else WRONG_RANK
-            return 0.0 if rank == number else -1.2 if open_rank == number else WRONG_RANK
+            return 0.0 if rank == number else OPEN_ONLY if open_rank == number else WRONG_RANK
         return 0.0 if what.names or related else AGAIN * min(rank - 1, 3)
 
     def _weigh_relation(self, state: State, sight: Sight, doors: Sequence[Sight], relation: str,
                         other: Description) -> float:
         """How well a door lies to other things as it is said."""
         best = -2.0 if not any(word.meaning in self.plan.vocabulary for word in other.names) else -3.5
+        rank = 0
         for mark in self.sights(state):
             if mark.feature is None or mark.feature.sort == "opening" or mark is sight:
                 continue
@@ -477,10 +536,13 @@ class Follower:
             if fit <= MISFIT:
                 continue
             gap = sight.ahead_m - mark.ahead_m
+            if mark.ahead_m > 0.0 and fit > -1.0:
+                fit += 0.7 * AGAIN * rank  # the first of several columns is meant
+                rank += 1
             between = [one for one in doors if one is not sight and one is not mark and one.side == sight.side
                        and min(sight.ahead_m, mark.ahead_m) - 0.05 < one.ahead_m < max(sight.ahead_m, mark.ahead_m)]
             if relation == "past":
-                fit += AGAIN * 1.5 * len(between) if gap > -0.3 else -3.0
+                fit += AGAIN * 1.5 * len(between) - 1.5 * (mark.ahead_m < -0.3) if gap > -0.3 else -3.0
             elif relation == "before":
                 fit += AGAIN * 1.5 * len(between) if gap < 0.3 else -3.0
             elif relation == "between":
@@ -538,6 +600,10 @@ class Follower:
                 fit = self._match.fit_area(what, self.hall_ahead(replace(state, heading=way)), state.senses)
                 best = max(best, fit, key=lambda pair: pair[0])
         if what.is_stretch and what.heads:
+            looking = replace(state, heading=turned(state.heading, TURNS.get(side, 0.0)))
+            for node in self.nodes(looking) if what.names else ():
+                own, senses = self._fit_sight(looking, node, what)
+                best = max(best, (own - 0.7 - 0.02 * node.ahead_m, senses), key=lambda pair: pair[0])
             return best
         far = side in ("ahead", "behind", "left", "right") or not self.area(state).is_hall
         looking = replace(state, heading=turned(state.heading, TURNS.get(side, 0.0))) if side in TURNS else state

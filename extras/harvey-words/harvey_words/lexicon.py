@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 CLASSES = ("VERB", "WAY", "PREP", "SEP", "NOT", "COUNT", "HEAD", "THING", "MOD")
-LONGEST = 4
+LONGEST = 5
 """Words of the longest phrase."""
 MOST_WORDS = 600
 """What comes after so many words of a text is not read: a way told by a person has some tens."""

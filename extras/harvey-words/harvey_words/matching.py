@@ -16,8 +16,10 @@ NEUTRAL = frozenset(("long", "colored", "frame", "north", "south", "east", "west
 """Words by which things are hardly told apart, and points of the compass, which are no part of a thing."""
 Senses = frozenset[tuple[str, str]]
 """Words with what this writer means by them."""
-MISFIT, UNKNOWN_HEAD, RELATED, UNKNOWN_MODIFIER = -4.0, -2.0, -1.2, -0.8
+MISFIT, UNKNOWN_HEAD, RELATED, UNKNOWN_MODIFIER = -4.5, -2.0, -1.2, -0.8
 """A word of the model that does not fit; one that the model lacks; a kindred thing; a property that the model lacks."""
+OTHER_KIND = -1.5
+"""A kindred thing, where the building has the very thing too."""
 OTHER_SENSE = -1.0
 """A word for one kind of thing that had another before."""
 WORST = -7.0
@@ -79,7 +81,7 @@ class Matcher:
             off = min(math.dist(lexicon.colours[word.meaning], colour) for colour in colours)
             return max(MISFIT, -((off / COLOUR_REACH) ** 2)), kind if off > COLOUR_REACH else ""
         if any((word.meaning, meaning) in lexicon.related for meaning in meanings):
-            return RELATED, kind
+            return RELATED + OTHER_KIND * (word.meaning in self._plan.vocabulary), kind
         if word.meaning in self._plan.vocabulary:
             return MISFIT, ""
         return (UNKNOWN_MODIFIER if word.sort == "MOD" else UNKNOWN_HEAD), kind

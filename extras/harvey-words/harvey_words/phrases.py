@@ -87,7 +87,7 @@ def read_clauses(words: Sequence[Word]) -> tuple[Tree[Any], list[Clause]]:
             part = _read_part(child)
             if part.sort == "sep":
                 clause.end = part.meaning
-            elif part.meaning in STARTS and part.sort == "verb" and any(
+            elif part.meaning in STARTS and part.sort == "verb" and not _is_posture(clause, part) and any(
                     one.sort in ("thing", "where", "way") or one.meaning == "exit" for one in clause.parts):
                 clauses.append(clause)
                 clause = Clause([part])
@@ -97,13 +97,21 @@ def read_clauses(words: Sequence[Word]) -> tuple[Tree[Any], list[Clause]]:
     return tree, clauses
 
 
+def _is_posture(clause: Clause, part: Part) -> bool:
+    """``Your back faces the wall``: a way that faces is no turn."""
+    return part.meaning == "face" and bool(clause.parts) and clause.parts[-1].meaning == "back"
+
+
 def _mend(words: Sequence[Word]) -> Iterator[Word]:
     """Leave out what the grammar has no place for: an ``of`` between no two things; ``between A and B`` is one part."""
     nouns = ("HEAD", "THING", "MOD", "NAME", "STRANGE", "COUNT")
     joined, pair = False, 0
     for index, word in enumerate(words):
         after = words[index + 1] if index + 1 < len(words) else None
-        if word.text == "once" and (after is None or after.sort == "SEP"):
+        if word.text == "its" and index and words[index - 1].sort == "PREP":
+            continue
+        if word.text == "once" and (after is None or after.sort == "SEP" or (
+                index and (words[index - 1].meaning in ("go", "ahead")))):
             yield Word("COUNT", "1", word.text, word.place)
             continue
         if word.meaning in COMPASS and after is not None and after.sort == "HEAD":

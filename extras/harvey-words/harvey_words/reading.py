@@ -17,7 +17,7 @@ from harvey_words.word_map import Point, WordMap
 from world_models.building.world import World
 from world_models.files.world_files import load_world
 
-SURE = 0.65
+SURE = 0.55
 """Least odds of an end that is taken without asking."""
 NOTHING_FITS = -7.5
 """Log odds that what is described is none of the places that were found, against a reading in which all fits."""

@@ -43,6 +43,7 @@ class Feature:
         colours: red, green, blue of its surfaces.
         beyond: the locale behind it.
         is_open: whether one can go through.
+        own_kind: of a thing, in the model.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Feature:
     colours: tuple[tuple[float, float, float], ...] = ()
     beyond: str | None = None
     is_open: bool = False
+    own_kind: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +175,7 @@ class WordMap:
             short = thing.name.rpartition("/")[2]
             words = self.lexicon.meanings(f"{thing.kind} , {short} , {said.get(short, '')}") | _textures(faces)
             yield Feature(thing.name, "thing", name, (x, y), self._toward_wall(areas[name], (x, y), thing.protrusion_m),
-                          words, words, _colours(faces))
+                          words, words, _colours(faces), own_kind=thing.kind)
 
     def _shut_door(self, locale: str, leaf: Face, said: Mapping[str, str]) -> Feature:
         short = leaf.name.split("/")[1]

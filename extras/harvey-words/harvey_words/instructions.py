@@ -1,0 +1,131 @@
+"""``harvey experiment instructions``: routes told by a generator, and paragraphs of many styles, read on buildings."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from experiments.generated.floors import generated_floor
+from experiments.report import Cell, Report
+from harvey_words.lexicon import split_text
+from harvey_words.mazes import write_maze
+from harvey_words.reading import Reading, read_route
+from harvey_words.routes import Told, draw_maze, tell_maze, tell_rooms
+from harvey_words.word_map import WordMap
+from world_models.files.toml.source import Source
+from world_models.files.world_files import WORLDS, load_world, read_world
+
+ROUTES, QUICK_ROUTES = 300, 30
+TOLD_ON_ONE = 10
+"""Routes on one building before another is drawn."""
+PARAGRAPHS = Path(str(files("harvey_words"))).parent / "tests" / "data" / "paragraphs.txt"
+COLUMNS = ("what", "texts", "arrive", "ask, the right place first", "ask, another first", "silently elsewhere",
+           "ms a sentence")
+LEAST = {"routes": (0.95, 0.01), "paragraphs": (0.85, 0.02)}
+"""Least share that arrives, and greatest that is elsewhere without a question."""
+
+
+@dataclass
+class Tally:
+    """How texts were read: those that arrive, ask with the right place first or another, or are silently elsewhere."""
+
+    arrive: int = 0
+    near: int = 0
+    ask: int = 0
+    elsewhere: int = 0
+    seconds: float = 0.0
+    sentences: int = 0
+
+    @property
+    def count(self) -> int:
+        return self.arrive + self.near + self.ask + self.elsewhere
+
+    def add(self, reading: Reading, end: str, seconds: float) -> None:
+        """Count one text."""
+        right = reading.end is not None and end in (reading.end.locale, reading.end.door)
+        if reading.is_understood:
+            self.arrive += right
+            self.elsewhere += not right
+        else:
+            self.near += right
+            self.ask += not right
+        self.seconds += seconds
+        self.sentences += max(1, split_text(reading.text).count("."))
+
+    def row(self, what: str) -> tuple[Cell, ...]:
+        """Of the table."""
+        return (what, self.count, self.arrive, self.near, self.ask, self.elsewhere,
+                1000.0 * self.seconds / max(self.sentences, 1))
+
+    def reaches(self, least: float, most_silent: float) -> bool:
+        """Whether enough arrive, and few enough are silently elsewhere."""
+        return self.arrive >= least * self.count and self.elsewhere <= most_silent * self.count
+
+
+def draw_routes(count: int, seed: int) -> Iterator[tuple[str, WordMap, Told]]:
+    """Routes on the research centre, on generated floors and in mazes, a third each."""
+    rng = np.random.default_rng([seed, 62])
+    centre = WordMap(load_world(WORLDS / "research_center.toml"))
+    for kind in ("research centre", "generated floors", "mazes"):
+        told = 0
+        while told < count // 3:
+            plan = centre if kind == "research centre" else None
+            if kind == "generated floors":
+                plan = WordMap(generated_floor(int(rng.integers(10**6)), 10, open_share=0.8).world)
+            halls, things = draw_maze(rng) if plan is None else ((), {})
+            plan = plan or WordMap(read_world(Source.parse(write_maze(halls, things), "maze")))
+            for _ in range(TOLD_ON_ONE):
+                route = tell_maze(halls, things, rng) if halls else tell_rooms(plan, rng)
+                if route is not None and told < count // 3:
+                    told += 1
+                    yield kind, plan, route
+
+
+def read_paragraphs(path: Path = PARAGRAPHS) -> Iterator[tuple[str, WordMap, str, float | None, str, str]]:
+    """The style, map, start, heading [degrees], end and text of each."""
+    plans: dict[str, WordMap] = {}
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if not line or line.startswith("#"):
+            continue
+        name, start, heading, end, style, text = (part.strip() for part in line.split("|", 5))
+        if name not in plans:
+            world = (read_world(Source.parse(write_maze(), name)) if name == "maze"
+                     else load_world(WORLDS / f"{name.replace('-', '_')}.toml"))
+            plans[name] = WordMap(world)
+        yield style, plans[name], start, None if heading == "-" else float(heading), end, text
+
+
+def run(quick: bool, seed: int) -> Report:
+    """Read routes and paragraphs."""
+    tallies: dict[str, Tally] = {}
+    routes, paragraphs = Tally(), Tally()
+    for kind, plan, told in draw_routes(QUICK_ROUTES if quick else ROUTES, seed):
+        begin = time.perf_counter()
+        reading = read_route(told.text, plan, told.start)
+        taken = time.perf_counter() - begin
+        for tally in (routes, tallies.setdefault(f"routes: {kind}", Tally())):
+            tally.add(reading, told.end, taken)
+    for style, plan, start, heading, end, text in read_paragraphs() if PARAGRAPHS.exists() else ():
+        begin = time.perf_counter()
+        reading = read_route(text, plan, start, heading)
+        taken = time.perf_counter() - begin
+        for tally in (paragraphs, tallies.setdefault(f"paragraphs: {style}", Tally())):
+            tally.add(reading, end, taken)
+    rows = tuple(tally.row(what) for what, tally in (
+        ("routes", routes), ("paragraphs", paragraphs), *tallies.items()))
+    claims = tuple(
+        (f"{what}: at least {least:.0%} arrive, at most {silent:.0%} silently elsewhere", tally.reaches(least, silent))
+        for (what, (least, silent)), tally in zip(LEAST.items(), (routes, paragraphs), strict=True))
+    return Report("Ways that are told in words", COLUMNS, rows, NOTES, claims)
+
+
+NOTES = (
+    "Routes: told by a generator with its own wording, from a room to a door of its hall in the research centre and on"
+    " generated floors, and from crossing to crossing in drawn mazes; nobody says which way the body faces.",
+    "Paragraphs: written down before the grammar, in differing styles; an installed package has none.",
+)
