@@ -178,6 +178,8 @@ def list_words(value: Any) -> Iterator[str]:
             yield "thing"
         case entries.Obstruction():
             yield "hidden"
+        case entries.Difference() if value.is_of_sense:
+            yield value.leader.kind
 
 
 @dataclass

@@ -125,13 +125,13 @@ class MilestoneJudge(RobotKnowledgeSource):
             return verdict
         wrong = view.latest(Difference, lambda d: d.p_misled > MAX_P_RIVAL)
         rival = find_alias(view, case.fix, case.belief, weighed)
-        p, said = (0.0, "") if rival is None else (rival.p, rival.said)
+        p, said = p_alias, _ = (0.0, "") if rival is None else (rival.p, rival.said)
         if wrong is not None:
             p, said = wrong.value.p_misled, f"{wrong.value.about} differs, {wrong.value.odds_in_words()}"
         if p <= MAX_P_RIVAL:
             return verdict
         reason = f"{verdict.reason}; but {said}: {tell_odds(p, MAX_P_RIVAL)}"
-        return Verdict("not testable", reason, p, MAX_P_RIVAL, p_alias=p)
+        return Verdict("not testable", reason, p, MAX_P_RIVAL, p_alias=p_alias)
 
     def _hold_against_single_lies(self, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:
         """What would be verified is looked at once more where one false thing may have moved the pose too far.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -10,11 +10,14 @@ from blackboard import OPEN, Blackboard, Discrepancy, Entry, Index, Level, View
 from world_models.building.locale_frame import CHANGED, FRAME_OF, LocaleFrame
 from world_models.entries import (
     GO_ON,
+    SENSES,
     BodyFault,
     CameraState,
     Command,
     Contact,
     Course,
+    Difference,
+    Explanation,
     Footprint,
     Goal,
     Hypothesis,
@@ -35,6 +38,8 @@ from world_models.robot import RobotModel
 
 MIN_FOLLOWED_LANDMARKS = 4
 """With so many landmarks in the last tracked frame, the robot is taken to be still in its room."""
+WORTH_TELLING = 2.0
+"""Below this log ratio of a sense everything is as expected."""
 HELD: Index[Hypothesis] = Index(Hypothesis, lambda h: h.is_held or None, "held")
 ACTIVE_GOAL: Index[Goal] = Index(Goal, lambda g: g.is_active or None, "active")
 OPEN_MILESTONE: Index[Milestone] = Index(Milestone, lambda m: m.is_open or None, "open")
@@ -238,3 +243,10 @@ def is_given_up(view: View) -> bool:
 def open_impasse(view: View) -> Entry[Impasse] | None:
     """What ends the mission unless somebody sees a way on."""
     return view.latest(Impasse, lambda impasse: impasse.is_open)
+
+
+def is_worth_telling(view: View, about: str, explained: Sequence[Explanation]) -> bool:
+    """Whether a sense would explain something better than chance; what acquits it is told once it was accused."""
+    accused = view.latest(Difference, lambda d: d.about == about) is not None
+    return bool(explained) and (
+        accused or any(e.log_ratio > WORTH_TELLING for e in explained if e.kind in SENSES))

@@ -12,8 +12,8 @@ with the building.
 """
 
 from world_models.entries.body import (
-    BodyFault, CameraPicture, Course, MotionReport, MotorCommand, Odometry, PictureRequest, Recovery, Ride,
-    RideReport, STOP_KEY,
+    BodyFault, CameraPicture, Course, LAST_REPORTS, MotionReport, MotorCommand, Odometry, PictureRequest, Recovery,
+    Ride, RideReport, STOP_KEY,
 )
 from world_models.entries.difference import Difference, Evidence, Explanation, MISLEADING, Rival, RivalKind, SENSES
 from world_models.entries.door_state import DoorCondition, DoorPicture, DoorState
@@ -40,15 +40,15 @@ from world_models.obstruction import Obstruction
 from world_models.entries.user_reports import DOOR_STATES, GO_ON, Redirection, UserReport
 
 __all__ = [
-    "ALERT_LIMIT_M", "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "LAST_VIEWS", "MISLEADING", "RISK", "SENSES",
-    "SHARED_SIGMA_M", "STOP_KEY", "Alias", "AliasOdds", "Anchor", "BodyFault", "CameraLesson", "CameraPicture",
-    "CameraState", "Certificate", "Command", "Contact", "Corners", "Course", "Difference", "DoorCondition",
-    "DoorPicture", "DoorState", "Drift", "Evidence", "Explanation", "FloorAppearance", "FloorEnd", "FloorThing",
-    "FloorView", "Footprint", "FreeFloor", "Glimpse", "Goal", "Hypothesis", "Impasse", "Leg", "Light", "LineMatch",
-    "LocalePoses", "Milestone", "MilestoneVerdict", "MotionReport", "MotorCommand", "Obstacle", "ObstacleStatus",
-    "Obstruction", "Odometry", "Outcome", "Panorama", "PictureRequest", "Place", "PlaceOdds", "PlaceSearch",
-    "PlanSketch", "Point", "PoseFix", "Protection", "Ranges", "Recovery", "Redirection", "Resumed", "Ride",
-    "RideReport", "Rival", "RivalKind", "Segments", "Sense", "SketchStatus", "Subgoal", "Track", "Tracks", "Travel",
-    "UserReport", "Wheels", "begin_travel", "count_sigmas", "covariance_tuple", "diagonal", "find_camera_lessons",
-    "turn_about_camera",
+    "ALERT_LIMIT_M", "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "LAST_REPORTS", "LAST_VIEWS", "MISLEADING", "RISK",
+    "SENSES", "SHARED_SIGMA_M", "STOP_KEY", "Alias", "AliasOdds", "Anchor", "BodyFault", "CameraLesson",
+    "CameraPicture", "CameraState", "Certificate", "Command", "Contact", "Corners", "Course", "Difference",
+    "DoorCondition", "DoorPicture", "DoorState", "Drift", "Evidence", "Explanation", "FloorAppearance", "FloorEnd",
+    "FloorThing", "FloorView", "Footprint", "FreeFloor", "Glimpse", "Goal", "Hypothesis", "Impasse", "Leg", "Light",
+    "LineMatch", "LocalePoses", "Milestone", "MilestoneVerdict", "MotionReport", "MotorCommand", "Obstacle",
+    "ObstacleStatus", "Obstruction", "Odometry", "Outcome", "Panorama", "PictureRequest", "Place", "PlaceOdds",
+    "PlaceSearch", "PlanSketch", "Point", "PoseFix", "Protection", "Ranges", "Recovery", "Redirection", "Resumed",
+    "Ride", "RideReport", "Rival", "RivalKind", "Segments", "Sense", "SketchStatus", "Subgoal", "Track", "Tracks",
+    "Travel", "UserReport", "Wheels", "begin_travel", "count_sigmas", "covariance_tuple", "diagonal",
+    "find_camera_lessons", "turn_about_camera",
 ]

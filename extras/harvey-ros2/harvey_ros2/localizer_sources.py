@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch, inference
+from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.verification import list_seen_locales, predict_milestone
 from knowledge_sources.priority import Priority
@@ -22,7 +22,6 @@ from knowledge_sources.reads import (
     NO_MILESTONE,
     NOT_LOST,
     PLACED_BY,
-    Belief,
     find_camera,
     find_frames,
     find_panorama,
@@ -40,7 +39,6 @@ from world_models.entries import (
     Travel,
     begin_travel,
 )
-from world_models.frames import Pose2, wrap_angle
 
 CONTRADICTED = 2
 """So many pictures one after the other that contradict the believed place, and it is lost."""
@@ -66,130 +64,19 @@ def contradicts(verdict: Certificate) -> bool:
     return verdict.verdict == "refuted" or (verdict.p_wrong >= MIN_P_WRONG and verdict.expected >= MIN_EXPECTED)
 
 
-WAY_M, WAY_RAD = 1.0, math.tau
-"""Corrections are summed over so much of the way, or so much turning."""
-MOST_WHEELS, MOST_BEND_RAD_PER_M, MOST_ASIDE_M_PER_RAD = 0.25, 0.1, 0.05
-"""Wheels that work err by at most such a part of what they count, and so far aside."""
-MOST_SIGMAS = 5.0
-"""By so many standard deviations of the places at both ends a sum of corrections may be off."""
-MOST_OFF_M, MOST_OFF_RAD = 0.02, 0.03
-"""Nor does it say anything up to here: the camera's mounting is learnt on the way."""
-
-
-class WheelCorrection(NamedTuple):
-    """A correction by a picture, and what the wheels counted since the one before.
-
-    Attributes:
-        gone_m, turned_rad: counted, without sign.
-        ahead_m, left_m, heading_rad: by how much the belief was moved, as seen from where the wheels put it.
-        sigma_m, sigma_rad: of the belief after it.
-    """
-
-    gone_m: float
-    turned_rad: float
-    ahead_m: float
-    left_m: float
-    heading_rad: float
-    sigma_m: float
-    sigma_rad: float
-
-
-@inference()
-@dataclass(frozen=True, slots=True)
-class WheelCheck:
-    """What pictures have corrected on the last metre or turn, against what wheels can err there.
-
-    A picture that never changes pulls the belief back by all that the wheels count, each time by a little.
-
-    Attributes:
-        reckoned: (x, y, heading) of the belief, world, as the wheels alone have moved it since the last correction.
-        steps: the corrections, oldest first; of the first only the place counts.
-        gone_m, turned_rad: counted since the last of them.
-        excess: what is wrong, in words; "" for nothing. It stays until a whole metre or turn is as it should be.
-    """
-
-    reckoned: tuple[float, float, float]
-    steps: tuple[WheelCorrection, ...] = ()
-    gone_m: float = 0.0
-    turned_rad: float = 0.0
-    excess: str = ""
-
-    def rolled(self, to: Pose2, turn_rad: float, move_m: float) -> WheelCheck:
-        """After the wheels have counted a motion."""
-        return replace(self, reckoned=(to.x_m, to.y_m, to.heading_rad), gone_m=self.gone_m + abs(move_m),
-                       turned_rad=self.turned_rad + abs(turn_rad))
-
-    def corrected(self, to: Pose2, belief: Hypothesis) -> WheelCheck:
-        """After a picture; where a search has found the place, that is no correction."""
-        by = Pose2(*self.reckoned).inverse() @ to
-        moved = (0.0, 0.0, 0.0) if belief.basis in PLACED_BY or not self.steps else (by.x_m, by.y_m, by.heading_rad)
-        step = WheelCorrection(self.gone_m, self.turned_rad, *moved, belief.sigma_m, belief.sigma_rad)
-        steps = (step,) if belief.basis in PLACED_BY else (*self.steps, step)
-        while len(steps) > 2 and (math.fsum(one.gone_m for one in steps[2:]) >= WAY_M
-                                  or math.fsum(one.turned_rad for one in steps[2:]) >= WAY_RAD):
-            steps = steps[1:]
-        is_whole = math.fsum(one.gone_m for one in steps[1:]) >= WAY_M or (
-            math.fsum(one.turned_rad for one in steps[1:]) >= WAY_RAD)
-        found = (_find_excess(steps[first:]) for first in range(len(steps) - 2, -1, -1))
-        excess = next(filter(None, found), "" if is_whole else self.excess)
-        return WheelCheck((to.x_m, to.y_m, to.heading_rad), steps, excess=excess)
-
-    def sentence(self) -> str:
-        return self.excess or f"{len(self.steps)} corrections by pictures are within what wheels can err"
-
-
-def _find_excess(steps: tuple[WheelCorrection, ...]) -> str:
-    """What is wrong with the corrections after the first of these; "" for nothing."""
-    first, last, since = steps[0], steps[-1], steps[1:]
-    gone_m, turned_rad = math.fsum(one.gone_m for one in since), math.fsum(one.turned_rad for one in since)
-    off_m = math.hypot(math.fsum(one.ahead_m for one in since), math.fsum(one.left_m for one in since))
-    off_rad = abs(wrap_angle(math.fsum(one.heading_rad for one in since)))
-    most_m = (MOST_OFF_M + MOST_WHEELS * gone_m + MOST_ASIDE_M_PER_RAD * turned_rad
-              + MOST_SIGMAS * math.hypot(first.sigma_m, last.sigma_m))
-    most_rad = (MOST_OFF_RAD + MOST_WHEELS * turned_rad + MOST_BEND_RAD_PER_M * gone_m
-                + MOST_SIGMAS * math.hypot(first.sigma_rad, last.sigma_rad))
-    if off_m > most_m:
-        return (f"pictures moved it by {off_m:.2f} m on {gone_m:.2f} m of way, where wheels err by at most"
-                f" {most_m:.2f} m: camera or wheels are wrong")
-    if off_rad > most_rad:
-        return (f"pictures turned it by {math.degrees(off_rad):.0f} degrees while its wheels counted"
-                f" {math.degrees(turned_rad):.0f}, where they err by at most {math.degrees(most_rad):.0f}: camera or"
-                " wheels are wrong")
-    return ""
-
-
-class ReportCase(NamedTuple):
-    """What the wheels report, or None after a correction by a picture, and the belief before or after it."""
-
-    report: Entry[MotionReport] | None
-    belief: Belief
-
-
 class ClaimReckoner(RobotKnowledgeSource):
     """Moves the belief by what the wheels of a robot report that somebody else drives, and keeps the way it came.
 
     The heading is the camera's less a yaw that is not exactly known: by that, too, the robot may have come aside.
-    What pictures correct of it is summed, and compared with what wheels can err.
     """
 
     level, priority = Level.ACTION, Priority.ENTER
-    on = (Watch(MotionReport, (Posted,)), Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis != "odometry"))
+    on = (Watch(MotionReport, (Posted,)),)
     needs = (HELD,)
-    writes = (Hypothesis, Travel, WheelCheck)
+    writes = (Hypothesis, Travel)
 
-    def bind(self, view: View, trigger: Change) -> ReportCase | None:
-        held = HELD.of(view)
-        if isinstance(trigger.entry.value, MotionReport):
-            return ReportCase(trigger.entry, held)
-        return None if view.latest(WheelCheck) is None else ReportCase(None, held)
-
-    def act(self, view: View, case: ReportCase) -> Iterable[Effect]:
-        told, held = case
-        check = view.latest(WheelCheck)
-        if told is None:
-            assert check is not None
-            yield Revise(check, check.value.corrected(held.pose, held.value), (held.entry, check))
-            return
+    def act(self, view: View, case: Change) -> Iterable[Effect]:
+        told, held = case.entry, HELD.of(view)
         report, world = told.value, held.robot.world
         pose, covariance = held.robot.actuator.propagate_move(
             held.pose, held.covariance, report.turn_rad, report.move_m)
@@ -206,9 +93,6 @@ class ClaimReckoner(RobotKnowledgeSource):
         yield Revise(held.entry, moved, (told, held.entry))
         if is_uncounted(report):
             return
-        before = WheelCheck((0.0, 0.0, 0.0)) if check is None else check.value
-        rolled = before.rolled(pose, report.turn_rad, report.move_m)
-        yield Post(rolled, (told,)) if check is None else Revise(check, rolled, (told, check))
         way = (begin_travel(held.pose, held.covariance, camera.mount.yaw_rad, yaw_variance)
                if travel is None or held.value.basis in PLACED_BY else travel.value)
         slip_m = held.robot.actuator.skitter_m * min(1.0, abs(report.turn_rad) / (math.pi / 2.0))

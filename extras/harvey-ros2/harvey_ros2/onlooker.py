@@ -39,6 +39,7 @@ from knowledge_sources.relocalizer.pose_adopter import pose_adopter
 from knowledge_sources.robot.camera_calibrator import CameraCalibrator
 from knowledge_sources.robot.travel_breaker import travel_breaker
 from knowledge_sources.robot.yaw_calibrator import YawCalibrator
+from knowledge_sources.senses.correction_monitor import CorrectionMonitor
 from knowledge_sources.senses.lens_monitor import LensMonitor
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
@@ -51,8 +52,9 @@ from world_models.frames import Pose2
 from world_models.plugins import GUESTS_GROUP, list_plugins
 from world_models.robot import RobotModel
 
-SEATED = (interpreter, LineFinder, Matcher, MedRAndT, LensMonitor, rival_weigher, MilestoneJudge, CameraCalibrator,
-          AliasMonitor, plan_adjuster, YawCalibrator, travel_breaker, PanoramaBuilder, Localizer, pose_adopter)
+SEATED = (interpreter, LineFinder, Matcher, MedRAndT, LensMonitor, CorrectionMonitor, rival_weigher, MilestoneJudge,
+          CameraCalibrator, AliasMonitor, plan_adjuster, YawCalibrator, travel_breaker, PanoramaBuilder, Localizer,
+          pose_adopter)
 """The sources of a mission that are wanted here too."""
 GUESTS = ("claim_reckoner", "view_expecter", "loss_declarer", "place_confirmer")
 AUTHOR = "onlooker"

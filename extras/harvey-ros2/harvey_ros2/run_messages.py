@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from blackboard import Discrepancy, Level
 from harvey.runner.ports import STANDS_STILL
-from harvey_ros2.localizer_sources import WheelCheck
 from harvey_ros2.messages import MessageTypes, stamp
 from harvey_ros2.middleware import LATCHED, SENSOR, Delivery, Topic, full_name
 from harvey_ros2.robot_file import FrameNames
@@ -41,8 +40,7 @@ UNKNOWN = 1e6
 DOUBTFUL = 0.5
 """A picture by which the place is wrong with this probability ends the certainty until the next that verifies it."""
 KINDS: tuple[type[Any], ...] = (
-    MotionReport, CameraPicture, Hypothesis, Certificate, Milestone, PlanSketch, Discrepancy, WheelCheck, Difference,
-    BodyFault)
+    MotionReport, CameraPicture, Hypothesis, Certificate, Milestone, PlanSketch, Discrepancy, Difference, BodyFault)
 """What is told of."""
 OK, WARN, ERROR = 0, 1, 2
 COLOURS: Mapping[str, tuple[float, float, float]] = {
@@ -128,8 +126,6 @@ class RunMessages:
             yield from self._tell_milestone(value)
         elif isinstance(value, PlanSketch):
             yield from self._tell_plan(value)
-        elif isinstance(value, WheelCheck):
-            yield from self.doubt("wheels", value.excess)
         elif isinstance(value, Difference):
             is_misled = value.p_misled > MAX_P_RIVAL
             yield from self.doubt(value.about, f"{value.about} differs, {value.odds_in_words()}" if is_misled else "")

@@ -21,6 +21,9 @@ PRIORS: Mapping[RivalKind, float] = {
     "mounting": -2.0, "wheels": -2.0, "bumper": -4.0, "report": -2.0, "elsewhere": -3.0,
 }
 """Log odds of a rival before any evidence, against what nobody has thought of: what is ordinary first."""
+P_MISREAD = 0.02
+"""Part of the looks that are misread as a whole: such a one looks as if its best rival were so (pictures of honest
+missions, development seeds: 1 of 67 matched wrongly)."""
 MAX_COUNTED = 12
 """So much evidence of one difference is kept: the strongest."""
 
@@ -36,6 +39,13 @@ def weigh_rivals(about: str, evidence: Sequence[Evidence], priors: Mapping[Rival
     return Difference(about, tuple(rivals), tuple(kept), max(one.seen_s for one in evidence))
 
 
+def hedge(ratios: Mapping[RivalKind, float]) -> dict[RivalKind, float]:
+    """Log likelihood ratios over chance as far as they stand where the look may be misread as a whole."""
+    most, misread = max(0.0, *ratios.values()), P_MISREAD / (1.0 - P_MISREAD)
+    least = math.log(math.exp(-most) + misread)
+    return {kind: math.log(math.exp(ratio - most) + misread) - least for kind, ratio in ratios.items()}
+
+
 def _list_kinds(evidence: Sequence[Evidence]) -> tuple[RivalKind, ...]:
     named = {e.kind for one in evidence for e in one.explanations}
     return tuple(kind for kind in PRIORS if kind in named)
@@ -46,6 +56,8 @@ def _add(kind: RivalKind, evidence: Sequence[Evidence]) -> float:
     looks = [(Look(Pose2(one.x_m, one.y_m, one.heading_rad), e.log_ratio), one)
              for one in evidence for e in one.explanations if e.kind == kind]
     alike = Alike(max(one.apart_m for _, one in looks), max(one.apart_rad for _, one in looks))
+    if not alike.step_m:
+        return math.fsum(look.log_ratio for look, _ in looks)
     return add_looks([look for look, _ in looks], alike)
 
 

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.pose.camera_kernel import measure_lines
+from knowledge_sources.methods.belief import hedge
+from knowledge_sources.methods.pose.with_camera import measure_lines
 from world_models.camera import Camera, CameraMount
 from world_models.entries import SHARED_SIGMA_M, Explanation
 from world_models.entries.difference import RivalKind
@@ -31,9 +32,6 @@ SIGMA_K1, SIGMA_FOCAL, SIGMA_TURN_RAD, SIGMA_HEIGHT_M, SIGMA_WALL_M = 0.1, 0.05,
 """How far off each may be, one standard deviation, where it is wrong."""
 KNOWN_K1 = 0.007
 """How well a stated lens is known: in a corridor so much moves a place by ``SHARED_SIGMA_M``."""
-P_MISREAD = 0.02
-"""Part of the pictures that are matched wrongly as a whole: such a one looks as if its best rival were so (honest
-missions, development seeds: 1 of 67)."""
 POSE, TILT, ROLL, YAW, HEIGHT, FOCAL, CX, CY = 3, 3, 4, 5, 6, 7, 8, 9
 
 WHAT: Mapping[RivalKind, str] = {
@@ -106,10 +104,7 @@ def explain(opened: Mapping[RivalKind, Opened]) -> tuple[Explanation, ...]:
     """The rivals in words, with what is left of their log ratios where the picture may be misread."""
     if not opened:
         return ()
-    most = max(0.0, *(one.log_ratio for one in opened.values()))
-    misread = P_MISREAD / (1.0 - P_MISREAD)
-    left = {kind: math.log(math.exp(one.log_ratio - most) + misread) - math.log(math.exp(-most) + misread)
-            for kind, one in opened.items()}
+    left = hedge({kind: one.log_ratio for kind, one in opened.items()})
     return (Explanation("chance", "chance", 0.0), *(
         Explanation(kind, WHAT[kind].format(one.off, math.degrees(one.off), one.name), left[kind], one.off, one.sigma)
         for kind, one in opened.items()))

@@ -1,11 +1,8 @@
 """Routes, clearance and the steering law."""
 
-from knowledge_sources.methods.motion.increments import (
-    MAX_HEADING_ERROR_RAD, MAX_LOOK_ERROR_RAD, count_increment, find_aim, plan_increment, plan_turn,
-)
 from knowledge_sources.methods.motion.pure_pursuit import (
-    ROLLING_STOP_MARGIN_M, choose_speed, compute_bearing, find_aim_point, lay_leg, measure_progress, steer_to,
-    update_leg,
+    MAX_HEADING_ERROR_RAD, MAX_LOOK_ERROR_RAD, ROLLING_STOP_MARGIN_M, choose_speed, compute_bearing, count_increment,
+    find_aim, find_aim_point, lay_leg, measure_progress, plan_increment, plan_turn, steer_to, update_leg,
 )
 from knowledge_sources.methods.motion.routes import (
     SLACK_M, compute_free_space, find_bends, find_free_space, find_nearest, is_clear,

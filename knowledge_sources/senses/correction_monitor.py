@@ -1,0 +1,117 @@
+"""Correction monitor (§3.2): how pictures say that the robot moved, against what the wheels counted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from blackboard import Change, Effect, Level, Post, Posted, View, Watch
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.belief import hedge
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import HELD, add_reports, is_worth_telling
+from knowledge_sources.reads.place_believed import MAX_P_RIVAL
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.actuator import ActuatorModel
+from world_models.entries import (
+    LAST_REPORTS,
+    SHARED_SIGMA_M,
+    Certificate,
+    Drift,
+    Evidence,
+    Explanation,
+    MotionReport,
+    PoseFix,
+    RivalKind,
+)
+from world_models.frames import Pose2
+
+ABOUT = "motion"
+SHARED_SIGMA_RAD = 0.0014
+"""What a model, a camera and a matcher share of the heading (as ``SHARED_SIGMA_M`` of the place)."""
+WHEELS_PART, BEND_RAD_PER_M, ASIDE_M_PER_RAD = 0.25, 0.1, 0.05
+"""Wheels that are wrong err by such a part of what they count, and so far aside, one standard deviation."""
+ELSEWHERE_M, ELSEWHERE_RAD = 1.0, 1.0
+"""How far off a robot is that was pushed or carried, or takes one place for another."""
+
+
+def tells_place(certificate: Certificate) -> bool:
+    """Whether a picture tells a place, be it held back as a sense may lie: else nothing could acquit that sense."""
+    return certificate.verdict != "refuted" and certificate.p_false <= MAX_P_RIVAL
+
+
+class CorrectionMonitor(RobotKnowledgeSource):
+    """Says where the motion from one picture to the next is not the one that the wheels counted.
+
+    A picture that never changes says that the robot stands; wheels that are wrong err by a part of what they count.
+    """
+
+    level, priority = Level.PLAN, Priority.ENTER
+    on = (Watch(Certificate, (Posted,), tells_place),)
+    needs = (HELD,)
+    writes = (Evidence,)
+
+    def bind(self, view: View, trigger: Change) -> Post | None:
+        """What is not as expected of the way since the certificate before; None where all is, or not all is known."""
+        before = view.latest(Certificate, lambda c: c is not trigger.entry.value)
+        if before is None or not tells_place(before.value):
+            return None
+        began, ended = view.get(before.value.fix), view.get(trigger.entry.value.fix)
+        reports = view.since(MotionReport, before.cycle)
+        if began is None or ended is None or not 0 < len(reports) < LAST_REPORTS:
+            return None
+        seen, here = began.value.world_from_robot.inverse() @ ended.value.world_from_robot, ended.value.world_from_robot
+        actuator, drift = HELD.of(view).robot.actuator, view.latest(Drift)
+        known = Drift.unknown(actuator, here.heading_rad) if drift is None else drift.value
+        spread = _spread(began.value, ended.value)
+        explained = _explain(seen, spread, actuator, known, [one.value for one in reports])
+        if not is_worth_telling(view, ABOUT, explained):
+            return None
+        shows = f"by pictures it moved {seen.x_m:+.2f} m ahead and {math.degrees(seen.heading_rad):+.0f} degrees"
+        told = Evidence(ABOUT, shows, explained, here.x_m, here.y_m, here.heading_rad, 0.0, 0.0,
+                        reports[-1].value.sim_time_s)
+        return Post(told, (trigger.entry, began, ended, *reports))
+
+    def act(self, view: View, case: Post) -> Iterable[Effect]:
+        yield case
+
+
+def _spread(began: PoseFix, ended: PoseFix) -> Floats:
+    """(3, 3) covariance of the motion by two pictures, in the robot's frame at its begin."""
+    c, s = math.cos(began.world_from_robot.heading_rad), math.sin(began.world_from_robot.heading_rad)
+    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    moved = began.world_from_robot.inverse() @ ended.world_from_robot
+    arm = np.array([[1.0, 0.0, -moved.y_m], [0.0, 1.0, moved.x_m], [0.0, 0.0, 1.0]])  # a heading moves the far end
+    shared = np.diag(np.square([SHARED_SIGMA_M, SHARED_SIGMA_M, SHARED_SIGMA_RAD]))
+    return np.asarray(arm @ turn @ began.covariance @ turn.T @ arm.T + turn @ ended.covariance @ turn.T + 2.0 * shared)
+
+
+def _explain(
+    seen: Pose2, spread: Floats, actuator: ActuatorModel, drift: Drift, reports: list[MotionReport]
+) -> tuple[Explanation, ...]:
+    """What each rival makes of a motion by pictures, with its covariance, and of what the wheels report of it."""
+    rolled = add_reports(actuator, drift, reports)
+    moved, off = rolled.moved, seen.minus(rolled.moved)
+    usual = spread + np.diag(np.square([rolled.sigma_m, rolled.sigma_m, rolled.sigma_rad]))
+    gone_m, turned_rad = (math.fsum(abs(part) for part in parts) for parts in (
+        (one.move_m for one in reports), (one.turn_rad for one in reports)))
+    aside_m = ASIDE_M_PER_RAD * turned_rad + BEND_RAD_PER_M * gone_m**2 / 2.0
+    wrong = WHEELS_PART * gone_m + aside_m, aside_m, WHEELS_PART * turned_rad + BEND_RAD_PER_M * gone_m
+    far = ELSEWHERE_M, ELSEWHERE_M, ELSEWHERE_RAD
+    plain = _log_density(off, usual)
+    ratios: dict[RivalKind, float] = {
+        "wheels": _log_density(off, usual + np.diag(np.square(wrong))) - plain,
+        "still camera": _log_density(seen.minus(Pose2(0.0, 0.0, 0.0)), spread) - plain,
+        "elsewhere": _log_density(off, usual + np.diag(np.square(far))) - plain}
+    ahead = f"{off[0]:+.2f} m of {moved.x_m:.2f} m ahead"
+    what = {"wheels": f"wheels that count wrongly by {ahead}", "still camera": "a camera whose picture does not change",
+            "elsewhere": "a robot that was moved, or is elsewhere"}
+    return (Explanation("chance", "chance", 0.0), *(
+        Explanation(kind, what[kind], left) for kind, left in hedge(ratios).items()))
+
+
+def _log_density(off: Floats, covariance: Floats) -> float:
+    """Of a Gaussian (3,) about zero, but for what all have in common."""
+    return -0.5 * float(off @ np.linalg.solve(covariance, off) + np.linalg.slogdet(covariance)[1])

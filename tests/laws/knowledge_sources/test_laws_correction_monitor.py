@@ -1,0 +1,91 @@
+"""Laws of the correction monitor: pictures that never change, wheels that count wrongly and a push are told apart."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blackboard import Entry, Posted
+from generated_boards import Bench, made, plain_robot, reasons, wakes
+from knowledge_sources.methods.belief import weigh_rivals
+from knowledge_sources.senses.correction_monitor import CorrectionMonitor
+from world_models.actuator import ActuatorModel
+from world_models.entries import Certificate, Evidence, PoseFix, Rival
+from world_models.frames import Pose2
+
+SOURCE, WHEELS, HERE = CorrectionMonitor(), ActuatorModel(), Pose2(2.0, 1.5, 0.3)
+
+
+def certify(bench: Bench, pose: Pose2, verdict: str = "verified", p_false: float = 1e-3) -> Entry[Certificate]:
+    """A picture that tells a place to 4 mm."""
+    fix = bench.put(PoseFix("LineMatch-1", pose, np.diag([1.6e-5, 1.6e-5, 1e-6]), np.ones(0, bool), np.zeros(0), ()))
+    return bench.put(Certificate("Milestone-1", fix.id, verdict, "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0,  # type: ignore[arg-type]
+                                 p_false, p_false, 0.006))
+
+
+def go(step: Pose2, turn_rad: float, move_m: float, **told: object) -> tuple[Bench, Entry[Certificate]]:
+    """Pictures before and after a motion, which moved the robot by a step, and which the wheels counted."""
+    bench = Bench(plain_robot(actuator=WHEELS))
+    bench.believe(HERE)
+    certify(bench, HERE, **told)  # type: ignore[arg-type]
+    bench.move(turn_rad, move_m)
+    return bench, certify(bench, HERE @ step)
+
+
+def say(*legs: tuple[Bench, Entry[Certificate]]) -> list[Evidence]:
+    return [found for bench, last in legs for found in made(bench.ask(SOURCE, last), Evidence)]
+
+
+def lead(seen: list[Evidence], legs: int = 4) -> Rival:
+    """What so many such legs together are taken for."""
+    return weigh_rivals("motion", seen * legs).leader
+
+
+turns, ways = st.floats(-0.6, 0.6), st.floats(0.2, 1.5)
+errors = st.builds(Pose2, st.floats(-0.008, 0.008), st.floats(-0.008, 0.008), st.floats(-0.003, 0.003))
+
+
+@settings(max_examples=60, deadline=None)
+@given(turns, ways, errors)
+def test_of_wheels_and_pictures_that_agree_nothing_is_told(turn_rad: float, way_m: float, error: Pose2) -> None:
+    assert not say(go(WHEELS.predict_motion(turn_rad, way_m) @ error, turn_rad, way_m))
+
+
+@settings(max_examples=60, deadline=None)
+@given(turns, ways, errors)
+def test_pictures_that_never_change_are_told_by_each_leg(turn_rad: float, way_m: float, error: Pose2) -> None:
+    seen = say(go(error, turn_rad, way_m))
+    other = say(go(Pose2(error.x_m, -error.y_m, -error.heading_rad), -turn_rad, way_m))
+    assert lead(seen).kind == lead(other).kind == "still camera" and lead(seen).p > 0.95
+    for one, two in zip(seen[0].explanations, other[0].explanations, strict=True):
+        assert two.log_ratio == pytest.approx(one.log_ratio, abs=1e-3)  # in a mirror it is the same
+    assert 0.03 < weigh_rivals("motion", seen).p_misled < 0.1  # one leg may be misread
+
+
+@settings(max_examples=60, deadline=None)
+@given(ways, st.sampled_from((-0.25, -0.2, 0.2, 0.25)))
+def test_wheels_that_count_wrongly_are_no_reason_to_mistrust_pictures(way_m: float, part: float) -> None:
+    moved = WHEELS.predict_motion(0.0, way_m)
+    seen = say(go(Pose2((1.0 + part) * moved.x_m, 0.0, 0.0), 0.0, way_m))
+    assert not seen or weigh_rivals("motion", seen * 4).p_misled < 0.01
+    assert way_m < 0.5 or lead(seen).kind == "wheels"
+
+
+@given(st.sampled_from(("verified", "not testable", "refuted")), st.floats(0.0, 1.0))
+def test_only_pictures_that_tell_the_place_count(verdict: str, p_false: float) -> None:
+    tells = verdict != "refuted" and p_false <= 0.03
+    legs = go(Pose2(0.0, 0.0, 0.0), 0.0, 1.0, verdict=verdict, p_false=p_false)
+    assert bool(say(legs)) == tells
+    assert wakes(SOURCE, Posted(certify(Bench(), HERE, verdict, p_false))) == tells
+
+
+def test_it_rests_on_all_that_was_counted_and_needs_all_of_it() -> None:
+    bench, last = go(Pose2(0.0, 0.0, math.radians(1.0)), 0.0, 1.0)
+    (effect,) = bench.ask(SOURCE, last) or ()
+    assert reasons(effect) == {last.id, "PoseFix-1", "PoseFix-2", "MotionReport-1"}
+    bench.lack("PoseFix-1")
+    assert bench.ask(SOURCE, last) is None
