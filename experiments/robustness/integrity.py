@@ -166,6 +166,8 @@ def list_words(value: Any) -> Iterator[str]:
     match value:
         case entries.CameraState():
             yield from (f"camera {lesson.what}" for lesson in entries.find_camera_lessons(value.as_nominal(), value))
+        case entries.Difference() if value.is_sure:
+            yield value.leader.kind
         case entries.BodyFault():
             yield value.what
         case entries.Certificate() if value.verdict != "verified":
