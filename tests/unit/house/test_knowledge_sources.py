@@ -105,6 +105,7 @@ def test_it_knows_no_other_knowledge_source(stem: str) -> None:
 MOST_LINES = 150
 SHARED: dict[str, tuple[int, str]] = {
     "CameraState": (3, "learnt from lines, from the way, and told again to who was lost"),
+    "Evidence": (4, "each source tells what it saw, touched or found out; one weighs it"),
     "Discrepancy": (12, "who measures a difference posts it; who corrects it says so"),
     "DoorState": (3, "by a leaf in sight, by a touch, and by what a shut door explains"),
     "Drift": (4, "the belief's other half: who turns the heading restarts it"),
