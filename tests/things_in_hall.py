@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,8 +11,11 @@ import numpy as np
 from blackboard import Change, Effect, Entry, KnowledgeSource, Post, Revise, Scheduler
 from harvey.runner.world_port import WorldPort
 from harvey.simulation.simulated_run import build_robot_model
+from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.model.halt_explainer import HaltExplainer
 from knowledge_sources.model.model_reviser import ModelReviser
+from knowledge_sources.model.rival_weigher import rival_weigher
+from knowledge_sources.model.thing_judge import ThingJudge
 from knowledge_sources.model.thing_mapper import ThingMapper
 from knowledge_sources.model.thing_mover import ThingMover
 from knowledge_sources.model.touch_finder import TouchFinder
@@ -20,6 +24,9 @@ from world_models.building.locale_frame import FRAME_OF, LocaleFrame
 from world_models.entries import (
     Certificate,
     Contact,
+    Difference,
+    Evidence,
+    Explanation,
     FloorThing,
     FreeFloor,
     Hypothesis,
@@ -38,7 +45,8 @@ X_M, Y_M = 6.2484, 3.6576
 """The hall's corner in the world."""
 HERE = Pose2(X_M + 2.0, Y_M + 1.2, 0.0)
 CARTON = tuple((X_M + x, Y_M + y) for x, y in ((4.0, 1.0), (4.5, 1.0), (4.5, 1.4), (4.0, 1.4)))
-FINDERS = (ThingMapper(), TouchFinder(), HaltExplainer(), ThingMover(), ModelReviser())
+FINDERS = (ThingMapper(), TouchFinder(), HaltExplainer(), ThingMover(), ModelReviser(), rival_weigher,
+           ThingJudge())
 
 
 class Hall:
@@ -122,6 +130,15 @@ class Hall:
         return entry.value
 
 
+def known_by_sight(thing: Obstacle) -> Difference:
+    """The difference that makes a thing as certain as it is, by one sight."""
+    ratio = math.log(thing.certainty / (1.0 - thing.certainty))
+    eye = thing.judged_from or (-9.0, 0.0)
+    seen = Evidence(thing.name, "seen", (Explanation("thing", "a thing", ratio),), *eye, 0.0, 0.1, math.tau, 0.0)
+    return weigh_rivals(thing.name, (seen,))
+
+
 def carton(p_thing: float = 0.97, *, by_m: float = 0.0, height_m: float = 0.4) -> FloorThing:
     corners = tuple((x, y + by_m) for x, y in CARTON)
-    return FloorThing(corners, 0.03, height_m, 0.05, p_thing, (200.0, 300.0, 260.0, 350.0), "unlike the floor")
+    left = 200.0 - 100.0 * by_m
+    return FloorThing(corners, 0.03, height_m, 0.05, p_thing, (left, 300.0, left + 60.0, 350.0), "unlike the floor")

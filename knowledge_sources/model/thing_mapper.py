@@ -11,25 +11,27 @@ import shapely
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
 from knowledge_sources.methods.floor import Sight, is_telling, may_be_there
+from knowledge_sources.methods.floor.rivals_on_floor import tell_of_door
 from knowledge_sources.methods.floor.weigh_sight import weigh_sight
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, SEEN_MARGIN_M, SURE, Belief, current_leg, find_known_free, find_swept_next
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import CameraPicture, FreeFloor, Obstacle
+from world_models.entries import CameraPicture, Difference, Evidence, FreeFloor, Obstacle
 
 
 class ThingMapper(RobotKnowledgeSource):
-    """Concludes from a sight of the floor that something stands on it; or that it is gone.
+    """Concludes from a sight of the floor that something stands on it; or that it is gone, or no thing.
 
     What is seen is joined with what is known there already. It is there when it is certain enough, by one sure picture
     or two unsure ones, or by one where it is next on the way; and gone when most of its footprint is seen to be free
-    floor. Where its feet were not seen, it may reach to the robot's rim.
+    floor, or it rather is dirt on the lens. Of a jamb that stands beside the wall's end is there, and its door is told.
+    Where its feet were not seen, it may reach to the robot's rim.
     """
 
     level, priority = Level.ACTION, Priority.REVISE
     on = (Watch(FreeFloor, (Posted,)),)
     needs = (HELD, SURE)
-    writes = (Obstacle,)
+    writes = (Obstacle, Evidence)
 
     def bind(self, view: View, trigger: Change) -> Entry[FreeFloor] | None:
         """A sight with a thing in it that is certain enough, or of floor on which something may be there."""
@@ -45,6 +47,10 @@ class ThingMapper(RobotKnowledgeSource):
         for found in weigh_sight(self._tell_of(view, scan, belief), obstacles, self._settings):
             entry = None if found.known is None else known[found.known]
             on_way = (driving[0],) if found.is_next and driving is not None else ()
+            if found.weighed is not None:
+                evidence, difference = found.weighed
+                of_door = tell_of_door(difference, evidence)
+                yield from (Post(one, (scan,)) for one in (evidence, of_door) if one is not None)
             if entry is None:
                 yield Post(found.obstacle, (scan, *on_way))
             else:
@@ -58,4 +64,8 @@ class ThingMapper(RobotKnowledgeSource):
         pictures = (found.id for ref in scan.because
                     if (found := view.get(ref.id)) is not None and isinstance(found.value, CameraPicture))
         seen_by = next(pictures, scan.id) if scan.value.sense == "camera" else scan.id
-        return Sight(scan.value, seen_by, belief.world, belief.robot.radius_m + SEEN_MARGIN_M, known_free, ahead)
+        before = [one.value.things for one in view.newest_first(FreeFloor)
+                  if one.value.sense == "camera" and one is not scan]
+        differences = {entry.value.about: entry.value for entry in view.all(Difference)}
+        return Sight(scan.value, seen_by, belief.world, belief.robot.radius_m + SEEN_MARGIN_M, known_free, ahead,
+                     belief.robot.camera, before, differences)

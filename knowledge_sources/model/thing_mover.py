@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch
-from knowledge_sources.methods.floor import doubt_thing, may_be_there, move_thing
+from blackboard import Change, Effect, Entry, Level, Post, Ref, Revise, Revised, View, Watch
+from knowledge_sources.methods.floor import explain_seen_elsewhere, may_be_there, move_thing
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Certificate, Hypothesis, Obstacle
+from world_models.entries import Certificate, Difference, Evidence, Hypothesis, Obstacle
 from world_models.frames import Pose2, wrap_angle
 
 MAX_DRIFT_M = 0.5  # a belief that was further off was not worn out on the way: the robot was kidnapped
@@ -34,15 +34,15 @@ class ThingMover(RobotKnowledgeSource):
     """Moves what was seen on the floor since a milestone was last verified, where the belief was a little off.
 
     It was seen from the robot, so it stands where it stood as seen from there, less surely by what the belief was off.
-    Was the robot kidnapped, what it saw on the way was seen before or after that: it stays where it is, and is
-    believed less. A thing leaves only when its floor is seen free. What was touched stays: a contact was weighed at a
-    milestone.
+    Was the robot kidnapped, what it saw on the way was seen before or after that: it stays where it is, or stands
+    elsewhere, half as likely. A thing leaves only when its floor is seen free. What was touched stays: a
+    contact was weighed at a milestone.
     """
 
     level, priority = Level.ACTION, Priority.REVISE
     on = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.correction is not None),)
     needs = (HELD,)
-    writes = (Obstacle,)
+    writes = (Obstacle, Evidence)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         """What was seen, and not touched, since a milestone was last verified."""
@@ -57,10 +57,17 @@ class ThingMover(RobotKnowledgeSource):
         belief, here = held.entry, held.pose
         moved_m, turned_rad = by.distance_to(Pose2(0.0, 0.0, 0.0)), abs(wrap_angle(by.heading_rad))
         for entry in things:
+            because = (belief, entry, *sure)
             if moved_m > MAX_DRIFT_M or turned_rad > MAX_DRIFT_RAD:
-                evidence = f"seen before or after the robot was kidnapped, as {belief.ref} tells"
-                now = doubt_thing(entry.value, evidence)
+                yield Post(_doubt(view, entry.value, here, belief.ref), because)
             else:
                 evidence = f"moved with the belief, which {belief.ref} corrected"
                 now = move_thing(held.world, entry.value, here @ by @ here.inverse(), moved_m, evidence)
-            yield Revise(entry, now, (belief, entry, *sure))
+                yield Revise(entry, now, because)
+
+
+def _doubt(view: View, thing: Obstacle, here: Pose2, told_by: Ref) -> Evidence:
+    known = view.latest(Difference, lambda d: d.about == thing.name)
+    shows = f"seen before or after the robot was kidnapped, as {told_by} tells"
+    return Evidence(thing.name, shows, explain_seen_elsewhere(None if known is None else known.value), here.x_m,
+                    here.y_m, here.heading_rad, MAX_DRIFT_M, MAX_DRIFT_RAD, thing.seen_s)

@@ -7,13 +7,21 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Revise, Revised, View, Watch
-from knowledge_sources.methods.floor import TOUCH_MARGIN_M, find_touched, locate_touch, touch_again, touch_first
+from knowledge_sources.methods.doors import is_in_opening
+from knowledge_sources.methods.floor import (
+    TOUCH_MARGIN_M,
+    explain_touch,
+    find_touched,
+    locate_touch,
+    touch_again,
+    touch_first,
+)
 from knowledge_sources.methods.floor.weigh_touch import Touched
 from knowledge_sources.methods.motion import find_nearest
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD
+from knowledge_sources.reads import HELD, Belief
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Contact, Course, Hypothesis, MotorCommand, Obstacle
+from world_models.entries import Contact, Course, Difference, Evidence, Hypothesis, MotorCommand, Obstacle
 
 MAX_TOUCH_SIGMA_RAD = 0.6  # a contact whose direction is less sure tells of no obstacle
 
@@ -39,7 +47,7 @@ class TouchFinder(RobotKnowledgeSource):
     level, priority = Level.ACTION, Priority.REVISE
     on = (Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in ("milestone", "relocalization")),)
     needs = (HELD,)
-    writes = (Obstacle,)
+    writes = (Obstacle, Evidence)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         """The newest contact, where its direction is known well enough and the model does not explain it."""
@@ -62,10 +70,24 @@ class TouchFinder(RobotKnowledgeSource):
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         (touched, sigma_m, known, because), belief, s = case, HELD.of(view), self._settings.action
         if known is None:
-            number = 1 + len(view.all(Obstacle))
-            yield Post(touch_first(belief.world, touched, belief.locale, sigma_m, number, s), because)
+            new = touch_first(belief.world, touched, belief.locale, sigma_m, 1 + len(view.all(Obstacle)), s)
+            yield Post(new, because)
         else:
-            yield Revise(known, touch_again(belief.world, touched, known.value, s), (*because, known))
+            new = touch_again(belief.world, touched, known.value, s)
+            yield Revise(known, new, (*because, known))
+        yield Post(_tell(view, belief, new, touched, s.max_obstacle_certainty), because)
+
+
+def _tell(view: View, belief: Belief, thing: Obstacle, touched: Touched, most: float) -> Evidence:
+    """What a touch says of what was touched: in an opening it may be a leaf as well as a thing."""
+    known = view.latest(Difference, lambda d: d.about == thing.name)
+    at = belief.pose
+    doors = (d.name for d in belief.world.doorways_of(belief.locale)
+             if is_in_opening(d, belief.locale, touched.at, TOUCH_MARGIN_M))
+    leaf = next((f"the leaf of {door}, shut" for door in doors), None)
+    explanations = explain_touch(leaf, None if known is None else known.value, most)
+    return Evidence(thing.name, touched.contact.sentence(), explanations, at.x_m, at.y_m, at.heading_rad,
+                    TOUCH_MARGIN_M, math.tau, touched.contact.when_s)
 
 
 def _find_new_touch(view: View) -> tuple[Entry[Contact], float, tuple[Entry[MotorCommand], ...]] | None:

@@ -9,11 +9,11 @@ way they do not show, and from where that can be seen); what stands on it: ``fou
 """
 
 from knowledge_sources.methods.floor.door_beside import take_as_jamb
-from knowledge_sources.methods.floor.fixed_boxes import enclose, find_fixed, is_behind
+from knowledge_sources.methods.floor.fixed_boxes import MAX_FIXED_LOOKS, MIN_MOVED_M, enclose, find_fixed, is_behind
 from knowledge_sources.methods.floor.footprints import (
     MIN_SIDE_M, build_free_floor, build_polygon, list_corners, measure_approach_m,
 )
-from knowledge_sources.methods.floor.found_things import MIN_OBSTACLE_CERTAINTY, doubt_thing, may_be_there, move_thing
+from knowledge_sources.methods.floor.found_things import MIN_OBSTACLE_CERTAINTY, may_be_there, move_thing
 from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.methods.floor.relief import TYPICAL_M
 from knowledge_sources.methods.floor.revise_frame import (
@@ -21,6 +21,9 @@ from knowledge_sources.methods.floor.revise_frame import (
 )
 from knowledge_sources.methods.floor.see_floor import (
     FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD, MotionBetween, Seen, see_free_floor,
+)
+from knowledge_sources.methods.floor.rivals_on_floor import (
+    explain_seen_elsewhere, explain_seen_in_patch, explain_touch, judge_thing,
 )
 from knowledge_sources.methods.floor.seen_floor import (
     Costs, Lookout, SPACING_M, SeenFloor, Sweep, choose_look, find_floor, measure_blind_end_m, measure_first_seen_m,
@@ -32,10 +35,11 @@ from knowledge_sources.methods.floor.weigh_touch import (
 )
 
 __all__ = [
-    "FLOOR_VIEW_DISTANCE_M", "FLOOR_VIEW_TURN_RAD", "MIN_OBSTACLE_CERTAINTY", "MIN_SIDE_M", "MIN_THING_CERTAINTY",
-    "SPACING_M", "TOUCH_MARGIN_M", "TYPICAL_M", "Costs", "Lookout", "MotionBetween", "Seen", "SeenFloor", "Sight",
-    "Sweep", "build_free_floor", "build_polygon", "choose_look", "doubt_thing", "enclose", "find_fixed",
-    "find_floor", "find_touched", "is_behind", "is_telling", "list_corners", "locate_touch", "may_be_there",
+    "FLOOR_VIEW_DISTANCE_M", "FLOOR_VIEW_TURN_RAD", "MAX_FIXED_LOOKS", "MIN_MOVED_M", "MIN_OBSTACLE_CERTAINTY",
+    "MIN_SIDE_M", "MIN_THING_CERTAINTY", "SPACING_M", "TOUCH_MARGIN_M", "TYPICAL_M", "Costs", "Lookout",
+    "MotionBetween", "Seen", "SeenFloor", "Sight", "Sweep", "build_free_floor", "build_polygon", "choose_look",
+    "enclose", "explain_seen_elsewhere", "explain_seen_in_patch", "explain_touch", "find_fixed", "find_floor",
+    "find_touched", "is_behind", "is_telling", "judge_thing", "list_corners", "locate_touch", "may_be_there",
     "measure_approach_m", "measure_blind_end_m", "measure_first_seen_m", "measure_free_m", "move_thing",
     "revise_by_difference", "revise_by_door", "revise_by_report", "revise_by_thing", "sample_sweep", "see_free_floor",
     "see_ranges", "take_as_jamb", "touch_again", "touch_first",

@@ -1,11 +1,12 @@
-"""Is a thing whose feet are not seen the jamb of a door that stands a little beside its place in the model (§4)?
+"""May a thing be the jamb of a door that stands a little beside its place in the model, or the leaf of a door (§4)?
 
 A model is right to centimetres, and a wall's end that reaches into the model's opening looks like a thing there. So a
-sight in the directions of such an end alone is that end, and not anything from there to the robot's rim.
+sight in the directions of such an end alone may be that end, and not anything from there to the robot's rim.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -13,7 +14,12 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor.footprints import build_polygon, list_corners, measure_common_directions
+from knowledge_sources.methods.floor.footprints import (
+    build_polygon,
+    list_corners,
+    measure_common_directions,
+    measure_width_m,
+)
 from world_models.building.building import Building
 from world_models.building.locales import Doorway
 from world_models.entries import Obstacle
@@ -21,14 +27,30 @@ from world_models.entries import Obstacle
 JAMB_M = 0.002  # a jamb that stands where the model has it reaches no further into the opening
 MAX_BESIDE_M = 0.15  # a jamb stands at most so far beside: 10 cm, with its casing
 MAX_SLIVER_M = 0.3  # what is narrower, at a jamb, may be the jamb itself, until it is touched
+JAMB_OF = "a jamb of "
 MIN_EXPLAINED = 0.8  # least part of the directions of a sight that such a jamb explains
+MIN_JAMB_SIGMA_M = 0.05  # of a jamb's place: the edge of what is seen may be its casing, or its shade
+MIN_LEAF_PART = 0.6  # least part of a door's width that is seen of a leaf
 
 
 class JambBeside(NamedTuple):
-    """The door, and the end of its wall that is seen in its opening (on the floor, world)."""
+    """A jamb that stands beside its place in the model, as one sight shows it.
+
+    Attributes:
+        door: its name.
+        shape: the end of the wall that is seen in the opening [m, world].
+        off_m, sigma_m: how far the jamb is displaced along its wall, to the right as seen from the door's first room.
+        log_ratio: by how much a jamb explains better than a thing that it is seen there, at an end of the opening.
+    """
 
     door: str
     shape: shapely.Polygon
+    off_m: float
+    sigma_m: float
+    log_ratio: float
+
+    def words(self) -> str:
+        return f"{JAMB_OF}{self.door} that stands {abs(100.0 * self.off_m):.0f} cm beside"
 
 
 def find_jamb_beside(
@@ -48,8 +70,37 @@ def find_jamb_beside(
                 continue
             part = measure_common_directions(end, seen, at)
             if part >= MIN_EXPLAINED and (best is None or part > best[0]):
-                best = part, JambBeside(doorway.name, _cut_to(end, seen, at))
+                best = part, _describe(doorway, end, seen, at)
     return None if best is None else best[1]
+
+
+def find_leaf(world: Building, locale: str, seen: shapely.Polygon, within_m: float) -> str | None:
+    """The leaf that explains what is seen of a thing on the floor, in words: it is thin, and as wide as its door; it
+    stands in the opening, or is hinged at a jamb.
+    """
+    width_m = measure_width_m(list_corners(seen) or shapely.get_coordinates(seen)[:-1])
+    for doorway in world.doorways_of(locale):
+        if not MIN_LEAF_PART * doorway.width_m <= width_m <= doorway.width_m + 2.0 * within_m:
+            continue
+        opening = shapely.MultiPoint(np.concatenate(doorway.thresholds_world)).convex_hull
+        if opening.buffer(within_m).contains(seen):
+            return f"the leaf of {doorway.name}, shut"
+        jambs = [shapely.Point(jamb) for jamb in doorway.threshold_of(locale)]
+        is_thin = seen.area <= 2.0 * within_m * width_m
+        if is_thin and min(seen.distance(jamb) for jamb in jambs) <= within_m and any(
+                jamb.buffer(doorway.width_m + within_m).contains(seen) for jamb in jambs):
+            return f"the leaf of {doorway.name}, which stands open"
+    return None
+
+
+def _describe(doorway: Doorway, end: shapely.Polygon, seen: shapely.Polygon, at: Floats) -> JambBeside:
+    shape = _cut_to(end, seen, at)
+    left, right = doorway.threshold_of(doorway.between[0])
+    along = (shapely.get_coordinates(shape) - left) @ (right - left) / doorway.width_m
+    off_m = float(along.max()) if along.mean() < 0.5 * doorway.width_m else float(along.min()) - doorway.width_m
+    sigma_m = math.hypot(MIN_JAMB_SIGMA_M, 0.25 * doorway.depth_m)  # on which side of its wall it is seen is not known
+    return JambBeside(doorway.name, shape, round(off_m, 3), round(sigma_m, 3),
+                      math.log(doorway.width_m / (2.0 * MAX_BESIDE_M)))
 
 
 def take_as_jamb(world: Building, obstacle: Obstacle) -> Obstacle:

@@ -10,7 +10,8 @@ from knowledge_sources.methods.floor.footprints import build_polygon
 from world_models.camera import Camera
 from world_models.entries import FloorThing, Obstruction
 
-MIN_FIXED_LOOKS = 3  # in two looks something may be at one place of the picture by chance
+MAX_FIXED_LOOKS = 2  # so many earlier looks tell enough
+MAX_ABSENT_LOOKS = 4  # what so many of the last looks do not show at its place was not there
 FIXED_PX = 6.0  # sides that are no further apart are one: the floor is looked at every second pixel
 BORDER_PX = 4.0  # a side so near to the picture's border tells nothing; nor does the upper one: there the floor ends
 MIN_MOVED_M = 0.3  # so far it would have moved on the floor from each look to each other one
@@ -22,18 +23,20 @@ Box = tuple[float, float, float, float]
 
 def find_fixed(thing: FloorThing, earlier: Iterable[Sequence[FloorThing]], camera: Camera) -> dict[int, Box]:
     """The boxes in earlier looks (the newest first), by their numbers, that show a thing at the same place of the
-    picture and elsewhere on the floor; none where they are too few.
+    picture and elsewhere on the floor.
     """
-    found, places = dict[int, Box](), [build_polygon(thing.footprint).centroid]
+    found, places, absent = dict[int, Box](), [build_polygon(thing.footprint).centroid], 0
     for number, things in enumerate(earlier):
-        for same in (one for one in things if _is_same(one.box_px, thing.box_px, camera)):
+        alike = [one for one in things if _is_same(one.box_px, thing.box_px, camera)]
+        absent += not alike
+        for same in alike:
             place = build_polygon(same.footprint).centroid
             if number not in found and min(shapely.distance(place, places)) >= MIN_MOVED_M:
                 found[number] = same.box_px
                 places.append(place)
-        if len(places) == MIN_FIXED_LOOKS:
-            return found
-    return {}
+        if len(found) == MAX_FIXED_LOOKS or absent == MAX_ABSENT_LOOKS:
+            break
+    return found
 
 
 def enclose(boxes: Sequence[Box], known: Obstruction | None) -> Obstruction:

@@ -96,12 +96,6 @@ def move_thing(world: Building, thing: Obstacle, by: Pose2, off_m: float, eviden
     return place(world, moved, build_polygon(moved.footprint))
 
 
-def doubt_thing(thing: Obstacle, evidence: str) -> Obstacle:
-    """A thing that was seen there, or elsewhere, one as likely as the other."""
-    certainty = 0.5 * thing.certainty
-    return replace(thing, certainty=certainty, evidence=evidence, status=tell_status(certainty))
-
-
 def find_room(world: Building, shape: shapely.Polygon, near: str) -> str:
     """The room in which most of a thing stands, of that where the robot is and those next to it."""
     if shapely.Polygon(world.outline(near)).contains(shape.centroid):

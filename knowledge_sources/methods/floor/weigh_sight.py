@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 
-from knowledge_sources.methods.belief import to_log_odds, update
-from knowledge_sources.methods.floor.door_beside import find_jamb_beside
+from knowledge_sources.methods.belief import to_log_odds, weigh_rivals
+from knowledge_sources.methods.floor.door_beside import find_jamb_beside, find_leaf
+from knowledge_sources.methods.floor.fixed_boxes import MIN_MOVED_M, find_fixed
 from knowledge_sources.methods.floor.footprints import (
     build_free_floor,
     build_polygon,
@@ -26,14 +28,15 @@ from knowledge_sources.methods.floor.found_things import (
     find_same,
     may_be_there,
     place,
-    tell_status,
 )
+from knowledge_sources.methods.floor.rivals_on_floor import Shown, explain_free, explain_sight, judge_thing
 from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M, MAX_P_SEEN_ONCE
 from knowledge_sources.methods.floor.thing_shapes import ThingShape, join_shapes, leave_free
 from knowledge_sources.methods.floor.weigh_touch import TOUCH_MARGIN_M
 from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.building import Building
-from world_models.entries import FloorThing, FreeFloor, Obstacle, ObstacleStatus
+from world_models.camera import Camera
+from world_models.entries import Difference, Evidence, Explanation, FloorThing, FreeFloor, Obstacle
 
 MIN_THING_CERTAINTY = 0.5  # what is seen on the floor with less certainty than this tells of no obstacle
 MIN_FREE_PART = 0.5  # part of an obstacle's footprint that must be seen free to tell that it is not there any more
@@ -61,6 +64,9 @@ class Sight(NamedTuple):
         rim_m: to here from the eye a thing may reach whose feet are not seen.
         known_free: the floor that was known to be free before [m, world].
         ahead: what the robot sweeps next on its way [m, world].
+        camera: by which it was seen.
+        before: the things in earlier pictures, the newest first.
+        differences: what is known of things, by their names.
     """
 
     floor: FreeFloor
@@ -69,6 +75,9 @@ class Sight(NamedTuple):
     rim_m: float
     known_free: shapely.Geometry
     ahead: shapely.Geometry
+    camera: Camera
+    before: Sequence[Sequence[FloorThing]] = ()
+    differences: Mapping[str, Difference] = MappingProxyType({})
 
     @property
     def eye(self) -> tuple[float, float]:
@@ -78,6 +87,33 @@ class Sight(NamedTuple):
         """Whether the eye is not where it was at the last evidence of an obstacle: this is further evidence."""
         return known.judged_from is None or math.dist(self.eye, known.judged_from) >= MIN_WAY_M
 
+    def is_surer(self, thing: FloorThing, known: Obstacle) -> bool:
+        """Whether this sight alone is surer of a thing than all before."""
+        difference = self.differences.get(known.name)
+        rival = None if difference is None else difference.find("thing")
+        return rival is None or to_log_odds(thing.p_thing) > rival.log_odds + 1e-6
+
+    def is_dirt(self, known: Obstacle) -> bool:
+        """Whether it was taken back as dirt; what else is gone, and is seen again, is another thing."""
+        difference = self.differences.get(known.name)
+        dirt = None if difference is None else difference.find("dirt")
+        return dirt is not None and dirt.p > 0.5
+
+    def tell(
+        self, about: str, shows: str, explanations: tuple[Explanation, ...], apart_m: float = MIN_WAY_M
+    ) -> Weighed:
+        """Evidence of something on the floor, and what is known of it then."""
+        f, known = self.floor, self.differences.get(about)
+        evidence = Evidence(about, shows, explanations, f.x_m, f.y_m, 0.0, apart_m, math.tau, f.seen_s)
+        return Weighed(evidence, weigh_rivals(about, (*(() if known is None else known.counted), evidence)))
+
+
+class Weighed(NamedTuple):
+    """Evidence of something on the floor, and what is known of it then."""
+
+    evidence: Evidence
+    difference: Difference
+
 
 class Sighted(NamedTuple):
     """What is known of one obstacle after a sight.
@@ -85,10 +121,12 @@ class Sighted(NamedTuple):
     Attributes:
         known: id under which it was known; None where it is new.
         is_next: whether it counts as there because it stands on the robot's way.
+        weighed: the evidence of the sight; None where that is no further evidence.
     """
 
     known: str | None
     obstacle: Obstacle
+    weighed: Weighed | None = None
     is_next: bool = False
 
 
@@ -117,30 +155,31 @@ def weigh_sight(
         if not is_telling(thing):
             continue
         new = _shape_of(sight, thing)
-        rest, whole = {id: o for id, o in known.items() if id not in drafts}, MAX_HULL_PART
+        rest = {id: o for id, o in known.items() if id not in drafts and (may_be_there(o) or sight.is_dirt(o))}
+        whole = MAX_HULL_PART
         if f.sense == "ranges":  # an echo tells how far a thing is, not where in its cone: any in it may be heard
-            rest, whole = {id: o for id, o in rest.items() if may_be_there(o)}, math.inf
+            whole = math.inf
         id = find_before(rest, new.seen, sight.eye, settings.plan.overhang_m) if thing.is_cut else None
-        jamb = find_jamb_beside(sight.world, f.locale, new.seen, sight.eye) if thing.is_cut and id is None else None
-        if jamb is not None:  # a door that is a little displaced, before anything wider is believed
-            new = ThingShape(jamb.shape, jamb.shape, float(jamb.shape.distance(shapely.Point(sight.eye))))
-            thing = replace(thing, evidence=f"{thing.evidence}, as a jamb of {jamb.door} that stands beside would")
+        shown = _show(sight, thing, new)
+        if shown.jamb is not None and thing.is_cut and id is None:  # before anything wider is believed
+            beside = shown.jamb.shape
+            new = ThingShape(beside, beside, float(beside.distance(shapely.Point(sight.eye))))
         shape = new.whole
         id = id or find_same(rest, shape, thing.sigma_m, whole)
         if id is not None:
-            again = see_again(sight, known[id], thing, new, free, s)
+            again = see_again(sight, known[id], thing, new, shown, free, s)
             if again is not None:
-                drafts[id] = Sighted(id, again)
+                drafts[id] = again._replace(known=id)
             continue
         joined = [build_polygon(draft.obstacle.footprint) for draft in drafts.values()]
         if any(shapely.intersection(polygon, shape).area > 0.5 * shape.area for polygon in joined):
             continue  # another part of what was joined already
-        if jamb is None and _is_explained(sight, thing, shape):
+        if shown.jamb is None and _is_explained(sight, thing, shape):
             continue
-        found = see_first(sight, thing, new, 1 + len(known) + fresh, s)
+        found = see_first(sight, thing, new, shown, 1 + len(known) + fresh, s)
         if found is not None:
             fresh += 1
-            drafts[f"new {fresh}"] = Sighted(None, found)
+            drafts[f"new {fresh}"] = found
     for draft in drafts.values():
         yield _hold_next(draft, sight.ahead)
     seen = shapely.union_all([build_polygon(thing.footprint).buffer(2.0 * thing.sigma_m) for thing in f.things])
@@ -150,14 +189,24 @@ def weigh_sight(
         if sight.is_from_elsewhere(obstacle) and measure_free_part(obstacle.footprint, seen) <= MAX_SHARED_PART:
             gone = miss(sight, obstacle, confirmed if obstacle.is_camouflaged else free, confirmed, s)
             if gone is not None:
-                yield Sighted(id, gone)
+                yield gone._replace(known=id)
 
 
 def _hold_next(draft: Sighted, ahead: shapely.Geometry) -> Sighted:
     """What is suspected next on the way counts as there."""
     if draft.obstacle.status == "suspected" and build_polygon(draft.obstacle.footprint).intersects(ahead):
-        return Sighted(draft.known, replace(draft.obstacle, status="there"), is_next=True)
+        return draft._replace(obstacle=replace(draft.obstacle, status="there"), is_next=True)
     return draft
+
+
+def _show(sight: Sight, thing: FloorThing, shape: ThingShape) -> Shown:
+    """What a sight shows of a thing, beside how it looks."""
+    if sight.floor.sense != "camera":
+        return Shown()
+    within_m = 2.0 * thing.sigma_m
+    jamb = find_jamb_beside(sight.world, sight.floor.locale, shape.seen, sight.eye) if thing.is_cut else None
+    leaf = None if thing.is_cut else find_leaf(sight.world, sight.floor.locale, shape.seen, within_m)
+    return Shown(jamb, leaf, len(find_fixed(thing, sight.before, sight.camera)))
 
 
 def _shape_of(sight: Sight, thing: FloorThing) -> ThingShape:
@@ -183,8 +232,8 @@ def _is_explained(sight: Sight, thing: FloorThing, shape: shapely.Polygon) -> bo
 
 
 def see_first(
-    sight: Sight, thing: FloorThing, shape: ThingShape, number: int, settings: ActionSettings
-) -> Obstacle | None:
+    sight: Sight, thing: FloorThing, shape: ThingShape, shown: Shown, number: int, settings: ActionSettings
+) -> Sighted | None:
     """A thing that was not known; None where it stands on no floor."""
     f, world = sight.floor, sight.world
     locale = find_room(world, shape.whole, f.locale)
@@ -192,46 +241,51 @@ def see_first(
     footprint, core = shape._replace(whole=own).list_corners()
     if not footprint:
         return None
+    name = f"{locale}/obstacle-{number}"
+    weighed = _weigh(sight, name, thing, shown, settings)
     found = Obstacle(
-        f"{locale}/obstacle-{number}", locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m,
-        thing.sigma_height_m, min(thing.p_thing, settings.max_obstacle_certainty), f.seen_s, None, f.sense,
-        _tell(thing, sight), tell_status(thing.p_thing), core, thing.is_camouflaged, shape.from_m,
+        name, locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m, thing.sigma_height_m, 0.0, f.seen_s,
+        None, f.sense, _tell(thing, sight, weighed.difference), "suspected", core, thing.is_camouflaged, shape.from_m,
         sight.eye)
-    return place(world, found, own)
+    return Sighted(None, judge_thing(place(world, found, own), weighed.difference, settings), weighed)
+
+
+def _weigh(sight: Sight, name: str, thing: FloorThing, shown: Shown, settings: ActionSettings) -> Weighed:
+    """What a sight of a thing says of it. Where it is dirt, what it shows further on is no further evidence."""
+    explanations = explain_sight(
+        thing.p_thing, shown, sight.differences.get(name), settings.max_obstacle_certainty)
+    return sight.tell(name, thing.evidence, explanations, MIN_MOVED_M if shown.still else MIN_WAY_M)
 
 
 def see_again(
-    sight: Sight, known: Obstacle, thing: FloorThing, shape: ThingShape, free: shapely.Geometry,
+    sight: Sight, known: Obstacle, thing: FloorThing, shape: ThingShape, shown: Shown, free: shapely.Geometry,
     settings: ActionSettings,
-) -> Obstacle | None:
+) -> Sighted | None:
     """A known obstacle after it was seen once more; None where that tells nothing that matters.
 
     What deceives the eye once does so again from the same place: only another sight is further evidence.
     """
     s, f, world = settings, sight.floor, sight.world
-    certainty = max(known.certainty, thing.p_thing)
-    if known.status == "gone":
-        certainty = thing.p_thing
-    elif sight.is_from_elsewhere(known):
-        certainty = update(known.certainty, to_log_odds(min(thing.p_thing, s.max_obstacle_certainty)))
-    certainty = min(certainty, s.max_obstacle_certainty)
+    is_further = sight.is_from_elsewhere(known) or sight.is_surer(thing, known)
+    weighed = _weigh(sight, known.name, thing, shown, s) if is_further else None
+    judged = known if weighed is None else judge_thing(known, weighed.difference, s)
     joined = _join_sight(sight, known, shape, free)
     footprint, core = joined.list_corners()
     seen_before = known.core or known.footprint
     moved = max(measure_change_m(known.footprint, footprint),
                 measure_change_m(seen_before, core or footprint)) >= s.min_footprint_change_m
-    surer = certainty > known.certainty + 0.005 or tell_status(certainty) != known.status
+    surer = abs(judged.certainty - known.certainty) > 0.005 or judged.status != known.status
     higher = thing.sigma_height_m < 0.7 * known.sigma_height_m
     if not (moved or surer or higher or f.seen_s - known.seen_s >= SEEN_AGAIN_S):
         return None
     height, sigma = (thing.height_m, thing.sigma_height_m) if higher else (known.height_m, known.sigma_height_m)
-    status: ObstacleStatus = "there" if known.is_there else tell_status(certainty)
-    new = replace(known, certainty=certainty, seen_s=f.seen_s, status=status, height_m=height,
-                  sigma_height_m=sigma, sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight),
+    difference = sight.differences.get(known.name) if weighed is None else weighed.difference
+    new = replace(judged, seen_s=f.seen_s, height_m=height, sigma_height_m=sigma,
+                  sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight, difference),
                   is_camouflaged=known.is_camouflaged and thing.is_camouflaged, judged_from=sight.eye)
-    if not moved or not footprint:
-        return new
-    return place(world, replace(new, footprint=footprint, core=core, seen_from_m=joined.from_m), joined.whole)
+    if moved and footprint:
+        new = place(world, replace(new, footprint=footprint, core=core, seen_from_m=joined.from_m), joined.whole)
+    return Sighted(None, new, weighed)
 
 
 def _join_sight(sight: Sight, known: Obstacle, new: ThingShape, free: shapely.Geometry) -> ThingShape:
@@ -251,7 +305,7 @@ def _join_sight(sight: Sight, known: Obstacle, new: ThingShape, free: shapely.Ge
 
 def miss(
     sight: Sight, known: Obstacle, free: shapely.Geometry, confirmed: shapely.Geometry, settings: ActionSettings
-) -> Obstacle | None:
+) -> Sighted | None:
     """A known obstacle after its floor, or some of it, was seen free; None where that tells nothing.
 
     Args:
@@ -263,20 +317,22 @@ def miss(
         odds = CAMOUFLAGED_FREE_ODDS if known.is_camouflaged else LOOKS_FREE_ODDS
         if not known.is_camouflaged and confirmed_part >= MIN_FREE_PART:
             odds = FREE_FLOOR_ODDS
-        certainty = update(known.certainty, free_part * math.log(odds))
-        status: ObstacleStatus = "gone" if certainty < settings.min_gone_certainty else known.status
-        return replace(known, certainty=certainty, status=status, judged_from=sight.eye)
+        explanations = explain_free(free_part * math.log(odds), sight.differences.get(known.name))
+        weighed = sight.tell(known.name, f"{free_part:.0%} of its floor is seen free", explanations)
+        judged = judge_thing(known, weighed.difference, settings)
+        return Sighted(None, replace(judged, judged_from=sight.eye), weighed)
     left = leave_free(ThingShape.of(known), free)
     footprint, core = left.list_corners()
     if not footprint or measure_change_m(known.footprint, footprint) < settings.min_footprint_change_m:
         return None
     new = replace(known, footprint=footprint, core=core, judged_from=sight.eye)
-    return place(sight.world, new, left.whole)
+    return Sighted(None, place(sight.world, new, left.whole))
 
 
-def _tell(thing: FloorThing, sight: Sight) -> str:
-    """Which pixels of which picture tell of a thing."""
+def _tell(thing: FloorThing, sight: Sight, difference: Difference | None) -> str:
+    """Which pixels of which picture tell of a thing, and what it may be."""
+    odds = "" if difference is None else f": {difference.odds_in_words()}"
     if sight.floor.sense != "camera":
-        return f"{sight.seen_by}: {thing.evidence}"
+        return f"{sight.seen_by}: {thing.evidence}{odds}"
     left, top, right, bottom = thing.box_px
-    return f"{sight.seen_by}, pixels ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}): {thing.evidence}"
+    return f"{sight.seen_by}, pixels ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}): {thing.evidence}{odds}"

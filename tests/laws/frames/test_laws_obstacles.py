@@ -85,7 +85,7 @@ def test_what_is_seen_free_is_forgotten_within_two_pictures_and_found_again(hall
     assert [o.status for o in hall.obstacles] == ["gone"]
     assert hall.frame.changes == () and "is gone" in hall.obstacles[0].sentence()
     hall.see(carton(), seen_s=5.0)
-    assert [o.status for o in hall.obstacles] == ["there"] and len(hall.frame.changes) == 1
+    assert [o.status for o in hall.obstacles] == ["gone", "there"] and len(hall.frame.changes) == 1
 
 
 def test_floor_that_is_not_seen_does_not_make_an_obstacle_gone(hall: Hall) -> None:

@@ -10,8 +10,12 @@ import pytest
 
 from blackboard import Entry, Level, Post, Posted
 from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
+from knowledge_sources.methods.belief import weigh_rivals
+from knowledge_sources.methods.floor import judge_thing
 from knowledge_sources.milestone.obstruction_finder import MIN_OBSTRUCTION_LOOKS, ObstructionFinder
-from world_models.entries import FloorThing, FreeFloor, Obstacle, Obstruction, Segments
+from knowledge_sources.settings import DEFAULT
+from things_in_hall import known_by_sight
+from world_models.entries import Evidence, FloorThing, FreeFloor, Obstruction, Segments
 
 SOURCE = ObstructionFinder()
 CORNERS = np.array([(70.0, 90.0), (190.0, 90.0), (190.0, 230.0), (70.0, 230.0)])
@@ -86,12 +90,18 @@ def test_what_keeps_its_box_while_it_would_have_moved_is_before_the_camera_and_n
         left, *rest = LENS.box_px
         thing = replace(LENS, footprint=footprint, box_px=(left + shift_px, *rest))
         scan = bench.put(FreeFloor("camera", "hall", 0.0, 0.0, (), (), (), (), (), (thing,), 1.0))
-    effects = bench.ask(SOURCE, scan)
-    assert bool(effects) == (shifts[1] < 6.0 and moved_m > 0.3)
-    for shows in (*(effects or ()), Post(Obstruction(((0.0, 0.0), (90.0, 0.0), (90.0, 90.0))))):
+    told = made(bench.ask(SOURCE, scan), Evidence)
+    assert len(told) == (shifts[1] < 6.0 and moved_m > 0.3)
+    sure = bench.put(weigh_rivals("lens patch", told)) if told else None
+    effects = bench.ask(SOURCE, sure) or () if sure else ()
+    assert len(effects) == len(told)
+    for shows in (*effects, Post(Obstruction(((0.0, 0.0), (90.0, 0.0), (90.0, 90.0))))):
         (found,) = bench.apply(shows)[:1]
-        taken = made(bench.ask(SOURCE, found.entry), Obstacle)
-        assert [thing.status for thing in taken] == ["gone"] * (shows in (effects or ()))
+        (*taken,) = made(bench.ask(SOURCE, found.entry), Evidence)
+        known = known_by_sight(replace(held.value, certainty=0.95))
+        judged = [judge_thing(held.value, weigh_rivals(held.value.name, (*known.counted, one)), DEFAULT.action).status
+                  for one in taken]
+        assert judged == ["gone"] * (shows in effects)
 
 
 def test_what_was_known_is_a_reason_of_what_is_known_now() -> None:

@@ -65,8 +65,8 @@ def test_a_sure_touch_is_a_square_behind_the_point_however_the_robot_has_turned_
         assert effects is None
         return
     assert effects is not None
-    (effect,) = effects
-    assert isinstance(effect, Post)
+    effect, told = effects
+    assert isinstance(effect, Post) and isinstance(told, Post) and told.value.about == effect.value.name
     found: Obstacle = effect.value
     assert {entry.id for entry in effect.because} == {*ids, trigger.entry.id}
     out, side_m = cmath.exp(1j * direction_rad), DEFAULT.action.obstacle_width_m
@@ -108,8 +108,8 @@ def test_what_was_known_there_reaches_to_where_it_was_touched(gap_m: float, is_s
     pose = Pose2(front_m - hall.robot.radius_m - gap_m, HERE.y_m, 0.0)
     ids = touch(hall, Contact("bumper", 0.0, 0.15, 3.0))
     trigger = verify(hall, pose)
-    (effect,) = answer(SOURCE, hall.board.view, trigger) or ()
-    assert isinstance(effect, Revise) == is_same
+    effect, told = answer(SOURCE, hall.board.view, trigger) or ()
+    assert isinstance(effect, Revise) == is_same and told.value.about == effect.value.name
     if isinstance(effect, Revise):
         found: Obstacle = effect.value
         assert effect.entry is known and {entry.id for entry in effect.because} == {known.id, *ids, trigger.entry.id}
