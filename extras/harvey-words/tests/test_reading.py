@@ -22,7 +22,7 @@ from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world
 
 LAB = "robot-laboratory"
-SPEEDY = settings(deadline=None, max_examples=40, suppress_health_check=list(HealthCheck))
+SPEEDY = settings(deadline=None, max_examples=25, suppress_health_check=list(HealthCheck))
 
 
 @cache
