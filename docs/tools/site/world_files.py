@@ -46,6 +46,7 @@ LOCALES: Mapping[str, str] = {
     "properties": "texts, numbers and flags of your own",
     "survey": "`{ sigma = ..., sigma_deg = ... }`: how well its frame's place and direction are known",
     "sigma_cm": "how well its walls, doors and things are known; standard deviation in centimetres",
+    "words": "what people call it: a text, or several; those of its finishes are added",
     **{key: DEFAULTS[key] for key in ("walls", "floor", "ceiling", "baseboard", "moulding")},
 }
 COPIES: Mapping[str, str] = {
@@ -69,6 +70,8 @@ DOORS: Mapping[str, str] = {
     "threshold": DEFAULTS["threshold"],
     "panel": "a part that is mounted on the closed leaf",
     "sigma_cm": "how well its place is known; standard deviation in centimetres",
+    "kind": "what it is, in a word of your own, as `fire exit`",
+    "words": "what people call it: a text, or several",
 }
 THINGS: Mapping[str, str] = {
     "part": "the part of which it is made, or instead of it",
@@ -82,6 +85,8 @@ THINGS: Mapping[str, str] = {
     "at": "instead of a wall: `[x, y]` on the floor, in the locale's frame, with `turn`",
     "turn": "degrees, counter-clockwise",
     "sigma_cm": DOORS["sigma_cm"],
+    "kind": "what it is, in a word of your own; else the part's name",
+    "words": DOORS["words"],
 }
 TABLES: Mapping[str, tuple[Iterable[str], Mapping[str, str]]] = {
     "Shared by files": (SHARED_KEYS, TOP),

@@ -16,6 +16,8 @@ ROOMS = frozenset(("office", "laboratory", "toilet", "kitchen", "closet", "stair
                    "emergency-exit"))
 STRETCHES = frozenset(("hall", "turning"))
 POINTS = frozenset(("end", "crossing", "corner"))
+MOST_PASSED = 6
+"""Things that are passed in one act."""
 LENGTHS_M = {"metre": 1.0, "foot": 0.3048}
 
 
@@ -108,7 +110,8 @@ class _Reader:
         verbs = {part.meaning for part in parts if part.sort == "verb"}
         things, ways, wheres = self._collect(parts, verbs)
         begun = len(self.acts)
-        if self.goes_on and not verbs and things and self.acts[-1].past and self.acts[-1].until is None:
+        if (self.goes_on and not verbs and things and self.acts[-1].until is None
+                and 0 < len(self.acts[-1].past) < MOST_PASSED):
             self.acts[-1] = replace(self.acts[-1], past=(*self.acts[-1].past, things[0]))
             wheres = [pair for pair in wheres if pair[1].heads or pair[1].names]
             if wheres:

@@ -14,7 +14,10 @@ from harvey_words.acts import COMPASS, Act, Description
 from harvey_words.matching import MISFIT, UNKNOWN_HEAD, WORST, Matcher, Senses
 from harvey_words.word_map import Area, Feature, Point, Sight, WordMap, is_along, is_level, moved, offsets, turned
 
-BEAM = 80
+BEAM, FEW = 80, 12
+"""Hypotheses that are followed on: after an act, and within one."""
+ALL_ACTS = 800
+"""A text with more acts than a tenth of these is followed with fewer hypotheses, so that it takes no longer."""
 AGAIN = -1.0
 """Of each further place that would do as well as the first."""
 UNTOLD = -4.0
@@ -25,6 +28,8 @@ NO_WAY, MISSED, NOT_SEEN = -2.0, -3.0, -2.5
 WRONG_RANK, WRONG_SIDE = -3.5, -4.0
 OPEN_ONLY = -1.8
 """That only open doors were counted."""
+BEHIND = 1.5
+"""Off for a thing that lies behind when the walk begins, where a door after it is meant."""
 SHUT = -0.5
 """A shut door without a name, as a goal: people are sent to rooms."""
 NEAR_M, PASSED_M, BESIDE_M, HERE_M = 2.6, 0.4, 6.0, 1.3
@@ -71,6 +76,11 @@ class State:
         return (self.locale, round(self.at[0], 1), round(self.at[1], 1), round(self.heading, 2), self.moving, self.door)
 
 
+def _best(states: Iterable[State], count: int = FEW) -> list[State]:
+    """The best of some hypotheses, in an order that does not depend on how they came."""
+    return sorted(states, key=lambda one: (-one.odds, one.locale, one.at, one.heading))[:count]
+
+
 class Follower:
     """Follows acts on one map."""
 
@@ -90,9 +100,9 @@ class Follower:
                     new = replace(new, misfits=marked)
                     if new.key not in best or best[new.key].odds < new.odds:
                         best[new.key] = new
-            states = sorted(best.values(), key=lambda one: (-one.odds, one.locale, one.at, one.heading))[:BEAM]
+            states = _best(best.values(), min(BEAM, max(4, ALL_ACTS // len(acts))))
         ended = [new for state in states for new in (self._halt(state) if state.moving else (state,))]
-        return sorted(ended, key=lambda one: (-one.odds, one.locale, one.at, one.heading))
+        return _best(ended, len(ended))
 
     def _expand(self, state: State, act: Act, is_last: bool) -> Iterator[State]:
         if act.sort == "exit":
@@ -239,7 +249,7 @@ class Follower:
             return
         starts: Iterable[State] = (state,)
         for passed in act.past:
-            starts = [new for one in starts for new in self._pass(one, passed)]
+            starts = _best(new for one in starts for new in self._pass(one, passed))
         if act.until is not None:
             starts = [new for one in starts for new in self._reach(one, act.until)]
         for one in starts:
@@ -296,7 +306,7 @@ class Follower:
         for facing in self._facings(state, act.along):
             starts: Iterable[State] = (facing,)
             for passed in act.past:
-                starts = [new for one in starts for new in self._pass(one, passed)]
+                starts = _best(new for one in starts for new in self._pass(one, passed))
             if act.units and not act.past:
                 starts = [new for one in starts for new in self._count(one, act.units)]
             elif act.units:
@@ -334,7 +344,7 @@ class Follower:
             any_seen = True
             beyond = PASSED_M if sight.feature is None or sight.feature.sort != "opening" else 0.1
             there = self.stand(state, sight, beyond)
-            yield replace(there, odds=state.odds + cost, senses=senses, moving=True, begun=None)
+            yield replace(there, odds=state.odds + cost, senses=senses, moving=True)
         if not any_seen or what.names:
             known = any(word.meaning in self.plan.vocabulary for word in what.names)
             yield replace(state, odds=state.odds + (MISSED - 1.0 if known else UNKNOWN_HEAD), moving=True)
@@ -501,7 +511,10 @@ class Follower:
                 rank = same.index(sight) + 1
                 own = max(own, self._weigh_rank(what, rank, len(same), 0, 0, only_open) - 0.5)
             cost += own
-        for relation, other in what.relations:
+        between = [other for relation, other in what.relations if relation == "between"]
+        if len(between) == 2:
+            cost += self._weigh_between(state, sight, doors, between[0], between[1])
+        for relation, other in what.relations if len(between) != 2 else ():
             cost += self._weigh_relation(state, sight, doors, relation, other)
         return cost, senses
 
@@ -524,6 +537,22 @@ class Follower:
             return 0.0 if rank == number else OPEN_ONLY if open_rank == number else WRONG_RANK
         return 0.0 if what.names or related else AGAIN * min(rank - 1, 3)
 
+    def _weigh_between(self, state: State, sight: Sight, doors: Sequence[Sight], one: Description,
+                       other: Description) -> float:
+        """How well a door lies between two things: on their side, with no other door there."""
+        best = WRONG_SIDE
+        marks = [mark for mark in self.sights(state) if mark.feature is not None and mark.feature.sort != "opening"]
+        fits = [[(mark, fit) for mark in marks if mark.feature and mark is not sight and (
+            fit := self._match.fit(what, mark.feature, state.senses)[0]) > MISFIT] for what in (one, other)]
+        for first, fit in fits[0]:
+            for second, more in fits[1]:
+                low, high = sorted((first.ahead_m, second.ahead_m))
+                if low < sight.ahead_m < high:
+                    rivals = sum(low < door.ahead_m < high and door.side == sight.side for door in doors) - 1
+                    sides = (first.side != sight.side) + (second.side != sight.side)
+                    best = max(best, fit + more + AGAIN * rivals + AGAIN * sides)
+        return best
+
     def _weigh_relation(self, state: State, sight: Sight, doors: Sequence[Sight], relation: str,
                         other: Description) -> float:
         """How well a door lies to other things as it is said."""
@@ -536,17 +565,16 @@ class Follower:
             if fit <= MISFIT:
                 continue
             gap = sight.ahead_m - mark.ahead_m
-            if mark.ahead_m > 0.0 and fit > -1.0:
+            walked_m = offsets(state.begun or state.at, state.heading, mark.feature.at)[0]
+            if walked_m > 0.0 and fit > -1.0:
                 fit += 0.7 * AGAIN * rank  # the first of several columns is meant
                 rank += 1
             between = [one for one in doors if one is not sight and one is not mark and one.side == sight.side
                        and min(sight.ahead_m, mark.ahead_m) - 0.05 < one.ahead_m < max(sight.ahead_m, mark.ahead_m)]
             if relation == "past":
-                fit += AGAIN * 1.5 * len(between) - 1.5 * (mark.ahead_m < -0.3) if gap > -0.3 else -3.0
+                fit += AGAIN * 1.5 * len(between) - BEHIND * (walked_m < -0.3) if gap > -0.3 else -3.0
             elif relation == "before":
                 fit += AGAIN * 1.5 * len(between) if gap < 0.3 else -3.0
-            elif relation == "between":
-                fit += -0.4 * len(between) - (max(abs(gap) - BESIDE_M, 0.0)) / 4.0
             elif relation == "across":
                 fit += -abs(gap) / 2.0 - 2.0 * (mark.side == sight.side)
             else:
@@ -578,7 +606,7 @@ class Follower:
             return
         found = list(self._candidates(state, what))
         for sight, cost, own in found:
-            yield replace(self.stand(state, sight), odds=state.odds + cost, senses=own, moving=True, begun=None)
+            yield replace(self.stand(state, sight), odds=state.odds + cost, senses=own, moving=True)
         yield replace(state, odds=state.odds + max(here, NOT_SEEN) - 0.5 * bool(found), senses=senses)
 
     def _seen_from(self, state: State, what: Description) -> tuple[float, Senses]:

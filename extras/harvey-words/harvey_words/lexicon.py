@@ -16,7 +16,7 @@ from typing import Any
 CLASSES = ("VERB", "WAY", "PREP", "SEP", "NOT", "COUNT", "HEAD", "THING", "MOD")
 LONGEST = 5
 """Words of the longest phrase."""
-MOST_WORDS = 600
+MOST_WORDS = 400
 """What comes after so many words of a text is not read: a way told by a person has some tens."""
 SHORT, LONG = 4, 8
 """Letters of a word that may have one wrong, and two."""

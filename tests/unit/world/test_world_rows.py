@@ -63,7 +63,7 @@ def test_a_row_of_doors_is_several_doors() -> None:
     ('things = [ ["chest", "north", { from = 7, to = 1, step = 2 }] ]', "expected 1 to 1000 places"),
     ('things = [ ["chest", "north", { from = 1, to = 7 }] ]', "expected the key 'step'"),
     ('things = [ ["chest", "north", 1, { colour = 3 }] ]',
-     "expected one of the keys finish, up, turn, sigma_cm, got 'colour'"),
+     "expected one of the keys finish, up, turn, sigma_cm, kind, words, got 'colour'"),
     ("wall_heights = { north = 9 }\n", "house.toml:10: locales.hall.wall_heights.north: expected a number from 0.1 to"),
     ('walls = ["oak"]\n', "house.toml:10: locales.hall.walls: expected a finish for each of the 4 walls south"),
     ("sky = 1\n", "house.toml:10: locales.hall.sky: expected true or false"),
@@ -138,3 +138,28 @@ def test_a_step_in_a_doorway_is_a_fault() -> None:
             '[doors]\nd = { between = ["hall", "den"], wall = "east", along = 2, open = true }\n')
     assert [str(f) for f in check_world(house(more))] == [
         "house.toml:15: d: expected hall and den on one level, got a step of 0.20 m"]
+
+
+WORDY = """words = ["big hall", "aula"]
+floor = "oak"
+things = [ ["chest", "north", 1, 3, "big", { kind = "trunk", words = "sea chest" }] ]
+[doors]
+cell = { between = ["hall"], wall = "south", along = 4, kind = "fire exit", words = "way out" }
+"""
+
+
+def test_what_people_call_things_reaches_the_model_and_changes_nothing_that_is_seen() -> None:
+    plain = house(WORDY.replace('words = ["big hall", "aula"]\n', "").replace(
+        ', { kind = "trunk", words = "sea chest" }', "").replace(', kind = "fire exit", words = "way out"', ""))
+    wordy = read_world(Source.parse((HEAD + WORDY).replace("0.3] }", '0.3], words = "planks" }'), "house.toml"))
+    assert wordy.locale("hall").properties == {
+        "words": "big hall, aula, planks",
+        "words_of": {"trunk-1": "sea chest", "big": "sea chest", "cell": "fire exit, way out"}}
+    assert [thing.kind for thing in wordy.things] == ["trunk", "trunk"] and wordy.named("aula") == ["hall"]
+    assert not plain.locale("hall").properties
+    assert [f.polygon_world.tolist() for f in wordy.faces] == [f.polygon_world.tolist() for f in plain.faces]
+
+
+def test_a_finish_of_a_locale_without_walls_is_refused() -> None:
+    with pytest.raises(WorldError, match=r"locales\.wing\.floor: expected a finish only in a locale with walls"):
+        house('in = "wing"\n[locales.wing]\nkind = "wing"\nfloor = "oak"\n')

@@ -1,0 +1,200 @@
+"""Reading route instructions: what a text means on a building, laws of all texts, and the command."""
+
+from __future__ import annotations
+
+import json
+import time
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from harvey.cli import main
+from harvey_words import Reading, RouteError, read_route
+from harvey_words.instructions import draw_routes, read_paragraphs, run
+from harvey_words.lexicon import Lexicon, edit_distance, lexicon_data
+from harvey_words.mazes import HALLS, THINGS, write_maze
+from harvey_words.routes import tell_maze
+from harvey_words.word_map import WordMap
+from world_models.files.toml.source import Source
+from world_models.files.world_files import WORLDS, load_world, read_world
+
+LAB = "robot-laboratory"
+SPEEDY = settings(deadline=None, max_examples=25, suppress_health_check=list(HealthCheck))
+
+
+@cache
+def centre() -> WordMap:
+    return WordMap(load_world(WORLDS / "research_center.toml"))
+
+
+@cache
+def maze(mirrored: bool = False) -> WordMap:
+    """The maze, or its mirror image with west for east."""
+    def flip(node: tuple[int, int]) -> tuple[int, int]:
+        return (3 - node[0], node[1]) if mirrored else node
+    halls = [(flip(one), flip(two), floor, picture) for one, two, floor, picture in HALLS]
+    text = write_maze(halls, {flip(node): kind for node, kind in THINGS.items()})
+    return WordMap(read_world(Source.parse(text, "maze")))
+
+
+def end_of(reading: Reading) -> str:
+    assert reading.end is not None
+    return reading.end.locale
+
+
+@pytest.mark.parametrize(("text", "end"), [
+    ("go out of the lab, turn left, it is the third door on the right", "mail-room"),
+    ("out, right, first open door on the left", "conference-room"),
+    ("Turn right when you leave the lab. Walk past the drinking fountain; it's the next door on the right.", "library"),
+    ("tunr rigt out of teh labratory, frist door on yuor rihgt", "graduate-office"),
+    ("It is the door between the fountain and the fire hose.", "library"),
+    ("Go right, past the vending machine. Allen's office is after the machine room.", "allens-office"),
+    ("go to the library", "library"),
+])
+def test_a_way_from_the_laboratory(text: str, end: str) -> None:
+    reading = read_route(text, centre(), LAB)
+    assert reading.is_understood and end_of(reading) == end
+
+
+@pytest.mark.parametrize(("start", "text", "end"), [
+    ("c-0-1", "Face the lamp and walk to it.", "c-1-1"),
+    ("c-0-0", "With your back to the wall go forward one block. Turn left and go to the brick hall.", "c-1-2"),
+    ("c-3-0", "go up the yellow hall to the corner and turn left, so that the wall is on your right. go to the seat",
+     "c-2-1"),
+    ("c-2-2", "head south on the gravel until you hit the blue, hang a left to the end", "c-3-1"),
+    ("c-0-1", "it is at the end of the wooden hall where the sofa is", "c-0-0"),
+])
+def test_a_way_in_a_maze(start: str, text: str, end: str) -> None:
+    reading = read_route(text, maze(), start)
+    assert reading.is_understood and end_of(reading) == end
+
+
+def test_a_text_that_two_places_fit_asks_and_names_both() -> None:
+    reading = read_route("It is the first door on the right.", centre(), "hallway")
+    assert not reading.is_understood and len([end for end in reading.ends if end.odds > 0.2]) == 2
+
+
+def test_what_did_not_fit_is_named() -> None:
+    reading = read_route("Turn right out of the lab. Walk past the sofa. The library is the second door on the right.",
+                         centre(), LAB)
+    assert end_of(reading) == "library" and "sofa" in " ".join(reading.unused)
+
+
+# -- laws ------------------------------------------------------------------------------------------------------------
+
+PHRASES = (("go", "walk", "Move"), ("turn left", "take a left", "make a left", "Hang a left"),
+           ("lamp", "light"), ("the", "", "that"), ("hallway", "hall", "corridor"),
+           ("hatrack", "hat rack", "coat rack"))
+TEXT = "{0} down {3} blue {4} to {3} {2}. {1}. {0} to {3} brick {4}, then turn right and {0} to {3} {5}."
+
+
+@SPEEDY
+@given(st.tuples(*(st.sampled_from(choice) for choice in PHRASES)), st.booleans())
+def test_paraphrases_read_the_same(words: tuple[str, ...], loud: bool) -> None:
+    text = TEXT.format(*words)
+    plain = read_route(TEXT.format(*(choice[0] for choice in PHRASES)), maze(), "c-0-1")
+    reading = read_route(text.upper() if loud else text, maze(), "c-0-1")
+    assert [end.as_data() for end in reading.ends[:3]] == [end.as_data() for end in plain.ends[:3]]
+    assert end_of(reading) == "c-2-2"
+
+
+@SPEEDY
+@given(st.integers(0, 10**6))
+def test_left_for_right_in_a_mirrored_maze_ends_at_the_mirrored_place(seed: int) -> None:
+    told = tell_maze(HALLS, dict(THINGS), np.random.default_rng(seed))
+    other = told.text.replace("left", "?").replace("right", "left").replace("?", "right")
+    x, y = told.start.split("-")[1:]
+    one, mirrored = (read_route(told.text, maze(), told.start),
+                     read_route(other, maze(mirrored=True), f"c-{3 - int(x)}-{y}"))
+    assert one.end is not None and mirrored.end is not None
+    assert one.end.odds == pytest.approx(mirrored.end.odds, abs=1e-6)
+    if one.is_understood:
+        x, y = end_of(one).split("-")[1:]
+        assert end_of(mirrored) == f"c-{3 - int(x)}-{y}"
+
+
+WORDS = ("go", "turn", "left", "right", "back", "past", "between", "of", "and", "the", "once", "two", "last", "door",
+         "hall", "brick", "lamp", "until", "with", "so that", ",", ".", "when", "end", "is", "its", "on", "to", "xyzzy")
+
+
+@SPEEDY
+@given(st.one_of(st.text(max_size=300), st.lists(st.sampled_from(WORDS), max_size=60).map(" ".join)))
+def test_no_text_makes_it_raise_and_odds_are_odds(text: str) -> None:
+    for plan, start in ((centre(), LAB), (maze(), "c-1-1")):
+        reading = read_route(text, plan, start)
+        json.dumps(reading.as_data())
+        assert all(0.0 <= end.odds <= 1.0 for end in reading.ends)
+        assert sum(end.odds for end in reading.ends) <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("piece", ["go past the sign and ", "turn left ", "it is the second door on the right. ",
+                                   "abcdefgh ijklmnop ", "between and of past ", "past the lamp "])
+def test_ten_thousand_characters_take_less_than_a_second(piece: str) -> None:
+    text = (piece * 10_000)[:10_000]
+    for plan, start in ((centre(), LAB), (maze(), "c-1-1")):
+        read_route(piece, plan, start)
+        begin = time.process_time()
+        read_route(text, plan, start)
+        assert time.process_time() - begin < 1.0
+
+
+def test_a_detail_more_never_lowers_the_odds_of_the_right_end() -> None:
+    checked = 0
+    for kind, plan, told in draw_routes(60, 5):
+        before = read_route(told.text, plan, told.start)
+        for detail in told.details[:2] if kind != "mazes" or before.is_understood else ():
+            first, _, rest = told.text.partition(". ")
+            text = f"{told.text} {detail}" if kind == "mazes" else f"{first}. {detail} {rest}"
+            after = read_route(text, plan, told.start)
+            right = [sum(end.odds for end in reading.ends if told.end in (end.locale, end.door))
+                     for reading in (before, after)]
+            checked += 1
+            assert right[1] > right[0] - 0.02, (told.text, detail, right)
+    assert checked > 20
+
+
+@given(st.text("abcde", max_size=6), st.text("abcde", max_size=6))
+def test_the_distance_of_words_is_the_same_both_ways(one: str, other: str) -> None:
+    assert edit_distance(one, other, 9) == edit_distance(other, one, 9) <= max(len(one), len(other))
+    assert (edit_distance(one, other, 9) == 0) == (one == other)
+
+
+def test_a_known_word_is_never_corrected() -> None:
+    lexicon = Lexicon(lexicon_data(), ("wright",))
+    assert [word.meaning for word in lexicon.read("the wright door to the rigth")] == ["wright", "door", "to", "right"]
+
+
+# -- from outside ----------------------------------------------------------------------------------------------------
+
+def test_the_same_text_gives_the_same_bytes() -> None:
+    one, other = (json.dumps(read_route("out, left, third door on the right", plan, LAB).as_data())
+                  for plan in (centre(), load_world(WORLDS / "research_center.toml")))
+    assert one == other
+
+
+def test_a_start_that_is_none_is_refused() -> None:
+    with pytest.raises(RouteError, match="expected a start that is a room"):
+        read_route("go", centre(), "nowhere")
+    assert end_of(read_route("go to the end of the hall", centre(), (10.0, 1.2), 0.0)) == "hallway"
+
+
+@pytest.mark.parametrize(("text", "more", "code", "says"), [
+    ("out, left, third door on the right", (), 0, "It leads to mail-room"),
+    ("out, left, third door on the right", ("--json",), 0, '"locale": "mail-room"'),
+    ("whatever", (), 1, "Which way?"),
+    ("first door on the right", ("--start", "hallway"), 1, "Or is it"),
+    ("go", ("--start", "nowhere"), 2, ""), ("go", ("--heading", "1000"), 2, ""), ("x" * 10_001, (), 2, ""),
+])
+def test_the_command(text: str, more: tuple[str, ...], code: int, says: str,
+                     capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["parse", text, "--world", "research_center", "--start", LAB, *more]) == code
+    assert says in capsys.readouterr().out
+
+
+def test_the_experiment_reads_routes_and_paragraphs() -> None:
+    assert len(list(read_paragraphs())) == 80
+    report = run(quick=True, seed=3)
+    assert report.claims[0][1] and report.rows[0][1] == 30 and report.rows[1][1] == 80
