@@ -22,6 +22,12 @@ class Level(IntEnum):
         return word_of(self)
 
 
+class Flat(IntEnum):
+    """The one level of a program that has no levels; no journal tells of it."""
+
+    ONLY = 0
+
+
 def word_of(level: IntEnum) -> str:
     """A level in words."""
     return _words(type(level))[level]

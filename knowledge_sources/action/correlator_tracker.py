@@ -13,7 +13,7 @@ from statistics import median
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Level, Posted, Revise, View, Watch, open_or_measure
+from blackboard import Change, Effect, Level, Posted, Revise, View, Watch
 from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.features import Template
@@ -47,6 +47,7 @@ from knowledge_sources.reads import (
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Anchor, CameraPicture, Drift, Hypothesis, Track, Tracks
+from world_models.entries.discrepancy import Discrepancy, open_or_measure
 
 MAX_MISSES = 2  # a landmark that is not found so many times in a row is dropped
 MIN_EXPECTED_LANDMARKS = 4  # fewest expected landmarks that can make a discrepancy

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch, inference
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch, inference
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.verification import list_seen_locales, predict_milestone
 from knowledge_sources.priority import Priority
@@ -40,6 +40,7 @@ from world_models.entries import (
     Travel,
     begin_travel,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2, wrap_angle
 
 CONTRADICTED = 2

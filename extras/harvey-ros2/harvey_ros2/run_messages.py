@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard import Discrepancy, Level
+from blackboard import Level
 from harvey.runner.ports import STANDS_STILL
 from harvey_ros2.localizer_sources import WheelCheck
 from harvey_ros2.messages import MessageTypes, stamp
@@ -22,6 +22,7 @@ from harvey_ros2.robot_file import FrameNames
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import BodyFault, CameraPicture, Certificate, Hypothesis, Milestone, MotionReport, PlanSketch
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 CAMERA_FRAME = "camera_optical"
