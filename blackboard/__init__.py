@@ -1,8 +1,8 @@
 """A blackboard: entries, changes, effects, knowledge sources, agenda, levels, journal and history.
 
 Standard library only. It knows no robot and no pixel. README.md has it on one screen. One idea a file; read them in
-this order: entry, kinds, change, effect, entry_store, board, level, condition, knowledge_source, rule, agenda,
-ladder, journal, retention, scheduler, decoding, history.
+this order: entry, kinds, change, effect, entry_store, board, ladder, condition, knowledge_source, rule,
+agenda, journal, retention, scheduler, decoding, history.
 """
 
 from blackboard.agenda import Activation
@@ -17,8 +17,7 @@ from blackboard.history import History
 from blackboard.journal import Decision, NOT_FINITE, Sink, decision_line, decision_record, plain
 from blackboard.kinds import Registry, Role, always, inference, is_request, kind_of, kinds_in, observation, request
 from blackboard.knowledge_source import KnowledgeSource
-from blackboard.ladder import Ladder
-from blackboard.level import Level, highest
+from blackboard.ladder import Ladder, Level, highest
 from blackboard.rule import rule
 from blackboard.scheduler import Port, RAISED, Scheduler, registry_of
 

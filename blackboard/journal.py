@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from blackboard.agenda import Activation, Obviated
 from blackboard.change import Change
 from blackboard.entry import Entry, Ref
-from blackboard.level import Flat, word_of
+from blackboard.ladder import Flat, word_of
 
 NOT_FINITE = frozenset(map(repr, (nan, inf, -inf)))
 """Floats that JSON has no word for; they are written as texts."""
