@@ -40,7 +40,6 @@ ROLLING_LOOKAHEAD_M = 0.75  # distance ahead on the line at which the path follo
 MIN_ROLLING_LEG_M = 0.3  # shortest rest of a leg, beyond the stopping distance, that is driven without stopping
 MAX_ROLLING_START_ERROR_RAD = math.radians(3.0)  # the path follower starts when it faces its aim to within this
 MAX_ROLLING_ERROR_RAD = math.radians(12.0)  # the path follower stops when its aim is further to the side than this
-
 MIN_FREE_M = 2.0 * ROLLING_STOP_MARGIN_M  # with less floor seen to be free ahead it stops, or does not start
 
 
