@@ -5,6 +5,7 @@ SCENARIO ?= lab-to-allens-office
 ROOM ?= pose
 SAMPLE ?= 60
 SEED ?= 0
+WHEELS ?= build/wheels
 PIP_VERSION := 26.3
 
 BIN := $(VENV)/bin
@@ -25,7 +26,7 @@ export OMP_NUM_THREADS := 1
 # Two at once; each takes neighbours, so that what the tests of a file share is seldom made twice.
 TWO := -n 2 --dist worksteal
 
-.PHONY: help run test test-rest test-all mutants environment site course lock clean
+.PHONY: help run test test-rest test-all mutants environment site course wheels lock clean
 
 help:
 	@echo "make run          prepare everything, then drive: harvey run $(SCENARIO)"
@@ -34,6 +35,7 @@ help:
 	@echo "make mutants      mutation testing of ROOM=$(ROOM), SAMPLE=$(SAMPLE); goes on where it stopped, and reports"
 	@echo "make site         build the documentation site, build/site/index.html, and the man page, build/man/harvey.1"
 	@echo "make course       execute the notebooks of the course: build/course"
+	@echo "make wheels       build wheels of the core, of the board alone and of each extra: $(WHEELS)"
 	@echo "make environment  only prepare $(VENV), for running and for testing"
 	@echo "make lock         write the three requirements*.lock anew from pyproject.toml and those of the extras"
 	@echo "make clean        remove environments and caches; recordings in runs/ stay"
@@ -103,6 +105,9 @@ site: $(VENV)/.ready-to-test
 
 course: $(VENV)/.ready-to-test
 	@$(BIN)/python -m docs.tools.course build/course
+
+wheels: $(VENV)/.ready-to-test
+	@$(PIP) wheel --no-deps --no-build-isolation --wheel-dir $(WHEELS) . ./blackboard $(EXTRAS:%=./%) && ls $(WHEELS)
 
 lock:
 	@$(PYTHON) -m venv $(LOCK)

@@ -1,8 +1,8 @@
 """A blackboard: entries, changes, effects, knowledge sources, agenda, levels, journal and history.
 
 Standard library only. It knows no robot and no pixel. README.md has it on one screen. One idea a file; read them in
-this order: entry, kinds, change, effect, entry_store, board, level, condition, knowledge_source, rule, agenda,
-servoing, journal, retention, scheduler, decoding, history.
+this order: entry, kinds, change, effect, entry_store, board, ladder, condition, knowledge_source, rule,
+agenda, journal, retention, scheduler, decoding, history.
 """
 
 from blackboard.agenda import Activation
@@ -17,16 +17,17 @@ from blackboard.history import History
 from blackboard.journal import Decision, NOT_FINITE, Sink, decision_line, decision_record, plain
 from blackboard.kinds import Registry, Role, always, inference, is_request, kind_of, kinds_in, observation, request
 from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level, highest
+from blackboard.ladder import Ladder, Level, highest
 from blackboard.rule import rule
 from blackboard.scheduler import Port, RAISED, Scheduler, registry_of
-from blackboard.servoing import Discrepancy, OPEN, Servoing, correct, last_escalated, open_or_measure
+
+__version__ = "0.1.0"
 
 __all__ = [
-    "NOT_FINITE", "OPEN", "RAISED", "Activation", "Blackboard", "Change", "Condition", "Decision", "Decoders",
-    "Discrepancy", "Effect", "Entry", "History", "Index", "KnowledgeSource", "Level", "MisfitError",
+    "NOT_FINITE", "RAISED", "Activation", "Blackboard", "Change", "Condition", "Decision", "Decoders",
+    "Effect", "Entry", "History", "Index", "KnowledgeSource", "Ladder", "Level", "MisfitError",
     "MissingEntryError", "Port", "Post", "Posted", "Quiescence", "Ref", "Registry", "Retract", "Retracted", "Revise",
-    "Revised", "Role", "Scheduler", "Servoing", "Sink", "StaleError", "View", "Watch", "always", "brief", "correct",
+    "Revised", "Role", "Scheduler", "Sink", "StaleError", "View", "Watch", "always", "brief",
     "decision_line", "decision_record", "decode", "fields_of", "highest", "inference", "is_request", "kind_of",
-    "kinds_in", "last_escalated", "observation", "open_or_measure", "plain", "registry_of", "request", "rule", "to_say",
+    "kinds_in", "observation", "plain", "registry_of", "request", "rule", "to_say",
 ]

@@ -1,7 +1,4 @@
-"""Agenda: the pending activations, found by the entry that triggered them and by how well they are rated.
-
-A robot has few of them at a time, so each question looks at all.
-"""
+"""Agenda: the pending activations, few at a time, found by what triggered them and by their rating."""
 
 from __future__ import annotations
 

@@ -13,8 +13,6 @@ from blackboard.kinds import always
 
 T = TypeVar("T")
 Reasons = tuple[Ref, ...]
-NAMED = (Ref, Entry)
-"""What names a revision that is there already."""
 
 
 class StaleError(Exception):
@@ -61,7 +59,7 @@ class Blackboard:
 
     def _refuse_faulty(self, effect: Effect, earlier: Collection[int], touched: Collection[str]) -> None:
         for reason in effect.because:
-            if not isinstance(reason, NAMED) and id(reason) not in earlier:
+            if not isinstance(reason, Ref | Entry) and id(reason) not in earlier:
                 expected = "because to hold entries or earlier effects of the same act"
                 raise ValueError(f"expected {expected}, got {reason!r}")
         if isinstance(effect, Post):
@@ -101,6 +99,10 @@ class Blackboard:
         entry = self._current[id] = new_tuple(Entry, (id, revision, value, author, cycle, because))
         (self._stores.get(kind) or self._store(kind)).put(entry)
         return new_tuple(Revised if revision else Posted, (entry, ()))
+
+    def __str__(self) -> str:
+        """What is believed now, an entry a line, oldest first."""
+        return "\n".join(f"{e.ref}: {e.value} (by {e.author}, cycle {e.cycle})" for e in self._current.values())
 
     def follow(self, change: Change) -> None:
         """Take over a change that was made on another board, as one that a journal or a recorder tells of."""

@@ -64,7 +64,8 @@ def decode(value: Any, hint: Any, others: Decoders = NO_OTHERS) -> Any:
     if dataclasses.is_dataclass(hint) and isinstance(hint, type):
         return _dataclass(value, hint, others)
     if isinstance(hint, type) and issubclass(hint, Enum):
-        return _member(value, hint)
+        names = {member.name.lower(): member for member in hint}
+        return names[_choice(value, names)]
     if hint is float and isinstance(value, str) and value in NOT_FINITE:
         return float(value)
     fits = isinstance(value, (int, float) if hint is float else hint)
@@ -73,17 +74,10 @@ def decode(value: Any, hint: Any, others: Decoders = NO_OTHERS) -> Any:
     return value
 
 
-def _choice(value: Any, choices: tuple[Any, ...]) -> Any:
+def _choice(value: Any, choices: collections.abc.Collection[Any]) -> Any:
     if value not in choices:
         raise ValueError(f"expected one of {', '.join(map(str, choices))}, got {brief(value)}")
     return value
-
-
-def _member(value: Any, kind: type[Enum]) -> Enum:
-    names = {member.name.lower(): member for member in kind}
-    if value not in names:
-        raise ValueError(f"expected one of {', '.join(names)}, got {brief(value)}")
-    return names[value]
 
 
 def _tuple(value: Any, hints: tuple[Any, ...], others: Decoders) -> tuple[Any, ...]:

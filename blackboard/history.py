@@ -6,7 +6,8 @@ A line of a history is a line of the journal (:mod:`blackboard.journal`): the sa
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from blackboard.decoding import decode
 from blackboard.effect import Effect, Post, Retract, Revise
 from blackboard.entry import Ref
 from blackboard.journal import Decision, decision_line
-from blackboard.kinds import Registry
+from blackboard.knowledge_source import KnowledgeSource
 from blackboard.scheduler import Scheduler
 
 Record = Mapping[str, Any]
@@ -33,6 +34,18 @@ class History:
                 self._note(line)
             except (ValueError, TypeError, KeyError):
                 raise ValueError(f"line {number}: expected a decision, got {line[:80]!r}") from None
+
+    @classmethod
+    def of(
+        cls, sources: Sequence[KnowledgeSource], kinds: Iterable[type[Any]] = (), /, **outside: Iterable[Any]
+    ) -> History:
+        """What sources make of values from outside, each by who tells it; ``kinds``: as for a scheduler."""
+        history = cls()
+        scheduler = Scheduler(sources, sinks=[history], kinds=kinds)
+        for author, told in outside.items():
+            scheduler.post(map(Post, told), author)
+        scheduler.run()
+        return history
 
     def __call__(self, decision: Decision) -> None:
         self._note(decision_line(decision))
@@ -78,6 +91,16 @@ class History:
                 return cycle
         return None
 
+    def to_dot(self) -> str:
+        """Who woke whom, by which kind of entry and how often: a graph for Graphviz (``dot -Tsvg``)."""
+        woke = Counter[tuple[str, str, str]]()
+        for line in self.lines:
+            if chosen := json.loads(line)["chosen"]:
+                by = self._changes[chosen["trigger"]]
+                woke[by["author"], chosen["source"], by["type"]] += 1
+        edges = (f'  "{one}" -> "{other}" [label="{kind} x {times}"]' for (one, other, kind), times in woke.items())
+        return "\n".join(("digraph {", *edges, "}"))
+
     def parts_from(self, other: History) -> str:
         """The first cycle in which two runs differ, and in what, in words; "" where they are the same."""
         for cycle, (one, two) in enumerate(zip_longest(self.lines, other.lines), 1):
@@ -115,7 +138,7 @@ class History:
 
 def _effect_of(record: Record, scheduler: Scheduler) -> Effect:
     """The effect behind a change that came from outside. Raises ValueError."""
-    kinds: Registry = scheduler.kinds
+    kinds = scheduler.kinds
     if record["type"] not in kinds:
         raise ValueError(f"{record['entry']}: expected one of {', '.join(kinds)}, got a {record['type']}")
     because = tuple(_ref(text) for text in record["because"])

@@ -13,12 +13,10 @@ from typing import Any, NamedTuple
 from blackboard.agenda import Activation, Obviated
 from blackboard.change import Change
 from blackboard.entry import Entry, Ref
-from blackboard.level import word_of
+from blackboard.ladder import Flat, word_of
 
 NOT_FINITE = frozenset(map(repr, (nan, inf, -inf)))
 """Floats that JSON has no word for; they are written as texts."""
-
-FLOATS = frozenset((float,))
 
 
 def plain(value: Any) -> Any:
@@ -44,7 +42,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, tuple | list):
-        if set(map(type, value)) == FLOATS and all(map(isfinite, value)):
+        if set(map(type, value)) == {float} and all(map(isfinite, value)):
             return list(value)
         return [plain(v) for v in value]
     if hasattr(value, "tolist"):
@@ -107,13 +105,12 @@ def change_record(change: Change) -> dict[str, Any]:
     return record
 
 
-def activation_record(a: Activation | None) -> dict[str, Any] | None:
-    if a is None:
-        return None
+def activation_record(a: Activation, flat: bool) -> dict[str, Any]:
+    """An activation as JSON types; ``flat``: without its level."""
     return {
         "number": a.number,
         "source": a.source.name,
-        "level": word_of(a.source.level),
+        **({} if flat else {"level": word_of(a.source.level)}),
         "trigger": str(a.trigger.entry.ref),
         "kind": a.trigger.kind,
         "rating": a.rating,
@@ -122,16 +119,17 @@ def activation_record(a: Activation | None) -> dict[str, Any] | None:
 
 
 def decision_record(d: Decision) -> dict[str, Any]:
-    """A decision as JSON types: every changed entry in full, everything else by name."""
+    """A decision as JSON types: every changed entry in full, everything else by name; levels where there are any."""
+    flat = isinstance(d.focus, Flat)
     record = {
         "cycle": d.cycle,
-        "focus": word_of(d.focus),
+        **({} if flat else {"focus": word_of(d.focus)}),
         "observed": [change_record(c) for c in d.observed],
         "seen": [str(c.entry.ref) for c in d.seen],
-        "activated": [activation_record(a) for a in d.activated],
-        "obviated": [{**(activation_record(o.activation) or {}), "reason": o.reason} for o in d.obviated],
-        "chosen": activation_record(d.chosen),
-        "runner_up": activation_record(d.runner_up),
+        "activated": [activation_record(a, flat) for a in d.activated],
+        "obviated": [{**activation_record(o.activation, flat), "reason": o.reason} for o in d.obviated],
+        "chosen": activation_record(d.chosen, flat) if d.chosen else None,
+        "runner_up": activation_record(d.runner_up, flat) if d.runner_up else None,
         "pending": d.pending,
         "made": [change_record(c) for c in d.made],
         "refused": d.refused,

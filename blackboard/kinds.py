@@ -15,19 +15,15 @@ from typing import Any, TypeVar, dataclass_transform, overload
 
 T = TypeVar("T")
 
-MARK = "KIND"
-"""The class attribute that holds the mark."""
+MARK = "KIND"  # the class attribute that holds the mark
 
 
 class Role(Enum):
     """Where entries of a kind come from, and who acts on them."""
 
-    REQUEST = "request"
-    """A knowledge source writes it, and a port acts on it: it is in the journal before the port is asked."""
-    OBSERVATION = "observation"
-    """It comes from outside: from a port, from the user, or from the runner of the mission."""
-    INFERENCE = "inference"
-    """A knowledge source concludes it from other entries."""
+    REQUEST = "request"  # a rule writes it, and a port acts on it: it is in the journal before the port is asked
+    OBSERVATION = "observation"  # from outside: from a port, from the user, or from what runs the program
+    INFERENCE = "inference"  # a rule concludes it from other entries
 
 
 def always(_value: Any) -> bool:

@@ -12,7 +12,7 @@ from blackboard.board import View
 from blackboard.change import Change, Watch
 from blackboard.condition import Condition
 from blackboard.effect import Effect
-from blackboard.level import Level
+from blackboard.ladder import Level
 
 
 class KnowledgeSource(ABC):

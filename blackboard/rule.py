@@ -11,7 +11,7 @@ from blackboard.change import Change, Watch
 from blackboard.condition import Condition
 from blackboard.effect import Effect
 from blackboard.knowledge_source import KnowledgeSource
-from blackboard.level import Level
+from blackboard.ladder import Level
 
 Act = Callable[[View, Any], Iterable[Effect]]
 Bind = Callable[[View, Change], Any]

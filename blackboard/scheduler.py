@@ -23,10 +23,10 @@ from blackboard.change import Change, Posted, Quiescence, Retracted
 from blackboard.effect import Effect, MissingEntryError, Post, type_of
 from blackboard.entry import Ref, new_tuple
 from blackboard.journal import Decision, Sink
-from blackboard.kinds import Kind, Registry, always, is_request, kind_of
+from blackboard.kinds import Kind, NotAKindError, Registry, always, is_request, kind_of
 from blackboard.knowledge_source import KnowledgeSource
+from blackboard.ladder import Groups, Ladder
 from blackboard.retention import Retention
-from blackboard.servoing import Discrepancy, Groups, Servoing
 
 MISSING_RATING = 1.0
 """Rating of a source that lacks something to tell it: its act comes first, and asks."""
@@ -57,7 +57,7 @@ class Scheduler:
         sources: Sequence[KnowledgeSource],
         *,
         ports: Sequence[Port] = (),
-        servoing: Servoing | None = None,
+        ladder: Ladder | None = None,
         sinks: Sequence[Sink] = (),
         retention: Mapping[type[Any], Kind] | None = None,
         kinds: Iterable[type[Any]] = (),
@@ -65,8 +65,9 @@ class Scheduler:
         """A scheduler with an empty board.
 
         Args:
+            ladder: levels and which is in focus; None: those of the sources, and the lowest in focus.
             retention: how long entries stay, by the type of their value; None: as the kinds themselves say.
-            kinds: kinds that none of the sources watches or writes, but that ports may post.
+            kinds: what else comes from outside: kinds that sources only read, or that nobody does.
 
         Raises:
             NotAKindError: a source watches or writes what is not marked as a kind of entry.
@@ -79,13 +80,14 @@ class Scheduler:
         self.view: View = self.board.view
         self._current = self.board.current
         self.cycle = 0
-        self._servoing = servoing or Servoing()
-        self._sources = tuple(s for s in sources if self._servoing.allows(s.closes))
+        self._ladder = ladder or Ladder.of(source.level for source in sources)
+        self._sources = tuple(s for s in sources if self._ladder.allows(s.closes))
         self._watchers: dict[tuple[type[Change], type[Any]], Watchers] = {}
         self._ports = tuple(ports)
         self._sinks = tuple(sinks)
         self._agenda = Agenda()
         self.kinds = registry_of(sources, kinds)
+        self._known = frozenset(self.kinds.values())
         self._requests = frozenset(filter(is_request, self.kinds.values()))
         self._traced = frozenset(kind for kind in self.kinds.values() if kind_of(kind).traced)
         self._retention = Retention(self.kinds.marks() if retention is None else retention)
@@ -96,7 +98,14 @@ class Scheduler:
         self._is_waiting = False
 
     def post(self, effects: Iterable[Effect], author: str) -> tuple[Change, ...]:
-        """Put something on the board from outside (a command, an observation); it is seen in the next cycle."""
+        """Put something on the board from outside (a command, an observation); it is seen in the next cycle.
+
+        Raises NotAKindError for a kind that a replay could not read back.
+        """
+        effects = tuple(effects)
+        if alien := aliens(effects, self._known):
+            raise NotAKindError(f"expected a kind that a source watches or writes, got {', '.join(alien)}: give it to "
+                                f"the scheduler as well: Scheduler(..., kinds=[{', '.join(alien)}])")
         changes = self.board.apply(effects, author=author, cycle=self.cycle)
         self._unseen += changes
         self._observed += changes
@@ -117,7 +126,7 @@ class Scheduler:
         if left:  # the board is not as it was when they were found
             self._cases.clear()
         self._is_waiting = False
-        focus = self._servoing.focus(self.view)
+        focus = self._ladder.focus(self.view)
         chosen, runner_up, fault = (None, None, fault) if fault else self._two_best(focus, obviated)
         made, refused, used = self._execute(chosen) if chosen else ((), fault, ())
         decision = new_tuple(Decision, (
@@ -136,8 +145,10 @@ class Scheduler:
         try:
             for change in seen:
                 if not isinstance(change, Posted):
-                    for activation in self._agenda.triggered_by(change.entry.id):
-                        self._drop_if_stale(activation, obviated)
+                    for pending in self._agenda.triggered_by(change.entry.id):
+                        if not self._stands(pending.trigger):  # by an earlier revision of an entry that changed
+                            self._agenda.take(pending)
+                            obviated.append(Obviated(pending, self._staleness(pending.trigger)))
             for change in seen:
                 kind, value = type(change), type(change.entry.value)
                 watchers = self._watchers.get((kind, value))
@@ -148,12 +159,6 @@ class Scheduler:
         except Exception:  # whatever a source does wrong is journalled, never lost
             return RAISED + traceback.format_exc(limit=-4)
         return ""
-
-    def _drop_if_stale(self, activation: Activation, obviated: list[Obviated]) -> None:
-        """What was triggered by an earlier revision of an entry that changed goes."""
-        if not self._stands(activation.trigger):
-            self._agenda.take(activation)
-            obviated.append(Obviated(activation, self._staleness(activation.trigger)))
 
     def _staleness(self, trigger: Change) -> str:
         now = self.view.get(trigger.entry.id)
@@ -201,7 +206,7 @@ class Scheduler:
     ) -> tuple[Activation | None, Activation | None, str]:
         """Take the activation to be executed from the agenda; also the next best, or the traceback of a source."""
         chosen: Activation | None = None
-        groups = self._servoing.nearest(focus)
+        groups = self._ladder.nearest(focus)
         try:
             chosen = self._best(groups, obviated)
             if chosen is None:
@@ -306,7 +311,7 @@ def registry_of(
         NotAKindError: one of them is not marked; ValueError: two are of one name.
     """
     of_sources = ((*(watch.value_type for watch in s.on), *s.writes) for s in sources)
-    return Registry((Discrepancy, Quiescence, *kinds, *chain.from_iterable(of_sources)))
+    return Registry((Quiescence, *kinds, *chain.from_iterable(of_sources)))
 
 
 def _by_number(ref: Ref) -> tuple[str, int, int]:
@@ -316,9 +321,4 @@ def _by_number(ref: Ref) -> tuple[str, int, int]:
 
 def aliens(effects: Iterable[Effect], writes: Collection[type[Any]]) -> list[str]:
     """The types that effects touch and may not, by name."""
-    names: list[str] = []
-    for effect in effects:
-        value_type = type_of(effect)
-        if value_type not in writes:
-            names.append(value_type.__name__)
-    return sorted(set(names)) if names else names
+    return sorted({kind.__name__ for kind in map(type_of, effects) if kind not in writes})

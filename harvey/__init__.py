@@ -65,7 +65,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "blackboard.journal": ("Decision",),
     "blackboard.kinds": ("inference", "observation", "request"),
     "blackboard.knowledge_source": ("KnowledgeSource",),
-    "blackboard.level": ("Level",),
+    "blackboard.ladder": ("Level",),
     "blackboard.scheduler": ("Scheduler",),
     "harvey.api": ("RunPicture", "RecordedRun", "TrackPoint", "build_world", "open_run", "run"),
     "harvey.errors": ("BadInput",),

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
-from blackboard import KnowledgeSource, Registry, Scheduler, Servoing, registry_of
+from blackboard import KnowledgeSource, Ladder, Registry, Scheduler, registry_of
 from harvey.agent_settings import build_settings
 from harvey.errors import BadInput
 from harvey.replay.what_if import SegmentHider, WhatIf, check_removals, is_segment, parse_segments
@@ -49,7 +49,7 @@ class Agent:
     robot: RobotModel
     store: FrameStore
     sources: tuple[KnowledgeSource, ...]
-    servoing: Servoing
+    servoing: Ladder
     settings: Settings
     what_if: WhatIf
 
@@ -60,7 +60,7 @@ class Agent:
 
     def scheduler(self, **more: Any) -> Scheduler:
         """The knowledge sources round an empty board; ``more``: ports and sinks."""
-        return Scheduler(self.sources, servoing=self.servoing, kinds=KINDS, **more)
+        return Scheduler(self.sources, ladder=self.servoing, kinds=KINDS, **more)
 
 
 def build_agent(head: RunHead, sources: Sources = knowledge_sources) -> Agent:
@@ -107,7 +107,7 @@ def _foreign(head: RunHead, given: Set[str]) -> list[type[KnowledgeSource]]:
     return [installed[name] for name in needed]
 
 
-def _servoing(head: RunHead, levels: dict[str, str]) -> Servoing:
+def _servoing(head: RunHead, levels: dict[str, str]) -> Ladder:
     servo = head.servo_settings()
     for level, value in levels.items():
         if level not in servo.__slots__:

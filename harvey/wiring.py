@@ -7,14 +7,16 @@ package takes an entry point of the group ``harvey.knowledge_sources``.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 from types import ModuleType
 
-from blackboard import KnowledgeSource, Level, Registry, Servoing, registry_of
+from blackboard import KnowledgeSource, Ladder, Level, Registry, registry_of
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
+from world_models.entries.discrepancy import LADDER
 from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.mission import Servo
 from world_models.plugins import SOURCES_GROUP, PluginError, load_plugin_classes
@@ -72,7 +74,7 @@ def load_kinds() -> Registry:
     return registry_of((*KNOWLEDGE_SOURCES, *foreign_sources().values()), KINDS)
 
 
-def servoing(servo: Servo) -> Servoing:
+def servoing(servo: Servo) -> Ladder:
     """The levels that a scenario leaves on."""
     on = {Level.ACTION: servo.action, Level.PLAN: servo.plan, Level.GOAL: servo.goal}
-    return Servoing(frozenset(level for level, is_on in on.items() if not is_on))
+    return replace(LADDER, off=frozenset(level for level, is_on in on.items() if not is_on))

@@ -22,7 +22,6 @@ import numpy as np
 from blackboard import (
     Change,
     Decoders,
-    Discrepancy,
     Effect,
     Entry,
     Post,
@@ -43,6 +42,7 @@ from logs.run_errors import BadInput
 from world_models import words
 from world_models.building.locale_frame import FrameReference, FrameRequest, LocaleFrame
 from world_models.entries import CameraPicture
+from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.entry_kinds import KINDS
 
 if TYPE_CHECKING:  # an explanation starts fast only where no world is imported that it does not need

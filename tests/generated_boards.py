@@ -19,7 +19,6 @@ from acting import answer
 from blackboard import (
     Blackboard,
     Change,
-    Discrepancy,
     Effect,
     Entry,
     KnowledgeSource,
@@ -52,6 +51,7 @@ from world_models.entries import (
     covariance_tuple,
     diagonal,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.location import Covariance
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world

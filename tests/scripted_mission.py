@@ -12,7 +12,6 @@ import numpy as np
 
 from blackboard import (
     Change,
-    Discrepancy,
     Effect,
     KnowledgeSource,
     Level,
@@ -48,6 +47,8 @@ from world_models.entries import (
     Tracks,
     diagonal,
 )
+from world_models.entries.discrepancy import LADDER, Discrepancy
+from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2
@@ -130,7 +131,8 @@ def play(sinks: Sequence[Sink], before: Callable[[int], None] = lambda _number: 
     lines: list[Line] = []
     cast = {"interpreter": Level.GOAL, "sketcher": Level.PLAN, "judge": Level.PLAN, "motor": Level.ACTION,
             "tracker": Level.ACTION, "clumsy": Level.ACTION}
-    scheduler = Scheduler([Player(name, level, lines) for name, level in cast.items()], sinks=sinks)
+    players = [Player(name, level, lines) for name, level in cast.items()]
+    scheduler = Scheduler(players, sinks=sinks, ladder=LADDER, kinds=KINDS)
     for number, (who, line, observed) in enumerate(SCRIPT):
         lines.append(line)
         before(number)

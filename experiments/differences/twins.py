@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from blackboard import Decision, Discrepancy, Level, Ref
+from blackboard import Decision, Level, Ref
 from experiments import drives
 from experiments.drives import Driven, GoalEnd, Trial
 from experiments.generated.missions import write_twin_mission
@@ -21,6 +21,7 @@ from experiments.report import Cell, Claim, Report
 from experiments.trials import at_least, at_most, judge_rare
 from harvey.campaign.mission_task import Task
 from world_models.entries import AliasOdds, Outcome, PlaceOdds
+from world_models.entries.discrepancy import Discrepancy
 
 RIGHT, WRONG = "right", "wrong"
 MISSIONS, QUICK_MISSIONS = 3_000, 4

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blackboard import Change, Decision, Discrepancy, Entry, Level, Retracted
+from blackboard import Change, Decision, Entry, Level, Retracted
 from experiments import drives
 from experiments.generated.missions import FOCAL_PX, write_inexact_mission
 from experiments.report import OURS, PAPER, PEER, Cell, Claim, Report, chart, count_kinds
@@ -30,6 +30,7 @@ from sim.render.sensor import SensorParameters
 from sim.scenario_names import SCENARIOS
 from world_models import entries
 from world_models.entries import ALERT_LIMIT_M, RISK
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 MIN_AVAILABLE, MIN_NAMED = 0.95, 0.95

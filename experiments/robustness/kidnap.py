@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from blackboard import Blackboard, Discrepancy, Level, Post, Scheduler, Servoing
+from blackboard import Blackboard, Level, Post, Scheduler
 from experiments.generated.floors import Floor, generated_floor
 from experiments.report import Cell, Claim, Report
 from experiments.trials import RESULTS, campaign_folder, judge_rare, judge_share, run_trials
@@ -44,7 +44,7 @@ from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import BodyFault, CameraPicture, Hypothesis, Panorama, Place, diagonal
-from world_models.entries.entry_kinds import KINDS
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frame_building import FrameBuilding
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2
@@ -177,8 +177,7 @@ def _build_lost_agent(scene: Scene, body: FaultyBody, belief: Place) -> Schedule
     """Build a scheduler whose goal level is in doubt."""
     finders = (LineFinder, DeadReckoner, ProbePhotographer, PanoramaBuilder, Localizer, Prober)
     sources = [*(source(DEFAULT) for source in finders), pose_adopter, goal_renewer, mission_monitor]
-    scheduler = build_scheduler(sources, scene.floor.world, scene.robot, ports=(BodyPort(body),), servoing=Servoing(),
-                                kinds=KINDS)
+    scheduler = build_scheduler(sources, scene.floor.world, scene.robot, ports=(BodyPort(body),))
     held = Hypothesis(belief.locale, Pose2(belief.x_m, belief.y_m, belief.heading_rad or 0.0), diagonal(0.05, 0.02),
                       "milestone")
     bound_px = DEFAULT.plan.max_deviation_px

@@ -8,21 +8,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from blackboard import (
-    Change,
-    Discrepancy,
-    Effect,
-    KnowledgeSource,
-    Level,
-    Post,
-    Posted,
-    Revise,
-    Scheduler,
-    View,
-    Watch,
-    inference,
-)
+from blackboard import Change, Effect, KnowledgeSource, Level, Post, Posted, Revise, Scheduler, View, Watch, inference
 from logs.journal_file import JournalFile
+from world_models.entries.discrepancy import Discrepancy
 
 DOUBT_EVERY = 20
 """One picture in this many shows something unexpected."""

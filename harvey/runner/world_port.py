@@ -8,6 +8,8 @@ from typing import Any
 from blackboard import Change, Effect, KnowledgeSource, Port, Post, Posted, Revise, Scheduler
 from world_models.building.locale_frame import FrameRequest
 from world_models.building.world import World
+from world_models.entries.discrepancy import LADDER
+from world_models.entries.entry_kinds import KINDS
 from world_models.frame_store import FrameStore
 from world_models.robot import RobotModel
 
@@ -39,11 +41,11 @@ def tell_robot(scheduler: Scheduler, robot: RobotModel) -> None:
 def build_scheduler(
     sources: Sequence[KnowledgeSource], world: World, robot: RobotModel, *, ports: Sequence[Port] = (), **more: Any
 ) -> Scheduler:
-    """Knowledge sources round a board that knows the robot and can ask for the building.
+    """Knowledge sources round a board that knows the robot, all servo levels on, and can ask for the building.
 
     Args:
         ports: to the body; more: as for :class:`blackboard.scheduler.Scheduler`.
     """
-    scheduler = Scheduler(sources, ports=(*ports, WorldPort(FrameStore(world))), **more)
+    scheduler = Scheduler(sources, ports=(*ports, WorldPort(FrameStore(world))), ladder=LADDER, kinds=KINDS, **more)
     tell_robot(scheduler, robot)
     return scheduler

@@ -13,7 +13,7 @@ from statistics import median
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Level, Posted, Revise, View, Watch, open_or_measure
+from blackboard import Change, Effect, Level, Posted, Revise, View, Watch
 from knowledge_sources.methods.arrays import Image
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.features import Template
@@ -47,11 +47,11 @@ from knowledge_sources.reads import (
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Anchor, CameraPicture, Drift, Hypothesis, Track, Tracks
+from world_models.entries.discrepancy import Discrepancy, open_or_measure
 
 MAX_MISSES = 2  # a landmark that is not found so many times in a row is dropped
 MIN_EXPECTED_LANDMARKS = 4  # fewest expected landmarks that can make a discrepancy
-MIN_AGREEING_LANDMARKS = 2
-"""Fewest that must agree for the belief to be corrected; of those found alone, one in 17 was something else (of 34)."""
+MIN_AGREEING_LANDMARKS = 2  # fewest that must agree for a correction; of 34 found alone two were something else
 MIN_AGREEING_PART = 1.0 / 3.0  # if a smaller part of the expected landmarks agrees, tracking has failed
 MIN_LANDMARKS = 5  # with fewer tracked landmarks than this, new ones are always taken
 ENOUGH_LANDMARKS = 9  # with this many tracked landmarks or more, no new ones are taken

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, PLACED_BY, find_camera, find_contact
@@ -26,6 +26,7 @@ from world_models.entries import (
     Travel,
     begin_travel,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 MIN_CLAIMED_PART = 0.7  # if the wheels claim less than this part of a move, something stopped the robot

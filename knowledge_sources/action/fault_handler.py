@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import EMERGENCY_STOPS, NOT_GIVEN_UP, OPEN_FAULT, find_stop, open_discrepancy
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -23,6 +23,7 @@ from world_models.entries import (
     Redirection,
     Ride,
 )
+from world_models.entries.discrepancy import Discrepancy
 
 MAX_FAULT_S = 30.0  # a fault that lasts longer ends the mission
 MAX_BROKEN_MOTIONS = 5  # so many motions broken off in a row end the mission

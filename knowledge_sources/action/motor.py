@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch, correct
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.methods.motion import (
     MAX_HEADING_ERROR_RAD,
     MAX_LOOK_ERROR_RAD,
@@ -34,6 +34,7 @@ from knowledge_sources.reads import (
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import BodyFault, Drift, Hypothesis, Leg, Milestone, MotorCommand, PlanSketch
+from world_models.entries.discrepancy import Discrepancy, correct
 
 LOOKAHEAD_M = 1.2  # distance ahead on the line at which the motor steers (pure pursuit): two increments
 

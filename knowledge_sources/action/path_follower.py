@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch, correct
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.methods.motion import (
     ROLLING_STOP_MARGIN_M,
     choose_speed,
@@ -34,12 +34,12 @@ from knowledge_sources.reads import (
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Course, Drift, Hypothesis, Leg, Milestone, PlanSketch
+from world_models.entries.discrepancy import Discrepancy, correct
 
 ROLLING_LOOKAHEAD_M = 0.75  # distance ahead on the line at which the path follower steers (pure pursuit)
 MIN_ROLLING_LEG_M = 0.3  # shortest rest of a leg, beyond the stopping distance, that is driven without stopping
 MAX_ROLLING_START_ERROR_RAD = math.radians(3.0)  # the path follower starts when it faces its aim to within this
 MAX_ROLLING_ERROR_RAD = math.radians(12.0)  # the path follower stops when its aim is further to the side than this
-
 MIN_FREE_M = 2.0 * ROLLING_STOP_MARGIN_M  # with less floor seen to be free ahead it stops, or does not start
 
 

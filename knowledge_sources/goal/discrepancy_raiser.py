@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Revise, View, Watch, last_escalated
+from blackboard import Change, Effect, Entry, Level, Post, Revise, View, Watch
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import deepest_sketch, is_over
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Impasse, PlanSketch
+from world_models.entries.discrepancy import Discrepancy, last_escalated
 
 MAX_CHECKS_PER_SUBGOAL = 20
 """So often the action level may ask the plan level on the way to one subgoal; then it is blocked."""

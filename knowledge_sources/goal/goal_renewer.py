@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from blackboard import Change, Discrepancy, Effect, Level, Post, Revise, Revised, View, Watch, correct, rule
+from blackboard import Change, Effect, Level, Post, Revise, Revised, View, Watch, rule
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import LOST, active_goal, find_building
 from world_models.building.locale_frame import FrameRequest
 from world_models.entries import Goal, Hypothesis, Place
+from world_models.entries.discrepancy import Discrepancy, correct
 
 
 @rule(on=Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "relocalization"),

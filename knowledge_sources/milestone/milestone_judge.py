@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch, open_or_measure
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
 from knowledge_sources.methods.calibration import add_yaw, compute_camera_covariance, is_camera_known
 from knowledge_sources.methods.pose import tell_unavailable
 from knowledge_sources.methods.verification import (
@@ -48,6 +48,7 @@ from world_models.entries import (
     Segments,
     Travel,
 )
+from world_models.entries.discrepancy import Discrepancy, open_or_measure
 
 
 class Case(NamedTuple):

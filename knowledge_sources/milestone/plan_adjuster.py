@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Posted, Revise, View, Watch, rule
+from blackboard import Change, Effect, Entry, Level, Posted, Revise, View, Watch, rule
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, PLAN_DOUBT
 from world_models.building.locale_frame import FrameRequest
 from world_models.entries import Certificate, Hypothesis, PoseFix
+from world_models.entries.discrepancy import Discrepancy
 
 
 def find_fix(view: View, trigger: Change) -> tuple[Entry[Certificate], Entry[PoseFix]] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from blackboard import Change, Discrepancy, Effect, Level, Post, Posted, Revised, View, Watch
+from blackboard import Change, Effect, Level, Post, Posted, Revised, View, Watch
 from knowledge_sources.methods.verification import CHECK_TOLERANCE_M, choose_heading, find_untried, turn_headings
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
@@ -20,6 +20,7 @@ from knowledge_sources.reads import (
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Hypothesis, Milestone
+from world_models.entries.discrepancy import Discrepancy
 
 
 class BeliefChecker(RobotKnowledgeSource):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revised, View, Watch
 from knowledge_sources.methods.verification import CHECK_TOLERANCE_M, choose_heading, find_untried, turn_headings
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
@@ -25,6 +25,7 @@ from knowledge_sources.reads import (
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.building import Building
 from world_models.entries import Hypothesis, Milestone, PlanSketch
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2, wrap_angle
 
 LONG_TURN_RAD = math.radians(100.0)

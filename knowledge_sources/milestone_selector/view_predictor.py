@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.methods.localization import precompute_views
 from knowledge_sources.methods.verification import list_seen_locales, predict_milestone
 from knowledge_sources.priority import Priority
@@ -24,6 +24,7 @@ from knowledge_sources.reads import (
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Hypothesis, Milestone, Obstruction, PictureRequest
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import wrap_angle
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Revise, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Revise, Revised, View, Watch
 from knowledge_sources.methods.doors import (
     MAX_LOG_ODDS,
     MIN_FEW_LINES,
@@ -39,6 +39,7 @@ from knowledge_sources.reads import (
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import CameraPicture, DoorPicture, DoorState, Milestone, Segments
+from world_models.entries.discrepancy import Discrepancy
 
 MAX_DOUBTED_SIGMA_M = 0.3  # largest standard deviation of the place at which a shut door may explain a picture
 MAX_DOUBTED_SIGMA_RAD = 0.07  # largest standard deviation of the believed heading at which it may

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from blackboard import Condition, Discrepancy, Entry, Level, View
+from blackboard import Condition, Entry, Level, View
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.reads.questions import (
     active_goal,
@@ -32,6 +32,7 @@ from knowledge_sources.reads.questions import (
     unmeasured_doubt,
 )
 from world_models.entries import CameraPicture, CameraState, Hypothesis, Outcome, Travel
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from blackboard import Condition, Discrepancy, Entry, Level, Post, View
+from blackboard import Condition, Entry, Level, Post, View
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.features import picture
 from knowledge_sources.methods.localization import CameraView
@@ -23,6 +23,7 @@ from world_models.entries import (
     PlanSketch,
     Segments,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 

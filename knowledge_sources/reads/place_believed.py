@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from blackboard import Discrepancy, Entry, Level, View
+from blackboard import Entry, Level, View
 from knowledge_sources.methods.belief import BelievedPlace, bound_p_aliases, compute_p_aliases
 from knowledge_sources.methods.localization import (
     DISTINCT,
@@ -31,6 +31,7 @@ from world_models.entries import (
     RideReport,
     Travel,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 MAX_P_RIVAL = 0.03

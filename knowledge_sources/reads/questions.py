@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any
 
-from blackboard import OPEN, Blackboard, Discrepancy, Entry, Index, Level, View
+from blackboard import Blackboard, Entry, Index, Level, View
 from world_models.building.locale_frame import CHANGED, FRAME_OF, LocaleFrame
 from world_models.entries import (
     GO_ON,
@@ -33,6 +33,7 @@ from world_models.entries import (
     Tracks,
     Wheels,
 )
+from world_models.entries.discrepancy import OPEN, Discrepancy
 from world_models.frame_building import FrameBuilding
 from world_models.robot import RobotModel
 

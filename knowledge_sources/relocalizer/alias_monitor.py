@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
 from knowledge_sources.methods.localization import (
     ALIKE_LOG_NOISE,
     MAX_FLOOR_DIFFERENCE_M,
@@ -30,6 +30,7 @@ from knowledge_sources.reads import GOING_ON, HELD, NOT_LOST, Belief, count_refu
 from knowledge_sources.reads.place_believed import MIN_P_ALIAS
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Alias, AliasOdds, Certificate, PoseFix, Segments
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revised, View, Watch
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import LOST, WHILE_LOST, is_dark
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Hypothesis, MotionReport, PictureRequest, Segments
+from world_models.entries.discrepancy import Discrepancy
 
 MAX_DARK_FRAMES = 150  # so many dark frames are taken while waiting for light
 

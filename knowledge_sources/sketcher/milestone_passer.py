@@ -6,13 +6,14 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Revise, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Revise, Revised, View, Watch
 from knowledge_sources.methods.verification import is_last_look
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, declare_lost, find_building, find_search_here, has_missed, tell_missed
 from knowledge_sources.reads.sketches import MAX_ADJUSTMENTS
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Goal, Hypothesis, Impasse, Milestone, Place, PlaceSearch, PlanSketch
+from world_models.entries.discrepancy import Discrepancy
 
 
 class Case(NamedTuple):

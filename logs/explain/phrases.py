@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
 
-from blackboard import Discrepancy, Level
+from blackboard import Level
 from logs.records import WHAT_IF, Candidate, EntryRecord, is_a
 from logs.run_errors import BadInput
 from logs.timeline import Timeline
@@ -41,6 +41,7 @@ from world_models.entries import (
     Tracks,
     UserReport,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.words import count, degrees, landmark, listed, metres, point, quantity, size, turn
 
 MAX_LISTED = 4

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from blackboard import Discrepancy
 from logs.explain import phrases, turning_points
 from logs.explain.phrases import Sentence, Story, capital, named, plainly, said, sentence, wrap
 from logs.explain.turning_points import (
@@ -43,6 +42,7 @@ from world_models.entries import (
     UserReport,
     find_camera_lessons,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.words import count, listed, metres
 
 WITHOUT: Mapping[str, str] = {

@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from blackboard import Discrepancy
 from logs.explain import phrases
 from logs.explain.model import MAX_LISTED, WorldFile, tell_changes, tell_model_lines, tell_source
 from logs.explain.phrases import Sentence, Story, capital, describe_decision, said, sentence, tell
@@ -28,6 +27,7 @@ from world_models.entries import (
     PoseFix,
     Segments,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.words import count, landmark, listed
 
 FOLLOWED = (Certificate, Milestone, Discrepancy)

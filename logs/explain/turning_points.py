@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from blackboard import Decision, Discrepancy, Level, Posted, Retracted
+from blackboard import Decision, Level, Posted, Retracted
 from logs.explain.phrases import milestone_of, wrap
 from logs.records import EntryRecord, Opaque
 from logs.run_errors import BadInput
@@ -32,6 +32,7 @@ from world_models.entries import (
     Resumed,
     UserReport,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.words import count
 
 MAIN = ("refuted", "not testable", "lost", "found", "fault", "contact", "door", "thing", "resumed", "told")

@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from blackboard import Discrepancy, Quiescence
+from blackboard import Quiescence
 from logs.explain import model, phrases
 from logs.explain.model import WorldFile, tell_source
 from logs.explain.phrases import (
@@ -71,6 +71,7 @@ from world_models.entries import (
     UserReport,
     Wheels,
 )
+from world_models.entries.discrepancy import Discrepancy
 
 MOST, MOST_PLAIN, MOST_MET = 24, 12, 200
 """Most entries that are named, of a run of another version, and most that are reached."""

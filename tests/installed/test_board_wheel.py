@@ -7,10 +7,12 @@ import shutil
 import subprocess
 import sys
 import venv
+import zipfile
 from pathlib import Path
 
 import pytest
 
+import blackboard
 from elsewhere import ROOT
 
 
@@ -22,18 +24,28 @@ def test_the_same_program_written_for_another_system_greets_as_well(example: str
     assert done.stdout == "hello, world\n"
 
 
-def test_the_hello_world_of_its_readme_runs_from_its_own_wheel(tmp_path: Path) -> None:
+def test_the_programs_of_its_readme_run_from_its_own_wheel(tmp_path: Path) -> None:
     source = shutil.copytree(ROOT / "blackboard", tmp_path / "blackboard", ignore=shutil.ignore_patterns("__pycache__"))
     subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation",
                     "--wheel-dir", tmp_path, source], check=True, capture_output=True, timeout=300)
-    (wheel,) = tmp_path.glob("harvey_board-*.whl")
+    (wheel,) = tmp_path.glob(f"harvey_board-{blackboard.__version__}-*.whl")
+    assert "blackboard/py.typed" in zipfile.ZipFile(wheel).namelist()
     venv.create(tmp_path / "venv", with_pip=False)
     python = tmp_path / "venv" / "bin" / "python"
     subprocess.run([sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index",
                     wheel], check=True, capture_output=True, timeout=300)
     shutil.rmtree(source)
-    program, said = re.findall(r"```(?:python)?\n(.*?)```", (ROOT / "blackboard/README.md").read_text(), re.DOTALL)[:2]
-    assert sum(bool(line.strip()) for line in program.splitlines()) <= 12
-    (tmp_path / "hello.py").write_text(program, encoding="utf-8")
-    done = subprocess.run([python, "hello.py"], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=60)
-    assert done.stdout == said
+    readme = (ROOT / "blackboard/README.md").read_text(encoding="utf-8")
+    hello, said, larger = re.findall(r"```(?:python)?\n(.*?)```", readme, re.DOTALL)[:3]
+    assert sum(bool(line.strip()) for line in hello.splitlines()) == 9, "eight lines below the import"
+    assert run_program(python, tmp_path / "hello.py", hello) == said
+    assert larger.count("@rule") == 3
+    told = run_program(python, tmp_path / "larger.py", larger)
+    assert "Answer-1.0: Answer(text='yes, shut it') (by phone, cycle 2)\n" in told
+    assert '"phone" -> "closer" [label="Answer x 1"]\n' in told and told.endswith("}\nNone\n")
+
+
+def run_program(python: Path, file: Path, text: str) -> str:
+    file.write_text(text, encoding="utf-8")
+    return subprocess.run([python, file.name], cwd=file.parent, capture_output=True, text=True, check=True,
+                          timeout=60).stdout

@@ -7,8 +7,8 @@ certificate, outcome. ``percepts``: tracks, segments, matches, pose fixes. ``use
 way. ``location``: pose hypotheses, and the way since a known place. ``protection_level``: how far off a pose may be at
 a stated risk. ``obstacle``: contacts and ranges, what stands in the way, occlusions of the lens. ``floor``: free
 floor, and what floors look like. ``door_state``: which doors are seen open or shut. ``difference``: what is not as
-expected, and the rivals that would explain it. ``entry_kinds``: all of them; not part of this face, as frames stand
-with the building.
+expected, and the rivals that would explain it. ``discrepancy``: how far off, and the ladder of levels that correct it.
+``entry_kinds``: all of them; not part of this face, as frames stand with the building.
 """
 
 from world_models.entries.body import (

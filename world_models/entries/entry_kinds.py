@@ -6,6 +6,7 @@ from world_models.building import locale_frame
 from world_models.entries import (
     body,
     difference,
+    discrepancy,
     door_state,
     floor,
     location,
@@ -18,4 +19,4 @@ from world_models.entries import (
 
 KINDS = kinds_in(
     locale_frame, user_reports, robot_state, body, task, percepts, location, obstacle, obstruction, floor, door_state,
-    difference)
+    difference, discrepancy)

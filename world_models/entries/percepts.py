@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard import OPEN, Entry, Level, View, inference
+from blackboard import Entry, Level, View, inference
 from world_models import words
+from world_models.entries.discrepancy import OPEN
 from world_models.entries.location import Covariance
 from world_models.entries.protection_level import UNPROTECTED, Protection
 from world_models.frames import Pose2

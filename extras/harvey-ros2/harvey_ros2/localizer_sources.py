@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from blackboard import Change, Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.methods.verification import list_seen_locales, predict_milestone
 from knowledge_sources.priority import Priority
@@ -39,6 +39,7 @@ from world_models.entries import (
     Travel,
     begin_travel,
 )
+from world_models.entries.discrepancy import Discrepancy
 
 CONTRADICTED = 2
 """So many pictures one after the other that contradict the believed place, and it is lost."""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blackboard import Discrepancy, Level
+from blackboard import Level
 from harvey.runner.ports import STANDS_STILL
 from harvey_ros2.messages import MessageTypes, stamp
 from harvey_ros2.middleware import LATCHED, SENSOR, Delivery, Topic, full_name
@@ -32,6 +32,7 @@ from world_models.entries import (
     MotionReport,
     PlanSketch,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 CAMERA_FRAME = "camera_optical"

@@ -8,12 +8,13 @@ from collections import deque
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
-from blackboard import Change, Decision, Discrepancy, Entry, Level, Retracted, highest
+from blackboard import Change, Decision, Entry, Level, Retracted, highest
 from harvey.report.data import place_in_picture, placed, shrink
 from world_models import words
 from world_models.building.world import World
 from world_models.camera import Camera
 from world_models.entries import CameraPicture, Goal, Hypothesis, LineMatch, Milestone, PlanSketch, PoseFix, Segments
+from world_models.entries.discrepancy import Discrepancy
 
 DECISIONS, MILESTONES = 12, 12
 """So many of the last are shown."""

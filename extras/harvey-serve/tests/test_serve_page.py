@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 pytest.importorskip("starlette", reason="the extra 'serve' is not installed")
 from starlette.testclient import TestClient
 
-from blackboard import Change, Discrepancy, Level, Posted, Revised
+from blackboard import Change, Level, Posted, Revised
 from generated_boards import Bench
 from harvey.cli import main
 from harvey.errors import BadInput
@@ -41,6 +41,7 @@ from world_models.entries import (
     Subgoal,
     diagonal,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.files.world_files import load_world
 from world_models.frames import Pose2
 

@@ -9,7 +9,7 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard import Change, Decision, Discrepancy, Retracted, Revised
+from blackboard import Change, Decision, Retracted, Revised
 from logs.recording.logger import Logger, Moment, Panel, Subject, log_view
 from logs.recording.palette import DONE, LEVELS, REJECTED
 from logs.recording.paths import RECORDS, TABLE
@@ -17,6 +17,7 @@ from logs.recording.stream import TROUBLE, Mixed, RecordingStream
 from world_models import words
 from world_models.building.locale_frame import FrameRequest, LocaleFrame, has_answer
 from world_models.entries import Drift, Hypothesis, Leg, Milestone
+from world_models.entries.discrepancy import Discrepancy
 
 TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "halted")
 """Statuses of milestones, sketches, goals, hypotheses and legs that stand for something gone wrong."""

@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard import Activation, Discrepancy, Level, View
+from blackboard import Activation, Level, View
 from logs.recording.logger import NEAR, Logger, Moment, Panel, Subject
 from logs.recording.palette import ACTIVITIES, LEVELS, REJECTED, Colour
 from logs.recording.paths import FAULTS, FOCUS, HARVEY
 from logs.recording.stream import RecordingStream, viewable
 from world_models.entries import BodyFault, Goal, Leg, Milestone, Outcome, PlanSketch
+from world_models.entries.discrepancy import Discrepancy
 
 ACTS, GAP = "acts", ""
 ACTIVITY_KINDS = (Outcome, BodyFault, Discrepancy, Milestone, Leg, PlanSketch, Goal)

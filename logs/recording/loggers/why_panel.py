@@ -9,7 +9,7 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from blackboard import Discrepancy, Entry, View, always
+from blackboard import Entry, View, always
 from logs.explain import phrases
 from logs.explain.turning_points import SIMULATOR, Happening, TurningPoint, TurningPointFinder
 from logs.recording.logger import Logger, Moment, Panel, Subject, log_view
@@ -34,6 +34,7 @@ from world_models.entries import (
     Segments,
     Tracks,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 Tell = Callable[[View], str]

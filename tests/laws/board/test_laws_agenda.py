@@ -8,7 +8,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from blackboard import Activation, Entry, Level, Posted, Revised, Servoing
+from blackboard import Activation, Entry, Ladder, Level, Posted, Revised
 from blackboard.agenda import Agenda
 from strategies import Note, Scripted, ratings
 
@@ -39,7 +39,7 @@ class AgendaMachine(RuleBasedStateMachine):
     @precondition(lambda self: self.model)
     @rule(focus=st.sampled_from(Level))
     def take_the_best(self, focus: Level) -> None:
-        best = self.agenda.best(Servoing().nearest(focus))
+        best = self.agenda.best(Ladder(Level).nearest(focus))
         assert best is not None
         self.agenda.take(best)
         self.model.remove(best)
@@ -63,7 +63,7 @@ class AgendaMachine(RuleBasedStateMachine):
         """Nearest level, then best rated, then oldest (§2, Figure 2)."""
         for focus in Level:
             ranked = sorted(self.model, key=lambda a: (abs(a.source.level - focus), -a.rating, a.number))
-            assert self.agenda.best(Servoing().nearest(focus)) is (ranked[0] if ranked else None)
+            assert self.agenda.best(Ladder(Level).nearest(focus)) is (ranked[0] if ranked else None)
 
     @invariant()
     def nothing_is_lost_and_what_triggered_it_is_known(self) -> None:

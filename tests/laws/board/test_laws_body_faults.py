@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard import Change, Decision, Discrepancy, Effect, Post, Scheduler, View
+from blackboard import Change, Decision, Effect, Post, Scheduler, View
 from harvey.runner.ports import BodyPort
 from knowledge_sources.action.fault_handler import (
     MAX_BROKEN_MOTIONS,
@@ -31,6 +31,8 @@ from world_models.entries import (
     PictureRequest,
     Recovery,
 )
+from world_models.entries.discrepancy import LADDER, Discrepancy
+from world_models.entries.entry_kinds import KINDS
 
 S = DEFAULT.action
 MOST_CYCLES = 2000
@@ -87,7 +89,7 @@ def drive(requests: list[str], body: ScriptedBody) -> tuple[Scheduler, list[Any]
     scheduler = Scheduler(
         [FaultHandler(), mission_monitor,
          Scripted("asker", Note, asking, writes=(MotorCommand, PictureRequest))],
-        ports=(BodyPort(body),), sinks=(listen,),
+        ports=(BodyPort(body),), sinks=(listen,), ladder=LADDER, kinds=KINDS,
     )
     for request in requests:
         scheduler.post([Post(Note(request))], "user")

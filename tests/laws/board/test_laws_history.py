@@ -13,20 +13,22 @@ from hypothesis import strategies as st
 
 from blackboard import (
     Change,
-    Discrepancy,
     Effect,
     History,
+    Ladder,
+    Level,
     Post,
     Posted,
     Retract,
     Revise,
     Scheduler,
-    Servoing,
     View,
     Watch,
     rule,
 )
+from blackboard.kinds import NotAKindError
 from strategies import Note, Scripted, Tally
+from world_models.entries.discrepancy import OPEN, Discrepancy
 
 TEXTS = st.lists(st.text(max_size=3), min_size=1, max_size=5)
 
@@ -114,6 +116,25 @@ def test_why_goes_down_to_what_came_from_outside(texts: list[str]) -> None:
         history.why("Nothing-1")
 
 
+@given(TEXTS)
+def test_what_is_posted_can_be_replayed_and_who_woke_whom_adds_up_to_the_cycles_that_acted(texts: list[str]) -> None:
+    scheduler, history = drive(texts)
+    assert History.of(SOURCES, user=map(Note, texts)).replay(Scheduler(SOURCES)) is None
+    times = [int(line.rpartition(" x ")[2].rstrip('"]')) for line in history.to_dot().splitlines()[1:-1]]
+    assert sum(times) == sum('"chosen":{' in line for line in history.lines)
+    assert str(scheduler.board).count("(by ") == len(scheduler.view)
+    with pytest.raises(NotAKindError, match=r"kinds=\[Discrepancy\]"):
+        scheduler.post([Post(Discrepancy(Level.GOAL, "far", None, (1.0, 1.0), "m"))], "user")
+
+
+@given(TEXTS)
+def test_a_program_without_levels_writes_none(texts: list[str]) -> None:
+    _, flat = drive(texts)
+    assert not any('"level"' in line or '"focus"' in line for line in flat.lines)
+    laddered = History.of([*SOURCES, Scripted("goal", Note, level=Level.GOAL)], user=[Note(texts[0])])
+    assert all('"focus":"action"' in line for line in laddered.lines)
+
+
 class Floor(IntEnum):
     """Two levels of a system of its own."""
 
@@ -132,7 +153,8 @@ def test_levels_are_the_users() -> None:
 
         return Scripted(name, Note, act, level=level)  # type: ignore[arg-type]
 
-    scheduler = Scheduler([worker("up", Floor.ROOF), worker("down", Floor.GROUND)], servoing=Servoing(levels=Floor))
+    sources = [worker("up", Floor.ROOF), worker("down", Floor.GROUND)]
+    scheduler = Scheduler(sources, ladder=Ladder(Floor, OPEN), kinds=[Discrepancy])
     scheduler.post([Post(Note("a"))], "user")
     scheduler.run()
     assert done == ["down", "up"]

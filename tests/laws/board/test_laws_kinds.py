@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 from blackboard import (
     Change,
-    Discrepancy,
     Effect,
     Post,
     Quiescence,
@@ -36,6 +35,7 @@ from journals import read_journal
 from logs import disk
 from logs.journal_file import JournalFile
 from strategies import Note, Scripted
+from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.entry_kinds import KINDS
 from world_models.words import sentence
 

@@ -19,7 +19,6 @@ from hypothesis.stateful import RuleBasedStateMachine, rule
 from blackboard import (
     Change,
     Decision,
-    Discrepancy,
     Effect,
     Entry,
     Level,
@@ -65,7 +64,7 @@ from world_models.entries import (
     PoseFix,
     diagonal,
 )
-from world_models.entries.entry_kinds import KINDS
+from world_models.entries.discrepancy import Discrepancy
 from world_models.files.world_files import load_world
 from world_models.robot import RobotModel
 
@@ -213,8 +212,7 @@ class Ladder:
         self.body = ScriptedBody()
         self.seen: dict[Ref, Discrepancy] = {}
         self.scheduler = build_scheduler(
-            [*(s for s in real if s.name not in PERCEIVERS), *scripted], world(), robot(continuous), ports=[self.body],
-            kinds=KINDS)
+            [*(s for s in real if s.name not in PERCEIVERS), *scripted], world(), robot(continuous), ports=[self.body])
         task = with_settings(load_scenario("lab-to-allens-office"), {
             "goal": "(ptrans (allens-office (7,4,0)) (allens-office (13,12,0)))"}).command
         self.scheduler.post([Post(task)], "user")

@@ -34,6 +34,7 @@ from blackboard.kinds import Kind
 from logs.journal_file import JournalFile
 from logs.timeline import Timeline
 from strategies import Note, Scripted, Tally, levels, ratings, run
+from world_models.entries.discrepancy import LADDER
 
 MOST_CYCLES = 40
 SMALL: Index[Tally] = Index(Tally, lambda tally: tally.count % 3)
@@ -217,7 +218,7 @@ def test_every_revision_can_be_read_back_from_the_journal(program: list[Rule]) -
                     written[str(change.entry.ref)] = entry_record(change.entry)["value"]
 
         scheduler = Scheduler([source_of(i, r) for i, r in enumerate(program)], sinks=[journal, remember],
-                              retention={Note: keeping(1), Tally: keeping(1)})
+                              retention={Note: keeping(1), Tally: keeping(1)}, ladder=LADDER)
         scheduler.post([Post(Note("a")), Post(Tally(1))], "user")
         run(scheduler, 24)
         journal.close()

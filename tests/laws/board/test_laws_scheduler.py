@@ -15,9 +15,9 @@ from blackboard import (
     RAISED,
     Change,
     Condition,
-    Discrepancy,
     Effect,
     Entry,
+    Ladder,
     Level,
     Post,
     Posted,
@@ -26,11 +26,11 @@ from blackboard import (
     Revise,
     Revised,
     Scheduler,
-    Servoing,
     View,
     decision_line,
 )
 from strategies import Note, Scripted, Tally, levels, ratings, run
+from world_models.entries.discrepancy import LADDER, Discrepancy
 
 
 class Port:
@@ -277,7 +277,7 @@ def test_two_experts_of_one_name_are_refused() -> None:
 
 def test_a_level_that_is_off_silences_the_experts_that_close_it() -> None:
     sources = [Scripted("closer", closes=Level.ACTION), Scripted("worker", level=Level.ACTION)]
-    scheduler = Scheduler(sources, servoing=Servoing(frozenset({Level.ACTION})))
+    scheduler = Scheduler(sources, ladder=Ladder(Level, off=frozenset({Level.ACTION})))
     post(scheduler, Note("a"))
     assert names(scheduler.step().activated) == ["worker"]
 
@@ -313,7 +313,7 @@ def journal_of(program: list[Any], focus: Level) -> list[str]:
     lines: list[str] = []
     scheduler = Scheduler(
         [source_of(i, rule) for i, rule in enumerate(program)], ports=[Port([])],
-        sinks=[lambda d: lines.append(decision_line(d))],
+        sinks=[lambda d: lines.append(decision_line(d))], ladder=LADDER, kinds=[Discrepancy],
     )
     post(scheduler, Note("a"), Discrepancy(focus, "it is elsewhere", 1.0, (2.0, 3.0), "px"))
     run(scheduler, 20)

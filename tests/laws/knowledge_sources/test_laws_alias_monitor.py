@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from blackboard import Discrepancy, Entry, Level, Posted
+from blackboard import Entry, Level, Posted
 from generated_boards import (
     HALL,
     LENGTH_M,
@@ -53,6 +53,7 @@ from world_models.entries import (
     Segments,
     diagonal,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2, wrap_angle
 
 SOURCE, ROBOT, SMALL = AliasMonitor(), plain_robot(), 1e-6

@@ -8,13 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Discrepancy, Entry, Level
+from blackboard import Entry, Level
 from generated_boards import Bench, effect_on, plain_robot, poses, reasons, to_world
 from knowledge_sources.methods.verification import MIN_MATCHED_LINES, turn_headings
 from knowledge_sources.milestone_selector.belief_checker import BeliefChecker
 from knowledge_sources.reads import list_log_odds
 from knowledge_sources.reads.looks import MAX_LOOK_LOG_ODDS
 from world_models.entries import Certificate, Milestone
+from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2, wrap_angle
 

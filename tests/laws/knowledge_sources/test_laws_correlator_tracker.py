@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from blackboard import Discrepancy, Effect, Level, Retract, Revise
+from blackboard import Effect, Level, Retract, Revise
 from generated_boards import Bench, reasons
 from knowledge_sources.action import correlator_tracker
 from knowledge_sources.action.correlator_tracker import (
@@ -47,6 +47,7 @@ from world_models.entries import (
     covariance_tuple,
     diagonal,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 SURE, TURNED = diagonal(0.004, 0.001), diagonal(0.004, 0.02)

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Discrepancy, Effect, Entry, Level, Post, Revise
+from blackboard import Effect, Entry, Level, Post, Revise
 from generated_boards import (
     HALL,
     STUDY,
@@ -45,6 +45,7 @@ from world_models.entries import (
     Travel,
     begin_travel,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.location import Covariance
 from world_models.frames import Pose2
 

@@ -11,7 +11,7 @@ import pytest
 
 from acting import answer
 from archive_door import DOOR, before_door, photograph
-from blackboard import Discrepancy, Effect, Level, Post, Posted, Revise, Revised
+from blackboard import Effect, Level, Post, Posted, Revise, Revised
 from knowledge_sources.methods.doors import MAX_LOG_ODDS, PRIOR_LOG_ODDS
 from knowledge_sources.methods.doors.belief import MIN_PICTURES
 from knowledge_sources.model.door_watcher import DoorWatcher
@@ -19,6 +19,7 @@ from knowledge_sources.model.floor_watcher import FloorWatcher
 from knowledge_sources.reads import MAX_SIGMA_M, MAX_SIGMA_RAD
 from things_in_hall import HALL, Hall
 from world_models.entries import CameraPicture, DoorState, Hypothesis, Milestone, Outcome, diagonal
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 SOURCE = DoorWatcher()

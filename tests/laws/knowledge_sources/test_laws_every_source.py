@@ -16,7 +16,6 @@ from acting import answer
 from blackboard import (
     Blackboard,
     Change,
-    Discrepancy,
     Effect,
     Entry,
     KnowledgeSource,
@@ -56,6 +55,7 @@ from world_models.entries import (
     Subgoal,
     Travel,
 )
+from world_models.entries.discrepancy import Discrepancy
 
 pytestmark = pytest.mark.slow
 

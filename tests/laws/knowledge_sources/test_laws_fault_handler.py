@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acting import answer
-from blackboard import Blackboard, Discrepancy, Entry, Level, Post, Posted, Revise, Revised
+from blackboard import Blackboard, Entry, Level, Post, Posted, Revise, Revised
 from generated_boards import Bench, made, plain_robot
 from knowledge_sources.action.fault_handler import (
     MAX_BROKEN_MOTIONS,
@@ -41,6 +41,7 @@ from world_models.entries import (
     diagonal,
 )
 from world_models.entries.body import RecoveryStatus
+from world_models.entries.discrepancy import Discrepancy
 
 SOURCE, S = FaultHandler(), DEFAULT.action
 MOST = MAX_BROKEN_MOTIONS

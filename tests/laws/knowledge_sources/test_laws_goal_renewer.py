@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Discrepancy, Level, Post, Posted, Revise, Revised
+from blackboard import Level, Post, Posted, Revise, Revised
 from generated_boards import (
     HALL,
     WIDTH_M,
@@ -25,6 +25,7 @@ from generated_boards import (
 )
 from knowledge_sources.goal.goal_renewer import goal_renewer
 from world_models.entries import Goal, Place
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 SOURCE = goal_renewer

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Discrepancy, Entry, Level, Post, Posted, Retract
+from blackboard import Entry, Level, Post, Posted, Retract
 from generated_boards import HALL, Bench, drive, go, made, motions, plain_robot, poses, reasons, to_world, wakes
 from knowledge_sources.methods.localization import (
     LOST_AGAIN_ODDS,
@@ -41,6 +41,7 @@ from world_models.entries import (
     Segments,
     diagonal,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, flattened
 

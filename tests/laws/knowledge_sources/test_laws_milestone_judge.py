@@ -18,7 +18,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import OPEN, Blackboard, Change, Discrepancy, Effect, Entry, Index, Level, Post, Retract, Revise, View
+from blackboard import Blackboard, Change, Effect, Entry, Index, Level, Post, Retract, Revise, View
 from blackboard.board import TracedView
 from experiments.generated.missions import OFFICE
 from generated_boards import effect_on, made, reasons
@@ -80,6 +80,7 @@ from world_models.entries import (
     Travel,
     diagonal,
 )
+from world_models.entries.discrepancy import OPEN, Discrepancy
 from world_models.frames import Pose2
 
 T = TypeVar("T")

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from blackboard import Discrepancy, Effect, Level, Post, Posted, Retract, Revise, Revised
+from blackboard import Effect, Level, Post, Posted, Retract, Revise, Revised
 from generated_boards import INEXACT, Bench, all_reasons, plain_robot, reasons, wakes
 from harvey.simulation.simulated_run import build_robot_model
 from knowledge_sources.reads import has_missed
@@ -29,6 +29,7 @@ from world_models.entries import (
     Subgoal,
     diagonal,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.task import MilestoneStatus
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2

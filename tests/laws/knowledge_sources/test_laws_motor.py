@@ -11,7 +11,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from blackboard import Discrepancy, Effect, Entry, Level, Posted, Revised
+from blackboard import Effect, Entry, Level, Posted, Revised
 from generated_boards import (
     HALL,
     Bench,
@@ -37,6 +37,7 @@ from knowledge_sources.reads.floor_ahead import MIN_INCREMENT_M, TOUCH_HOLDS_M, 
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.entries import Contact, Drift, Leg, Milestone, MotorCommand, Obstacle, Place
+from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 

@@ -11,7 +11,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from blackboard import Discrepancy, Effect, Entry, Level, Posted, Revise, Revised
+from blackboard import Effect, Entry, Level, Posted, Revise, Revised
 from generated_boards import (
     HALL,
     Bench,
@@ -41,6 +41,7 @@ from knowledge_sources.reads import FloorAhead
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.entries import Course, Drift, Leg, MotionReport, MotorCommand, Outcome, Place
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 ACTUATOR = ActuatorModel()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from blackboard import Discrepancy, Entry, Level, Posted
+from blackboard import Entry, Level, Posted
 from generated_boards import (
     Bench,
     covariances,
@@ -23,6 +23,7 @@ from generated_boards import (
 )
 from knowledge_sources.milestone.plan_adjuster import plan_adjuster
 from world_models.entries import Certificate, Hypothesis, MilestoneVerdict, PoseFix
+from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.location import Covariance
 from world_models.frames import Pose2
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acting import answer
-from blackboard import Discrepancy, Effect, Entry, Level, Post, Posted, Revise, Revised
+from blackboard import Effect, Entry, Level, Post, Posted, Revise, Revised
 from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, MIN_OBSTACLE_CERTAINTY, MIN_THING_CERTAINTY
 from knowledge_sources.methods.floor.weigh_sight import (
     CAMOUFLAGED_FREE_ODDS,
@@ -36,6 +36,7 @@ from world_models.entries import (
     PlanSketch,
     Subgoal,
 )
+from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.floor import FloorSense
 
 SOURCE, S = ThingMapper(), DEFAULT.action

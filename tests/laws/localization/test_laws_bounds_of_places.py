@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard import Discrepancy, Level
+from blackboard import Level
 from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.belief import MAX_SLIP_CHI2, MIN_P_BELIEVED, SLIP_SIGMA_M, SLIP_SIGMA_RAD
 from knowledge_sources.methods.features import MIN_BRIGHTNESS, MIN_CONTRAST
@@ -56,6 +56,7 @@ from knowledge_sources.reads.place_believed import MIN_P_ALIAS, P_DISPLACED_TO_A
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries import AliasOdds, PlaceOdds, Segments
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

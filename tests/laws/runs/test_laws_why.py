@@ -37,6 +37,7 @@ from logs.records import Candidate, DecisionRecord, EntryRecord, as_line, decisi
 from logs.timeline import Timeline
 from memory_timeline import MemoryTimeline
 from strategies import Note, Scripted, Tally
+from world_models.entries.discrepancy import LADDER
 
 LAWS = settings(deadline=None, max_examples=60)
 KNOWN = re.compile(", as (above|below)$")
@@ -72,7 +73,7 @@ def journals(draw: st.DrawFn) -> list[str]:
     decisions: list[Decision] = []
     choices = draw(st.lists(st.integers(0, 60), min_size=1, max_size=120))
     second = Scripted("second", Tally, lambda view, trigger: [Post(Note("seen"), (trigger.entry,))], rate=0.4)
-    scheduler = Scheduler([wilful(choices), second], sinks=(decisions.append,))
+    scheduler = Scheduler([wilful(choices), second], sinks=(decisions.append,), ladder=LADDER)
     scheduler.post([Post(Note("first")), Post(Tally(1))], "user")
     for _ in range(40):
         if scheduler.step() is None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blackboard import Discrepancy, Level, plain
+from blackboard import Level, plain
 from experiments.paper.levels import _row
 from experiments.report import Report
 from experiments.scale.render_speed import measure_edge_offsets_px
@@ -21,6 +21,7 @@ from logs.explain.phrases import sentence
 from logs.records import EntryRecord
 from logs.tables import table
 from world_models.entries import Hypothesis, Leg, MotorCommand, Outcome, Track, Tracks, diagonal
+from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 from world_models.words import degrees, metres, turn
 

@@ -1,4 +1,4 @@
-"""Perceptual servoing (§2, Figure 2) as the choice rule, and the ladder that discrepancies climb.
+"""Perceptual servoing (§2, Figure 2): the ladder that discrepancies climb, and what of it is open.
 
 A discrepancy within its level's bound is corrected where it arose. Beyond it, it is passed one level up, action ->
 plan -> goal, and measured again by that level's means. The highest level with an open discrepancy is in focus; while
@@ -11,19 +11,10 @@ above a level is in focus while all open discrepancies belong to it.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
-from dataclasses import dataclass, field, replace
-from enum import IntEnum
-from functools import cache
-from itertools import groupby
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from blackboard.board import View
-from blackboard.effect import Post, Revise
-from blackboard.entry import Entry
-from blackboard.entry_store import Index
-from blackboard.kinds import inference
-from blackboard.level import Level, highest
+from blackboard import Entry, Index, Ladder, Level, Post, Revise, View, highest, inference
 
 DiscrepancyStatus = Literal["open", "corrected", "escalated"]
 
@@ -126,45 +117,5 @@ def last_escalated(view: View, level: Level) -> Entry[Discrepancy] | None:
 OPEN: Index[Discrepancy] = Index(Discrepancy, lambda found: found.level if found.is_open else None, "open")
 """Open discrepancies by their level."""
 
-
-Groups = tuple[tuple[IntEnum, ...], ...]
-"""Levels, those together that are equally near."""
-
-
-@cache
-def _nearest(levels: type[IntEnum], focus: int) -> Groups:
-    """All levels in groups, nearest to the focus first. Levels of two enums may be equal numbers: both are the key."""
-    def distance(level: IntEnum) -> int:
-        return abs(level - focus)
-
-    return tuple(tuple(group) for _, group in groupby(sorted(levels, key=distance), key=distance))
-
-
-@dataclass(frozen=True, slots=True)
-class Servoing:
-    """Which levels there are, which are switched on, and how the next activation is chosen.
-
-    Attributes:
-        off: the levels whose loops are not closed.
-        levels: an ordered enum, lowest first; a system without a ladder may have one level.
-    """
-
-    off: frozenset[IntEnum] = field(default_factory=frozenset)
-    levels: type[IntEnum] = Level
-
-    def allows(self, closes: IntEnum | None) -> bool:
-        """Whether a knowledge source that closes this loop may be activated."""
-        return closes not in self.off
-
-    def focus(self, view: View) -> IntEnum:
-        """The highest level with an open discrepancy; the lowest where there is none."""
-        found: Collection[Any] = view.keys(OPEN)
-        return max(found) if found else min(self.levels)
-
-    def nearest(self, focus: IntEnum) -> Groups:
-        """The levels, nearest to the focus first; two that are equally near stand together. Pure.
-
-        This is the choice rule: the best rated activation of the nearest level that has any is executed, and of equally
-        rated ones the oldest.
-        """
-        return _nearest(self.levels, focus)
+LADDER = Ladder(Level, OPEN)
+"""The three levels, all of them on."""
