@@ -204,6 +204,8 @@ class Follower:
             cost = 0.0 if abs(turn) < 0.8 else UNSAID_BACK if abs(turn) > 2.3 else UNSAID_TURN
             if not fits_now and abs(turn) < 2.3:
                 cost = -0.4
+            if state.moving and abs(turn) > 2.3:
+                cost *= 2.0  # nobody turns back in the middle of a walk and says nothing of it
             if along is not None and (along.names or along.side in COMPASS):
                 fit, senses = self._match.fit_area(along, self.hall_ahead(new), state.senses)
                 if along.side in COMPASS:
@@ -482,7 +484,7 @@ class Follower:
             doors = [sight for sight in self.sights(facing) if sight.feature is not None
                      and sight.feature.sort == "door" and sight.side != "behind"
                      and sight.ahead_m > (OPPOSITE_M if facing.came and facing.begun == facing.at else -0.2)
-                     and not (sight.feature.name == facing.came and sight.ahead_m < 0.3)]
+                     and sight.feature.name != facing.came]
             for sight in doors:
                 cost, senses = self._weigh_door(facing, sight, doors, what)
                 if cost > WORST:
