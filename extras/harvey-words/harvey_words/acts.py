@@ -72,7 +72,8 @@ class Act:
     """One thing to do or to see.
 
     Attributes:
-        sort: ``exit``, ``turn``, ``go``, ``find`` (the goal, or a door to go in at), ``see``, ``orient``.
+        sort: ``exit``, ``turn``, ``go``, ``find`` (the goal, or a door to go in at), ``see``, ``orient``,
+            ``note`` (that is passed somewhere on the walk).
         way: left, right, back, or a point of the compass, of a turn.
         what: that is found, seen, faced or left.
         until: where a walk or a turn ends; past: what is passed before; along: the hall that is taken.
@@ -120,6 +121,8 @@ class _Reader:
             self._orient(things, ways, wheres)
         elif "exit" in verbs:
             self._exit(things, ways, wheres)
+        elif "note" in verbs and things:
+            self.acts += [Act("note", what=thing) for thing in things]
         elif self._is_posture(parts, verbs):
             self._posture(things, wheres)
         elif "face" in verbs or (verbs & {"turn"} and not ways and wheres and wheres[0][0] in ("to", "away")):

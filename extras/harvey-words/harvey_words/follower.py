@@ -115,6 +115,9 @@ class Follower:
             yield from self._find(state, act.what)
         elif act.sort == "see" and act.what is not None:
             yield from self._see(state, act.what)
+        elif act.sort == "note" and act.what is not None:
+            best = max((cost for _, cost, _ in self._candidates(state, replace(act.what, count=""))), default=NOT_SEEN)
+            yield replace(state, odds=state.odds + max(best, NOT_SEEN), moving=True)
         elif act.sort == "orient" and act.what is not None:
             yield from self._orient(state, act.what)
         else:
