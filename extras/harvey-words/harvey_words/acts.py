@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from harvey_words.lexicon import Word
-from harvey_words.phrases import Clause, Part
+from harvey_words.word_clauses import Clause, Part
 
 SIDES = ("left", "right", "ahead", "behind", "north", "south", "east", "west")
 COMPASS = ("north", "south", "east", "west")

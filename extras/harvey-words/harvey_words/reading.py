@@ -11,8 +11,8 @@ from typing import Any
 from lark import Tree
 
 from harvey_words.acts import Act, read_acts
-from harvey_words.follower import Follower, State
-from harvey_words.phrases import read_clauses
+from harvey_words.word_clauses import read_clauses
+from harvey_words.word_follower import Follower, State
 from harvey_words.word_map import Point, WordMap
 from world_models.building.world import World
 from world_models.files.world_files import load_world
