@@ -1,6 +1,6 @@
 """Words for Harvey: route instructions of people, read on the model of a building."""
 
-from harvey_words.reading import End as End
+from harvey_words.reading import RouteEnd as RouteEnd
 from harvey_words.reading import Reading as Reading
 from harvey_words.reading import RouteError as RouteError
 from harvey_words.reading import read_route as read_route

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from harvey_words.lexicon import Word
-from harvey_words.phrases import Clause, Part
+from harvey_words.word_clauses import Clause, Part
 
 SIDES = ("left", "right", "ahead", "behind", "north", "south", "east", "west")
 COMPASS = ("north", "south", "east", "west")
@@ -22,7 +22,7 @@ LENGTHS_M = {"metre": 1.0, "foot": 0.3048}
 
 
 @dataclass(frozen=True)
-class Description:
+class ThingWords:
     """A thing, door, room, hall, crossing or end as a text describes it.
 
     Attributes:
@@ -38,7 +38,7 @@ class Description:
     names: tuple[Word, ...] = ()
     count: str = ""
     side: str = ""
-    relations: tuple[tuple[str, Description], ...] = ()
+    relations: tuple[tuple[str, ThingWords], ...] = ()
     text: str = ""
 
     @property
@@ -59,12 +59,12 @@ class Description:
             not self.heads and bool(self.names) and all(word.sort == "MOD" for word in self.names))
 
 
-def describe(words: Sequence[Word], side: str = "") -> Description:
+def describe(words: Sequence[Word], side: str = "") -> ThingWords:
     """What a row of words describes."""
     heads = frozenset(word.meaning for word in words if word.sort == "HEAD")
     counts = [word.meaning for word in words if word.sort == "COUNT"]
     names = tuple(word for word in words if word.sort not in ("HEAD", "COUNT") and word.meaning != "&")
-    return Description(heads, names, counts[0] if counts else "", side, (), " ".join(word.text for word in words))
+    return ThingWords(heads, names, counts[0] if counts else "", side, (), " ".join(word.text for word in words))
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,8 @@ class Act:
     """One thing to do or to see.
 
     Attributes:
-        sort: ``exit``, ``turn``, ``go``, ``find`` (the goal, or a door to go in at), ``see``, ``orient``.
+        sort: ``exit``, ``turn``, ``go``, ``find`` (the goal, or a door to go in at), ``see``, ``orient``,
+            ``note`` (that is passed somewhere on the walk).
         way: left, right, back, or a point of the compass, of a turn.
         what: that is found, seen, faced or left.
         until: where a walk or a turn ends; past: what is passed before; along: the hall that is taken.
@@ -83,10 +84,10 @@ class Act:
 
     sort: str
     way: str = ""
-    what: Description | None = None
-    until: Description | None = None
-    past: tuple[Description, ...] = ()
-    along: Description | None = None
+    what: ThingWords | None = None
+    until: ThingWords | None = None
+    past: tuple[ThingWords, ...] = ()
+    along: ThingWords | None = None
     units: int = 0
     metres: float = 0.0
     enters: bool = False
@@ -99,7 +100,7 @@ class _Reader:
     """Turns clauses into acts, one clause after the other."""
 
     acts: list[Act] = field(default_factory=list)
-    last_thing: Description | None = None
+    last_thing: ThingWords | None = None
     wants_orient: bool = False
     side_before: bool = False
     goes_on: bool = False
@@ -120,6 +121,8 @@ class _Reader:
             self._orient(things, ways, wheres)
         elif "exit" in verbs:
             self._exit(things, ways, wheres)
+        elif "note" in verbs and things:
+            self.acts += [Act("note", what=thing) for thing in things]
         elif self._is_posture(parts, verbs):
             self._posture(things, wheres)
         elif "face" in verbs or (verbs & {"turn"} and not ways and wheres and wheres[0][0] in ("to", "away")):
@@ -145,12 +148,12 @@ class _Reader:
             self.acts[begun:] = [replace(act, place=place, text=text) for act in self.acts[begun:]]
 
     def _collect(self, parts: Sequence[Part], verbs: set[str]) -> tuple[
-            list[Description], list[str], list[tuple[str, Description]]]:
+            list[ThingWords], list[str], list[tuple[str, ThingWords]]]:
         """Things, ways, and prepositions with their things; sides belong to the thing before them."""
-        things: list[Description] = []
+        things: list[ThingWords] = []
         ways: list[str] = []
-        wheres: list[tuple[str, Description]] = []
-        target: list[Description] | None = None
+        wheres: list[tuple[str, ThingWords]] = []
+        target: list[ThingWords] | None = None
         turning = bool(verbs & {"turn", "take"}) and not verbs & {"be"}
         for part in parts:
             side = part.side or (part.meaning if part.sort == "way" else "")
@@ -174,7 +177,7 @@ class _Reader:
             elif part.sort == "where" and side in SIDES and (turning or verbs & {"go"}):
                 ways.append(side)
             elif part.sort == "where" and side:
-                wheres.append(("on", Description(side=side)))
+                wheres.append(("on", ThingWords(side=side)))
             elif part.sort == "way":
                 ways.append(side)
         for thing in (*things, *(one for _, one in wheres)):
@@ -182,10 +185,10 @@ class _Reader:
                 self.last_thing = thing
         return things, ways, wheres
 
-    def _it(self) -> Description:
-        return self.last_thing or Description()
+    def _it(self) -> ThingWords:
+        return self.last_thing or ThingWords()
 
-    def _relation(self, meaning: str, words: Sequence[Word]) -> Iterable[tuple[str, Description]]:
+    def _relation(self, meaning: str, words: Sequence[Word]) -> Iterable[tuple[str, ThingWords]]:
         """A relation to a description; ``between`` is one to each of two."""
         cut = [index for index, word in enumerate(words) if word.meaning == "&"]
         if meaning == "between" and cut:
@@ -194,7 +197,7 @@ class _Reader:
 
     # -- the sorts of clauses ----------------------------------------------------------------------------------------
 
-    def _exit(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+    def _exit(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         by = [one for meaning, one in wheres
               if one.is_door and "door" in one.heads and meaning in ("past", "along", "to")]
         own = [thing for thing in things if thing.is_door and not ({"door"} & thing.heads and not thing.names)]
@@ -212,7 +215,7 @@ class _Reader:
         return bool(back) and not verbs & {"turn", "take", "go"} and any(
             part.words and part.sort in ("where", "thing") for part in parts[back[0]:])
 
-    def _posture(self, things: list[Description], wheres: list[tuple[str, Description]]) -> None:
+    def _posture(self, things: list[ThingWords], wheres: list[tuple[str, ThingWords]]) -> None:
         towards = [one for meaning, one in wheres if meaning in ("to", "away", "at", "on", "next-to")]
         if towards or things:
             self.acts.append(Act("orient", what=replace((towards or things)[0], side="behind")))
@@ -220,7 +223,7 @@ class _Reader:
         if rest:
             self._go([], [], rest)
 
-    def _orient(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+    def _orient(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         all_things = [*things, *(one for _, one in wheres)]
         side = next((one.side for one in all_things if one.side), ways[0] if ways else "ahead")
         side = "behind" if side == "back" else side
@@ -228,7 +231,7 @@ class _Reader:
         if what is not None:
             self.acts.append(Act("orient", what=replace(what, side=what.side or side)))
 
-    def _face(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+    def _face(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         turns = [way for way in ways if way in ("left", "right", *COMPASS)]
         self.acts += [Act("turn", way) for way in turns]
         away = any(meaning == "away" for meaning, _ in wheres)
@@ -236,7 +239,7 @@ class _Reader:
         if what and not turns:
             self.acts.append(Act("orient", what=replace(what[0], side="behind" if away else "ahead")))
 
-    def _turn(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+    def _turn(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         halls = [thing for thing in things if thing.is_stretch]
         onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch]
         at = [one for meaning, one in wheres if meaning in ("at", "on") and not one.is_stretch
@@ -255,13 +258,13 @@ class _Reader:
         if rest:
             self._go([], [], rest)
 
-    def _go(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]], *,
+    def _go(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]], *,
             until: bool = False, passing: bool = False) -> None:
         self.acts += [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
         units, metres = 0, 0.0
-        ends: list[Description] = []
-        passed: list[Description] = []
-        along: Description | None = None
+        ends: list[ThingWords] = []
+        passed: list[ThingWords] = []
+        along: ThingWords | None = None
         for meaning, one in [*(("", thing) for thing in things), *wheres]:
             if one.heads & {"unit"} or (one.count.isdigit() and not one.heads and not one.names and not one.side):
                 units = one.number or 1
@@ -293,7 +296,7 @@ class _Reader:
         for more in [one for one in ends[1:] if not (end and end.is_door and "end" in one.heads)]:
             self.acts.append(Act("find", what=more) if more.is_door else Act("see", what=more))
 
-    def _enter(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+    def _enter(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         what = [thing for thing in things if not thing.is_stretch]
         what += [one for meaning, one in wheres if meaning in ("to", "at", "in", "on") and one.is_door]
         halls = [one for one in (*things, *(one for _, one in wheres)) if one.is_stretch]
@@ -308,7 +311,7 @@ class _Reader:
             *what[0].relations, *((meaning, one) for meaning, one in wheres if meaning in RELATIONS)))
         self.acts.append(Act("find", what=_at_end(goal, wheres), enters=True))
 
-    def _state(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]],
+    def _state(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]],
                verbs: set[str]) -> None:
         """A sentence that says what is where."""
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS)
@@ -329,7 +332,7 @@ class _Reader:
         elif not things and (related or side) and self.acts and self.acts[-1].sort == "find":
             self._amend(related, side)
         elif not things and (related or side):
-            self.acts.append(Act("find", what=Description(frozenset(("door",)), side=side, relations=related)))
+            self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), side=side, relations=related)))
         ended = next((one for meaning, one in wheres if meaning in ("at", "in") and "end" in one.heads), None)
         if ended is not None and not doors:
             self.acts.append(Act("go", until=ended))
@@ -345,7 +348,7 @@ class _Reader:
         self.acts += [Act("see", what=one) for one in places
                       if not (doors and (one.is_stretch or one in doors)) and "end" not in one.heads]
 
-    def _terse(self, things: list[Description], ways: list[str], wheres: list[tuple[str, Description]]) -> None:
+    def _terse(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         """No verb: ``second door on the right``, ``left``, ``past the machine room``."""
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS and one.text)
         side = next((one.side for _, one in wheres if one.side), "")
@@ -372,7 +375,7 @@ class _Reader:
             if "ahead" in ways:
                 self.acts.append(Act("go"))
 
-    def _amend(self, related: Iterable[tuple[str, Description]], side: str) -> None:
+    def _amend(self, related: Iterable[tuple[str, ThingWords]], side: str) -> None:
         """What is said afterwards of the thing before."""
         last = self.acts[-1]
         assert last.what is not None
@@ -380,17 +383,17 @@ class _Reader:
         self.acts[-1] = replace(last, what=what)
 
 
-def _merge(things: Sequence[Description]) -> Description:
+def _merge(things: Sequence[ThingWords]) -> ThingWords:
     """``Allen's office is the next door on the left``: two descriptions of one thing."""
     first, *rest = things
     for other in rest:
-        first = Description(first.heads | other.heads, first.names + other.names, first.count or other.count,
+        first = ThingWords(first.heads | other.heads, first.names + other.names, first.count or other.count,
                             first.side or other.side, (*first.relations, *other.relations),
                             f"{first.text} {other.text}")
     return first
 
 
-def _at_end(goal: Description, wheres: Sequence[tuple[str, Description]]) -> Description:
+def _at_end(goal: ThingWords, wheres: Sequence[tuple[str, ThingWords]]) -> ThingWords:
     """``The door at the end``: the one ahead, or the last on its side."""
     if not any("end" in one.heads for meaning, one in wheres if meaning in ("at", "in", "on")):
         return goal

@@ -15,7 +15,7 @@ from experiments.report import Cell, Report
 from harvey_words.lexicon import split_text
 from harvey_words.mazes import write_maze
 from harvey_words.reading import Reading, read_route
-from harvey_words.routes import Told, draw_maze, tell_maze, tell_rooms
+from harvey_words.told_routes import Told, draw_maze, tell_maze, tell_rooms
 from harvey_words.word_map import WordMap
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
-from harvey_words.acts import Description
+from harvey_words.acts import ThingWords
 from harvey_words.lexicon import Word
-from harvey_words.word_map import COLOUR_REACH, Area, Feature, WordMap
+from harvey_words.word_map import COLOUR_REACH, Area, NamedFeature, WordMap
 
 NEUTRAL = frozenset(("long", "colored", "frame", "north", "south", "east", "west"))
 """Words by which things are hardly told apart, and points of the compass, which are no part of a thing."""
@@ -25,14 +25,14 @@ OTHER_SENSE = -1.0
 WORST = -7.0
 
 
-class Matcher:
+class WordMatcher:
     """Fits descriptions to the features and areas of a map."""
 
     def __init__(self, plan: WordMap) -> None:
         self._plan = plan
         self._words: dict[tuple[str, str, int], tuple[float, str]] = {}
 
-    def fit(self, what: Description, feature: Feature, senses: Senses) -> tuple[float, Senses]:
+    def fit(self, what: ThingWords, feature: NamedFeature, senses: Senses) -> tuple[float, Senses]:
         """How well a feature fits the words of a description, and the senses with those that it takes."""
         score = 0.0
         if what.heads & {"door", "room"} and feature.sort != "door":
@@ -50,7 +50,7 @@ class Matcher:
                 score += own
         return max(score, WORST), senses
 
-    def fit_area(self, what: Description, area: Area, senses: Senses) -> tuple[float, Senses]:
+    def fit_area(self, what: ThingWords, area: Area, senses: Senses) -> tuple[float, Senses]:
         """How well a hall or room fits."""
         score = 0.0
         if what.is_stretch and not area.is_hall:
@@ -87,6 +87,6 @@ class Matcher:
         return (UNKNOWN_MODIFIER if word.sort == "MOD" else UNKNOWN_HEAD), kind
 
 
-def _kind(of: Feature | Area) -> str:
+def _kind(of: NamedFeature | Area) -> str:
     """What a sense is kept for: all things that are called the same."""
     return " ".join(sorted(of.meanings))

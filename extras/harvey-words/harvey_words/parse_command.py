@@ -12,7 +12,7 @@ from harvey.commands.world_command import load_file
 from harvey.errors import BadInput
 
 if TYPE_CHECKING:
-    from harvey_words.reading import End, Reading
+    from harvey_words.reading import Reading, RouteEnd
 
 MOST_CHARACTERS = 10_000
 
@@ -56,7 +56,7 @@ def tell(reading: Reading) -> Iterator[str]:
         yield f"Did not fit: '{phrase}'."
 
 
-def name_end(end: End) -> str:
+def name_end(end: RouteEnd) -> str:
     """A place in words."""
     at = f"at ({end.x_m:.1f}, {end.y_m:.1f}), facing {end.heading_rad * 57.29578:.0f}°"
     return f"{end.locale}, door {end.door}, {at}" if end.door else f"{end.locale}, {at}"

@@ -11,8 +11,8 @@ from typing import Any
 from lark import Tree
 
 from harvey_words.acts import Act, read_acts
-from harvey_words.follower import Follower, State
-from harvey_words.phrases import read_clauses
+from harvey_words.word_clauses import read_clauses
+from harvey_words.word_follower import State, WordFollower
 from harvey_words.word_map import Point, WordMap
 from world_models.building.world import World
 from world_models.files.world_files import load_world
@@ -30,7 +30,7 @@ class RouteError(ValueError):
 
 
 @dataclass(frozen=True)
-class End:
+class RouteEnd:
     """Where a text may lead.
 
     Attributes:
@@ -66,11 +66,11 @@ class Reading:
     text: str
     tree: Tree[Any]
     acts: tuple[Act, ...]
-    ends: tuple[End, ...]
+    ends: tuple[RouteEnd, ...]
     unused: tuple[str, ...] = field(default=())
 
     @property
-    def end(self) -> End | None:
+    def end(self) -> RouteEnd | None:
         """The best end; None where the text tells no way at all."""
         return self.ends[0] if self.ends else None
 
@@ -113,7 +113,7 @@ def read_route(text: str, world: World | str | PathLike[str] | WordMap, start: s
     begin = _begin(plan, start, heading_deg)
     tree, clauses = read_clauses(plan.lexicon.read(text))
     acts = read_acts(clauses)
-    states = Follower(plan).follow(begin, acts) if acts else []
+    states = WordFollower(plan).follow(begin, acts) if acts else []
     ends = _weigh_ends(states)
     misfits = states[0].misfits if states else ()
     return Reading(text, tree, tuple(acts), ends, tuple(acts[number].text for number in misfits if number < len(acts)))
@@ -153,7 +153,7 @@ def _read_point(text: str) -> Point | None:
     return x, y
 
 
-def _weigh_ends(states: Sequence[State]) -> tuple[End, ...]:
+def _weigh_ends(states: Sequence[State]) -> tuple[RouteEnd, ...]:
     """The ends of the hypotheses, those at one place together."""
     groups: list[list[State]] = []
     for state in states:
@@ -165,7 +165,7 @@ def _weigh_ends(states: Sequence[State]) -> tuple[End, ...]:
     weights = [max(math.exp(state.odds) for state in group) for group in groups]
     total = sum(weights) + math.exp(NOTHING_FITS)
     return tuple(sorted((
-        End(group[0].locale, group[0].door, group[0].at[0], group[0].at[1], group[0].heading, weight / total,
+        RouteEnd(group[0].locale, group[0].door, group[0].at[0], group[0].at[1], group[0].heading, weight / total,
             group[0].way) for group, weight in zip(groups, weights, strict=True)),
         key=lambda end: (-end.odds, end.locale, end.x_m, end.y_m)))
 

@@ -29,7 +29,7 @@ COLOUR_REACH = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Feature:
+class NamedFeature:
     """Something that a text may name: a door, an opening from hall to hall, a lift or stairs, a thing.
 
     Attributes:
@@ -80,7 +80,7 @@ class Area:
     half: Point
     meanings: frozenset[str]
     colours: tuple[tuple[float, float, float], ...]
-    features: tuple[Feature, ...] = ()
+    features: tuple[NamedFeature, ...] = ()
 
 
 def turned(heading: float, by: float) -> float:
@@ -109,7 +109,7 @@ class WordMap:
         for face in world.faces:
             for depth in range(1, face.name.count("/") + 2):
                 self._surfaces.setdefault("/".join(face.name.split("/")[:depth]), []).append(face)
-        self._looks: dict[tuple[str, float, float, float], tuple[Sight, ...]] = {}
+        self._looks: dict[tuple[str, float, float, float], tuple[NamedSight, ...]] = {}
 
     @cached_property
     def areas(self) -> Mapping[str, Area]:
@@ -151,7 +151,7 @@ class WordMap:
         """Whether a doorway is an opening without a frame."""
         return not any("/casing/" in face.name for face in self._surfaces.get(f"{locale}/{door.name}", ()))
 
-    def _features(self, name: str, areas: Mapping[str, Area]) -> Iterator[Feature]:
+    def _features(self, name: str, areas: Mapping[str, Area]) -> Iterator[NamedFeature]:
         locale = self.world.locales[name]
         said: Mapping[str, str] = locale.properties.get(WORDS_OF, {})
         for door in self.world.doorways_of(name):
@@ -159,7 +159,7 @@ class WordMap:
             plain = beyond.is_hall and (areas[name].is_hall and self._is_plain(name, door))
             faces = self._surfaces.get(f"{name}/{door.name}", [])
             own = self.lexicon.meanings(f"{door.name} {said.get(door.name, '')}") | _textures(faces)
-            yield Feature(door.name, "opening" if plain else "door", name, (pose.x_m, pose.y_m), pose.heading_rad,
+            yield NamedFeature(door.name, "opening" if plain else "door", name, (pose.x_m, pose.y_m), pose.heading_rad,
                           own | beyond.meanings, own, _colours(faces), beyond.name, True)
         for face in self._surfaces.get(name, ()):
             if face.name.endswith("/leaf") and face.name.count("/") == 2:
@@ -167,24 +167,26 @@ class WordMap:
         for link in self.world.links:
             if name in link.between:
                 x, y, _ = link.stop_of(name).tolist()
-                yield Feature(link.name, "door", name, (x, y), None, self.lexicon.meanings(f"{link.name} {link.kind}"),
+                yield NamedFeature(link.name, "door", name, (x, y), None,
+                                   self.lexicon.meanings(f"{link.name} {link.kind}"),
                               frozenset((link.kind,)), (), link.other(name), True)
         for thing in self.world.frame(name).things:
             x, y = thing.footprint_world.mean(axis=0).tolist()
             faces = self._surfaces.get(thing.name, [])
             short = thing.name.rpartition("/")[2]
             words = self.lexicon.meanings(f"{thing.kind} , {short} , {said.get(short, '')}") | _textures(faces)
-            yield Feature(thing.name, "thing", name, (x, y), self._toward_wall(areas[name], (x, y), thing.protrusion_m),
+            yield NamedFeature(thing.name, "thing", name, (x, y), self._toward_wall(areas[name], (x, y),
+                                                                                    thing.protrusion_m),
                           words, words, _colours(faces), own_kind=thing.kind)
 
-    def _shut_door(self, locale: str, leaf: Face, said: Mapping[str, str]) -> Feature:
+    def _shut_door(self, locale: str, leaf: Face, said: Mapping[str, str]) -> NamedFeature:
         short = leaf.name.split("/")[1]
         x, y = leaf.polygon_world.mean(axis=0)[:2].tolist()
         faces = self._surfaces[f"{locale}/{short}"]
         one, two, three = leaf.polygon_world[:3]
         normal = np.cross(two - one, three - two)
         words = self.lexicon.meanings(f"{short} {said.get(short, '')}") | _textures(faces)
-        return Feature(short, "door", locale, (x, y), math.atan2(-normal[1], -normal[0]), words, words,
+        return NamedFeature(short, "door", locale, (x, y), math.atan2(-normal[1], -normal[0]), words, words,
                        _colours(faces))
 
     def _toward_wall(self, area: Area, at: Point, protrusion_m: float | None) -> float | None:
@@ -198,37 +200,37 @@ class WordMap:
 
     # -- looking ---------------------------------------------------------------------------------------------------
 
-    def look(self, locale: str, at: Point, heading: float) -> tuple[Sight, ...]:
+    def look(self, locale: str, at: Point, heading: float) -> tuple[NamedSight, ...]:
         """What is seen along a heading, through all halls in line, nearest first; what is behind comes with < 0."""
         key = locale, round(at[0], 2), round(at[1], 2), round(heading, 3)
         if key not in self._looks:
             self._looks[key] = tuple(sorted(self._look(locale, at, heading), key=lambda sight: sight.ahead_m))
         return self._looks[key]
 
-    def _look(self, locale: str, at: Point, heading: float) -> Iterator[Sight]:
+    def _look(self, locale: str, at: Point, heading: float) -> Iterator[NamedSight]:
         area, begin_m, here = self.areas[locale], 0.0, at
         seen = {locale}
         while True:
-            onward: tuple[float, Feature] | None = None
+            onward: tuple[float, NamedFeature] | None = None
             for feature in area.features:
                 ahead, left = offsets(here, heading, feature.at)
                 side = _side(heading, feature, left)
-                yield Sight(feature, begin_m + ahead, left, side, area.name)
+                yield NamedSight(feature, begin_m + ahead, left, side, area.name)
                 if (area.is_hall and side == "ahead" and feature.is_open and feature.beyond is not None
                         and abs(left) < WALKED_M and feature.outward is not None
                         and self.areas[feature.beyond].is_hall and feature.sort == "opening"):
                     onward = ahead, feature
             gap_m = wall_gap(area, here, heading)
             if onward is None or onward[1].beyond in seen or len(seen) > 200:
-                yield Sight(None, begin_m + gap_m, 0.0, "ahead", area.name)
+                yield NamedSight(None, begin_m + gap_m, 0.0, "ahead", area.name)
                 return
             begin_m, here, area = begin_m + onward[0], onward[1].at, self.areas[onward[1].beyond or ""]
             seen.add(area.name)
-            yield Sight(None, begin_m + area.half[0 if is_level(area.axis, heading) else 1], 0.0, "in", area.name)
+            yield NamedSight(None, begin_m + area.half[0 if is_level(area.axis, heading) else 1], 0.0, "in", area.name)
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class NamedSight:
     """A feature as seen along a heading.
 
     Attributes:
@@ -238,7 +240,7 @@ class Sight:
         locale: where.
     """
 
-    feature: Feature | None
+    feature: NamedFeature | None
     ahead_m: float
     left_m: float
     side: str
@@ -269,7 +271,7 @@ def wall_gap(area: Area, here: Point, heading: float) -> float:
     return ahead + area.half[0 if is_level(area.axis, heading) else 1]
 
 
-def _side(heading: float, feature: Feature, left_m: float) -> str:
+def _side(heading: float, feature: NamedFeature, left_m: float) -> str:
     if feature.outward is not None:
         for side, turn in (("ahead", 0.0), ("left", math.pi / 2), ("right", -math.pi / 2), ("behind", math.pi)):
             if is_along(feature.outward, heading + turn):

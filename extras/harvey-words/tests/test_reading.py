@@ -16,7 +16,7 @@ from harvey_words import Reading, RouteError, read_route
 from harvey_words.instructions import draw_routes, read_paragraphs, run
 from harvey_words.lexicon import Lexicon, edit_distance, lexicon_data
 from harvey_words.mazes import HALLS, THINGS, write_maze
-from harvey_words.routes import tell_maze
+from harvey_words.told_routes import tell_maze
 from harvey_words.word_map import WordMap
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world

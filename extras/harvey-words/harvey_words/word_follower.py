@@ -10,9 +10,20 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from harvey_words.acts import COMPASS, Act, Description
-from harvey_words.matching import MISFIT, UNKNOWN_HEAD, WORST, Matcher, Senses
-from harvey_words.word_map import Area, Feature, Point, Sight, WordMap, is_along, is_level, moved, offsets, turned
+from harvey_words.acts import COMPASS, Act, ThingWords
+from harvey_words.matching import MISFIT, UNKNOWN_HEAD, WORST, Senses, WordMatcher
+from harvey_words.word_map import (
+    Area,
+    NamedFeature,
+    NamedSight,
+    Point,
+    WordMap,
+    is_along,
+    is_level,
+    moved,
+    offsets,
+    turned,
+)
 
 BEAM, FEW = 80, 12
 """Hypotheses that are followed on: after an act, and within one."""
@@ -81,12 +92,12 @@ def _best(states: Iterable[State], count: int = FEW) -> list[State]:
     return sorted(states, key=lambda one: (-one.odds, one.locale, one.at, one.heading))[:count]
 
 
-class Follower:
+class WordFollower:
     """Follows acts on one map."""
 
     def __init__(self, plan: WordMap) -> None:
         self.plan = plan
-        self._match = Matcher(plan)
+        self._match = WordMatcher(plan)
 
     def follow(self, begin: Iterable[State], acts: Sequence[Act]) -> list[State]:
         """The hypotheses after all acts, best first; none is left out that is nearly as good as the best."""
@@ -115,6 +126,9 @@ class Follower:
             yield from self._find(state, act.what)
         elif act.sort == "see" and act.what is not None:
             yield from self._see(state, act.what)
+        elif act.sort == "note" and act.what is not None:
+            best = max((cost for _, cost, _ in self._candidates(state, replace(act.what, count=""))), default=NOT_SEEN)
+            yield replace(state, odds=state.odds + max(best, NOT_SEEN), moving=True)
         elif act.sort == "orient" and act.what is not None:
             yield from self._orient(state, act.what)
         else:
@@ -126,7 +140,7 @@ class Follower:
         """Where a hypothesis stands."""
         return self.plan.areas[state.locale]
 
-    def sights(self, state: State) -> tuple[Sight, ...]:
+    def sights(self, state: State) -> tuple[NamedSight, ...]:
         """What it sees along its heading."""
         return self.plan.look(state.locale, state.at, state.heading)
 
@@ -142,7 +156,7 @@ class Follower:
                 found.append(heading)
         return found
 
-    def _leads(self, state: State, feature: Feature, heading: float) -> bool:
+    def _leads(self, state: State, feature: NamedFeature, heading: float) -> bool:
         """Whether an opening to another hall is here, in a direction."""
         if feature.sort != "opening" or feature.outward is None or not is_along(feature.outward, heading):
             return False
@@ -158,7 +172,7 @@ class Follower:
                 return self.plan.areas[feature.beyond or state.locale]
         return area
 
-    def stand(self, state: State, sight: Sight, beyond_m: float = 0.0) -> State:
+    def stand(self, state: State, sight: NamedSight, beyond_m: float = 0.0) -> State:
         """The same hypothesis at what it saw, in the middle of the hall there."""
         area = self.plan.areas[sight.locale]
         at = moved(state.at, state.heading, max(sight.ahead_m, 0.0) + beyond_m)
@@ -174,9 +188,9 @@ class Follower:
             return state
         return replace(state, locale=name, at=at, way=(*state.way, (name, round(at[0], 2), round(at[1], 2))))
 
-    def nodes(self, state: State) -> list[Sight]:
+    def nodes(self, state: State) -> list[NamedSight]:
         """The crossings, corners and the end ahead, nearest first; where one stands is none."""
-        found: list[Sight] = []
+        found: list[NamedSight] = []
         for sight in self.sights(state):
             area = self.plan.areas[sight.locale]
             feature = sight.feature
@@ -190,7 +204,7 @@ class Follower:
             found.append(sight)
         return found
 
-    def _facings(self, state: State, along: Description | None) -> Iterator[State]:
+    def _facings(self, state: State, along: ThingWords | None) -> Iterator[State]:
         """The hypothesis out in the hall, facing the ways that it may go on, those that are not said at a price."""
         if not self.area(state).is_hall:
             for out in self._leave(state, None):
@@ -204,6 +218,8 @@ class Follower:
             cost = 0.0 if abs(turn) < 0.8 else UNSAID_BACK if abs(turn) > 2.3 else UNSAID_TURN
             if not fits_now and abs(turn) < 2.3:
                 cost = -0.4
+            if state.moving and abs(turn) > 2.3:
+                cost *= 2.0  # nobody turns back in the middle of a walk and says nothing of it
             if along is not None and (along.names or along.side in COMPASS):
                 fit, senses = self._match.fit_area(along, self.hall_ahead(new), state.senses)
                 if along.side in COMPASS:
@@ -222,7 +238,7 @@ class Follower:
             return
         yield from self._leave(state, act.along)
 
-    def _leave(self, state: State, by: Description | None) -> Iterator[State]:
+    def _leave(self, state: State, by: ThingWords | None) -> Iterator[State]:
         """Out of a room by each of its open doors."""
         for feature in self.area(state).features:
             if feature.is_open and feature.beyond is not None:
@@ -297,7 +313,7 @@ class Follower:
                 if rank == act.units:
                     yield from self._turn_to(there, state.heading + TURNS[act.way], act, 0.0)
         if not rank:
-            yield from self._find(state, Description(frozenset(("door",)), count=str(act.units), side=act.way))
+            yield from self._find(state, ThingWords(frozenset(("door",)), count=str(act.units), side=act.way))
         elif rank < act.units:
             yield replace(state, odds=state.odds + MISSED)
 
@@ -337,7 +353,7 @@ class Follower:
         if nodes and len(nodes) < units:
             yield replace(self.stand(state, nodes[-1]), odds=state.odds + MISSED)
 
-    def _pass(self, state: State, what: Description) -> Iterator[State]:
+    def _pass(self, state: State, what: ThingWords) -> Iterator[State]:
         """Beyond what is passed."""
         any_seen = False
         for sight, cost, senses in self._candidates(state, what):
@@ -349,7 +365,7 @@ class Follower:
             known = any(word.meaning in self.plan.vocabulary for word in what.names)
             yield replace(state, odds=state.odds + (MISSED - 1.0 if known else UNKNOWN_HEAD), moving=True)
 
-    def _reach(self, state: State, what: Description) -> Iterator[State]:
+    def _reach(self, state: State, what: ThingWords) -> Iterator[State]:
         """At what is to be reached."""
         if what.heads & {"end", "wall"} or (what.heads & {"corner"} and not what.number):
             last = self.nodes(state)[-1:]
@@ -372,7 +388,7 @@ class Follower:
         if not found or what.names:
             yield replace(state, odds=state.odds + (MISSED - 1.0 if known else UNKNOWN_HEAD), moving=True)
 
-    def _candidates(self, state: State, what: Description) -> Iterator[tuple[Sight, float, Senses]]:
+    def _candidates(self, state: State, what: ThingWords) -> Iterator[tuple[NamedSight, float, Senses]]:
         """What is seen ahead and fits, nearest first, each with its price."""
         rank = 0
         taken = -math.inf
@@ -389,7 +405,7 @@ class Follower:
             if fit + cost > WORST:
                 yield sight, fit + cost, senses
 
-    def _sights_for(self, state: State, what: Description) -> Iterable[Sight]:
+    def _sights_for(self, state: State, what: ThingWords) -> Iterable[NamedSight]:
         """The sights that a description may be of: crossings for a crossing or hall, features for the rest."""
         if what.heads & {"crossing", "corner"} or what.is_stretch or not (what.heads or what.names):
             return self.nodes(state)
@@ -397,7 +413,7 @@ class Follower:
         return [sight for sight in self.sights(state) if sight.feature is not None and sight.feature.sort != "opening"
                 and sight.ahead_m > least and sight.side != "behind"]
 
-    def _fit_sight(self, state: State, sight: Sight, what: Description) -> tuple[float, Senses]:
+    def _fit_sight(self, state: State, sight: NamedSight, what: ThingWords) -> tuple[float, Senses]:
         if sight.feature is not None and sight.feature.sort != "opening":
             return self._match.fit(what, sight.feature, state.senses)
         there = self.stand(state, sight)
@@ -412,7 +428,7 @@ class Follower:
             return self._best_here(there, replace(what, heads=frozenset()), halls)
         return 0.0, state.senses
 
-    def _best_here(self, state: State, what: Description, halls: Sequence[Area]) -> tuple[float, Senses]:
+    def _best_here(self, state: State, what: ThingWords, halls: Sequence[Area]) -> tuple[float, Senses]:
         """The best fit of the halls that leave here and of what stands here."""
         fits = [self._match.fit_area(what, hall, state.senses) for hall in halls]
         fits += [self._match.fit(what, feature, state.senses) for feature in self.area(state).features
@@ -421,7 +437,7 @@ class Follower:
 
     # -- the goal ------------------------------------------------------------------------------------------------------
 
-    def _find(self, state: State, what: Description) -> Iterator[State]:
+    def _find(self, state: State, what: ThingWords) -> Iterator[State]:
         """At each door, or thing, that may be meant."""
         if what.heads & {"crossing", "corner", "end"} and not what.heads & {"door"}:
             for facing in self._facings(state, None):
@@ -445,7 +461,7 @@ class Follower:
         yield from self._anywhere(state, what)
         yield replace(state, odds=state.odds + WORST)
 
-    def _anywhere(self, state: State, what: Description) -> Iterator[State]:
+    def _anywhere(self, state: State, what: ThingWords) -> Iterator[State]:
         """What is named and out of sight, wherever it is: a goal without a way."""
         if not what.names:
             return
@@ -461,9 +477,10 @@ class Follower:
                 if fit > UNKNOWN_HEAD and feature.sort == "door" and area.is_hall:
                     ahead = feature.outward if feature.outward is not None else 0.0
                     before = replace(here, at=feature.at, heading=ahead)
-                    yield self._at_door(before, Sight(feature, 0.0, 0.0, "ahead", area.name), here.odds + fit, senses)
+                    yield self._at_door(before, NamedSight(feature, 0.0, 0.0, "ahead", area.name),
+                                        here.odds + fit, senses)
 
-    def _named_crossing(self, state: State, what: Description) -> Iterator[State]:
+    def _named_crossing(self, state: State, what: ThingWords) -> Iterator[State]:
         """A crossing or end of halls, each word of which is said of one that leaves here or of what stands here."""
         ways = self.ways(state)
         if (what.heads & {"end"} and len(ways) > 2) or (what.heads & {"corner"} and len(ways) != 2):
@@ -471,25 +488,25 @@ class Follower:
         halls = [self.hall_ahead(replace(state, heading=way)) for way in ways]
         odds, senses = state.odds, state.senses
         for word in what.names:
-            fit, senses = self._best_here(replace(state, senses=senses), Description(names=(word,)), halls)
+            fit, senses = self._best_here(replace(state, senses=senses), ThingWords(names=(word,)), halls)
             odds += fit
         if odds > state.odds + WORST:
             yield replace(state, odds=odds, senses=senses)
 
-    def _find_from(self, facings: Iterable[State], what: Description) -> Iterator[State]:
+    def _find_from(self, facings: Iterable[State], what: ThingWords) -> Iterator[State]:
         """The doors that may be meant from where one stands, along the ways that one may face."""
         for facing in facings:
             doors = [sight for sight in self.sights(facing) if sight.feature is not None
                      and sight.feature.sort == "door" and sight.side != "behind"
                      and sight.ahead_m > (OPPOSITE_M if facing.came and facing.begun == facing.at else -0.2)
-                     and not (sight.feature.name == facing.came and sight.ahead_m < 0.3)]
+                     and sight.feature.name != facing.came]
             for sight in doors:
                 cost, senses = self._weigh_door(facing, sight, doors, what)
                 if cost > WORST:
                     yield self._at_door(facing, sight, facing.odds + cost, senses)
 
-    def _weigh_door(self, state: State, sight: Sight, doors: Sequence[Sight],
-                    what: Description) -> tuple[float, Senses]:
+    def _weigh_door(self, state: State, sight: NamedSight, doors: Sequence[NamedSight],
+                    what: ThingWords) -> tuple[float, Senses]:
         """Words, side, rank and relations of a door, together."""
         assert sight.feature is not None
         cost, senses = self._match.fit(what, sight.feature, state.senses)
@@ -525,7 +542,7 @@ class Follower:
         turn = math.remainder(POINTS[side] - state.heading, math.tau)
         return "left" if 0.8 < turn < 2.3 else "right" if -2.3 < turn < -0.8 else "ahead"
 
-    def _weigh_rank(self, what: Description, rank: int, count: int, open_rank: int, open_count: int,
+    def _weigh_rank(self, what: ThingWords, rank: int, count: int, open_rank: int, open_count: int,
                     only_open: bool) -> float:
         related = any(relation in ("past", "before", "across", "next-to", "between") for relation, _ in what.relations)
         if what.count == "last":
@@ -537,8 +554,8 @@ class Follower:
             return 0.0 if rank == number else OPEN_ONLY if open_rank == number else WRONG_RANK
         return 0.0 if what.names or related else AGAIN * min(rank - 1, 3)
 
-    def _weigh_between(self, state: State, sight: Sight, doors: Sequence[Sight], one: Description,
-                       other: Description) -> float:
+    def _weigh_between(self, state: State, sight: NamedSight, doors: Sequence[NamedSight], one: ThingWords,
+                       other: ThingWords) -> float:
         """How well a door lies between two things: on their side, with no other door there."""
         best = WRONG_SIDE
         marks = [mark for mark in self.sights(state) if mark.feature is not None and mark.feature.sort != "opening"]
@@ -553,8 +570,8 @@ class Follower:
                     best = max(best, fit + more + AGAIN * rivals + AGAIN * sides)
         return best
 
-    def _weigh_relation(self, state: State, sight: Sight, doors: Sequence[Sight], relation: str,
-                        other: Description) -> float:
+    def _weigh_relation(self, state: State, sight: NamedSight, doors: Sequence[NamedSight], relation: str,
+                        other: ThingWords) -> float:
         """How well a door lies to other things as it is said."""
         best = -2.0 if not any(word.meaning in self.plan.vocabulary for word in other.names) else -3.5
         rank = 0
@@ -584,7 +601,7 @@ class Follower:
             best = max(best, -abs(sight.ahead_m) / 2.0)
         return best
 
-    def _at_door(self, state: State, sight: Sight, odds: float, senses: Senses) -> State:
+    def _at_door(self, state: State, sight: NamedSight, odds: float, senses: Senses) -> State:
         """At a door: in the room behind it where it is open, else before it."""
         feature = sight.feature
         assert feature is not None
@@ -597,7 +614,7 @@ class Follower:
 
     # -- what is seen --------------------------------------------------------------------------------------------------
 
-    def _see(self, state: State, what: Description) -> Iterator[State]:
+    def _see(self, state: State, what: ThingWords) -> Iterator[State]:
         """Where a thing is as it is said; walking on to where it is, if one was walking."""
         here, senses = self._seen_from(state, what)
         if not state.moving:
@@ -609,7 +626,7 @@ class Follower:
             yield replace(self.stand(state, sight), odds=state.odds + cost, senses=own, moving=True)
         yield replace(state, odds=state.odds + max(here, NOT_SEEN) - 0.5 * bool(found), senses=senses)
 
-    def _seen_from(self, state: State, what: Description) -> tuple[float, Senses]:
+    def _seen_from(self, state: State, what: ThingWords) -> tuple[float, Senses]:
         """The best fit of what is to be seen where one stands, on the side where it is said to be."""
         if not (what.heads - {"side"} or what.names):
             return 0.0, state.senses
@@ -647,7 +664,7 @@ class Follower:
             best = max(best, (fit[0] - 0.02 * abs(sight.ahead_m), fit[1]), key=lambda pair: pair[0])
         return best
 
-    def _orient(self, state: State, what: Description) -> Iterator[State]:
+    def _orient(self, state: State, what: ThingWords) -> Iterator[State]:
         """Turned so that a thing is on the side where it is said to be; before that, where one was going is reached."""
         if not self.area(state).is_hall:
             yield state

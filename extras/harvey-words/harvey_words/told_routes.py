@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from harvey_words.mazes import Hall, Node
-from harvey_words.word_map import Feature, Sight, WordMap, moved, turned
+from harvey_words.word_map import NamedFeature, NamedSight, WordMap, moved, turned
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
@@ -71,14 +71,14 @@ def tell_rooms(plan: WordMap, rng: np.random.Generator) -> Told | None:
     return Told(start.name, goal.feature.beyond or goal.feature.name, text, tuple(details))
 
 
-def _out(plan: WordMap, features: Sequence[Feature]) -> Feature | None:
+def _out(plan: WordMap, features: Sequence[NamedFeature]) -> NamedFeature | None:
     """The one door of a room that leads to a hall."""
     doors = [one for one in features if one.is_open and one.sort == "door" and one.outward is not None
              and one.beyond is not None and plan.areas[one.beyond].is_hall]
     return doors[0] if len(doors) == 1 else None
 
 
-def _tell_goal(goals: Sequence[Sight], goal: Sight, ahead: Sequence[Sight],
+def _tell_goal(goals: Sequence[NamedSight], goal: NamedSight, ahead: Sequence[NamedSight],
                rng: np.random.Generator) -> tuple[str, str]:
     """The last sentence, and one before it that a mark is passed."""
     row = [sight for sight in goals if sight.side == goal.side]
@@ -101,7 +101,7 @@ def _tell_goal(goals: Sequence[Sight], goal: Sight, ahead: Sequence[Sight],
                   f"You want the {ORDINALS[rank]} doorway on the {goal.side} hand side."], rng), ""
 
 
-def _is_first(mark: Sight, ahead: Sequence[Sight]) -> bool:
+def _is_first(mark: NamedSight, ahead: Sequence[NamedSight]) -> bool:
     """Whether no other thing of its kind comes before it."""
     assert mark.feature is not None
     kind = mark.feature.own_kind
