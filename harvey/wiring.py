@@ -21,7 +21,7 @@ from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.mission import Servo
 from world_models.plugins import SOURCES_GROUP, PluginError, load_plugin_classes
 
-SUBJECTS = ("sketcher", "milestone_selector", "action", "milestone", "relocalizer", "goal", "model", "robot", "senses")
+SUBJECTS = ("sketcher", "milestone_selector", "action", "milestone", "relocalizer", "goal", "model", "senses")
 """The folders of knowledge sources, in the order in which a mission meets them."""
 
 

@@ -1,6 +1,7 @@
-"""Senses (§3.2): does one of them lie?
+"""Senses (§3.2): what the robot learns of its own camera and wheels, and whether one of them lies.
 
-Each monitor posts what is not as expected, once and unexplained; the rivals that would explain it compete. Read
-``lens_monitor`` (the camera bends lines otherwise than is stated), ``correction_monitor`` (pictures and wheels do not
-agree on the way) and ``sense_judge`` (what follows from that).
+Read ``camera_calibrator`` (focal length and mounting, by matched lines), ``yaw_calibrator`` (where it looks aside) and
+``travel_breaker`` (what breaks the way that this is learnt from). A monitor posts what is not as expected, once and
+unexplained; the rivals that would explain it compete: ``lens_monitor`` (the camera bends lines otherwise than is
+stated), ``correction_monitor`` (pictures and wheels do not agree on the way) and ``sense_judge`` (what follows).
 """

@@ -36,11 +36,11 @@ from knowledge_sources.relocalizer.alias_monitor import AliasMonitor
 from knowledge_sources.relocalizer.localizer import Localizer
 from knowledge_sources.relocalizer.panorama_builder import PanoramaBuilder
 from knowledge_sources.relocalizer.pose_adopter import pose_adopter
-from knowledge_sources.robot.camera_calibrator import CameraCalibrator
-from knowledge_sources.robot.travel_breaker import travel_breaker
-from knowledge_sources.robot.yaw_calibrator import YawCalibrator
+from knowledge_sources.senses.camera_calibrator import CameraCalibrator
 from knowledge_sources.senses.correction_monitor import CorrectionMonitor
 from knowledge_sources.senses.lens_monitor import LensMonitor
+from knowledge_sources.senses.travel_breaker import travel_breaker
+from knowledge_sources.senses.yaw_calibrator import YawCalibrator
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, RunHead
 from logs.run_recorder import RunRecorder

@@ -19,7 +19,7 @@ from knowledge_sources.methods.calibration import (
     MAX_COUNTED,
     compute_camera_covariance,
 )
-from knowledge_sources.robot.camera_calibrator import CameraCalibrator
+from knowledge_sources.senses.camera_calibrator import CameraCalibrator
 from world_models.entries import CameraState, Certificate, MilestoneVerdict, PoseFix, Travel, begin_travel, diagonal
 from world_models.frames import Pose2
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from blackboard import Level, Posted, Revised
 from generated_boards import Bench, all_reasons, wakes
-from knowledge_sources.robot.travel_breaker import travel_breaker
+from knowledge_sources.senses.travel_breaker import travel_breaker
 from world_models.entries import begin_travel, diagonal
 from world_models.frames import Pose2
 

@@ -22,7 +22,7 @@ from knowledge_sources.methods.calibration import (
     SIGMA_TILT_RAD,
     SIGMA_YAW_RAD,
 )
-from knowledge_sources.robot.yaw_calibrator import (
+from knowledge_sources.senses.yaw_calibrator import (
     HEADING_SIGMA_RAD,
     MAX_TRAVEL_M,
     MAX_YAW_SIGMAS,

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from consistency import assert_soon_consistent
-from knowledge_sources.robot.yaw_calibrator import YawCalibrator
+from knowledge_sources.senses.yaw_calibrator import YawCalibrator
 from world_models.entries import Travel, begin_travel
 from world_models.frames import Pose2
 
