@@ -16,7 +16,7 @@ from types import ModuleType
 from blackboard import KnowledgeSource, Ladder, Level, Registry, registry_of
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import DEFAULT, Settings
-from world_models.entries.discrepancy import LADDER
+from world_models.entries import LADDER
 from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.mission import Servo
 from world_models.plugins import SOURCES_GROUP, PluginError, load_plugin_classes

@@ -41,8 +41,7 @@ from logs.mjpeg_file import Pictures
 from logs.run_errors import BadInput
 from world_models import words
 from world_models.building.locale_frame import FrameReference, FrameRequest, LocaleFrame
-from world_models.entries import CameraPicture
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import CameraPicture, Discrepancy
 from world_models.entries.entry_kinds import KINDS
 
 if TYPE_CHECKING:  # an explanation starts fast only where no world is imported that it does not need

@@ -37,6 +37,7 @@ from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import (
+    Discrepancy,
     Goal,
     Hypothesis,
     Leg,
@@ -51,7 +52,6 @@ from world_models.entries import (
     covariance_tuple,
     diagonal,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.location import Covariance
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world

@@ -27,8 +27,10 @@ from blackboard import (
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.entries import (
+    LADDER,
     CameraPicture,
     Certificate,
+    Discrepancy,
     Goal,
     Hypothesis,
     Leg,
@@ -47,7 +49,6 @@ from world_models.entries import (
     Tracks,
     diagonal,
 )
-from world_models.entries.discrepancy import LADDER, Discrepancy
 from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from blackboard import Blackboard, Decision, Effect, Level, Post, Revise
-from world_models.entries import BodyFault, Certificate, Hypothesis, Milestone, Outcome, Recovery, diagonal
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import BodyFault, Certificate, Discrepancy, Hypothesis, Milestone, Outcome, Recovery, diagonal
 from world_models.frames import Pose2
 
 CERTIFICATE = Certificate("Milestone-1", "", "refuted", "1 of 9 lines", 9, 3, 1, 0.1, 1.0, 0.1, 0.0, 9.0, 30.0, 1.0,

@@ -20,8 +20,7 @@ from experiments.generated.missions import write_twin_mission
 from experiments.report import Cell, Claim, Report
 from experiments.trials import at_least, at_most, judge_rare
 from harvey.campaign.mission_task import Task
-from world_models.entries import AliasOdds, Outcome, PlaceOdds
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import AliasOdds, Discrepancy, Outcome, PlaceOdds
 
 RIGHT, WRONG = "right", "wrong"
 MISSIONS, QUICK_MISSIONS = 3_000, 4

@@ -29,8 +29,7 @@ from sim.ground_truth.inexact import EXACT
 from sim.render.sensor import SensorParameters
 from sim.scenario_names import SCENARIOS
 from world_models import entries
-from world_models.entries import ALERT_LIMIT_M, RISK
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import ALERT_LIMIT_M, RISK, Discrepancy
 from world_models.frames import Pose2
 
 MIN_AVAILABLE, MIN_NAMED = 0.95, 0.95

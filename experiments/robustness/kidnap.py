@@ -43,8 +43,7 @@ from sim.body.simulated_building import SimulatedBuilding
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
-from world_models.entries import BodyFault, CameraPicture, Hypothesis, Panorama, Place, diagonal
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import BodyFault, CameraPicture, Discrepancy, Hypothesis, Panorama, Place, diagonal
 from world_models.frame_building import FrameBuilding
 from world_models.frame_store import FrameStore
 from world_models.frames import Pose2

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from blackboard import Change, Effect, KnowledgeSource, Level, Post, Posted, Revise, Scheduler, View, Watch, inference
 from logs.journal_file import JournalFile
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy
 
 DOUBT_EVERY = 20
 """One picture in this many shows something unexpected."""

@@ -8,7 +8,7 @@ from typing import Any
 from blackboard import Change, Effect, KnowledgeSource, Port, Post, Posted, Revise, Scheduler
 from world_models.building.locale_frame import FrameRequest
 from world_models.building.world import World
-from world_models.entries.discrepancy import LADDER
+from world_models.entries import LADDER
 from world_models.entries.entry_kinds import KINDS
 from world_models.frame_store import FrameStore
 from world_models.robot import RobotModel

@@ -46,8 +46,7 @@ from knowledge_sources.reads import (
     with_anchors,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Anchor, CameraPicture, Drift, Hypothesis, Track, Tracks
-from world_models.entries.discrepancy import Discrepancy, open_or_measure
+from world_models.entries import Anchor, CameraPicture, Discrepancy, Drift, Hypothesis, Track, Tracks, open_or_measure
 
 MAX_MISSES = 2  # a landmark that is not found so many times in a row is dropped
 MIN_EXPECTED_LANDMARKS = 4  # fewest expected landmarks that can make a discrepancy

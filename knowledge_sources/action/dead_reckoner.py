@@ -18,6 +18,7 @@ from world_models.camera import YAW
 from world_models.entries import (
     BodyFault,
     Course,
+    Discrepancy,
     Drift,
     Hypothesis,
     MotionReport,
@@ -26,7 +27,6 @@ from world_models.entries import (
     Travel,
     begin_travel,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 MIN_CLAIMED_PART = 0.7  # if the wheels claim less than this part of a move, something stopped the robot

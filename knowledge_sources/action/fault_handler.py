@@ -16,6 +16,7 @@ from world_models.entries import (
     BodyFault,
     Contact,
     Course,
+    Discrepancy,
     Impasse,
     MotorCommand,
     PictureRequest,
@@ -23,7 +24,6 @@ from world_models.entries import (
     Redirection,
     Ride,
 )
-from world_models.entries.discrepancy import Discrepancy
 
 MAX_FAULT_S = 30.0  # a fault that lasts longer ends the mission
 MAX_BROKEN_MOTIONS = 5  # so many motions broken off in a row end the mission

@@ -33,8 +33,7 @@ from knowledge_sources.reads import (
     rolling_course,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Course, Drift, Hypothesis, Leg, Milestone, PlanSketch
-from world_models.entries.discrepancy import Discrepancy, correct
+from world_models.entries import Course, Discrepancy, Drift, Hypothesis, Leg, Milestone, PlanSketch, correct
 
 ROLLING_LOOKAHEAD_M = 0.75  # distance ahead on the line at which the path follower steers (pure pursuit)
 MIN_ROLLING_LEG_M = 0.3  # shortest rest of a leg, beyond the stopping distance, that is driven without stopping

@@ -9,8 +9,7 @@ from blackboard import Change, Effect, Entry, Level, Post, Revise, View, Watch
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import deepest_sketch, is_over
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Impasse, PlanSketch
-from world_models.entries.discrepancy import Discrepancy, last_escalated
+from world_models.entries import Discrepancy, Impasse, PlanSketch, last_escalated
 
 MAX_CHECKS_PER_SUBGOAL = 20
 """So often the action level may ask the plan level on the way to one subgoal; then it is blocked."""

@@ -9,8 +9,7 @@ from blackboard import Change, Effect, Level, Post, Revise, Revised, View, Watch
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import LOST, active_goal, find_building
 from world_models.building.locale_frame import FrameRequest
-from world_models.entries import Goal, Hypothesis, Place
-from world_models.entries.discrepancy import Discrepancy, correct
+from world_models.entries import Discrepancy, Goal, Hypothesis, Place, correct
 
 
 @rule(on=Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis == "relocalization"),

@@ -41,14 +41,15 @@ from world_models.entries import (
     CameraPicture,
     Certificate,
     Difference,
+    Discrepancy,
     Hypothesis,
     LineMatch,
     Milestone,
     PoseFix,
     Segments,
     Travel,
+    open_or_measure,
 )
-from world_models.entries.discrepancy import Discrepancy, open_or_measure
 
 
 class Case(NamedTuple):

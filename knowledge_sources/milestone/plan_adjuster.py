@@ -8,8 +8,7 @@ from blackboard import Change, Effect, Entry, Level, Posted, Revise, View, Watch
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, PLAN_DOUBT
 from world_models.building.locale_frame import FrameRequest
-from world_models.entries import Certificate, Hypothesis, PoseFix
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Certificate, Discrepancy, Hypothesis, PoseFix
 
 
 def find_fix(view: View, trigger: Change) -> tuple[Entry[Certificate], Entry[PoseFix]] | None:

@@ -19,8 +19,7 @@ from knowledge_sources.reads import (
     list_log_odds,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Hypothesis, Milestone
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy, Hypothesis, Milestone
 
 
 class BeliefChecker(RobotKnowledgeSource):

@@ -24,8 +24,7 @@ from knowledge_sources.reads import (
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.building import Building
-from world_models.entries import Hypothesis, Milestone, PlanSketch
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy, Hypothesis, Milestone, PlanSketch
 from world_models.frames import Pose2, wrap_angle
 
 LONG_TURN_RAD = math.radians(100.0)

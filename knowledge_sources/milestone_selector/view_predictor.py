@@ -23,8 +23,7 @@ from knowledge_sources.reads import (
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Hypothesis, Milestone, Obstruction, PictureRequest
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy, Hypothesis, Milestone, Obstruction, PictureRequest
 from world_models.frames import wrap_angle
 
 

@@ -38,8 +38,7 @@ from knowledge_sources.reads import (
     with_door_shut,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import CameraPicture, DoorPicture, DoorState, Milestone, Segments
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import CameraPicture, Discrepancy, DoorPicture, DoorState, Milestone, Segments
 
 MAX_DOUBTED_SIGMA_M = 0.3  # largest standard deviation of the place at which a shut door may explain a picture
 MAX_DOUBTED_SIGMA_RAD = 0.07  # largest standard deviation of the believed heading at which it may

@@ -31,8 +31,7 @@ from knowledge_sources.reads.questions import (
     rolling_course,
     unmeasured_doubt,
 )
-from world_models.entries import CameraPicture, CameraState, Hypothesis, Outcome, Travel
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import CameraPicture, CameraState, Discrepancy, Hypothesis, Outcome, Travel
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 from world_models.robot import RobotModel

@@ -17,13 +17,13 @@ from knowledge_sources.reads.questions import find_robot
 from world_models.entries import (
     AROUND_SIGMA_RAD,
     Contact,
+    Discrepancy,
     Glimpse,
     MotionReport,
     Panorama,
     PlanSketch,
     Segments,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 

@@ -22,6 +22,7 @@ from knowledge_sources.methods.verification import P_WRONG_STANDING, Weighed, co
 from knowledge_sources.reads.questions import find_building, find_camera, find_robot_in, open_discrepancy
 from world_models.entries import (
     AliasOdds,
+    Discrepancy,
     Hypothesis,
     MotionReport,
     PlaceOdds,
@@ -31,7 +32,6 @@ from world_models.entries import (
     RideReport,
     Travel,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 MAX_P_RIVAL = 0.03

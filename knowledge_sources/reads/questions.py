@@ -10,6 +10,7 @@ from blackboard import Blackboard, Entry, Index, Level, View
 from world_models.building.locale_frame import CHANGED, FRAME_OF, LocaleFrame
 from world_models.entries import (
     GO_ON,
+    OPEN,
     SENSES,
     BodyFault,
     CameraState,
@@ -17,6 +18,7 @@ from world_models.entries import (
     Contact,
     Course,
     Difference,
+    Discrepancy,
     Explanation,
     Footprint,
     Goal,
@@ -33,7 +35,6 @@ from world_models.entries import (
     Tracks,
     Wheels,
 )
-from world_models.entries.discrepancy import OPEN, Discrepancy
 from world_models.frame_building import FrameBuilding
 from world_models.robot import RobotModel
 

@@ -29,8 +29,7 @@ from knowledge_sources.priority import Priority
 from knowledge_sources.reads import GOING_ON, HELD, NOT_LOST, Belief, count_refuted, declare_lost
 from knowledge_sources.reads.place_believed import MIN_P_ALIAS
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Alias, AliasOdds, Certificate, PoseFix, Segments
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Alias, AliasOdds, Certificate, Discrepancy, PoseFix, Segments
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 

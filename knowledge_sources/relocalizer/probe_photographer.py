@@ -9,8 +9,7 @@ from blackboard import Change, Effect, Entry, Level, Post, Posted, Revised, View
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import LOST, WHILE_LOST, is_dark
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Hypothesis, MotionReport, PictureRequest, Segments
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy, Hypothesis, MotionReport, PictureRequest, Segments
 
 MAX_DARK_FRAMES = 150  # so many dark frames are taken while waiting for light
 

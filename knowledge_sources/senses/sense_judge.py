@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping
 from blackboard import Change, Effect, Level, Post, View, Watch, rule
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import GOING_ON, is_in_doubt
-from world_models.entries import MISLEADING, RISK, Difference, Impasse, RivalKind
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import MISLEADING, RISK, Difference, Discrepancy, Impasse, RivalKind
 
 WRONG: Mapping[RivalKind, str] = {
     "lens": "the camera's lens is another", "late pictures": "pictures are late",

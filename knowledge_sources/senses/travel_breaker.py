@@ -9,8 +9,7 @@ from dataclasses import replace
 from blackboard import Change, Effect, Entry, Level, Posted, Revise, View, Watch, rule
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import WAY
-from world_models.entries import Travel
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy, Travel
 
 
 def find_unbroken(view: View, trigger: Change) -> Entry[Discrepancy] | None:

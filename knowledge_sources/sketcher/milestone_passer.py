@@ -12,8 +12,7 @@ from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, declare_lost, find_building, find_search_here, has_missed, tell_missed
 from knowledge_sources.reads.sketches import MAX_ADJUSTMENTS
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Goal, Hypothesis, Impasse, Milestone, Place, PlaceSearch, PlanSketch
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy, Goal, Hypothesis, Impasse, Milestone, Place, PlaceSearch, PlanSketch
 
 
 class Case(NamedTuple):

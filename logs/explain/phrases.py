@@ -23,6 +23,7 @@ from world_models.entries import (
     Certificate,
     Command,
     Course,
+    Discrepancy,
     Goal,
     Hypothesis,
     Leg,
@@ -41,7 +42,6 @@ from world_models.entries import (
     Tracks,
     UserReport,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.words import count, degrees, landmark, listed, metres, point, quantity, size, turn
 
 MAX_LISTED = 4

@@ -30,6 +30,7 @@ from world_models.entries import (
     Certificate,
     Command,
     Contact,
+    Discrepancy,
     DoorState,
     Goal,
     Hypothesis,
@@ -42,7 +43,6 @@ from world_models.entries import (
     UserReport,
     find_camera_lessons,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.words import count, listed, metres
 
 WITHOUT: Mapping[str, str] = {

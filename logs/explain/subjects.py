@@ -20,6 +20,7 @@ from world_models.building.locale_frame import FrameReference, FrameRequest
 from world_models.entries import (
     CameraPicture,
     Certificate,
+    Discrepancy,
     Hypothesis,
     LineMatch,
     Milestone,
@@ -27,7 +28,6 @@ from world_models.entries import (
     PoseFix,
     Segments,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.words import count, landmark, listed
 
 FOLLOWED = (Certificate, Milestone, Discrepancy)

@@ -20,6 +20,7 @@ from world_models.entries import (
     BodyFault,
     Certificate,
     Contact,
+    Discrepancy,
     DoorState,
     Goal,
     Hypothesis,
@@ -32,7 +33,6 @@ from world_models.entries import (
     Resumed,
     UserReport,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.words import count
 
 MAIN = ("refuted", "not testable", "lost", "found", "fault", "contact", "door", "thing", "resumed", "told")

@@ -38,6 +38,7 @@ from world_models.entries import (
     Command,
     Contact,
     Course,
+    Discrepancy,
     DoorState,
     Drift,
     FloorAppearance,
@@ -71,7 +72,6 @@ from world_models.entries import (
     UserReport,
     Wheels,
 )
-from world_models.entries.discrepancy import Discrepancy
 
 MOST, MOST_PLAIN, MOST_MET = 24, 12, 200
 """Most entries that are named, of a run of another version, and most that are reached."""

@@ -18,7 +18,7 @@ from world_models.building.changes import add_extra, remove_element, remove_thin
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.building.locales import EXTRA_KIND, ROBOT_TOP_M, Doorway, Link, Locale, LocaleExtent, Thing
 from world_models.building.passages import PassageEdge
-from world_models.entries.discrepancy import OPEN
+from world_models.entries import OPEN
 from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, PlanSketch
 from world_models.frames import frozen

@@ -16,6 +16,7 @@ from world_models.entries.body import (
     Ride, RideReport, STOP_KEY,
 )
 from world_models.entries.difference import Difference, Evidence, Explanation, MISLEADING, Rival, RivalKind, SENSES
+from world_models.entries.discrepancy import Discrepancy, LADDER, OPEN, correct, last_escalated, open_or_measure
 from world_models.entries.door_state import DoorCondition, DoorPicture, DoorState
 from world_models.entries.floor import (
     FloorAppearance, FloorEnd, FloorThing, FloorView, FreeFloor, LAST_VIEWS, Light, Point,
@@ -40,15 +41,15 @@ from world_models.obstruction import Obstruction
 from world_models.entries.user_reports import DOOR_STATES, GO_ON, Redirection, UserReport
 
 __all__ = [
-    "ALERT_LIMIT_M", "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "LAST_REPORTS", "LAST_VIEWS", "MISLEADING", "RISK",
-    "SENSES", "SHARED_SIGMA_M", "STOP_KEY", "Alias", "AliasOdds", "Anchor", "BodyFault", "CameraLesson",
+    "ALERT_LIMIT_M", "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "LADDER", "LAST_REPORTS", "LAST_VIEWS", "MISLEADING",
+    "OPEN", "RISK", "SENSES", "SHARED_SIGMA_M", "STOP_KEY", "Alias", "AliasOdds", "Anchor", "BodyFault", "CameraLesson",
     "CameraPicture", "CameraState", "Certificate", "Command", "Contact", "Corners", "Course", "Difference",
-    "DoorCondition", "DoorPicture", "DoorState", "Drift", "Evidence", "Explanation", "FloorAppearance", "FloorEnd",
-    "FloorThing", "FloorView", "Footprint", "FreeFloor", "Glimpse", "Goal", "Hypothesis", "Impasse", "Leg", "Light",
-    "LineMatch", "LocalePoses", "Milestone", "MilestoneVerdict", "MotionReport", "MotorCommand", "Obstacle",
+    "Discrepancy", "DoorCondition", "DoorPicture", "DoorState", "Drift", "Evidence", "Explanation", "FloorAppearance",
+    "FloorEnd", "FloorThing", "FloorView", "Footprint", "FreeFloor", "Glimpse", "Goal", "Hypothesis", "Impasse", "Leg",
+    "Light", "LineMatch", "LocalePoses", "Milestone", "MilestoneVerdict", "MotionReport", "MotorCommand", "Obstacle",
     "ObstacleStatus", "Obstruction", "Odometry", "Outcome", "Panorama", "PictureRequest", "Place", "PlaceOdds",
     "PlaceSearch", "PlanSketch", "Point", "PoseFix", "Protection", "Ranges", "Recovery", "Redirection", "Resumed",
     "Ride", "RideReport", "Rival", "RivalKind", "Segments", "Sense", "SketchStatus", "Subgoal", "Track", "Tracks",
-    "Travel", "UserReport", "Wheels", "begin_travel", "count_sigmas", "covariance_tuple", "diagonal",
-    "find_camera_lessons", "turn_about_camera",
+    "Travel", "UserReport", "Wheels", "begin_travel", "correct", "count_sigmas", "covariance_tuple", "diagonal",
+    "find_camera_lessons", "last_escalated", "open_or_measure", "turn_about_camera",
 ]

@@ -31,6 +31,7 @@ from world_models.camera import YAW
 from world_models.entries import (
     CameraPicture,
     Certificate,
+    Discrepancy,
     Hypothesis,
     Milestone,
     MotionReport,
@@ -39,7 +40,6 @@ from world_models.entries import (
     Travel,
     begin_travel,
 )
-from world_models.entries.discrepancy import Discrepancy
 
 CONTRADICTED = 2
 """So many pictures one after the other that contradict the believed place, and it is lost."""

@@ -27,12 +27,12 @@ from world_models.entries import (
     CameraPicture,
     Certificate,
     Difference,
+    Discrepancy,
     Hypothesis,
     Milestone,
     MotionReport,
     PlanSketch,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 CAMERA_FRAME = "camera_optical"

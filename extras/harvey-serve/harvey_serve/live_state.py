@@ -13,8 +13,17 @@ from harvey.report.data import place_in_picture, placed, shrink
 from world_models import words
 from world_models.building.world import World
 from world_models.camera import Camera
-from world_models.entries import CameraPicture, Goal, Hypothesis, LineMatch, Milestone, PlanSketch, PoseFix, Segments
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import (
+    CameraPicture,
+    Discrepancy,
+    Goal,
+    Hypothesis,
+    LineMatch,
+    Milestone,
+    PlanSketch,
+    PoseFix,
+    Segments,
+)
 
 DECISIONS, MILESTONES = 12, 12
 """So many of the last are shown."""

@@ -33,6 +33,7 @@ from world_models.camera import Camera
 from world_models.entries import (
     STOP_KEY,
     BodyFault,
+    Discrepancy,
     Goal,
     Hypothesis,
     MotionReport,
@@ -41,7 +42,6 @@ from world_models.entries import (
     Subgoal,
     diagonal,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.files.world_files import load_world
 from world_models.frames import Pose2
 

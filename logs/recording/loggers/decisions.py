@@ -16,8 +16,7 @@ from logs.recording.paths import RECORDS, TABLE
 from logs.recording.stream import TROUBLE, Mixed, RecordingStream
 from world_models import words
 from world_models.building.locale_frame import FrameRequest, LocaleFrame, has_answer
-from world_models.entries import Drift, Hypothesis, Leg, Milestone
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy, Drift, Hypothesis, Leg, Milestone
 
 TROUBLES = ("refuted", "not testable", "superseded", "abandoned", "halted")
 """Statuses of milestones, sketches, goals, hypotheses and legs that stand for something gone wrong."""

@@ -15,8 +15,7 @@ from logs.recording.logger import NEAR, Logger, Moment, Panel
 from logs.recording.palette import BELIEVED, LEVELS, PLANNED, faint
 from logs.recording.paths import DEVIATION, HEADING, POSITION
 from logs.recording.stream import RecordingStream
-from world_models.entries import Hypothesis
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy, Hypothesis
 from world_models.frames import Pose2
 
 MM = 1e3

@@ -12,8 +12,7 @@ from logs.recording.logger import NEAR, Logger, Moment, Panel, Subject
 from logs.recording.palette import ACTIVITIES, LEVELS, REJECTED, Colour
 from logs.recording.paths import FAULTS, FOCUS, HARVEY
 from logs.recording.stream import RecordingStream, viewable
-from world_models.entries import BodyFault, Goal, Leg, Milestone, Outcome, PlanSketch
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import BodyFault, Discrepancy, Goal, Leg, Milestone, Outcome, PlanSketch
 
 ACTS, GAP = "acts", ""
 ACTIVITY_KINDS = (Outcome, BodyFault, Discrepancy, Milestone, Leg, PlanSketch, Goal)

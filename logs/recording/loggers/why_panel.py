@@ -22,6 +22,7 @@ from world_models import words
 from world_models.entries import (
     BodyFault,
     Certificate,
+    Discrepancy,
     Goal,
     Hypothesis,
     LineMatch,
@@ -34,7 +35,6 @@ from world_models.entries import (
     Segments,
     Tracks,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 Tell = Callable[[View], str]

@@ -22,16 +22,17 @@ from knowledge_sources.goal.mission_monitor import mission_monitor
 from knowledge_sources.settings import DEFAULT
 from strategies import Note, Scripted
 from world_models.entries import (
+    LADDER,
     STOP_KEY,
     BodyFault,
     CameraPicture,
+    Discrepancy,
     MotionReport,
     MotorCommand,
     Outcome,
     PictureRequest,
     Recovery,
 )
-from world_models.entries.discrepancy import LADDER, Discrepancy
 from world_models.entries.entry_kinds import KINDS
 
 S = DEFAULT.action

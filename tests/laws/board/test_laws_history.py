@@ -28,7 +28,7 @@ from blackboard import (
 )
 from blackboard.kinds import NotAKindError
 from strategies import Note, Scripted, Tally
-from world_models.entries.discrepancy import OPEN, Discrepancy
+from world_models.entries import OPEN, Discrepancy
 
 TEXTS = st.lists(st.text(max_size=3), min_size=1, max_size=5)
 

@@ -35,7 +35,7 @@ from journals import read_journal
 from logs import disk
 from logs.journal_file import JournalFile
 from strategies import Note, Scripted
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy
 from world_models.entries.entry_kinds import KINDS
 from world_models.words import sentence
 

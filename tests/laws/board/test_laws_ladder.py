@@ -53,6 +53,7 @@ from world_models.entries import (
     CameraPicture,
     Certificate,
     Course,
+    Discrepancy,
     Goal,
     Hypothesis,
     Milestone,
@@ -64,7 +65,6 @@ from world_models.entries import (
     PoseFix,
     diagonal,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.files.world_files import load_world
 from world_models.robot import RobotModel
 

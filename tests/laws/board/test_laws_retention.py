@@ -34,7 +34,7 @@ from blackboard.kinds import Kind
 from logs.journal_file import JournalFile
 from logs.timeline import Timeline
 from strategies import Note, Scripted, Tally, levels, ratings, run
-from world_models.entries.discrepancy import LADDER
+from world_models.entries import LADDER
 
 MOST_CYCLES = 40
 SMALL: Index[Tally] = Index(Tally, lambda tally: tally.count % 3)

@@ -30,7 +30,7 @@ from blackboard import (
     decision_line,
 )
 from strategies import Note, Scripted, Tally, levels, ratings, run
-from world_models.entries.discrepancy import LADDER, Discrepancy
+from world_models.entries import LADDER, Discrepancy
 
 
 class Port:

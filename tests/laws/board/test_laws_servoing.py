@@ -13,7 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from blackboard import Change, Decision, Effect, Level, Post, Posted, Ref, Retracted, Revise, Scheduler, View
 from knowledge_sources.goal.discrepancy_raiser import DiscrepancyRaiser
 from strategies import Note, Scripted, levels, magnitudes, run
-from world_models.entries.discrepancy import LADDER, Discrepancy
+from world_models.entries import LADDER, Discrepancy
 
 bounds = st.tuples(st.floats(0.0, 5.0), st.floats(0.0, 8.0))
 

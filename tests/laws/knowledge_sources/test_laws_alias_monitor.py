@@ -44,6 +44,7 @@ from world_models.entries import (
     Alias,
     AliasOdds,
     Certificate,
+    Discrepancy,
     Hypothesis,
     LineMatch,
     MilestoneVerdict,
@@ -53,7 +54,6 @@ from world_models.entries import (
     Segments,
     diagonal,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2, wrap_angle
 
 SOURCE, ROBOT, SMALL = AliasMonitor(), plain_robot(), 1e-6

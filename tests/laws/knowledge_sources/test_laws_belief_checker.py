@@ -14,8 +14,7 @@ from knowledge_sources.methods.verification import MIN_MATCHED_LINES, turn_headi
 from knowledge_sources.milestone_selector.belief_checker import BeliefChecker
 from knowledge_sources.reads import list_log_odds
 from knowledge_sources.reads.looks import MAX_LOOK_LOG_ODDS
-from world_models.entries import Certificate, Milestone
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Certificate, Discrepancy, Milestone
 from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2, wrap_angle
 

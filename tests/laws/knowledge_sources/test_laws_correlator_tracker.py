@@ -39,6 +39,7 @@ from sim.render.sensor import compress_jpeg
 from world_models.entries import (
     Anchor,
     CameraPicture,
+    Discrepancy,
     Drift,
     FreeFloor,
     Hypothesis,
@@ -47,7 +48,6 @@ from world_models.entries import (
     covariance_tuple,
     diagonal,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.frames import Pose2
 
 SURE, TURNED = diagonal(0.004, 0.001), diagonal(0.004, 0.02)

@@ -37,6 +37,7 @@ from world_models.entries import (
     BodyFault,
     Contact,
     Course,
+    Discrepancy,
     Drift,
     Hypothesis,
     MotionReport,
@@ -45,7 +46,6 @@ from world_models.entries import (
     Travel,
     begin_travel,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.location import Covariance
 from world_models.frames import Pose2
 

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from blackboard import Level, Posted, Revise
 from generated_boards import Bench, effect_on, made, reasons, wakes
 from knowledge_sources.goal.discrepancy_raiser import MAX_CHECKS_PER_SUBGOAL, MAX_LOST_PER_MISSION, DiscrepancyRaiser
-from world_models.entries import Impasse, Outcome
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy, Impasse, Outcome
 
 SOURCE = DiscrepancyRaiser()
 BOUNDS = (5.0, 30.0)

@@ -18,8 +18,7 @@ from knowledge_sources.model.door_watcher import DoorWatcher
 from knowledge_sources.model.floor_watcher import FloorWatcher
 from knowledge_sources.reads import MAX_SIGMA_M, MAX_SIGMA_RAD
 from things_in_hall import HALL, Hall
-from world_models.entries import CameraPicture, DoorState, Hypothesis, Milestone, Outcome, diagonal
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import CameraPicture, Discrepancy, DoorState, Hypothesis, Milestone, Outcome, diagonal
 from world_models.frames import Pose2
 
 SOURCE = DoorWatcher()

@@ -45,6 +45,7 @@ from world_models.entries import (
     BodyFault,
     CameraPicture,
     CameraState,
+    Discrepancy,
     Goal,
     Hypothesis,
     Milestone,
@@ -55,7 +56,6 @@ from world_models.entries import (
     Subgoal,
     Travel,
 )
-from world_models.entries.discrepancy import Discrepancy
 
 pytestmark = pytest.mark.slow
 

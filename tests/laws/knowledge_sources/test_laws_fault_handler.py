@@ -31,6 +31,7 @@ from world_models.entries import (
     Command,
     Contact,
     Course,
+    Discrepancy,
     Impasse,
     MotorCommand,
     Outcome,
@@ -41,7 +42,6 @@ from world_models.entries import (
     diagonal,
 )
 from world_models.entries.body import RecoveryStatus
-from world_models.entries.discrepancy import Discrepancy
 
 SOURCE, S = FaultHandler(), DEFAULT.action
 MOST = MAX_BROKEN_MOTIONS

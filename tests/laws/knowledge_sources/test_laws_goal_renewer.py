@@ -24,8 +24,7 @@ from generated_boards import (
     wakes,
 )
 from knowledge_sources.goal.goal_renewer import goal_renewer
-from world_models.entries import Goal, Place
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy, Goal, Place
 from world_models.frames import Pose2
 
 SOURCE = goal_renewer

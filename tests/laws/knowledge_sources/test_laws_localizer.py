@@ -31,6 +31,7 @@ from world_models.actuator import ActuatorModel
 from world_models.entries import (
     Certificate,
     Contact,
+    Discrepancy,
     Glimpse,
     Hypothesis,
     Obstacle,
@@ -41,7 +42,6 @@ from world_models.entries import (
     Segments,
     diagonal,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, flattened
 

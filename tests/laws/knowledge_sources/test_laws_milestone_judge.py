@@ -66,8 +66,10 @@ from sim.stage import build_stage
 from world_models.camera import YAW
 from world_models.entries import (
     ALERT_LIMIT_M,
+    OPEN,
     Certificate,
     Difference,
+    Discrepancy,
     Hypothesis,
     Milestone,
     MilestoneVerdict,
@@ -80,7 +82,6 @@ from world_models.entries import (
     Travel,
     diagonal,
 )
-from world_models.entries.discrepancy import OPEN, Discrepancy
 from world_models.frames import Pose2
 
 T = TypeVar("T")

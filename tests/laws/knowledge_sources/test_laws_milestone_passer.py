@@ -17,6 +17,7 @@ from knowledge_sources.settings import DEFAULT
 from knowledge_sources.sketcher.milestone_passer import MilestonePasser
 from sim.scenario import load_scenario
 from world_models.entries import (
+    Discrepancy,
     Goal,
     Impasse,
     MotionReport,
@@ -29,7 +30,6 @@ from world_models.entries import (
     Subgoal,
     diagonal,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.task import MilestoneStatus
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2

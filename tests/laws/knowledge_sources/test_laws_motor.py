@@ -36,8 +36,7 @@ from knowledge_sources.reads import FloorAhead
 from knowledge_sources.reads.floor_ahead import MIN_INCREMENT_M, TOUCH_HOLDS_M, UNSURE_GAP_M
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.entries import Contact, Drift, Leg, Milestone, MotorCommand, Obstacle, Place
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Contact, Discrepancy, Drift, Leg, Milestone, MotorCommand, Obstacle, Place
 from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 

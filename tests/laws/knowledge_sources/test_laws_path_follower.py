@@ -40,8 +40,7 @@ from knowledge_sources.priority import Priority
 from knowledge_sources.reads import FloorAhead
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.entries import Course, Drift, Leg, MotionReport, MotorCommand, Outcome, Place
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Course, Discrepancy, Drift, Leg, MotionReport, MotorCommand, Outcome, Place
 from world_models.frames import Pose2
 
 ACTUATOR = ActuatorModel()

@@ -22,8 +22,7 @@ from generated_boards import (
     wakes,
 )
 from knowledge_sources.milestone.plan_adjuster import plan_adjuster
-from world_models.entries import Certificate, Hypothesis, MilestoneVerdict, PoseFix
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Certificate, Discrepancy, Hypothesis, MilestoneVerdict, PoseFix
 from world_models.entries.location import Covariance
 from world_models.frames import Pose2
 

@@ -9,9 +9,19 @@ from hypothesis import strategies as st
 from blackboard import Level, Posted
 from generated_boards import Bench, made, reasons, wakes
 from knowledge_sources.senses.sense_judge import WRONG, sense_judge
-from world_models.entries import MISLEADING, RISK, SENSES, Difference, Evidence, Explanation, Impasse, Rival, RivalKind
+from world_models.entries import (
+    MISLEADING,
+    RISK,
+    SENSES,
+    Difference,
+    Discrepancy,
+    Evidence,
+    Explanation,
+    Impasse,
+    Rival,
+    RivalKind,
+)
 from world_models.entries.difference import SURE
-from world_models.entries.discrepancy import Discrepancy
 
 
 def differ(kind: RivalKind, p: float) -> Difference:

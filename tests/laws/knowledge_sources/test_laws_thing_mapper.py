@@ -26,6 +26,7 @@ from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall, carton, known_by_sight
 from world_models.entries import (
     CameraPicture,
+    Discrepancy,
     Evidence,
     FreeFloor,
     Goal,
@@ -36,7 +37,6 @@ from world_models.entries import (
     PlanSketch,
     Subgoal,
 )
-from world_models.entries.discrepancy import Discrepancy
 from world_models.entries.floor import FloorSense
 
 SOURCE, S = ThingMapper(), DEFAULT.action

@@ -55,8 +55,7 @@ from knowledge_sources.reads import is_dark as is_picture_dark
 from knowledge_sources.reads.place_believed import MIN_P_ALIAS, P_DISPLACED_TO_ALIAS
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
-from world_models.entries import AliasOdds, PlaceOdds, Segments
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import AliasOdds, Discrepancy, PlaceOdds, Segments
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
 

@@ -13,8 +13,7 @@ from logs.recording.paths import RECORDS
 from logs.recording.stream import REFUTED, SIGNS, TROUBLE, VERIFIED, viewable
 from logs.recording.writer import RecordingWriter
 from scripted_mission import CAMERA, HOUSE, MOUNT, play
-from world_models.entries import BodyFault, Goal, Milestone, Outcome, Place, PlanSketch, Subgoal
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import BodyFault, Discrepancy, Goal, Milestone, Outcome, Place, PlanSketch, Subgoal
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 

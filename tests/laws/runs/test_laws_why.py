@@ -37,7 +37,7 @@ from logs.records import Candidate, DecisionRecord, EntryRecord, as_line, decisi
 from logs.timeline import Timeline
 from memory_timeline import MemoryTimeline
 from strategies import Note, Scripted, Tally
-from world_models.entries.discrepancy import LADDER
+from world_models.entries import LADDER
 
 LAWS = settings(deadline=None, max_examples=60)
 KNOWN = re.compile(", as (above|below)$")

@@ -20,8 +20,7 @@ from harvey.runner.result import MissionResult, format_error
 from logs.explain.phrases import sentence
 from logs.records import EntryRecord
 from logs.tables import table
-from world_models.entries import Hypothesis, Leg, MotorCommand, Outcome, Track, Tracks, diagonal
-from world_models.entries.discrepancy import Discrepancy
+from world_models.entries import Discrepancy, Hypothesis, Leg, MotorCommand, Outcome, Track, Tracks, diagonal
 from world_models.frames import Pose2
 from world_models.words import degrees, metres, turn
 
