@@ -6,14 +6,13 @@ import re
 import shutil
 import subprocess
 import sys
-import venv
 import zipfile
 from pathlib import Path
 
 import pytest
 
 import blackboard
-from elsewhere import ROOT
+from elsewhere import ROOT, build_wheel, install_elsewhere
 
 
 @pytest.mark.parametrize(("example", "package"), [("greeter_py_trees", "py_trees"), ("greeter_clipspy", "clips")])
@@ -26,14 +25,11 @@ def test_the_same_program_written_for_another_system_greets_as_well(example: str
 
 def test_the_programs_of_its_readme_run_from_its_own_wheel(tmp_path: Path) -> None:
     source = shutil.copytree(ROOT / "blackboard", tmp_path / "blackboard", ignore=shutil.ignore_patterns("__pycache__"))
-    subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation",
-                    "--wheel-dir", tmp_path, source], check=True, capture_output=True, timeout=300)
-    (wheel,) = tmp_path.glob(f"harvey_board-{blackboard.__version__}-*.whl")
+    wheel = build_wheel(source, tmp_path)
+    assert wheel.name.startswith(f"harvey_board-{blackboard.__version__}-")
     assert "blackboard/py.typed" in zipfile.ZipFile(wheel).namelist()
-    venv.create(tmp_path / "venv", with_pip=False)
     python = tmp_path / "venv" / "bin" / "python"
-    subprocess.run([sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index",
-                    wheel], check=True, capture_output=True, timeout=300)
+    install_elsewhere(tmp_path / "venv", wheel, with_needs=False)
     shutil.rmtree(source)
     readme = (ROOT / "blackboard/README.md").read_text(encoding="utf-8")
     hello, said, larger = re.findall(r"```(?:python)?\n(.*?)```", readme, re.DOTALL)[:3]

@@ -7,14 +7,12 @@ import os
 import shutil
 import subprocess
 import sys
-import sysconfig
-import venv
 import zipfile
 from pathlib import Path
 
 import pytest
 
-from elsewhere import ROOT
+from elsewhere import ROOT, build_wheel, install_elsewhere, run_elsewhere
 
 PACKAGES = ("blackboard", "world_models", "knowledge_sources", "sim", "logs", "harvey", "experiments")
 FAKE_VIEWER = "#!/bin/sh\necho \"viewer: $1\"\n"
@@ -22,21 +20,14 @@ FAKE_VIEWER = "#!/bin/sh\necho \"viewer: $1\"\n"
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("wheel")
-    subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation",
-                    "--wheel-dir", folder, ROOT], check=True, capture_output=True, timeout=300)
-    return next(folder.glob("harvey-*.whl"))
+    return build_wheel(ROOT, tmp_path_factory.mktemp("wheel"))
 
 
 @pytest.fixture(scope="module")
 def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A fresh environment with the wheel; the packages that it needs are those of this environment."""
+    """A fresh environment with the wheel, and a viewer that shows nothing."""
     folder = tmp_path_factory.mktemp("env") / "venv"
-    venv.create(folder, with_pip=False)
-    site = Path(sysconfig.get_path("purelib", vars={"base": str(folder), "platbase": str(folder)}))
-    subprocess.run([sys.executable, "-m", "pip", "--python", folder / "bin" / "python", "install", "--quiet",
-                    "--no-deps", "--no-index", wheel], check=True, capture_output=True, timeout=300)
-    (site / "needed.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+    site = install_elsewhere(folder, wheel)
     for package in PACKAGES:
         take_compiled_code_over(ROOT / package, site / package)
     viewer = folder / "bin" / "rerun"
@@ -60,9 +51,7 @@ def take_compiled_code_over(source: Path, target: Path) -> None:
 
 
 def harvey(environment: Path, folder: Path, *args: str, **variables: str) -> subprocess.CompletedProcess[str]:
-    known = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
-    return subprocess.run([environment / "bin" / "harvey", *args], cwd=folder, env={**known, **variables},
-                          capture_output=True, text=True, timeout=900)
+    return run_elsewhere(environment / "bin" / "harvey", *args, cwd=folder, **variables)
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +100,5 @@ def test_why_replay_and_view(environment: Path, run: Path, tmp_path: Path) -> No
 def test_a_folder_of_the_same_name_beside_a_program_is_named(environment: Path, tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs" / "__init__.py").write_text("", encoding="utf-8")
-    done = subprocess.run([environment / "bin" / "python", "-c", "import harvey"], cwd=tmp_path, capture_output=True,
-                          text=True, timeout=60, env={k: v for k, v in os.environ.items() if k != "PYTHONPATH"})
+    done = run_elsewhere(environment / "bin" / "python", "-c", "import harvey", cwd=tmp_path)
     assert done.returncode == 1 and f"'logs' is hidden by {tmp_path / 'logs'}" in done.stderr

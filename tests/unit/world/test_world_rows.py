@@ -140,26 +140,6 @@ def test_a_step_in_a_doorway_is_a_fault() -> None:
         "house.toml:15: d: expected hall and den on one level, got a step of 0.20 m"]
 
 
-WORDY = """words = ["big hall", "aula"]
-floor = "oak"
-things = [ ["chest", "north", 1, 3, "big", { kind = "trunk", words = "sea chest" }] ]
-[doors]
-cell = { between = ["hall"], wall = "south", along = 4, kind = "fire exit", words = "way out" }
-"""
-
-
-def test_what_people_call_things_reaches_the_model_and_changes_nothing_that_is_seen() -> None:
-    plain = house(WORDY.replace('words = ["big hall", "aula"]\n', "").replace(
-        ', { kind = "trunk", words = "sea chest" }', "").replace(', kind = "fire exit", words = "way out"', ""))
-    wordy = read_world(Source.parse((HEAD + WORDY).replace("0.3] }", '0.3], words = "planks" }'), "house.toml"))
-    assert wordy.locale("hall").properties == {
-        "words": "big hall, aula, planks",
-        "words_of": {"trunk-1": "sea chest", "big": "sea chest", "cell": "fire exit, way out"}}
-    assert [thing.kind for thing in wordy.things] == ["trunk", "trunk"] and wordy.named("aula") == ["hall"]
-    assert not plain.locale("hall").properties
-    assert [f.polygon_world.tolist() for f in wordy.faces] == [f.polygon_world.tolist() for f in plain.faces]
-
-
 def test_a_finish_of_a_locale_without_walls_is_refused() -> None:
     with pytest.raises(WorldError, match=r"locales\.wing\.floor: expected a finish only in a locale with walls"):
         house('in = "wing"\n[locales.wing]\nkind = "wing"\nfloor = "oak"\n')
