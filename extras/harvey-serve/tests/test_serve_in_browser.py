@@ -11,8 +11,6 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("harvey_serve", reason="the extra harvey-serve is not installed")
-
 from harvey.campaign.mission_task import Task
 from harvey.runner.result import MissionResult
 from harvey.simulation.simulated_run import build_head, run_mission
