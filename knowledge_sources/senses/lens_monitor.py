@@ -38,7 +38,7 @@ class LensMonitor(RobotKnowledgeSource):
         entry, fix = trigger.entry, trigger.entry.value
         match = view.get(fix.match)
         milestone = None if match is None else view.get(match.value.milestone)
-        if match is None or milestone is None or milestone.value.displacement_modes:
+        if match is None or milestone is None or milestone.value.is_inexact:
             return None
         m, pairs = milestone.value, match.value
         robot, known = HELD.of(view).robot, compute_camera_covariance(CAMERA.of(view).value)
