@@ -7,11 +7,13 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Revise, Revised, View, Watch
+from knowledge_sources.methods.belief import add_evidence
 from knowledge_sources.methods.doors import is_in_opening
 from knowledge_sources.methods.floor import (
     TOUCH_MARGIN_M,
     explain_touch,
     find_touched,
+    judge_thing,
     locate_touch,
     touch_again,
     touch_first,
@@ -69,25 +71,24 @@ class TouchFinder(RobotKnowledgeSource):
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         (touched, sigma_m, known, because), belief, s = case, HELD.of(view), self._settings.action
-        if known is None:
-            new = touch_first(belief.world, touched, belief.locale, sigma_m, 1 + len(view.all(Obstacle)), s)
-            yield Post(new, because)
-        else:
-            new = touch_again(belief.world, touched, known.value, s)
-            yield Revise(known, new, (*because, known))
-        yield Post(_tell(view, belief, new, touched, s.max_obstacle_certainty), because)
+        new = touch_again(belief.world, touched, known.value) if known is not None else touch_first(
+            belief.world, touched, belief.locale, sigma_m, 1 + len(view.all(Obstacle)), s.obstacle_width_m)
+        entry = view.latest(Difference, lambda d: d.about == new.name)
+        before = None if entry is None else entry.value
+        told = _tell(belief, new.name, touched, before, s.max_obstacle_certainty)
+        new = judge_thing(new, add_evidence(before, told), s)
+        yield Post(new, because) if known is None else Revise(known, new, (*because, known))
+        yield Post(told, because)
 
 
-def _tell(view: View, belief: Belief, thing: Obstacle, touched: Touched, most: float) -> Evidence:
+def _tell(belief: Belief, about: str, touched: Touched, known: Difference | None, most: float) -> Evidence:
     """What a touch says of what was touched: in an opening it may be a leaf as well as a thing."""
-    known = view.latest(Difference, lambda d: d.about == thing.name)
     at = belief.pose
     doors = (d.name for d in belief.world.doorways_of(belief.locale)
              if is_in_opening(d, belief.locale, touched.at, TOUCH_MARGIN_M))
     leaf = next((f"the leaf of {door}, shut" for door in doors), None)
-    explanations = explain_touch(leaf, None if known is None else known.value, most)
-    return Evidence(thing.name, touched.contact.sentence(), explanations, at.x_m, at.y_m, at.heading_rad,
-                    TOUCH_MARGIN_M, math.tau, touched.contact.when_s)
+    return Evidence(about, touched.contact.sentence(), explain_touch(leaf, known, most), at.x_m, at.y_m,
+                    at.heading_rad, 0.0, 0.0, touched.contact.when_s)
 
 
 def _find_new_touch(view: View) -> tuple[Entry[Contact], float, tuple[Entry[MotorCommand], ...]] | None:

@@ -59,7 +59,8 @@ class Evidence:
         shows: what was seen, in words.
         explanations: what each rival makes of it; a rival that is not named has no opinion.
         x_m, y_m, heading_rad: from where [world].
-        apart_m, apart_rad: evidence from so far apart, or by such a turn, is independent; all is where apart_m is 0.
+        apart_m, apart_rad: evidence from so far apart, or by such a turn, is independent; where apart_m is 0
+            it has nothing in common with any other.
         seen_s: by the body's clock.
     """
 

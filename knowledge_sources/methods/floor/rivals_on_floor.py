@@ -77,12 +77,13 @@ def explain_free(ratio: float, known: Difference | None) -> tuple[Explanation, .
 
 
 def explain_touch(leaf: str | None, known: Difference | None, most: float) -> tuple[Explanation, ...]:
-    """What each rival makes of a touch: dirt on the lens cannot be touched."""
-    odds = {} if known is None else {rival.kind: rival.log_odds for rival in known.rivals}
-    ratio = max(0.0, to_log_odds(most) - odds.get("thing", 0.0))
+    """What each rival makes of a touch: neither dirt on the lens is touched, nor what stands elsewhere."""
+    rivals = {} if known is None else {rival.kind: rival for rival in known.rivals}
+    ratio = max(0.0, to_log_odds(most) - (rivals["thing"].log_odds if "thing" in rivals else PRIORS["thing"]))
     of_leaf = () if leaf is None else (Explanation("leaf", leaf, ratio),)
-    dirt = Explanation("dirt", "dirt on the lens", -2.0 * STOOD_STILL - max(0.0, odds.get("dirt", 0.0)))
-    return Explanation("thing", "a thing", ratio), *of_leaf, dirt
+    not_here = (Explanation(kind, rival.what, -2.0 * STOOD_STILL - max(0.0, rival.log_odds))
+                for kind, rival in rivals.items() if kind not in BLOCKING)
+    return Explanation("thing", "a thing", ratio), *of_leaf, *not_here
 
 
 def explain_seen_elsewhere(known: Difference | None) -> tuple[Explanation, ...]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from knowledge_sources.methods.belief import to_log_odds, weigh_rivals
+from knowledge_sources.methods.belief import add_evidence, to_log_odds
 from knowledge_sources.methods.floor.door_beside import find_jamb_beside, find_leaf
 from knowledge_sources.methods.floor.fixed_boxes import MIN_MOVED_M, find_fixed
 from knowledge_sources.methods.floor.footprints import (
@@ -103,9 +103,9 @@ class Sight(NamedTuple):
         self, about: str, shows: str, explanations: tuple[Explanation, ...], apart_m: float = MIN_WAY_M
     ) -> Weighed:
         """Evidence of something on the floor, and what is known of it then."""
-        f, known = self.floor, self.differences.get(about)
+        f = self.floor
         evidence = Evidence(about, shows, explanations, f.x_m, f.y_m, 0.0, apart_m, math.tau, f.seen_s)
-        return Weighed(evidence, weigh_rivals(about, (*(() if known is None else known.counted), evidence)))
+        return Weighed(evidence, add_evidence(self.differences.get(about), evidence))
 
 
 class Weighed(NamedTuple):

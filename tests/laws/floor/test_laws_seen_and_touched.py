@@ -54,7 +54,7 @@ def test_touched_it_reaches_to_where_it_was_touched_and_what_was_seen_of_it_too(
     contact = Contact("bumper", 0.0, 0.2, 7.0)
     touched = Touched(np.array(here.position), np.array([math.cos(out), math.sin(out)]), contact)
     known = THING if has_core else replace(THING, core=())
-    new = touch_again(house(), touched, known, DEFAULT.action)
+    new = touch_again(house(), touched, known)
     square = touched.build_square(TOUCHED_SIDE_M)
     for before, after in ((known.footprint, new.footprint), (known.core, new.core)):
         assert bool(after) == bool(before)
@@ -63,7 +63,6 @@ def test_touched_it_reaches_to_where_it_was_touched_and_what_was_seen_of_it_too(
             assert build_polygon(after).hausdorff_distance(hull) < 8e-3
     assert not has_core or is_part(new.core, new.footprint)
     assert (new.status, new.seen_s, new.touched_s) == ("there", 7.0, 7.0)
-    assert new.certainty == DEFAULT.action.max_obstacle_certainty
 
 
 @pytest.mark.parametrize("core", [(), PART])
