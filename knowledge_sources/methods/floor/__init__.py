@@ -4,16 +4,15 @@ In reading order: ``model_floor`` (which point of the floor each pixel shows, an
 ``appearance`` (what the floor looks like), ``relief`` (what an earlier picture shows to stand up from it, or to lie on
 it), ``standing_regions`` (regions that do not look like it, or stand up from it, and where they stand), ``see_floor``
 (all of it for one picture), ``ranges`` (one reading of range sensors), ``seen_floor`` (all readings together, what of a
-way they do not show, and from where that can be seen); what stands on it: ``found_things``, ``door_beside``,
+way they do not show, and from where that can be seen); what stands on it: ``found_things``, ``rivals_on_floor``,
 ``weigh_sight``, ``weigh_touch``, and ``revise_frame`` (what is known of the locale then).
 """
 
-from knowledge_sources.methods.floor.door_beside import take_as_jamb
 from knowledge_sources.methods.floor.fixed_boxes import MAX_FIXED_LOOKS, MIN_MOVED_M, enclose, find_fixed, is_behind
 from knowledge_sources.methods.floor.footprints import (
     MIN_SIDE_M, build_free_floor, build_polygon, list_corners, measure_approach_m,
 )
-from knowledge_sources.methods.floor.found_things import MIN_OBSTACLE_CERTAINTY, may_be_there, move_thing
+from knowledge_sources.methods.floor.found_things import may_be_there, move_thing
 from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.methods.floor.relief import TYPICAL_M
 from knowledge_sources.methods.floor.revise_frame import (
@@ -23,7 +22,7 @@ from knowledge_sources.methods.floor.see_floor import (
     FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD, MotionBetween, Seen, see_free_floor,
 )
 from knowledge_sources.methods.floor.rivals_on_floor import (
-    explain_seen_elsewhere, explain_seen_in_patch, explain_touch, judge_thing,
+    MIN_OBSTACLE_CERTAINTY, explain_seen_elsewhere, explain_seen_in_patch, explain_touch, judge_thing, take_as_jamb,
 )
 from knowledge_sources.methods.floor.seen_floor import (
     Costs, Lookout, SPACING_M, SeenFloor, Sweep, choose_look, find_floor, measure_blind_end_m, measure_first_seen_m,

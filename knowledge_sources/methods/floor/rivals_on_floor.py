@@ -1,7 +1,8 @@
 """What something on the floor may be (§4): a thing, a jamb that stands beside, a leaf, or dirt on the lens.
 
 All of them compete for each sight. What nobody has thought of is the rest: by it a sight is a stain, a shade or a
-reflection, as likely as its pixels leave open.
+reflection, as likely as its pixels leave open. A model is right to centimetres, and a wall's end that reaches into the
+model's opening looks like a thing there: what is seen in the directions of such an end alone may be that end.
 """
 
 from __future__ import annotations
@@ -11,10 +12,20 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+import shapely
+
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import PRIORS, to_log_odds
-from knowledge_sources.methods.floor.door_beside import JAMB_OF, JambBeside
-from knowledge_sources.methods.floor.found_things import tell_status
+from knowledge_sources.methods.floor.footprints import (
+    build_polygon,
+    list_corners,
+    measure_common_directions,
+    measure_width_m,
+)
 from knowledge_sources.settings import ActionSettings
+from world_models.building.building import Building
+from world_models.building.locales import Doorway
 from world_models.entries import Difference, Evidence, Explanation, Obstacle, RivalKind
 
 BLOCKING: tuple[RivalKind, ...] = ("thing", "leaf", "jamb")
@@ -28,6 +39,34 @@ SEEN_BEFORE = math.log(2.0)
 """Of three things that were seen since the place was sure, one was seen after a kidnap."""
 NO_JAMB = -3.0
 """For a jamb where a sight shows what it does not explain."""
+MIN_OBSTACLE_CERTAINTY = 0.9  # with this certainty an obstacle is there: by one sure picture, or by two unsure ones
+JAMB_M = 0.002  # a jamb that stands where the model has it reaches no further into the opening
+MAX_BESIDE_M = 0.15  # a jamb stands at most so far beside: 10 cm, with its casing
+MAX_SLIVER_M = 0.3  # what is narrower, at a jamb, may be the jamb itself, until it is touched
+JAMB_OF = "a jamb of "
+MIN_EXPLAINED = 0.8  # least part of the directions of a sight that such a jamb explains
+MIN_JAMB_SIGMA_M = 0.05  # of a jamb's place: the edge of what is seen may be its casing, or its shade
+MIN_LEAF_PART = 0.6  # least part of a door's width that is seen of a leaf
+
+
+class JambBeside(NamedTuple):
+    """A jamb that stands beside its place in the model, as one sight shows it.
+
+    Attributes:
+        door: its name.
+        shape: the end of the wall that is seen in the opening [m, world].
+        off_m, sigma_m: how far the jamb is displaced along its wall, to the right as seen from the door's first room.
+        log_ratio: by how much a jamb explains better than a thing that it is seen there, at an end of the opening.
+    """
+
+    door: str
+    shape: shapely.Polygon
+    off_m: float
+    sigma_m: float
+    log_ratio: float
+
+    def words(self) -> str:
+        return f"{JAMB_OF}{self.door} that stands {abs(100.0 * self.off_m):.0f} cm beside"
 
 
 class Shown(NamedTuple):
@@ -107,7 +146,8 @@ def judge_thing(thing: Obstacle, difference: Difference, settings: ActionSetting
     if certainty < settings.min_gone_certainty:
         return replace(thing, certainty=certainty, status="gone")
     is_held = thing.is_there and difference.find("elsewhere") is None
-    return replace(thing, certainty=certainty, status="there" if is_held else tell_status(certainty))
+    is_there = is_held or certainty >= MIN_OBSTACLE_CERTAINTY
+    return replace(thing, certainty=certainty, status="there" if is_there else "suspected")
 
 
 def tell_of_door(difference: Difference, evidence: Evidence) -> Evidence | None:
@@ -118,3 +158,85 @@ def tell_of_door(difference: Difference, evidence: Evidence) -> Evidence | None:
         return None
     door = jamb.what.removeprefix(JAMB_OF).partition(" ")[0]
     return replace(evidence, about=door, shows=f"{difference.about} is seen at its end", explanations=said)
+
+
+def find_jamb_beside(
+    world: Building, locale: str, seen: shapely.Polygon, eye: tuple[float, float]
+) -> JambBeside | None:
+    """The jamb of a door of a room that explains a sight without feet, by that end of its wall alone; None: none does.
+
+    Args:
+        seen: what is seen of the thing, on the floor: its foot is no further from the ``eye`` than that.
+    """
+    at = np.array(eye)
+    reach_m = float(np.linalg.norm(shapely.get_coordinates(seen) - at, axis=1).max())
+    best: tuple[float, JambBeside] | None = None
+    for doorway in world.doorways_of(locale):
+        for end in _list_ends(doorway, locale):
+            if end.distance(shapely.Point(at)) > reach_m or end.buffer(MAX_BESIDE_M).contains(shapely.Point(at)):
+                continue
+            part = measure_common_directions(end, seen, at)
+            if part >= MIN_EXPLAINED and (best is None or part > best[0]):
+                best = part, _describe(doorway, end, seen, at)
+    return None if best is None else best[1]
+
+
+def find_leaf(world: Building, locale: str, seen: shapely.Polygon, within_m: float) -> str | None:
+    """The leaf that explains what is seen of a thing on the floor, in words: it is thin, and as wide as its door; it
+    stands in the opening, or is hinged at a jamb.
+    """
+    width_m = measure_width_m(list_corners(seen) or shapely.get_coordinates(seen)[:-1])
+    for doorway in world.doorways_of(locale):
+        if not MIN_LEAF_PART * doorway.width_m <= width_m <= doorway.width_m + 2.0 * within_m:
+            continue
+        opening = shapely.MultiPoint(np.concatenate(doorway.thresholds_world)).convex_hull
+        if opening.buffer(within_m).contains(seen):
+            return f"the leaf of {doorway.name}, shut"
+        jambs = [shapely.Point(jamb) for jamb in doorway.threshold_of(locale)]
+        is_thin = seen.area <= 2.0 * within_m * width_m
+        if is_thin and min(seen.distance(jamb) for jamb in jambs) <= within_m and any(
+                jamb.buffer(doorway.width_m + within_m).contains(seen) for jamb in jambs):
+            return f"the leaf of {doorway.name}, which stands open"
+    return None
+
+
+def _describe(doorway: Doorway, end: shapely.Polygon, seen: shapely.Polygon, at: Floats) -> JambBeside:
+    shape = _cut_to(end, seen, at)
+    left, right = doorway.threshold_of(doorway.between[0])
+    along = (shapely.get_coordinates(shape) - left) @ (right - left) / doorway.width_m
+    off_m = float(along.max()) if along.mean() < 0.5 * doorway.width_m else float(along.min()) - doorway.width_m
+    sigma_m = math.hypot(MIN_JAMB_SIGMA_M, 0.25 * doorway.depth_m)  # on which side of its wall it is seen is not known
+    return JambBeside(doorway.name, shape, round(off_m, 3), round(sigma_m, 3),
+                      math.log(doorway.width_m / (2.0 * MAX_BESIDE_M)))
+
+
+def take_as_jamb(world: Building, obstacle: Obstacle) -> Obstacle:
+    """An obstacle that is seen to take no more than the model's jamb does, where it may be a jamb that stands beside;
+    else the obstacle as it is.
+    """
+    if obstacle.width_m >= MAX_SLIVER_M or obstacle.touched_s is not None:
+        return obstacle
+    shape = build_polygon(obstacle.footprint)
+    for doorway in world.doorways_of(obstacle.locale):
+        ends = (_list_ends(doorway, obstacle.locale, into_m) for into_m in (MAX_BESIDE_M, JAMB_M))
+        for beside, jamb in zip(*ends, strict=True):
+            if beside.intersects(shape):
+                return replace(obstacle, core=list_corners(jamb))
+    return obstacle
+
+
+def _list_ends(doorway: Doorway, locale: str, into_m: float = MAX_BESIDE_M) -> list[shapely.Polygon]:
+    """Both ends of the wall, as far as they may reach into an opening, through the wall."""
+    near, far = doorway.threshold_of(locale), doorway.threshold_of(doorway.other(locale))[::-1]
+    into = into_m / doorway.width_m * (near[1] - near[0])
+    return [build_polygon([a, a + step, b + step, b])
+            for a, b, step in ((near[0], far[0], into), (near[1], far[1], -into))]
+
+
+def _cut_to(end: shapely.Polygon, seen: shapely.Polygon, at: Floats) -> shapely.Polygon:
+    """The part of a wall's end that lies in the directions of what is seen; all of it where that is nothing."""
+    away = shapely.get_coordinates(seen)[:-1] - at
+    far_m = 2.0 * float(np.linalg.norm(shapely.get_coordinates(end) - at, axis=1).max())
+    rim = at + far_m * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+    part = shapely.intersection(end, build_polygon(np.concatenate([rim, at[None]])))
+    return build_polygon(shapely.get_coordinates(end if part.is_empty else part))

@@ -12,7 +12,6 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.belief import add_evidence, to_log_odds
-from knowledge_sources.methods.floor.door_beside import find_jamb_beside, find_leaf
 from knowledge_sources.methods.floor.fixed_boxes import MIN_MOVED_M, find_fixed
 from knowledge_sources.methods.floor.footprints import (
     build_free_floor,
@@ -22,16 +21,25 @@ from knowledge_sources.methods.floor.footprints import (
     measure_free_part,
 )
 from knowledge_sources.methods.floor.found_things import (
+    ThingShape,
     find_before,
     find_open_floor,
     find_room,
     find_same,
+    join_shapes,
+    leave_free,
     may_be_there,
     place,
 )
-from knowledge_sources.methods.floor.rivals_on_floor import Shown, explain_free, explain_sight, judge_thing
+from knowledge_sources.methods.floor.rivals_on_floor import (
+    Shown,
+    explain_free,
+    explain_sight,
+    find_jamb_beside,
+    find_leaf,
+    judge_thing,
+)
 from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M, MAX_P_SEEN_ONCE
-from knowledge_sources.methods.floor.thing_shapes import ThingShape, join_shapes, leave_free
 from knowledge_sources.methods.floor.weigh_touch import TOUCH_MARGIN_M
 from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.building import Building

@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 
 from generated_boards import HALL, house, plain_robot, to_world
 from knowledge_sources.methods.floor import MIN_OBSTACLE_CERTAINTY, Sight, build_polygon, see_ranges, touch_again
-from knowledge_sources.methods.floor.found_things import find_same
+from knowledge_sources.methods.floor.found_things import ThingShape, find_same
 from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M
 from knowledge_sources.methods.floor.rivals_on_floor import Shown
-from knowledge_sources.methods.floor.thing_shapes import ThingShape
 from knowledge_sources.methods.floor.weigh_sight import see_again
 from knowledge_sources.methods.floor.weigh_touch import TOUCHED_SIDE_M, Touched
 from knowledge_sources.settings import DEFAULT
