@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Ref, Revise, Revised, View, Watch
-from knowledge_sources.methods.floor import explain_seen_elsewhere, may_be_there, move_thing
+from knowledge_sources.methods.floor import explain_seen_elsewhere, judge_by, may_be_there, move_thing
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD
+from knowledge_sources.reads import HELD, find_difference
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Certificate, Difference, Evidence, Hypothesis, Obstacle
 from world_models.frames import Pose2, wrap_angle
@@ -59,15 +59,18 @@ class ThingMover(RobotKnowledgeSource):
         for entry in things:
             because = (belief, entry, *sure)
             if moved_m > MAX_DRIFT_M or turned_rad > MAX_DRIFT_RAD:
-                yield Post(_doubt(view, entry.value, here, belief.ref), because)
+                known = find_difference(view, entry.value.name)
+                difference = None if known is None else known.value
+                told = _doubt(difference, entry.value, here, belief.ref)
+                yield Post(told, because)
+                yield Revise(entry, judge_by(told, entry.value, difference, self._settings.action), because)
             else:
                 evidence = f"moved with the belief, which {belief.ref} corrected"
                 now = move_thing(held.world, entry.value, here @ by @ here.inverse(), moved_m, evidence)
                 yield Revise(entry, now, because)
 
 
-def _doubt(view: View, thing: Obstacle, here: Pose2, told_by: Ref) -> Evidence:
-    known = view.latest(Difference, lambda d: d.about == thing.name)
+def _doubt(known: Difference | None, thing: Obstacle, here: Pose2, told_by: Ref) -> Evidence:
     shows = f"seen before or after the robot was kidnapped, as {told_by} tells"
-    return Evidence(thing.name, shows, explain_seen_elsewhere(None if known is None else known.value), here.x_m,
-                    here.y_m, here.heading_rad, MAX_DRIFT_M, MAX_DRIFT_RAD, thing.seen_s)
+    return Evidence(thing.name, shows, explain_seen_elsewhere(known), here.x_m, here.y_m, here.heading_rad,
+                    MAX_DRIFT_M, MAX_DRIFT_RAD, thing.seen_s)

@@ -7,13 +7,12 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Revise, Revised, View, Watch
-from knowledge_sources.methods.belief import add_evidence
 from knowledge_sources.methods.doors import is_in_opening
 from knowledge_sources.methods.floor import (
     TOUCH_MARGIN_M,
     explain_touch,
     find_touched,
-    judge_thing,
+    judge_by,
     locate_touch,
     touch_again,
     touch_first,
@@ -21,7 +20,7 @@ from knowledge_sources.methods.floor import (
 from knowledge_sources.methods.floor.weigh_touch import Touched
 from knowledge_sources.methods.motion import find_nearest
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, Belief
+from knowledge_sources.reads import HELD, Belief, find_difference
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Contact, Course, Difference, Evidence, Hypothesis, MotorCommand, Obstacle
 
@@ -73,10 +72,10 @@ class TouchFinder(RobotKnowledgeSource):
         (touched, sigma_m, known, because), belief, s = case, HELD.of(view), self._settings.action
         new = touch_again(belief.world, touched, known.value) if known is not None else touch_first(
             belief.world, touched, belief.locale, sigma_m, 1 + len(view.all(Obstacle)), s.obstacle_width_m)
-        entry = view.latest(Difference, lambda d: d.about == new.name)
+        entry = find_difference(view, new.name)
         before = None if entry is None else entry.value
         told = _tell(belief, new.name, touched, before, s.max_obstacle_certainty)
-        new = judge_thing(new, add_evidence(before, told), s)
+        new = judge_by(told, new, before, s)
         yield Post(new, because) if known is None else Revise(known, new, (*because, known))
         yield Post(told, because)
 

@@ -1,4 +1,4 @@
-"""Things on the floor that the model lacks: what was seen of them and what they may take, where, and which are the same.
+"""Things on the floor that the model lacks: what was seen of them, what they may take, where, and which are the same.
 
 From far away what hangs over the floor seems to stand on it further off, and things that stand behind one another seem
 to be one. So of two sights the one from clearly nearer tells the shape.

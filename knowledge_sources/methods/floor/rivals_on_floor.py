@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.belief import PRIORS, to_log_odds
+from knowledge_sources.methods.belief import PRIORS, add_evidence, to_log_odds
 from knowledge_sources.methods.floor.footprints import (
     build_polygon,
     list_corners,
@@ -148,6 +148,13 @@ def judge_thing(thing: Obstacle, difference: Difference, settings: ActionSetting
     is_held = thing.is_there and difference.find("elsewhere") is None
     is_there = is_held or certainty >= MIN_OBSTACLE_CERTAINTY
     return replace(thing, certainty=certainty, status="there" if is_there else "suspected")
+
+
+def judge_by(told: Evidence, thing: Obstacle, known: Difference | None, settings: ActionSettings) -> Obstacle:
+    """A thing with one evidence more."""
+    difference = add_evidence(known, told)
+    evidence = f"{told.shows}: {difference.odds_in_words()}"
+    return replace(judge_thing(thing, difference, settings), evidence=evidence)
 
 
 def tell_of_door(difference: Difference, evidence: Evidence) -> Evidence | None:

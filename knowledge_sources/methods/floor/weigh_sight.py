@@ -71,7 +71,6 @@ class Sight(NamedTuple):
         world: the building as it is known.
         rim_m: to here from the eye a thing may reach whose feet are not seen.
         known_free: the floor that was known to be free before [m, world].
-        ahead: what the robot sweeps next on its way [m, world].
         camera: by which it was seen.
         before: the things in earlier pictures, the newest first.
         differences: what is known of things, by their names.
@@ -82,7 +81,6 @@ class Sight(NamedTuple):
     world: Building
     rim_m: float
     known_free: shapely.Geometry
-    ahead: shapely.Geometry
     camera: Camera
     before: Sequence[Sequence[FloorThing]] = ()
     differences: Mapping[str, Difference] = MappingProxyType({})
@@ -128,14 +126,12 @@ class Sighted(NamedTuple):
 
     Attributes:
         known: id under which it was known; None where it is new.
-        is_next: whether it counts as there because it stands on the robot's way.
         weighed: the evidence of the sight; None where that is no further evidence.
     """
 
     known: str | None
     obstacle: Obstacle
     weighed: Weighed | None = None
-    is_next: bool = False
 
 
 def is_telling(thing: FloorThing) -> bool:
@@ -188,8 +184,7 @@ def weigh_sight(
         if found is not None:
             fresh += 1
             drafts[f"new {fresh}"] = found
-    for draft in drafts.values():
-        yield _hold_next(draft, sight.ahead)
+    yield from drafts.values()
     seen = shapely.union_all([build_polygon(thing.footprint).buffer(2.0 * thing.sigma_m) for thing in f.things])
     for id, obstacle in known.items():
         if id in drafts or not may_be_there(obstacle):
@@ -198,13 +193,6 @@ def weigh_sight(
             gone = miss(sight, obstacle, confirmed if obstacle.is_camouflaged else free, confirmed, s)
             if gone is not None:
                 yield gone._replace(known=id)
-
-
-def _hold_next(draft: Sighted, ahead: shapely.Geometry) -> Sighted:
-    """What is suspected next on the way counts as there."""
-    if draft.obstacle.status == "suspected" and build_polygon(draft.obstacle.footprint).intersects(ahead):
-        return draft._replace(obstacle=replace(draft.obstacle, status="there"), is_next=True)
-    return draft
 
 
 def _show(sight: Sight, thing: FloorThing, shape: ThingShape) -> Shown:

@@ -69,7 +69,7 @@ def touch_first(
     at = Place.of_world(world, locale, float(touched.at[0]), float(touched.at[1]))
     return Obstacle(
         f"{locale}/obstacle-{number}", locale, touched.build_square(width_m), sigma_m, at.x_m, at.y_m, width_m,
-        seen_s=contact.when_s, touched_s=contact.when_s, by="touch", evidence=contact.sentence())
+        seen_s=contact.when_s, touched_s=contact.when_s, by="touch")
 
 
 def touch_again(world: Building, touched: Touched, known: Obstacle) -> Obstacle:

@@ -23,18 +23,13 @@ from knowledge_sources.methods.floor.weigh_sight import (
 )
 from knowledge_sources.model.thing_mapper import ThingMapper
 from knowledge_sources.settings import DEFAULT
-from things_in_hall import CARTON, HALL, HERE, Hall, carton, known_by_sight
+from things_in_hall import CARTON, HALL, Hall, carton, known_by_sight
 from world_models.entries import (
     CameraPicture,
     Evidence,
     FreeFloor,
-    Goal,
-    Leg,
     Obstacle,
     ObstacleStatus,
-    Place,
-    PlanSketch,
-    Subgoal,
 )
 from world_models.entries.floor import FloorSense
 
@@ -214,21 +209,3 @@ def test_another_part_of_a_thing_in_the_same_sight_is_not_another_thing(part: fl
     aside_m = 0.4 * (1.0 - part)
     _, effects = ask(hall, hall.look(carton(), carton(by_m=aside_m), seen_s=9.0))
     assert len(effects or ()) == count
-
-
-@pytest.mark.parametrize(("turn_rad", "is_next"), [(0.0, True), (0.3, True), (-0.3, True), (0.9, False), (2.0, False)])
-def test_what_is_suspected_next_on_the_way_counts_as_there_and_the_leg_is_a_reason(
-    turn_rad: float, is_next: bool
-) -> None:
-    hall = Hall(())
-    here, there = (Place(HALL, x_m, 1.2) for x_m in (2.0, 6.0))
-    goal = hall.put(Goal(here, there))
-    steps = (Subgoal(here, there, primitive=True),)
-    sketch = hall.put(PlanSketch(goal.id, (), "", steps, verified=True))
-    end = HERE.x_m + 3.0 * math.cos(turn_rad), HERE.y_m + 3.0 * math.sin(turn_rad)
-    leg = hall.put(Leg(sketch.id, 0, HERE.x_m, HERE.y_m, *end, 0.05))
-    near = tuple((x - 2.0 + S.act_within_m, y) for x, y in CARTON)  # its front where the next way ends
-    scan, effects = ask(hall, hall.look(replace(carton(0.8), footprint=near), seen_s=7.0))
-    (effect,) = effects or ()
-    assert effect.value.status == ("there" if is_next else "suspected")
-    assert set(effect.because) == ({scan, leg} if is_next else {scan})

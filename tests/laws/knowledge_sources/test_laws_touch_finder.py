@@ -113,7 +113,7 @@ def test_what_was_known_there_reaches_to_where_it_was_touched(gap_m: float, is_s
     effect, told = answer(SOURCE, hall.board.view, trigger) or ()
     assert isinstance(effect, Revise) == is_same and told.value.about == effect.value.name
     weighed = weigh_rivals(effect.value.name, (told.value,))
-    assert judge_thing(effect.value, weighed, DEFAULT.action) == effect.value  # nothing is left for the thing judge
+    assert judge_thing(effect.value, weighed, DEFAULT.action) == effect.value
     if isinstance(effect, Revise):
         found: Obstacle = effect.value
         assert effect.entry is known and {entry.id for entry in effect.because} == {known.id, *ids, trigger.entry.id}
