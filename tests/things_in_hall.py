@@ -128,10 +128,9 @@ class Hall:
         return entry.value
 
 
-def known_by_sight(thing: Obstacle) -> Difference:
+def known_by_sight(thing: Obstacle, eye: tuple[float, float] = (-9.0, 0.0)) -> Difference:
     """The difference that makes a thing as certain as it is, by one sight."""
     ratio = math.log(thing.certainty / (1.0 - thing.certainty))
-    eye = thing.judged_from or (-9.0, 0.0)
     seen = Evidence(thing.name, "seen", (Explanation("thing", "a thing", ratio),), *eye, 0.0, 0.1, math.tau, 0.0)
     return weigh_rivals(thing.name, (seen,))
 

@@ -89,8 +89,8 @@ class ObstructionFinder(RobotKnowledgeSource):
                 dirt = Evidence(entry.value.name, shows, explain_seen_in_patch(), last.x_m, last.y_m, 0.0, MIN_MOVED_M,
                                 math.tau, last.seen_s)
                 because = (found, entry, *dict.fromkeys(look for look, _ in sights))
-                now = judge_by(dirt, entry.value, None if known is None else known.value, self._settings.action)
-                yield from (Post(dirt, because), Revise(entry, now, because))
+                yield Post(dirt, because)
+                yield Revise(entry, judge_by(dirt, entry.value, known, self._settings.action), because)
 
 
 def _find_fixed_box(view: View, now: Entry[FreeFloor]) -> Effect | None:

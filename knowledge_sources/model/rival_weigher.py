@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from blackboard import Change, Effect, Posted, View, Watch, rule, to_say
 from knowledge_sources.methods.belief import add_evidence
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_difference
 from world_models.entries import Difference, Evidence
 
 
@@ -15,10 +14,10 @@ from world_models.entries import Difference, Evidence
 def rival_weigher(view: View, case: Change) -> Iterable[Effect]:
     """Adds evidence to the difference that it is about, and weighs the rivals anew."""
     evidence = case.entry
-    known = find_difference(view, evidence.value.about)
-    before = () if known is None else (known,)
-    if any(evidence.value in entry.value.counted for entry in before):
+    known = view.latest(Difference, lambda d: d.about == evidence.value.about)
+    before = Difference.unknown(evidence.value.about) if known is None else known.value
+    if evidence.value in before.counted:
         return
-    effect = to_say(known, add_evidence(None if known is None else known.value, evidence.value), (evidence, *before))
+    effect = to_say(known, add_evidence(before, evidence.value), (evidence, *(() if known is None else (known,))))
     if effect is not None:
         yield effect

@@ -60,17 +60,16 @@ class ThingMover(RobotKnowledgeSource):
             because = (belief, entry, *sure)
             if moved_m > MAX_DRIFT_M or turned_rad > MAX_DRIFT_RAD:
                 known = find_difference(view, entry.value.name)
-                difference = None if known is None else known.value
-                told = _doubt(difference, entry.value, here, belief.ref)
+                told = _doubt(known, entry.value, here, belief.ref)
                 yield Post(told, because)
-                yield Revise(entry, judge_by(told, entry.value, difference, self._settings.action), because)
+                yield Revise(entry, judge_by(told, entry.value, known, self._settings.action), because)
             else:
                 evidence = f"moved with the belief, which {belief.ref} corrected"
                 now = move_thing(held.world, entry.value, here @ by @ here.inverse(), moved_m, evidence)
                 yield Revise(entry, now, because)
 
 
-def _doubt(known: Difference | None, thing: Obstacle, here: Pose2, told_by: Ref) -> Evidence:
+def _doubt(known: Difference, thing: Obstacle, here: Pose2, told_by: Ref) -> Evidence:
     shows = f"seen before or after the robot was kidnapped, as {told_by} tells"
     return Evidence(thing.name, shows, explain_seen_elsewhere(known), here.x_m, here.y_m, here.heading_rad,
                     MAX_DRIFT_M, MAX_DRIFT_RAD, thing.seen_s)

@@ -72,15 +72,14 @@ class TouchFinder(RobotKnowledgeSource):
         (touched, sigma_m, known, because), belief, s = case, HELD.of(view), self._settings.action
         new = touch_again(belief.world, touched, known.value) if known is not None else touch_first(
             belief.world, touched, belief.locale, sigma_m, 1 + len(view.all(Obstacle)), s.obstacle_width_m)
-        entry = find_difference(view, new.name)
-        before = None if entry is None else entry.value
+        before = find_difference(view, new.name)
         told = _tell(belief, new.name, touched, before, s.max_obstacle_certainty)
         new = judge_by(told, new, before, s)
         yield Post(new, because) if known is None else Revise(known, new, (*because, known))
         yield Post(told, because)
 
 
-def _tell(belief: Belief, about: str, touched: Touched, known: Difference | None, most: float) -> Evidence:
+def _tell(belief: Belief, about: str, touched: Touched, known: Difference, most: float) -> Evidence:
     """What a touch says of what was touched: in an opening it may be a leaf as well as a thing."""
     at = belief.pose
     doors = (d.name for d in belief.world.doorways_of(belief.locale)

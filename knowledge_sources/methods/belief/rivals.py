@@ -39,9 +39,9 @@ def weigh_rivals(about: str, evidence: Sequence[Evidence], priors: Mapping[Rival
     return Difference(about, tuple(rivals), tuple(kept), max(one.seen_s for one in evidence))
 
 
-def add_evidence(known: Difference | None, one: Evidence) -> Difference:
+def add_evidence(known: Difference, one: Evidence) -> Difference:
     """What is known of a difference with one evidence more."""
-    return weigh_rivals(one.about, (one,) if known is None else (*known.counted, one))
+    return weigh_rivals(one.about, (*known.counted, one))
 
 
 def hedge(ratios: Mapping[RivalKind, float]) -> dict[RivalKind, float]:

@@ -8,7 +8,6 @@ model's opening looks like a thing there: what is seen in the directions of such
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -83,54 +82,47 @@ class Shown(NamedTuple):
     still: int = 0
 
 
-def explain_sight(p_thing: float, shown: Shown, known: Difference | None, most: float) -> tuple[Explanation, ...]:
+def explain_sight(p_thing: float, shown: Shown, known: Difference, most: float) -> tuple[Explanation, ...]:
     """What each rival makes of a sight.
 
     Args:
         p_thing: how likely its pixels show something solid.
         most: no thing is more probable than this, so that what is gone is soon forgotten.
     """
-    thing = None if known is None else known.find("thing")
-    left = to_log_odds(most) - (0.0 if thing is None else thing.log_odds)
-    return tuple(_explain(min(to_log_odds(p_thing), max(left, 0.0)), shown, known))
-
-
-def _explain(ratio: float, shown: Shown, known: Difference | None) -> Iterator[Explanation]:
-    against = STOOD_STILL * shown.still
-    yield Explanation("thing", "a thing", ratio - against)
-    yield Explanation("dirt", "dirt on the lens", ratio + (against or CAME_NOW))
+    ratio = min(to_log_odds(p_thing), max(to_log_odds(most) - known.odds_of("thing"), 0.0))
+    still, jamb, before = STOOD_STILL * shown.still, shown.jamb, known.find("jamb")
+    explanations = [Explanation("thing", "a thing", ratio - still),
+                    Explanation("dirt", "dirt on the lens", ratio + (still or CAME_NOW))]
     if shown.leaf is not None:
-        yield Explanation("leaf", shown.leaf, ratio - against)
-    if shown.jamb is not None:
-        jamb = shown.jamb
-        yield Explanation("jamb", jamb.words(), ratio + jamb.log_ratio - against, jamb.off_m, jamb.sigma_m)
-    elif known is not None and (rival := known.find("jamb")) is not None:
-        yield Explanation("jamb", rival.what, NO_JAMB, rival.off, rival.sigma)
+        explanations.append(Explanation("leaf", shown.leaf, ratio - still))
+    if jamb is not None:
+        explanations.append(Explanation("jamb", jamb.words(), ratio + jamb.log_ratio - still, jamb.off_m, jamb.sigma_m))
+    elif before is not None:
+        explanations.append(Explanation("jamb", before.what, NO_JAMB, before.off, before.sigma))
+    return tuple(explanations)
 
 
-def explain_free(ratio: float, known: Difference | None) -> tuple[Explanation, ...]:
+def explain_free(ratio: float, known: Difference) -> tuple[Explanation, ...]:
     """What each rival makes of floor that is seen free where it should stand: dirt has no opinion."""
-    others = () if known is None else tuple(r for r in known.rivals if r.kind in ("leaf", "jamb"))
+    others = (rival for rival in known.rivals if rival.kind in ("leaf", "jamb"))
     return (Explanation("thing", "a thing", ratio),
             *(Explanation(rival.kind, rival.what, ratio, rival.off, rival.sigma) for rival in others))
 
 
-def explain_touch(leaf: str | None, known: Difference | None, most: float) -> tuple[Explanation, ...]:
+def explain_touch(leaf: str | None, known: Difference, most: float) -> tuple[Explanation, ...]:
     """What each rival makes of a touch: neither dirt on the lens is touched, nor what stands elsewhere."""
-    rivals = {} if known is None else {rival.kind: rival for rival in known.rivals}
-    ratio = max(0.0, to_log_odds(most) - (rivals["thing"].log_odds if "thing" in rivals else PRIORS["thing"]))
+    ratio = max(0.0, to_log_odds(most) - known.odds_of("thing"))
     of_leaf = () if leaf is None else (Explanation("leaf", leaf, ratio),)
-    not_here = (Explanation(kind, rival.what, -2.0 * STOOD_STILL - max(0.0, rival.log_odds))
-                for kind, rival in rivals.items() if kind not in BLOCKING)
+    not_here = (Explanation(rival.kind, rival.what, -2.0 * STOOD_STILL - max(0.0, rival.log_odds))
+                for rival in known.rivals if rival.kind not in BLOCKING)
     return Explanation("thing", "a thing", ratio), *of_leaf, *not_here
 
 
-def explain_seen_elsewhere(known: Difference | None) -> tuple[Explanation, ...]:
+def explain_seen_elsewhere(known: Difference) -> tuple[Explanation, ...]:
     """What a kidnap says of a thing that was seen before it or after: most sights are before it, as the next tells it.
     """
-    thing = None if known is None else known.find("thing")
-    odds = 0.0 if thing is None else thing.log_odds
-    return (Explanation("elsewhere", "a thing that stands elsewhere", odds - PRIORS["elsewhere"] - SEEN_BEFORE),)
+    ratio = known.odds_of("thing") - PRIORS["elsewhere"] - SEEN_BEFORE
+    return (Explanation("elsewhere", "a thing that stands elsewhere", ratio),)
 
 
 def explain_seen_in_patch() -> tuple[Explanation, ...]:
@@ -150,7 +142,7 @@ def judge_thing(thing: Obstacle, difference: Difference, settings: ActionSetting
     return replace(thing, certainty=certainty, status="there" if is_there else "suspected")
 
 
-def judge_by(told: Evidence, thing: Obstacle, known: Difference | None, settings: ActionSettings) -> Obstacle:
+def judge_by(told: Evidence, thing: Obstacle, known: Difference, settings: ActionSettings) -> Obstacle:
     """A thing with one evidence more."""
     difference = add_evidence(known, told)
     evidence = f"{told.shows}: {difference.odds_in_words()}"

@@ -89,20 +89,23 @@ class Sight(NamedTuple):
     def eye(self) -> tuple[float, float]:
         return self.floor.x_m, self.floor.y_m
 
+    def know(self, about: str) -> Difference:
+        """What is known of a thing."""
+        return self.differences.get(about, Difference.unknown(about))
+
     def is_from_elsewhere(self, known: Obstacle) -> bool:
-        """Whether the eye is not where it was at the last evidence of an obstacle: this is further evidence."""
-        return known.judged_from is None or math.dist(self.eye, known.judged_from) >= MIN_WAY_M
+        """Whether the eye is where none was at any evidence of an obstacle that counts: this is further evidence."""
+        eyes = ((one.x_m, one.y_m) for one in self.know(known.name).counted if one.apart_m)
+        return all(math.dist(self.eye, eye) >= MIN_WAY_M for eye in eyes)
 
     def is_surer(self, thing: FloorThing, known: Obstacle) -> bool:
         """Whether this sight alone is surer of a thing than all before."""
-        difference = self.differences.get(known.name)
-        rival = None if difference is None else difference.find("thing")
+        rival = self.know(known.name).find("thing")
         return rival is None or to_log_odds(thing.p_thing) > rival.log_odds + 1e-6
 
     def is_dirt(self, known: Obstacle) -> bool:
         """Whether it was taken back as dirt; what else is gone, and is seen again, is another thing."""
-        difference = self.differences.get(known.name)
-        dirt = None if difference is None else difference.find("dirt")
+        dirt = self.know(known.name).find("dirt")
         return dirt is not None and dirt.p > 0.5
 
     def tell(
@@ -111,7 +114,7 @@ class Sight(NamedTuple):
         """Evidence of something on the floor, and what is known of it then."""
         f = self.floor
         evidence = Evidence(about, shows, explanations, f.x_m, f.y_m, 0.0, apart_m, math.tau, f.seen_s)
-        return Weighed(evidence, add_evidence(self.differences.get(about), evidence))
+        return Weighed(evidence, add_evidence(self.know(about), evidence))
 
 
 class Weighed(NamedTuple):
@@ -241,15 +244,14 @@ def see_first(
     weighed = _weigh(sight, name, thing, shown, settings)
     found = Obstacle(
         name, locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m, thing.sigma_height_m, 0.0, f.seen_s,
-        None, f.sense, _tell(thing, sight, weighed.difference), "suspected", core, thing.is_camouflaged, shape.from_m,
-        sight.eye)
+        None, f.sense, _tell(thing, sight, weighed.difference), "suspected", core, thing.is_camouflaged, shape.from_m)
     return Sighted(None, judge_thing(place(world, found, own), weighed.difference, settings), weighed)
 
 
 def _weigh(sight: Sight, name: str, thing: FloorThing, shown: Shown, settings: ActionSettings) -> Weighed:
     """What a sight of a thing says of it. Where it is dirt, what it shows further on is no further evidence."""
     explanations = explain_sight(
-        thing.p_thing, shown, sight.differences.get(name), settings.max_obstacle_certainty)
+        thing.p_thing, shown, sight.know(name), settings.max_obstacle_certainty)
     return sight.tell(name, thing.evidence, explanations, MIN_MOVED_M if shown.still else MIN_WAY_M)
 
 
@@ -275,10 +277,10 @@ def see_again(
     if not (moved or surer or higher or f.seen_s - known.seen_s >= SEEN_AGAIN_S):
         return None
     height, sigma = (thing.height_m, thing.sigma_height_m) if higher else (known.height_m, known.sigma_height_m)
-    difference = sight.differences.get(known.name) if weighed is None else weighed.difference
+    difference = sight.know(known.name) if weighed is None else weighed.difference
     new = replace(judged, seen_s=f.seen_s, height_m=height, sigma_height_m=sigma,
                   sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight, difference),
-                  is_camouflaged=known.is_camouflaged and thing.is_camouflaged, judged_from=sight.eye)
+                  is_camouflaged=known.is_camouflaged and thing.is_camouflaged)
     if moved and footprint:
         new = place(world, replace(new, footprint=footprint, core=core, seen_from_m=joined.from_m), joined.whole)
     return Sighted(None, new, weighed)
@@ -313,22 +315,18 @@ def miss(
         odds = CAMOUFLAGED_FREE_ODDS if known.is_camouflaged else LOOKS_FREE_ODDS
         if not known.is_camouflaged and confirmed_part >= MIN_FREE_PART:
             odds = FREE_FLOOR_ODDS
-        explanations = explain_free(free_part * math.log(odds), sight.differences.get(known.name))
+        explanations = explain_free(free_part * math.log(odds), sight.know(known.name))
         weighed = sight.tell(known.name, f"{free_part:.0%} of its floor is seen free", explanations)
-        judged = judge_thing(known, weighed.difference, settings)
-        return Sighted(None, replace(judged, judged_from=sight.eye), weighed)
+        return Sighted(None, judge_thing(known, weighed.difference, settings), weighed)
     left = leave_free(ThingShape.of(known), free)
     footprint, core = left.list_corners()
     if not footprint or measure_change_m(known.footprint, footprint) < settings.min_footprint_change_m:
         return None
-    new = replace(known, footprint=footprint, core=core, judged_from=sight.eye)
-    return Sighted(None, place(sight.world, new, left.whole))
+    return Sighted(None, place(sight.world, replace(known, footprint=footprint, core=core), left.whole))
 
 
-def _tell(thing: FloorThing, sight: Sight, difference: Difference | None) -> str:
+def _tell(thing: FloorThing, sight: Sight, difference: Difference) -> str:
     """Which pixels of which picture tell of a thing, and what it may be."""
-    odds = "" if difference is None else f": {difference.odds_in_words()}"
-    if sight.floor.sense != "camera":
-        return f"{sight.seen_by}: {thing.evidence}{odds}"
     left, top, right, bottom = thing.box_px
-    return f"{sight.seen_by}, pixels ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}): {thing.evidence}{odds}"
+    pixels = f", pixels ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f})" if sight.floor.sense == "camera" else ""
+    return f"{sight.seen_by}{pixels}: {thing.evidence}: {difference.odds_in_words()}"

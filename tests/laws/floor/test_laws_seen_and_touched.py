@@ -101,9 +101,8 @@ def look(*, p: float = 0.6, sigma_m: float = 0.05, sigma_height_m: float = 0.3, 
     eye = to_world(Pose2(1.5, 2.0, 0.0))
     floor = FreeFloor("camera", HALL, eye.x_m, eye.y_m, (0.0,), (1.0,), (1.0,), ("thing",), (0.02,), (), seen_s)
     thing = FloorThing(known.footprint, sigma_m, height_m, sigma_height_m, p, (0.0, 0.0, 9.0, 9.0), "unlike the floor")
-    known = replace(known, judged_from=(eye.x_m + way_m, eye.y_m))
     sight = Sight(floor, "CameraPicture-1", house(), 0.4, NONE, plain_robot().camera, (),
-                  {known.name: known_by_sight(known)})
+                  {known.name: known_by_sight(known, (eye.x_m + way_m, eye.y_m))})
     again = see_again(sight, known, thing, shape or ThingShape.of(known), Shown(), free, DEFAULT.action)
     return None if again is None else again.obstacle
 

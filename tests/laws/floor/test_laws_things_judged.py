@@ -16,7 +16,7 @@ from knowledge_sources.methods.floor.rivals_on_floor import (
     judge_thing,
 )
 from knowledge_sources.settings import DEFAULT
-from world_models.entries import Evidence, Obstacle
+from world_models.entries import Difference, Evidence, Obstacle
 
 S = DEFAULT.action
 THING = Obstacle("hall/obstacle-1", "hall", ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), 0.05, 0.0, 0.0, 1.0, by="camera")
@@ -24,7 +24,7 @@ sights = st.lists(st.tuples(st.floats(0.05, 0.95), st.integers(0, 2)), min_size=
 
 
 def see(p_thing: float, still: int, x_m: float) -> Evidence:
-    explanations = explain_sight(p_thing, Shown(still=still), None, S.max_obstacle_certainty)
+    explanations = explain_sight(p_thing, Shown(still=still), Difference.unknown(THING.name), S.max_obstacle_certainty)
     return Evidence(THING.name, "a region", explanations, x_m, 0.0, 0.0, 0.3, 6.3, x_m)
 
 

@@ -56,9 +56,9 @@ def on_things(effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
     return things
 
 
-def hold(hall: Hall, thing: Obstacle, *because: Entry[object]) -> Entry[object]:
+def hold(hall: Hall, thing: Obstacle, *because: Entry[FreeFloor]) -> Entry[object]:
     """A thing that was seen, as certain as its difference."""
-    hall.put(known_by_sight(thing))
+    hall.put(known_by_sight(thing, *((scan.value.x_m, scan.value.y_m) for scan in because)))
     return hall.put(thing, *because)
 
 
@@ -131,7 +131,7 @@ def test_odds_multiply_only_where_it_is_seen_from_elsewhere(before: float, p_thi
     hall = Hall(())
     first = hall.put(hall.look(seen_s=1.0))
     status: ObstacleStatus = "there" if before >= MIN_OBSTACLE_CERTAINTY else "suspected"
-    old = hold(hall, replace(known(status, before), judged_from=(first.value.x_m, first.value.y_m)), first)
+    old = hold(hall, known(status, before), first)
     scan, effects = ask(hall, hall.look(carton(p_thing), seen_s=9.0, ahead_m=ahead_m))
     (effect,) = effects or ()
     is_elsewhere = ahead_m >= FLOOR_VIEW_DISTANCE_M / 2.0
@@ -151,8 +151,7 @@ def test_floor_that_is_seen_free_from_elsewhere_lowers_the_odds_by_a_stated_fact
     """By less where it only looks free; and what looks like the floor is gone only where it would be told."""
     hall = Hall(())
     first = hall.put(hall.look(seen_s=1.0))
-    old = hold(hall, replace(known("suspected", before), seen_s=2.0, is_camouflaged=is_camouflaged,
-                           judged_from=(first.value.x_m, first.value.y_m)), first)
+    old = hold(hall, replace(known("suspected", before), seen_s=2.0, is_camouflaged=is_camouflaged), first)
     look = hall.look(seen_s=6.0, ahead_m=ahead_m)
     scan, effects = ask(hall, look if is_told else replace(look, confirmed_m=()))
     assert effects is not None
