@@ -44,12 +44,12 @@ class ThingMapper(RobotKnowledgeSource):
         scan, belief = case, HELD.of(view)
         known = {entry.id: entry for entry in view.all(Obstacle)}
         obstacles = {id: entry.value for id, entry in known.items()}
-        for found in weigh_sight(self._tell_of(view, scan, belief), obstacles, self._settings):
+        sight = self._tell_of(view, scan, belief)
+        for found in weigh_sight(sight, obstacles, self._settings):
             entry = None if found.known is None else known[found.known]
-            if found.weighed is not None:
-                evidence, difference = found.weighed
-                of_door = tell_of_door(difference, evidence)
-                yield from (Post(one, (scan,)) for one in (evidence, of_door) if one is not None)
+            if found.told is not None:
+                of_door = tell_of_door(sight.weigh(found.told), found.told)
+                yield from (Post(one, (scan,)) for one in (found.told, of_door) if one is not None)
             if entry is None:
                 yield Post(found.obstacle, (scan,))
             else:

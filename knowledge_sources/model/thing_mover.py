@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 from blackboard import Change, Effect, Entry, Level, Post, Ref, Revise, Revised, View, Watch
 from knowledge_sources.methods.floor import explain_seen_elsewhere, judge_by, may_be_there, move_thing
@@ -17,17 +17,8 @@ MAX_DRIFT_M = 0.5  # a belief that was further off was not worn out on the way: 
 MAX_DRIFT_RAD = 0.35  # the same of its heading
 
 
-class Case(NamedTuple):
-    """What is moved, and the certificate after which it was seen.
-
-    Attributes:
-        correction: the pose that was found, as seen from the one that was believed.
-        sure: the last milestone that was verified, if one was.
-    """
-
-    correction: Pose2
-    things: tuple[Entry[Obstacle], ...]
-    sure: tuple[Entry[Any], ...]
+Case = tuple[Pose2, tuple[Entry[Obstacle], ...], tuple[Entry[Any], ...]]
+"""The pose that was found, as seen from the one that was believed; what is moved; the certificate before it, if any."""
 
 
 class ThingMover(RobotKnowledgeSource):
@@ -50,7 +41,7 @@ class ThingMover(RobotKnowledgeSource):
         seen = tuple(entry for entry in view.where(Obstacle, lambda o: may_be_there(o) and o.touched_s is None)
                      if sure is None or entry.cycle > sure.cycle)
         by: Pose2 | None = trigger.entry.value.correction
-        return None if not seen or by is None else Case(by, seen, () if sure is None else (sure,))
+        return None if not seen or by is None else (by, seen, () if sure is None else (sure,))
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         (by, things, sure), held = case, HELD.of(view)

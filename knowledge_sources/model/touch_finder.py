@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 from blackboard import Change, Effect, Entry, Level, Post, Revise, Revised, View, Watch
 from knowledge_sources.methods.doors import is_in_opening
@@ -27,13 +27,8 @@ from world_models.entries import Contact, Course, Difference, Evidence, Hypothes
 MAX_TOUCH_SIGMA_RAD = 0.6  # a contact whose direction is less sure tells of no obstacle
 
 
-class Case(NamedTuple):
-    """Where something was touched, by what deviation; what is known to stand there, if anything is; what tells it."""
-
-    touched: Touched
-    sigma_m: float
-    known: Entry[Obstacle] | None
-    because: tuple[Entry[Any], ...]
+Case = tuple[Touched, float, Entry[Obstacle] | None, tuple[Entry[Any], ...]]
+"""Where something was touched, by what deviation; what is known to stand there, if anything is; what tells it."""
 
 
 class TouchFinder(RobotKnowledgeSource):
@@ -63,10 +58,10 @@ class TouchFinder(RobotKnowledgeSource):
         obstacles = {entry.id: entry for entry in view.all(Obstacle)}
         id = find_touched({id: o.value for id, o in obstacles.items()}, touched, reach_m + 3.0 * sigma_m)
         if id is not None:
-            return Case(touched, sigma_m, obstacles[id], because)
+            return touched, sigma_m, obstacles[id], because
         if find_nearest(belief.world, b.locale, belief.pose.position, of_model=True)[0] <= radius_m + reach_m:
             return None
-        return Case(touched, sigma_m, None, because)
+        return touched, sigma_m, None, because
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         (touched, sigma_m, known, because), belief, s = case, HELD.of(view), self._settings.action

@@ -18,6 +18,7 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.footprints import (
     Corners,
     build_polygon,
+    cover_directions,
     join_footprints,
     list_corners,
     measure_common_directions,
@@ -116,14 +117,14 @@ def find_same(
 
     What lies next to an obstacle, so that a hull round both would take much floor that neither takes, is another thing.
     """
-    best: tuple[float, str] | None = None
+    shared = dict[str, float]()
     for name, obstacle in known.items():
         polygon = build_polygon(obstacle.footprint)
         reach_m = 2.0 * math.hypot(sigma_m, obstacle.sigma_m)
-        shared = shapely.intersection(polygon.buffer(reach_m), shape).area
-        if shared > 0.0 and (best is None or shared > best[0]) and measure_hull_part(polygon, shape) <= most_hull:
-            best = shared, name
-    return None if best is None else best[1]
+        if measure_hull_part(polygon, shape) <= most_hull:
+            shared[name] = shapely.intersection(polygon.buffer(reach_m), shape).area
+    best = max(shared, key=shared.__getitem__, default=None)
+    return best if best is not None and shared[best] > 0.0 else None
 
 
 def find_before(
@@ -132,19 +133,10 @@ def find_before(
     """The obstacle that something without a visible foot belongs to: well known, nearer than the picture's border,
     and in most of its directions, as its top may be wider than its foot.
     """
-    at = np.array(eye)
-    reach_m = float(np.linalg.norm(shapely.get_coordinates(seen) - at, axis=1).max())
-    best: tuple[float, str] | None = None
-    for name, obstacle in known.items():
-        wide = build_polygon(obstacle.footprint).buffer(overhang_m)
-        if not obstacle.is_there or obstacle.sigma_m > VAGUE_SIGMA_M:
-            continue
-        if wide.distance(shapely.Point(at)) > reach_m:
-            continue
-        part = measure_common_directions(wide, seen, at)
-        if part >= MIN_COMMON_DIRECTIONS and (best is None or part > best[0]):
-            best = part, name
-    return None if best is None else best[1]
+    parts = {name: cover_directions(build_polygon(obstacle.footprint).buffer(overhang_m), seen, eye)
+             for name, obstacle in known.items() if obstacle.is_there and obstacle.sigma_m <= VAGUE_SIGMA_M}
+    best = max(parts, key=parts.__getitem__, default=None)
+    return best if best is not None and parts[best] >= MIN_COMMON_DIRECTIONS else None
 
 
 def place(world: Building, obstacle: Obstacle, shape: shapely.Geometry) -> Obstacle:

@@ -18,8 +18,8 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import PRIORS, add_evidence, to_log_odds
 from knowledge_sources.methods.floor.footprints import (
     build_polygon,
+    cover_directions,
     list_corners,
-    measure_common_directions,
     measure_width_m,
 )
 from knowledge_sources.settings import ActionSettings
@@ -167,17 +167,10 @@ def find_jamb_beside(
     Args:
         seen: what is seen of the thing, on the floor: its foot is no further from the ``eye`` than that.
     """
-    at = np.array(eye)
-    reach_m = float(np.linalg.norm(shapely.get_coordinates(seen) - at, axis=1).max())
-    best: tuple[float, JambBeside] | None = None
-    for doorway in world.doorways_of(locale):
-        for end in _list_ends(doorway, locale):
-            if end.distance(shapely.Point(at)) > reach_m or end.buffer(MAX_BESIDE_M).contains(shapely.Point(at)):
-                continue
-            part = measure_common_directions(end, seen, at)
-            if part >= MIN_EXPLAINED and (best is None or part > best[0]):
-                best = part, _describe(doorway, end, seen, at)
-    return None if best is None else best[1]
+    ends = [(cover_directions(end, seen, eye), doorway, end) for doorway in world.doorways_of(locale)
+            for end in _list_ends(doorway, locale) if not end.buffer(MAX_BESIDE_M).contains(shapely.Point(eye))]
+    best = max(ends, key=lambda one: one[0], default=None)
+    return _describe(*best[1:], seen, np.array(eye)) if best is not None and best[0] >= MIN_EXPLAINED else None
 
 
 def find_leaf(world: Building, locale: str, seen: shapely.Polygon, within_m: float) -> str | None:

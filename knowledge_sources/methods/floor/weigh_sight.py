@@ -110,18 +110,14 @@ class Sight(NamedTuple):
 
     def tell(
         self, about: str, shows: str, explanations: tuple[Explanation, ...], apart_m: float = MIN_WAY_M
-    ) -> Weighed:
-        """Evidence of something on the floor, and what is known of it then."""
+    ) -> Evidence:
+        """Evidence of something on the floor."""
         f = self.floor
-        evidence = Evidence(about, shows, explanations, f.x_m, f.y_m, 0.0, apart_m, math.tau, f.seen_s)
-        return Weighed(evidence, add_evidence(self.know(about), evidence))
+        return Evidence(about, shows, explanations, f.x_m, f.y_m, 0.0, apart_m, math.tau, f.seen_s)
 
-
-class Weighed(NamedTuple):
-    """Evidence of something on the floor, and what is known of it then."""
-
-    evidence: Evidence
-    difference: Difference
+    def weigh(self, told: Evidence) -> Difference:
+        """What is known of something with what is told now."""
+        return add_evidence(self.know(told.about), told)
 
 
 class Sighted(NamedTuple):
@@ -129,12 +125,12 @@ class Sighted(NamedTuple):
 
     Attributes:
         known: id under which it was known; None where it is new.
-        weighed: the evidence of the sight; None where that is no further evidence.
+        told: the evidence of the sight; None where that is no further evidence.
     """
 
     known: str | None
     obstacle: Obstacle
-    weighed: Weighed | None = None
+    told: Evidence | None = None
 
 
 def is_telling(thing: FloorThing) -> bool:
@@ -241,14 +237,15 @@ def see_first(
     if not footprint:
         return None
     name = f"{locale}/obstacle-{number}"
-    weighed = _weigh(sight, name, thing, shown, settings)
+    told = _explain(sight, name, thing, shown, settings)
+    difference = sight.weigh(told)
     found = Obstacle(
         name, locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m, thing.sigma_height_m, 0.0, f.seen_s,
-        None, f.sense, _tell(thing, sight, weighed.difference), "suspected", core, thing.is_camouflaged, shape.from_m)
-    return Sighted(None, judge_thing(place(world, found, own), weighed.difference, settings), weighed)
+        None, f.sense, _tell(thing, sight, difference), "suspected", core, thing.is_camouflaged, shape.from_m)
+    return Sighted(None, judge_thing(place(world, found, own), difference, settings), told)
 
 
-def _weigh(sight: Sight, name: str, thing: FloorThing, shown: Shown, settings: ActionSettings) -> Weighed:
+def _explain(sight: Sight, name: str, thing: FloorThing, shown: Shown, settings: ActionSettings) -> Evidence:
     """What a sight of a thing says of it. Where it is dirt, what it shows further on is no further evidence."""
     explanations = explain_sight(
         thing.p_thing, shown, sight.know(name), settings.max_obstacle_certainty)
@@ -265,8 +262,9 @@ def see_again(
     """
     s, f, world = settings, sight.floor, sight.world
     is_further = sight.is_from_elsewhere(known) or sight.is_surer(thing, known)
-    weighed = _weigh(sight, known.name, thing, shown, s) if is_further else None
-    judged = known if weighed is None else judge_thing(known, weighed.difference, s)
+    told = _explain(sight, known.name, thing, shown, s) if is_further else None
+    difference = sight.know(known.name) if told is None else sight.weigh(told)
+    judged = known if told is None else judge_thing(known, difference, s)
     joined = _join_sight(sight, known, shape, free)
     footprint, core = joined.list_corners()
     seen_before = known.core or known.footprint
@@ -277,13 +275,12 @@ def see_again(
     if not (moved or surer or higher or f.seen_s - known.seen_s >= SEEN_AGAIN_S):
         return None
     height, sigma = (thing.height_m, thing.sigma_height_m) if higher else (known.height_m, known.sigma_height_m)
-    difference = sight.know(known.name) if weighed is None else weighed.difference
     new = replace(judged, seen_s=f.seen_s, height_m=height, sigma_height_m=sigma,
                   sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight, difference),
                   is_camouflaged=known.is_camouflaged and thing.is_camouflaged)
     if moved and footprint:
         new = place(world, replace(new, footprint=footprint, core=core, seen_from_m=joined.from_m), joined.whole)
-    return Sighted(None, new, weighed)
+    return Sighted(None, new, told)
 
 
 def _join_sight(sight: Sight, known: Obstacle, new: ThingShape, free: shapely.Geometry) -> ThingShape:
@@ -316,8 +313,8 @@ def miss(
         if not known.is_camouflaged and confirmed_part >= MIN_FREE_PART:
             odds = FREE_FLOOR_ODDS
         explanations = explain_free(free_part * math.log(odds), sight.know(known.name))
-        weighed = sight.tell(known.name, f"{free_part:.0%} of its floor is seen free", explanations)
-        return Sighted(None, judge_thing(known, weighed.difference, settings), weighed)
+        told = sight.tell(known.name, f"{free_part:.0%} of its floor is seen free", explanations)
+        return Sighted(None, judge_thing(known, sight.weigh(told), settings), told)
     left = leave_free(ThingShape.of(known), free)
     footprint, core = left.list_corners()
     if not footprint or measure_change_m(known.footprint, footprint) < settings.min_footprint_change_m:
