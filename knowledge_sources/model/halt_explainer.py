@@ -31,9 +31,8 @@ class HaltExplainer(RobotKnowledgeSource):
 
     def bind(self, view: View, trigger: Change) -> Ahead | None:
         """The leg, and what is suspected where the robot would sweep next."""
-        driving = current_leg(view)
-        leg = trigger.entry if isinstance(trigger.entry.value, Leg) else None if driving is None else driving[0]
-        if leg is None:
+        leg = view.latest(Leg)
+        if leg is None or (leg.value.status != "halted" and current_leg(view) is None):
             return None
         ahead = find_swept_next(HELD.of(view), leg.value, self._settings.action)
         found = tuple(entry for entry in view.where(Obstacle, lambda o: o.status == "suspected")
