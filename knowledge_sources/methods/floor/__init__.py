@@ -8,7 +8,6 @@ way they do not show, and from where that can be seen); what stands on it: ``fou
 ``weigh_sight``, ``weigh_touch``, and ``revise_frame`` (what is known of the locale then).
 """
 
-from knowledge_sources.methods.floor.fixed_boxes import MAX_FIXED_LOOKS, MIN_MOVED_M, enclose, find_fixed, is_behind
 from knowledge_sources.methods.floor.footprints import (
     MIN_SIDE_M, build_free_floor, build_polygon, list_corners, measure_approach_m,
 )
@@ -22,8 +21,8 @@ from knowledge_sources.methods.floor.see_floor import (
     FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD, MotionBetween, Seen, see_free_floor,
 )
 from knowledge_sources.methods.floor.rivals_on_floor import (
-    MIN_OBSTACLE_CERTAINTY, explain_seen_elsewhere, explain_seen_in_patch, explain_touch, judge_by, judge_thing,
-    take_as_jamb,
+    MAX_FIXED_LOOKS, MIN_MOVED_M, MIN_OBSTACLE_CERTAINTY, enclose, explain_seen_elsewhere, explain_seen_in_patch,
+    explain_touch, find_fixed, is_behind, judge_by, judge_thing, take_as_jamb,
 )
 from knowledge_sources.methods.floor.seen_floor import (
     Costs, Lookout, SPACING_M, SeenFloor, Sweep, choose_look, find_floor, measure_blind_end_m, measure_first_seen_m,

@@ -12,7 +12,6 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.belief import add_evidence, to_log_odds
-from knowledge_sources.methods.floor.fixed_boxes import MIN_MOVED_M, find_fixed
 from knowledge_sources.methods.floor.footprints import (
     build_free_floor,
     build_polygon,
@@ -32,9 +31,11 @@ from knowledge_sources.methods.floor.found_things import (
     place,
 )
 from knowledge_sources.methods.floor.rivals_on_floor import (
+    MIN_MOVED_M,
     Shown,
     explain_free,
     explain_sight,
+    find_fixed,
     find_jamb_beside,
     find_leaf,
     judge_thing,
