@@ -2,8 +2,8 @@
 
 All of them compete for each sight. What nobody has thought of is the rest: by it a sight is a stain, a shade or a
 reflection, as likely as its pixels leave open. A model is right to centimetres, and a wall's end that reaches into the
-model's opening looks like a thing there: what is seen in the directions of such an end alone may be that end. What keeps
-its place in the picture, and would have to move on the floor for that, is before the camera.
+model's opening looks like a thing there: what is seen in the directions of such an end alone may be that end. What
+keeps its place in the picture, and would have to move on the floor for that, is before the camera.
 """
 
 from __future__ import annotations
