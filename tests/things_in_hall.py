@@ -15,7 +15,6 @@ from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.model.halt_explainer import HaltExplainer
 from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.model.rival_weigher import rival_weigher
-from knowledge_sources.model.thing_judge import ThingJudge
 from knowledge_sources.model.thing_mapper import ThingMapper
 from knowledge_sources.model.thing_mover import ThingMover
 from knowledge_sources.model.touch_finder import TouchFinder
@@ -45,8 +44,7 @@ X_M, Y_M = 6.2484, 3.6576
 """The hall's corner in the world."""
 HERE = Pose2(X_M + 2.0, Y_M + 1.2, 0.0)
 CARTON = tuple((X_M + x, Y_M + y) for x, y in ((4.0, 1.0), (4.5, 1.0), (4.5, 1.4), (4.0, 1.4)))
-FINDERS = (ThingMapper(), TouchFinder(), HaltExplainer(), ThingMover(), ModelReviser(), rival_weigher,
-           ThingJudge())
+FINDERS = (ThingMapper(), TouchFinder(), HaltExplainer(), ThingMover(), ModelReviser(), rival_weigher)
 
 
 class Hall:
@@ -130,10 +128,9 @@ class Hall:
         return entry.value
 
 
-def known_by_sight(thing: Obstacle) -> Difference:
+def known_by_sight(thing: Obstacle, eye: tuple[float, float] = (-9.0, 0.0)) -> Difference:
     """The difference that makes a thing as certain as it is, by one sight."""
     ratio = math.log(thing.certainty / (1.0 - thing.certainty))
-    eye = thing.judged_from or (-9.0, 0.0)
     seen = Evidence(thing.name, "seen", (Explanation("thing", "a thing", ratio),), *eye, 0.0, 0.1, math.tau, 0.0)
     return weigh_rivals(thing.name, (seen,))
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from itertools import islice
-from typing import NamedTuple
 
 import numpy as np
 
-from blackboard import Change, Effect, Entry, Level, Post, Posted, Revised, View, Watch, to_say
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch, to_say
 from knowledge_sources.methods.floor import (
     MAX_FIXED_LOOKS,
     MIN_MOVED_M,
@@ -18,19 +17,18 @@ from knowledge_sources.methods.floor import (
     explain_seen_in_patch,
     find_fixed,
     is_behind,
+    judge_by,
     may_be_there,
 )
-from knowledge_sources.methods.floor.fixed_boxes import Box
 from knowledge_sources.methods.localization import CameraView, update_obstruction
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import active_goal, find_robot, unmeasured_doubt
+from knowledge_sources.reads import active_goal, find_difference, find_robot, unmeasured_doubt
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Difference, Evidence, FloorThing, FreeFloor, Obstacle, Obstruction, Segments
+from world_models.entries import Evidence, FreeFloor, Obstacle, Obstruction, Segments
 from world_models.frames import Pose2
 
 MAX_OBSTRUCTION_LOOKS = 6  # number of last looks that are compared
 MIN_OBSTRUCTION_LOOKS = 3  # what stands still in so many looks is before the camera; in two it may by chance
-PATCH = "lens patch"  # what evidence of it is about
 MIN_OBSTRUCTION_PART = 0.04  # smallest part of the picture that an obstruction covers
 
 
@@ -39,27 +37,24 @@ class ObstructionFinder(RobotKnowledgeSource):
 
     It acts when a milestone was not testable or the belief is in doubt, before the new picture is judged; and when what
     seems to stand on the floor keeps its place in the picture. While the robot is lost, the panorama builder does the
-    same with its own pictures. Of things on the floor that were seen nowhere but there it tells that they are dirt.
+    same with its own pictures. Things on the floor that were seen nowhere but there are rather dirt.
     """
 
     level, priority = Level.PLAN, Priority.REVISE
     on = (
         Watch(Segments, (Posted,), lambda s: s.milestone != ""),
         Watch(FreeFloor, (Posted,), lambda f: f.sense == "camera" and bool(f.things)),
-        Watch(Difference, where=lambda d: d.about == PATCH and d.is_of_sense),
         Watch(Obstruction, (Posted, Revised)),
     )
-    writes = (Obstruction, Evidence)
+    writes = (Obstruction, Obstacle, Evidence)
 
     def bind(self, view: View, trigger: Change) -> tuple[Effect, ...] | None:
         """The change of what the board says of an obstruction, or of what was seen in it; None where there is none."""
         value, change = trigger.entry.value, None
         if isinstance(value, Obstruction):
-            return tuple(_take_back(view, trigger.entry)) or None
+            return tuple(self._take_back(view, trigger.entry)) or None
         if isinstance(value, FreeFloor):
-            change = _tell_of_patch(view, trigger.entry)
-        elif isinstance(value, Difference):
-            change = _find_patch(view, trigger.entry)
+            change = _find_fixed_box(view, trigger.entry)
         else:
             milestone = view.get(value.milestone)
             if milestone is not None and (milestone.value.tried or unmeasured_doubt(view) is not None):
@@ -82,58 +77,33 @@ class ObstructionFinder(RobotKnowledgeSource):
         now = next((one for one in found if one is not None), None)
         return to_say(known, now, (*(s for s, _ in looks), *(() if known is None else (known,))))
 
+    def _take_back(self, view: View, found: Entry[Obstruction]) -> Iterable[Effect]:
+        """Things that rest on nothing but sights within an obstruction are dirt."""
+        shows = f"all that was seen of it is {found.ref}, which is before the camera"
+        for entry in view.where(Obstacle, lambda o: may_be_there(o) and o.by == "camera" and o.touched_s is None):
+            polygon = build_polygon(entry.value.footprint)
+            sights = [(look, thing.box_px) for look in view.all(FreeFloor) for thing in look.value.things
+                      if build_polygon(thing.footprint).intersects(polygon)]
+            if sights and all(is_behind(box, found.value) for _, box in sights):
+                last, known = sights[-1][0].value, find_difference(view, entry.value.name)
+                dirt = Evidence(entry.value.name, shows, explain_seen_in_patch(), last.x_m, last.y_m, 0.0, MIN_MOVED_M,
+                                math.tau, last.seen_s)
+                because = (found, entry, *dict.fromkeys(look for look, _ in sights))
+                yield Post(dirt, because)
+                yield Revise(entry, judge_by(dirt, entry.value, known, self._settings.action), because)
 
-class Fixed(NamedTuple):
-    """A thing in a look at the floor that had the same place in the picture in earlier looks, and those."""
 
-    thing: FloorThing
-    boxes: tuple[Box, ...]
-    looks: tuple[Entry[FreeFloor], ...]
-
-
-def _find_fixed(view: View) -> Fixed | None:
-    """What kept its place in the last looks at the floor, where the board does not say that it is before the camera."""
+def _find_fixed_box(view: View, now: Entry[FreeFloor]) -> Effect | None:
+    """The obstruction that a look at the floor shows with earlier ones, where the board does not say it."""
     known, camera = view.latest(Obstruction), find_robot(view).camera
-    now, *earlier = (look for look in view.newest_first(FreeFloor) if look.value.sense == "camera")
+    looks = [entry for entry in view.newest_first(FreeFloor) if entry.value.sense == "camera" and entry is not now]
     for thing in now.value.things:
-        fixed = find_fixed(thing, (look.value.things for look in earlier), camera)
+        fixed = find_fixed(thing, (look.value.things for look in looks), camera)
         if len(fixed) == MAX_FIXED_LOOKS and (known is None or not is_behind(thing.box_px, known.value)):
-            return Fixed(thing, (thing.box_px, *fixed.values()), (now, *(earlier[number] for number in fixed)))
+            found = enclose([thing.box_px, *fixed.values()], None if known is None else known.value)
+            because = (now, *(looks[number] for number in fixed), *(() if known is None else (known,)))
+            return to_say(known, found, because)
     return None
-
-
-def _tell_of_patch(view: View, now: Entry[FreeFloor]) -> Effect | None:
-    """Evidence that what a look at the floor shows is on the lens, as earlier looks show it there."""
-    found, f = _find_fixed(view), now.value
-    if found is None:
-        return None
-    left, top, right, bottom = found.thing.box_px
-    shows = f"pixels ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}) are the same in {len(found.looks)} looks"
-    dirt = next(e for e in explain_seen_in_patch() if e.kind == "dirt")
-    return Post(Evidence(PATCH, shows, (dirt,), f.x_m, f.y_m, 0.0, MIN_MOVED_M, math.tau, f.seen_s), found.looks)
-
-
-def _find_patch(view: View, sure: Entry[Difference]) -> Effect | None:
-    """The obstruction that the last looks at the floor show, where it surely is one."""
-    known, found = view.latest(Obstruction), _find_fixed(view)
-    if found is None:
-        return None
-    whole = enclose(found.boxes, None if known is None else known.value)
-    return to_say(known, whole, (sure, *found.looks, *(() if known is None else (known,))))
-
-
-def _take_back(view: View, found: Entry[Obstruction]) -> Iterable[Effect]:
-    """Things that rest on nothing but sights within an obstruction are dirt."""
-    shows = f"all that was seen of it is {found.ref}, which is before the camera"
-    for entry in view.where(Obstacle, lambda o: may_be_there(o) and o.by == "camera" and o.touched_s is None):
-        polygon = build_polygon(entry.value.footprint)
-        sights = [(look, thing.box_px) for look in view.all(FreeFloor) for thing in look.value.things
-                  if build_polygon(thing.footprint).intersects(polygon)]
-        if sights and all(is_behind(box, found.value) for _, box in sights):
-            last, name = sights[-1][0].value, entry.value.name
-            dirt = Evidence(name, shows, explain_seen_in_patch(), last.x_m, last.y_m, 0.0, MIN_MOVED_M, math.tau,
-                            last.seen_s)
-            yield Post(dirt, (found, entry, *dict.fromkeys(look for look, _ in sights)))
 
 
 def _list_last_looks(view: View, most: int) -> list[tuple[Entry[Segments], float]]:

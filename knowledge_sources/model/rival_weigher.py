@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from blackboard import Change, Effect, Posted, View, Watch, rule, to_say
-from knowledge_sources.methods.belief import weigh_rivals
+from knowledge_sources.methods.belief import add_evidence
 from knowledge_sources.priority import Priority
 from world_models.entries import Difference, Evidence
 
@@ -15,10 +15,9 @@ def rival_weigher(view: View, case: Change) -> Iterable[Effect]:
     """Adds evidence to the difference that it is about, and weighs the rivals anew."""
     evidence = case.entry
     known = view.latest(Difference, lambda d: d.about == evidence.value.about)
-    counted = () if known is None else known.value.counted
-    if evidence.value in counted:
+    before = Difference.unknown(evidence.value.about) if known is None else known.value
+    if evidence.value in before.counted:
         return
-    now = weigh_rivals(evidence.value.about, (*counted, evidence.value))
-    effect = to_say(known, now, (evidence, *(() if known is None else (known,))))
+    effect = to_say(known, add_evidence(before, evidence.value), (evidence, *(() if known is None else (known,))))
     if effect is not None:
         yield effect

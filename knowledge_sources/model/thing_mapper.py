@@ -14,7 +14,7 @@ from knowledge_sources.methods.floor import Sight, is_telling, may_be_there
 from knowledge_sources.methods.floor.rivals_on_floor import tell_of_door
 from knowledge_sources.methods.floor.weigh_sight import weigh_sight
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, SEEN_MARGIN_M, SURE, Belief, current_leg, find_known_free, find_swept_next
+from knowledge_sources.reads import HELD, SEEN_MARGIN_M, SURE, Belief, find_known_free
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import CameraPicture, Difference, Evidence, FreeFloor, Obstacle
 
@@ -23,7 +23,7 @@ class ThingMapper(RobotKnowledgeSource):
     """Concludes from a sight of the floor that something stands on it; or that it is gone, or no thing.
 
     What is seen is joined with what is known there already. It is there when it is certain enough, by one sure picture
-    or two unsure ones, or by one where it is next on the way; and gone when most of its footprint is seen to be free
+    or two unsure ones; and gone when most of its footprint is seen to be free
     floor, or it rather is dirt on the lens. Of a jamb that stands beside the wall's end is there, and its door is told.
     Where its feet were not seen, it may reach to the robot's rim.
     """
@@ -42,30 +42,28 @@ class ThingMapper(RobotKnowledgeSource):
 
     def act(self, view: View, case: Entry[FreeFloor]) -> Iterable[Effect]:
         scan, belief = case, HELD.of(view)
-        known, driving = {entry.id: entry for entry in view.all(Obstacle)}, current_leg(view)
+        known = {entry.id: entry for entry in view.all(Obstacle)}
         obstacles = {id: entry.value for id, entry in known.items()}
-        for found in weigh_sight(self._tell_of(view, scan, belief), obstacles, self._settings):
+        sight = self._tell_of(view, scan, belief)
+        for found in weigh_sight(sight, obstacles, self._settings):
             entry = None if found.known is None else known[found.known]
-            on_way = (driving[0],) if found.is_next and driving is not None else ()
-            if found.weighed is not None:
-                evidence, difference = found.weighed
-                of_door = tell_of_door(difference, evidence)
-                yield from (Post(one, (scan,)) for one in (evidence, of_door) if one is not None)
+            if found.told is not None:
+                of_door = tell_of_door(sight.weigh(found.told), found.told)
+                yield from (Post(one, (scan,)) for one in (found.told, of_door) if one is not None)
             if entry is None:
-                yield Post(found.obstacle, (scan, *on_way))
+                yield Post(found.obstacle, (scan,))
             else:
-                yield Revise(entry, found.obstacle, (scan, entry, *on_way))
+                yield Revise(entry, found.obstacle, (scan, entry))
 
     def _tell_of(self, view: View, scan: Entry[FreeFloor], belief: Belief) -> Sight:
         """A sight with what it is weighed by."""
-        is_any_cut, driving, s = any(thing.is_cut for thing in scan.value.things), current_leg(view), self._settings
-        known_free = find_known_free(view, belief.entry, s.action) if is_any_cut else shapely.Polygon()
-        ahead = shapely.Polygon() if driving is None else find_swept_next(belief, driving[0].value, s.action)
+        is_any_cut = any(thing.is_cut for thing in scan.value.things)
+        known_free = find_known_free(view, belief.entry, self._settings.action) if is_any_cut else shapely.Polygon()
         pictures = (found.id for ref in scan.because
                     if (found := view.get(ref.id)) is not None and isinstance(found.value, CameraPicture))
         seen_by = next(pictures, scan.id) if scan.value.sense == "camera" else scan.id
         before = [one.value.things for one in view.newest_first(FreeFloor)
                   if one.value.sense == "camera" and one is not scan]
         differences = {entry.value.about: entry.value for entry in view.all(Difference)}
-        return Sight(scan.value, seen_by, belief.world, belief.robot.radius_m + SEEN_MARGIN_M, known_free, ahead,
+        return Sight(scan.value, seen_by, belief.world, belief.robot.radius_m + SEEN_MARGIN_M, known_free,
                      belief.robot.camera, before, differences)

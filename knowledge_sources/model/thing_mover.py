@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 from blackboard import Change, Effect, Entry, Level, Post, Ref, Revise, Revised, View, Watch
-from knowledge_sources.methods.floor import explain_seen_elsewhere, may_be_there, move_thing
+from knowledge_sources.methods.floor import explain_seen_elsewhere, judge_by, may_be_there, move_thing
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD
+from knowledge_sources.reads import HELD, find_difference
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Certificate, Difference, Evidence, Hypothesis, Obstacle
 from world_models.frames import Pose2, wrap_angle
@@ -17,17 +17,8 @@ MAX_DRIFT_M = 0.5  # a belief that was further off was not worn out on the way: 
 MAX_DRIFT_RAD = 0.35  # the same of its heading
 
 
-class Case(NamedTuple):
-    """What is moved, and the certificate after which it was seen.
-
-    Attributes:
-        correction: the pose that was found, as seen from the one that was believed.
-        sure: the last milestone that was verified, if one was.
-    """
-
-    correction: Pose2
-    things: tuple[Entry[Obstacle], ...]
-    sure: tuple[Entry[Any], ...]
+Case = tuple[Pose2, tuple[Entry[Obstacle], ...], tuple[Entry[Any], ...]]
+"""The pose that was found, as seen from the one that was believed; what is moved; the certificate before it, if any."""
 
 
 class ThingMover(RobotKnowledgeSource):
@@ -50,7 +41,7 @@ class ThingMover(RobotKnowledgeSource):
         seen = tuple(entry for entry in view.where(Obstacle, lambda o: may_be_there(o) and o.touched_s is None)
                      if sure is None or entry.cycle > sure.cycle)
         by: Pose2 | None = trigger.entry.value.correction
-        return None if not seen or by is None else Case(by, seen, () if sure is None else (sure,))
+        return None if not seen or by is None else (by, seen, () if sure is None else (sure,))
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         (by, things, sure), held = case, HELD.of(view)
@@ -59,15 +50,17 @@ class ThingMover(RobotKnowledgeSource):
         for entry in things:
             because = (belief, entry, *sure)
             if moved_m > MAX_DRIFT_M or turned_rad > MAX_DRIFT_RAD:
-                yield Post(_doubt(view, entry.value, here, belief.ref), because)
+                known = find_difference(view, entry.value.name)
+                told = _doubt(known, entry.value, here, belief.ref)
+                yield Post(told, because)
+                yield Revise(entry, judge_by(told, entry.value, known, self._settings.action), because)
             else:
                 evidence = f"moved with the belief, which {belief.ref} corrected"
                 now = move_thing(held.world, entry.value, here @ by @ here.inverse(), moved_m, evidence)
                 yield Revise(entry, now, because)
 
 
-def _doubt(view: View, thing: Obstacle, here: Pose2, told_by: Ref) -> Evidence:
-    known = view.latest(Difference, lambda d: d.about == thing.name)
+def _doubt(known: Difference, thing: Obstacle, here: Pose2, told_by: Ref) -> Evidence:
     shows = f"seen before or after the robot was kidnapped, as {told_by} tells"
-    return Evidence(thing.name, shows, explain_seen_elsewhere(None if known is None else known.value), here.x_m,
-                    here.y_m, here.heading_rad, MAX_DRIFT_M, MAX_DRIFT_RAD, thing.seen_s)
+    return Evidence(thing.name, shows, explain_seen_elsewhere(known), here.x_m, here.y_m, here.heading_rad,
+                    MAX_DRIFT_M, MAX_DRIFT_RAD, thing.seen_s)

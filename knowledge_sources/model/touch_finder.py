@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 from blackboard import Change, Effect, Entry, Level, Post, Revise, Revised, View, Watch
 from knowledge_sources.methods.doors import is_in_opening
@@ -12,6 +12,7 @@ from knowledge_sources.methods.floor import (
     TOUCH_MARGIN_M,
     explain_touch,
     find_touched,
+    judge_by,
     locate_touch,
     touch_again,
     touch_first,
@@ -19,20 +20,15 @@ from knowledge_sources.methods.floor import (
 from knowledge_sources.methods.floor.weigh_touch import Touched
 from knowledge_sources.methods.motion import find_nearest
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, Belief
+from knowledge_sources.reads import HELD, Belief, find_difference
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Contact, Course, Difference, Evidence, Hypothesis, MotorCommand, Obstacle
 
 MAX_TOUCH_SIGMA_RAD = 0.6  # a contact whose direction is less sure tells of no obstacle
 
 
-class Case(NamedTuple):
-    """Where something was touched, by what deviation; what is known to stand there, if anything is; what tells it."""
-
-    touched: Touched
-    sigma_m: float
-    known: Entry[Obstacle] | None
-    because: tuple[Entry[Any], ...]
+Case = tuple[Touched, float, Entry[Obstacle] | None, tuple[Entry[Any], ...]]
+"""Where something was touched, by what deviation; what is known to stand there, if anything is; what tells it."""
 
 
 class TouchFinder(RobotKnowledgeSource):
@@ -62,32 +58,30 @@ class TouchFinder(RobotKnowledgeSource):
         obstacles = {entry.id: entry for entry in view.all(Obstacle)}
         id = find_touched({id: o.value for id, o in obstacles.items()}, touched, reach_m + 3.0 * sigma_m)
         if id is not None:
-            return Case(touched, sigma_m, obstacles[id], because)
+            return touched, sigma_m, obstacles[id], because
         if find_nearest(belief.world, b.locale, belief.pose.position, of_model=True)[0] <= radius_m + reach_m:
             return None
-        return Case(touched, sigma_m, None, because)
+        return touched, sigma_m, None, because
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         (touched, sigma_m, known, because), belief, s = case, HELD.of(view), self._settings.action
-        if known is None:
-            new = touch_first(belief.world, touched, belief.locale, sigma_m, 1 + len(view.all(Obstacle)), s)
-            yield Post(new, because)
-        else:
-            new = touch_again(belief.world, touched, known.value, s)
-            yield Revise(known, new, (*because, known))
-        yield Post(_tell(view, belief, new, touched, s.max_obstacle_certainty), because)
+        new = touch_again(belief.world, touched, known.value) if known is not None else touch_first(
+            belief.world, touched, belief.locale, sigma_m, 1 + len(view.all(Obstacle)), s.obstacle_width_m)
+        before = find_difference(view, new.name)
+        told = _tell(belief, new.name, touched, before, s.max_obstacle_certainty)
+        new = judge_by(told, new, before, s)
+        yield Post(new, because) if known is None else Revise(known, new, (*because, known))
+        yield Post(told, because)
 
 
-def _tell(view: View, belief: Belief, thing: Obstacle, touched: Touched, most: float) -> Evidence:
+def _tell(belief: Belief, about: str, touched: Touched, known: Difference, most: float) -> Evidence:
     """What a touch says of what was touched: in an opening it may be a leaf as well as a thing."""
-    known = view.latest(Difference, lambda d: d.about == thing.name)
     at = belief.pose
     doors = (d.name for d in belief.world.doorways_of(belief.locale)
              if is_in_opening(d, belief.locale, touched.at, TOUCH_MARGIN_M))
     leaf = next((f"the leaf of {door}, shut" for door in doors), None)
-    explanations = explain_touch(leaf, None if known is None else known.value, most)
-    return Evidence(thing.name, touched.contact.sentence(), explanations, at.x_m, at.y_m, at.heading_rad,
-                    TOUCH_MARGIN_M, math.tau, touched.contact.when_s)
+    return Evidence(about, touched.contact.sentence(), explain_touch(leaf, known, most), at.x_m, at.y_m,
+                    at.heading_rad, 0.0, 0.0, touched.contact.when_s)
 
 
 def _find_new_touch(view: View) -> tuple[Entry[Contact], float, tuple[Entry[MotorCommand], ...]] | None:

@@ -59,6 +59,12 @@ def find_belief(view: View) -> Entry[Hypothesis] | None:
     return view.newest(HELD, True)
 
 
+def find_difference(view: View, about: str) -> Difference:
+    """What is known of a difference."""
+    known = view.latest(Difference, lambda difference: difference.about == about)
+    return Difference.unknown(about) if known is None else known.value
+
+
 def rests_on(view: View, entry: Entry[Any], picture: str, steps: int = 4) -> bool:
     """Whether an entry rests on a picture by so few steps, as a belief on that of its milestone; not by older beliefs.
     """
@@ -249,6 +255,6 @@ def open_impasse(view: View) -> Entry[Impasse] | None:
 
 def is_worth_telling(view: View, about: str, explained: Sequence[Explanation]) -> bool:
     """Whether a sense would explain something better than chance; what acquits it is told once it was accused."""
-    accused = view.latest(Difference, lambda d: d.about == about) is not None
+    accused = bool(find_difference(view, about).rivals)
     return bool(explained) and (
         accused or any(e.log_ratio > WORTH_TELLING for e in explained if e.kind in SENSES))

@@ -59,7 +59,8 @@ class Evidence:
         shows: what was seen, in words.
         explanations: what each rival makes of it; a rival that is not named has no opinion.
         x_m, y_m, heading_rad: from where [world].
-        apart_m, apart_rad: evidence from so far apart, or by such a turn, is independent; all is where apart_m is 0.
+        apart_m, apart_rad: evidence from so far apart, or by such a turn, is independent; where apart_m is 0
+            it has nothing in common with any other.
         seen_s: by the body's clock.
     """
 
@@ -113,6 +114,11 @@ class Difference:
     counted: tuple[Evidence, ...]
     seen_s: float
 
+    @staticmethod
+    def unknown(about: str) -> Difference:
+        """A difference of which nothing is known yet."""
+        return Difference(about, (), (), 0.0)
+
     @property
     def leader(self) -> Rival:
         return self.rivals[0]
@@ -135,6 +141,11 @@ class Difference:
     def find(self, kind: RivalKind) -> Rival | None:
         """The rival of a kind; None where nothing spoke of it."""
         return next((rival for rival in self.rivals if rival.kind == kind), None)
+
+    def odds_of(self, kind: RivalKind) -> float:
+        """The log odds of a rival; even where nothing spoke of it."""
+        rival = self.find(kind)
+        return 0.0 if rival is None else rival.log_odds
 
     def odds_in_words(self) -> str:
         """``a jamb of bedroom-door that stands 9 cm beside 92%, a thing 6%, dirt on the lens 2%``."""

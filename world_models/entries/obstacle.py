@@ -125,7 +125,6 @@ class Obstacle:
         status: suspected (not certain enough to act on), there, or gone.
         is_camouflaged: whether it looks like the floor: that it is not seen tells little.
         seen_from_m: from how near its shape was seen; infinite where its feet were not.
-        judged_from: (2,) where the eye was when it was last judged [m, world]; None where no picture judged it.
     """
 
     name: str
@@ -146,7 +145,6 @@ class Obstacle:
     core: Corners = ()
     is_camouflaged: bool = False
     seen_from_m: float = math.inf
-    judged_from: tuple[float, float] | None = None
 
     @property
     def is_there(self) -> bool:

@@ -39,6 +39,11 @@ def weigh_rivals(about: str, evidence: Sequence[Evidence], priors: Mapping[Rival
     return Difference(about, tuple(rivals), tuple(kept), max(one.seen_s for one in evidence))
 
 
+def add_evidence(known: Difference, one: Evidence) -> Difference:
+    """What is known of a difference with one evidence more."""
+    return weigh_rivals(one.about, (*known.counted, one))
+
+
 def hedge(ratios: Mapping[RivalKind, float]) -> dict[RivalKind, float]:
     """Log likelihood ratios over chance as far as they stand where the look may be misread as a whole."""
     most, misread = max(0.0, *ratios.values()), P_MISREAD / (1.0 - P_MISREAD)
@@ -53,12 +58,13 @@ def _list_kinds(evidence: Sequence[Evidence]) -> tuple[RivalKind, ...]:
 
 def _add(kind: RivalKind, evidence: Sequence[Evidence]) -> float:
     """The log odds that all evidence adds to a rival; what is nearest apart decides what is independent."""
-    looks = [(Look(Pose2(one.x_m, one.y_m, one.heading_rad), e.log_ratio), one)
-             for one in evidence for e in one.explanations if e.kind == kind]
+    said = [(e.log_ratio, one) for one in evidence for e in one.explanations if e.kind == kind]
+    alone = math.fsum(ratio for ratio, one in said if not one.apart_m)
+    looks = [(Look(Pose2(one.x_m, one.y_m, one.heading_rad), ratio), one) for ratio, one in said if one.apart_m]
+    if not looks:
+        return alone
     alike = Alike(max(one.apart_m for _, one in looks), max(one.apart_rad for _, one in looks))
-    if not alike.step_m:
-        return math.fsum(look.log_ratio for look, _ in looks)
-    return add_looks([look for look, _ in looks], alike)
+    return alone + add_looks([look for look, _ in looks], alike)
 
 
 def _tell(kind: RivalKind, evidence: Sequence[Evidence], log_odds: float, p: float) -> Rival:

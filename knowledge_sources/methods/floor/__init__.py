@@ -4,16 +4,14 @@ In reading order: ``model_floor`` (which point of the floor each pixel shows, an
 ``appearance`` (what the floor looks like), ``relief`` (what an earlier picture shows to stand up from it, or to lie on
 it), ``standing_regions`` (regions that do not look like it, or stand up from it, and where they stand), ``see_floor``
 (all of it for one picture), ``ranges`` (one reading of range sensors), ``seen_floor`` (all readings together, what of a
-way they do not show, and from where that can be seen); what stands on it: ``found_things``, ``door_beside``,
+way they do not show, and from where that can be seen); what stands on it: ``found_things``, ``rivals_on_floor``,
 ``weigh_sight``, ``weigh_touch``, and ``revise_frame`` (what is known of the locale then).
 """
 
-from knowledge_sources.methods.floor.door_beside import take_as_jamb
-from knowledge_sources.methods.floor.fixed_boxes import MAX_FIXED_LOOKS, MIN_MOVED_M, enclose, find_fixed, is_behind
 from knowledge_sources.methods.floor.footprints import (
     MIN_SIDE_M, build_free_floor, build_polygon, list_corners, measure_approach_m,
 )
-from knowledge_sources.methods.floor.found_things import MIN_OBSTACLE_CERTAINTY, may_be_there, move_thing
+from knowledge_sources.methods.floor.found_things import may_be_there, move_thing
 from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.methods.floor.relief import TYPICAL_M
 from knowledge_sources.methods.floor.revise_frame import (
@@ -23,7 +21,8 @@ from knowledge_sources.methods.floor.see_floor import (
     FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD, MotionBetween, Seen, see_free_floor,
 )
 from knowledge_sources.methods.floor.rivals_on_floor import (
-    explain_seen_elsewhere, explain_seen_in_patch, explain_touch, judge_thing,
+    MAX_FIXED_LOOKS, MIN_MOVED_M, MIN_OBSTACLE_CERTAINTY, enclose, explain_seen_elsewhere, explain_seen_in_patch,
+    explain_touch, find_fixed, is_behind, judge_by, judge_thing, take_as_jamb,
 )
 from knowledge_sources.methods.floor.seen_floor import (
     Costs, Lookout, SPACING_M, SeenFloor, Sweep, choose_look, find_floor, measure_blind_end_m, measure_first_seen_m,
@@ -39,8 +38,8 @@ __all__ = [
     "MIN_SIDE_M", "MIN_THING_CERTAINTY", "SPACING_M", "TOUCH_MARGIN_M", "TYPICAL_M", "Costs", "Lookout",
     "MotionBetween", "Seen", "SeenFloor", "Sight", "Sweep", "build_free_floor", "build_polygon", "choose_look",
     "enclose", "explain_seen_elsewhere", "explain_seen_in_patch", "explain_touch", "find_fixed", "find_floor",
-    "find_touched", "is_behind", "is_telling", "judge_thing", "list_corners", "locate_touch", "may_be_there",
-    "measure_approach_m", "measure_blind_end_m", "measure_first_seen_m", "measure_free_m", "move_thing",
+    "find_touched", "is_behind", "is_telling", "judge_by", "judge_thing", "list_corners", "locate_touch",
+    "may_be_there", "measure_approach_m", "measure_blind_end_m", "measure_first_seen_m", "measure_free_m", "move_thing",
     "revise_by_difference", "revise_by_door", "revise_by_report", "revise_by_thing", "sample_sweep", "see_free_floor",
     "see_ranges", "take_as_jamb", "touch_again", "touch_first",
 ]

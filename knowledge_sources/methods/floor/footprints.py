@@ -123,6 +123,12 @@ def measure_common_directions(known: shapely.Geometry, seen: shapely.Geometry, e
     return max(0.0, min(b, high) - max(a, low)) / max(high - low, 1e-6)
 
 
+def cover_directions(known: shapely.Geometry, seen: shapely.Geometry, eye: Any) -> float:
+    """The same of what is seen of something, 0 where the known is further off than all of that."""
+    reach_m = float(np.linalg.norm(shapely.get_coordinates(seen) - np.asarray(eye, float), axis=1).max())
+    return measure_common_directions(known, seen, eye) if known.distance(shapely.Point(eye)) <= reach_m else 0.0
+
+
 def _find_directions(shape: shapely.Geometry, eye: Any) -> tuple[float, float, float]:
     """The direction of a shape's middle from an eye (2,), and its ends from that [rad]."""
     to = shapely.get_coordinates(shape) - np.asarray(eye, float)

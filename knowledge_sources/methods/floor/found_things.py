@@ -1,30 +1,46 @@
-"""Things on the floor that the model lacks: how certain they are, where they stand, and which are the same."""
+"""Things on the floor that the model lacks: what was seen of them, what they may take, where, and which are the same.
+
+From far away what hangs over the floor seems to stand on it further off, and things that stand behind one another seem
+to be one. So of two sights the one from clearly nearer tells the shape.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.footprints import (
     Corners,
     build_polygon,
+    cover_directions,
+    join_footprints,
+    list_corners,
     measure_common_directions,
     measure_hull_part,
     measure_width_m,
+    take_free,
 )
-from knowledge_sources.methods.floor.thing_shapes import MIN_COMMON_DIRECTIONS
 from world_models.building.building import Building
 from world_models.building.locales import EXTRA_KIND, Doorway
-from world_models.entries import Obstacle, ObstacleStatus, Place
+from world_models.entries import Obstacle, Place
 from world_models.frames import Pose2
 
-MIN_OBSTACLE_CERTAINTY = 0.9  # with this certainty an obstacle is there: by one sure picture, or by two unsure ones
 VAGUE_SIGMA_M = 0.05  # an obstacle of which the place is less sure is not known well
 MAX_BEHIND_DOOR_M = 4.0  # a thing that is seen through a doorway stands at most so far behind it
+NEARER = 0.7
+"""A sight from less than this part of the distance of another is from clearly nearer."""
+MIN_COMMON_DIRECTIONS = 0.6
+"""A sight without feet tells nothing new where this part of its directions is that of what is known."""
+REACH_M = 10.0
+"""No thing is further off than this when it is seen."""
+CORE_PART = 0.9
+"""Where more of a thing than this part was seen, all of it counts as seen."""
 
 
 def may_be_there(obstacle: Obstacle) -> bool:
@@ -32,9 +48,66 @@ def may_be_there(obstacle: Obstacle) -> bool:
     return obstacle.status != "gone"
 
 
-def tell_status(certainty: float) -> ObstacleStatus:
-    """Whether something so certain is acted on."""
-    return "there" if certainty >= MIN_OBSTACLE_CERTAINTY else "suspected"
+class ThingShape(NamedTuple):
+    """What is known of the shape of a thing [m, world].
+
+    Attributes:
+        seen: what was seen of it; whole: with what it may take besides.
+        from_m: from how near it was seen; infinite where its feet were not.
+    """
+
+    seen: shapely.Geometry
+    whole: shapely.Geometry
+    from_m: float
+
+    @staticmethod
+    def of(obstacle: Obstacle) -> ThingShape:
+        seen, whole = (build_polygon(corners) for corners in (obstacle.core or obstacle.footprint, obstacle.footprint))
+        return ThingShape(seen, whole, obstacle.seen_from_m)
+
+    def list_corners(self) -> tuple[Corners, Corners]:
+        """Of the whole, and of what was seen; () for the latter where it is about all."""
+        footprint = list_corners(self.whole)
+        if not footprint:
+            return (), ()
+        whole = build_polygon(footprint)
+        core = shapely.intersection(whole, self.seen)
+        return footprint, list_corners(core) if 0.0 < core.area < CORE_PART * whole.area else ()
+
+
+def join_shapes(known: ThingShape, new: ThingShape, free: shapely.Geometry, eye: Floats) -> ThingShape:
+    """The shape of a thing by what is known and by a new sight from an ``eye`` (2,), which shows some floor ``free``.
+
+    A sight of which the feet are not seen tells only in which directions the thing is: it adds to what is known in
+    directions in which nothing was known.
+    """
+    if new.from_m < NEARER * known.from_m:
+        behind = _build_sector(new.seen, eye)
+        seen, whole = (take_free(shapely.difference(shape, behind), free) for shape in (known.seen, known.whole))
+        return ThingShape(_join(new.seen, seen), _join(new.whole, whole), new.from_m)
+    if not math.isfinite(new.from_m):
+        if measure_common_directions(known.seen, new.seen, eye) >= MIN_COMMON_DIRECTIONS:
+            return leave_free(known, free)
+    elif NEARER * new.from_m > known.from_m:
+        return known
+    seen = join_footprints(known.seen, new.seen, free)
+    return ThingShape(seen, _join(join_footprints(known.whole, new.whole, free), seen), min(known.from_m, new.from_m))
+
+
+def leave_free(known: ThingShape, free: shapely.Geometry) -> ThingShape:
+    """What is left of a shape without the floor that is seen to be free."""
+    return ThingShape(take_free(known.seen, free), take_free(known.whole, free), known.from_m)
+
+
+def _build_sector(shape: shapely.Geometry, eye: Floats) -> shapely.Geometry:
+    """All in the directions of a shape from an eye."""
+    to = shapely.get_coordinates(shape) - eye
+    rim = eye + REACH_M * to / np.maximum(np.linalg.norm(to, axis=1, keepdims=True), 1e-9)
+    return shapely.convex_hull(shapely.multipoints(np.vstack([eye, rim])))
+
+
+def _join(one: shapely.Geometry, other: shapely.Geometry) -> shapely.Geometry:
+    return shapely.convex_hull(shapely.union(one, other))
 
 
 def find_same(
@@ -44,14 +117,14 @@ def find_same(
 
     What lies next to an obstacle, so that a hull round both would take much floor that neither takes, is another thing.
     """
-    best: tuple[float, str] | None = None
+    shared = dict[str, float]()
     for name, obstacle in known.items():
         polygon = build_polygon(obstacle.footprint)
         reach_m = 2.0 * math.hypot(sigma_m, obstacle.sigma_m)
-        shared = shapely.intersection(polygon.buffer(reach_m), shape).area
-        if shared > 0.0 and (best is None or shared > best[0]) and measure_hull_part(polygon, shape) <= most_hull:
-            best = shared, name
-    return None if best is None else best[1]
+        if measure_hull_part(polygon, shape) <= most_hull:
+            shared[name] = shapely.intersection(polygon.buffer(reach_m), shape).area
+    best = max(shared, key=shared.__getitem__, default=None)
+    return best if best is not None and shared[best] > 0.0 else None
 
 
 def find_before(
@@ -60,19 +133,10 @@ def find_before(
     """The obstacle that something without a visible foot belongs to: well known, nearer than the picture's border,
     and in most of its directions, as its top may be wider than its foot.
     """
-    at = np.array(eye)
-    reach_m = float(np.linalg.norm(shapely.get_coordinates(seen) - at, axis=1).max())
-    best: tuple[float, str] | None = None
-    for name, obstacle in known.items():
-        wide = build_polygon(obstacle.footprint).buffer(overhang_m)
-        if not obstacle.is_there or obstacle.sigma_m > VAGUE_SIGMA_M:
-            continue
-        if wide.distance(shapely.Point(at)) > reach_m:
-            continue
-        part = measure_common_directions(wide, seen, at)
-        if part >= MIN_COMMON_DIRECTIONS and (best is None or part > best[0]):
-            best = part, name
-    return None if best is None else best[1]
+    parts = {name: cover_directions(build_polygon(obstacle.footprint).buffer(overhang_m), seen, eye)
+             for name, obstacle in known.items() if obstacle.is_there and obstacle.sigma_m <= VAGUE_SIGMA_M}
+    best = max(parts, key=parts.__getitem__, default=None)
+    return best if best is not None and parts[best] >= MIN_COMMON_DIRECTIONS else None
 
 
 def place(world: Building, obstacle: Obstacle, shape: shapely.Geometry) -> Obstacle:

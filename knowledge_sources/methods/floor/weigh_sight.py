@@ -11,9 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from knowledge_sources.methods.belief import to_log_odds, weigh_rivals
-from knowledge_sources.methods.floor.door_beside import find_jamb_beside, find_leaf
-from knowledge_sources.methods.floor.fixed_boxes import MIN_MOVED_M, find_fixed
+from knowledge_sources.methods.belief import add_evidence, to_log_odds
 from knowledge_sources.methods.floor.footprints import (
     build_free_floor,
     build_polygon,
@@ -22,16 +20,27 @@ from knowledge_sources.methods.floor.footprints import (
     measure_free_part,
 )
 from knowledge_sources.methods.floor.found_things import (
+    ThingShape,
     find_before,
     find_open_floor,
     find_room,
     find_same,
+    join_shapes,
+    leave_free,
     may_be_there,
     place,
 )
-from knowledge_sources.methods.floor.rivals_on_floor import Shown, explain_free, explain_sight, judge_thing
+from knowledge_sources.methods.floor.rivals_on_floor import (
+    MIN_MOVED_M,
+    Shown,
+    explain_free,
+    explain_sight,
+    find_fixed,
+    find_jamb_beside,
+    find_leaf,
+    judge_thing,
+)
 from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M, MAX_P_SEEN_ONCE
-from knowledge_sources.methods.floor.thing_shapes import ThingShape, join_shapes, leave_free
 from knowledge_sources.methods.floor.weigh_touch import TOUCH_MARGIN_M
 from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.building import Building
@@ -63,7 +72,6 @@ class Sight(NamedTuple):
         world: the building as it is known.
         rim_m: to here from the eye a thing may reach whose feet are not seen.
         known_free: the floor that was known to be free before [m, world].
-        ahead: what the robot sweeps next on its way [m, world].
         camera: by which it was seen.
         before: the things in earlier pictures, the newest first.
         differences: what is known of things, by their names.
@@ -74,7 +82,6 @@ class Sight(NamedTuple):
     world: Building
     rim_m: float
     known_free: shapely.Geometry
-    ahead: shapely.Geometry
     camera: Camera
     before: Sequence[Sequence[FloorThing]] = ()
     differences: Mapping[str, Difference] = MappingProxyType({})
@@ -83,36 +90,35 @@ class Sight(NamedTuple):
     def eye(self) -> tuple[float, float]:
         return self.floor.x_m, self.floor.y_m
 
+    def know(self, about: str) -> Difference:
+        """What is known of a thing."""
+        return self.differences.get(about, Difference.unknown(about))
+
     def is_from_elsewhere(self, known: Obstacle) -> bool:
-        """Whether the eye is not where it was at the last evidence of an obstacle: this is further evidence."""
-        return known.judged_from is None or math.dist(self.eye, known.judged_from) >= MIN_WAY_M
+        """Whether the eye is where none was at any evidence of an obstacle that counts: this is further evidence."""
+        eyes = ((one.x_m, one.y_m) for one in self.know(known.name).counted if one.apart_m)
+        return all(math.dist(self.eye, eye) >= MIN_WAY_M for eye in eyes)
 
     def is_surer(self, thing: FloorThing, known: Obstacle) -> bool:
         """Whether this sight alone is surer of a thing than all before."""
-        difference = self.differences.get(known.name)
-        rival = None if difference is None else difference.find("thing")
+        rival = self.know(known.name).find("thing")
         return rival is None or to_log_odds(thing.p_thing) > rival.log_odds + 1e-6
 
     def is_dirt(self, known: Obstacle) -> bool:
         """Whether it was taken back as dirt; what else is gone, and is seen again, is another thing."""
-        difference = self.differences.get(known.name)
-        dirt = None if difference is None else difference.find("dirt")
+        dirt = self.know(known.name).find("dirt")
         return dirt is not None and dirt.p > 0.5
 
     def tell(
         self, about: str, shows: str, explanations: tuple[Explanation, ...], apart_m: float = MIN_WAY_M
-    ) -> Weighed:
-        """Evidence of something on the floor, and what is known of it then."""
-        f, known = self.floor, self.differences.get(about)
-        evidence = Evidence(about, shows, explanations, f.x_m, f.y_m, 0.0, apart_m, math.tau, f.seen_s)
-        return Weighed(evidence, weigh_rivals(about, (*(() if known is None else known.counted), evidence)))
+    ) -> Evidence:
+        """Evidence of something on the floor."""
+        f = self.floor
+        return Evidence(about, shows, explanations, f.x_m, f.y_m, 0.0, apart_m, math.tau, f.seen_s)
 
-
-class Weighed(NamedTuple):
-    """Evidence of something on the floor, and what is known of it then."""
-
-    evidence: Evidence
-    difference: Difference
+    def weigh(self, told: Evidence) -> Difference:
+        """What is known of something with what is told now."""
+        return add_evidence(self.know(told.about), told)
 
 
 class Sighted(NamedTuple):
@@ -120,14 +126,12 @@ class Sighted(NamedTuple):
 
     Attributes:
         known: id under which it was known; None where it is new.
-        is_next: whether it counts as there because it stands on the robot's way.
-        weighed: the evidence of the sight; None where that is no further evidence.
+        told: the evidence of the sight; None where that is no further evidence.
     """
 
     known: str | None
     obstacle: Obstacle
-    weighed: Weighed | None = None
-    is_next: bool = False
+    told: Evidence | None = None
 
 
 def is_telling(thing: FloorThing) -> bool:
@@ -180,8 +184,7 @@ def weigh_sight(
         if found is not None:
             fresh += 1
             drafts[f"new {fresh}"] = found
-    for draft in drafts.values():
-        yield _hold_next(draft, sight.ahead)
+    yield from drafts.values()
     seen = shapely.union_all([build_polygon(thing.footprint).buffer(2.0 * thing.sigma_m) for thing in f.things])
     for id, obstacle in known.items():
         if id in drafts or not may_be_there(obstacle):
@@ -190,13 +193,6 @@ def weigh_sight(
             gone = miss(sight, obstacle, confirmed if obstacle.is_camouflaged else free, confirmed, s)
             if gone is not None:
                 yield gone._replace(known=id)
-
-
-def _hold_next(draft: Sighted, ahead: shapely.Geometry) -> Sighted:
-    """What is suspected next on the way counts as there."""
-    if draft.obstacle.status == "suspected" and build_polygon(draft.obstacle.footprint).intersects(ahead):
-        return draft._replace(obstacle=replace(draft.obstacle, status="there"), is_next=True)
-    return draft
 
 
 def _show(sight: Sight, thing: FloorThing, shape: ThingShape) -> Shown:
@@ -242,18 +238,18 @@ def see_first(
     if not footprint:
         return None
     name = f"{locale}/obstacle-{number}"
-    weighed = _weigh(sight, name, thing, shown, settings)
+    told = _explain(sight, name, thing, shown, settings)
+    difference = sight.weigh(told)
     found = Obstacle(
         name, locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m, thing.sigma_height_m, 0.0, f.seen_s,
-        None, f.sense, _tell(thing, sight, weighed.difference), "suspected", core, thing.is_camouflaged, shape.from_m,
-        sight.eye)
-    return Sighted(None, judge_thing(place(world, found, own), weighed.difference, settings), weighed)
+        None, f.sense, _tell(thing, sight, difference), "suspected", core, thing.is_camouflaged, shape.from_m)
+    return Sighted(None, judge_thing(place(world, found, own), difference, settings), told)
 
 
-def _weigh(sight: Sight, name: str, thing: FloorThing, shown: Shown, settings: ActionSettings) -> Weighed:
+def _explain(sight: Sight, name: str, thing: FloorThing, shown: Shown, settings: ActionSettings) -> Evidence:
     """What a sight of a thing says of it. Where it is dirt, what it shows further on is no further evidence."""
     explanations = explain_sight(
-        thing.p_thing, shown, sight.differences.get(name), settings.max_obstacle_certainty)
+        thing.p_thing, shown, sight.know(name), settings.max_obstacle_certainty)
     return sight.tell(name, thing.evidence, explanations, MIN_MOVED_M if shown.still else MIN_WAY_M)
 
 
@@ -267,8 +263,9 @@ def see_again(
     """
     s, f, world = settings, sight.floor, sight.world
     is_further = sight.is_from_elsewhere(known) or sight.is_surer(thing, known)
-    weighed = _weigh(sight, known.name, thing, shown, s) if is_further else None
-    judged = known if weighed is None else judge_thing(known, weighed.difference, s)
+    told = _explain(sight, known.name, thing, shown, s) if is_further else None
+    difference = sight.know(known.name) if told is None else sight.weigh(told)
+    judged = known if told is None else judge_thing(known, difference, s)
     joined = _join_sight(sight, known, shape, free)
     footprint, core = joined.list_corners()
     seen_before = known.core or known.footprint
@@ -279,13 +276,12 @@ def see_again(
     if not (moved or surer or higher or f.seen_s - known.seen_s >= SEEN_AGAIN_S):
         return None
     height, sigma = (thing.height_m, thing.sigma_height_m) if higher else (known.height_m, known.sigma_height_m)
-    difference = sight.differences.get(known.name) if weighed is None else weighed.difference
     new = replace(judged, seen_s=f.seen_s, height_m=height, sigma_height_m=sigma,
                   sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight, difference),
-                  is_camouflaged=known.is_camouflaged and thing.is_camouflaged, judged_from=sight.eye)
+                  is_camouflaged=known.is_camouflaged and thing.is_camouflaged)
     if moved and footprint:
         new = place(world, replace(new, footprint=footprint, core=core, seen_from_m=joined.from_m), joined.whole)
-    return Sighted(None, new, weighed)
+    return Sighted(None, new, told)
 
 
 def _join_sight(sight: Sight, known: Obstacle, new: ThingShape, free: shapely.Geometry) -> ThingShape:
@@ -317,22 +313,18 @@ def miss(
         odds = CAMOUFLAGED_FREE_ODDS if known.is_camouflaged else LOOKS_FREE_ODDS
         if not known.is_camouflaged and confirmed_part >= MIN_FREE_PART:
             odds = FREE_FLOOR_ODDS
-        explanations = explain_free(free_part * math.log(odds), sight.differences.get(known.name))
-        weighed = sight.tell(known.name, f"{free_part:.0%} of its floor is seen free", explanations)
-        judged = judge_thing(known, weighed.difference, settings)
-        return Sighted(None, replace(judged, judged_from=sight.eye), weighed)
+        explanations = explain_free(free_part * math.log(odds), sight.know(known.name))
+        told = sight.tell(known.name, f"{free_part:.0%} of its floor is seen free", explanations)
+        return Sighted(None, judge_thing(known, sight.weigh(told), settings), told)
     left = leave_free(ThingShape.of(known), free)
     footprint, core = left.list_corners()
     if not footprint or measure_change_m(known.footprint, footprint) < settings.min_footprint_change_m:
         return None
-    new = replace(known, footprint=footprint, core=core, judged_from=sight.eye)
-    return Sighted(None, place(sight.world, new, left.whole))
+    return Sighted(None, place(sight.world, replace(known, footprint=footprint, core=core), left.whole))
 
 
-def _tell(thing: FloorThing, sight: Sight, difference: Difference | None) -> str:
+def _tell(thing: FloorThing, sight: Sight, difference: Difference) -> str:
     """Which pixels of which picture tell of a thing, and what it may be."""
-    odds = "" if difference is None else f": {difference.odds_in_words()}"
-    if sight.floor.sense != "camera":
-        return f"{sight.seen_by}: {thing.evidence}{odds}"
     left, top, right, bottom = thing.box_px
-    return f"{sight.seen_by}, pixels ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}): {thing.evidence}{odds}"
+    pixels = f", pixels ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f})" if sight.floor.sense == "camera" else ""
+    return f"{sight.seen_by}{pixels}: {thing.evidence}: {difference.odds_in_words()}"

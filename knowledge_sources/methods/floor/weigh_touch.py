@@ -13,7 +13,6 @@ import shapely
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor.footprints import Corners, build_polygon, list_corners
 from knowledge_sources.methods.floor.found_things import may_be_there, place
-from knowledge_sources.settings import ActionSettings
 from world_models.building.building import Building
 from world_models.entries import Contact, Obstacle, Place
 from world_models.frames import Pose2
@@ -63,22 +62,21 @@ def find_touched(known: Mapping[str, Obstacle], touched: Touched, reach_m: float
 
 
 def touch_first(
-    world: Building, touched: Touched, locale: str, sigma_m: float, number: int, settings: ActionSettings
+    world: Building, touched: Touched, locale: str, sigma_m: float, number: int, width_m: float
 ) -> Obstacle:
     """Something that was not known. How large it is a touch does not tell."""
-    s, contact, width_m = settings, touched.contact, settings.obstacle_width_m
+    contact = touched.contact
     at = Place.of_world(world, locale, float(touched.at[0]), float(touched.at[1]))
     return Obstacle(
         f"{locale}/obstacle-{number}", locale, touched.build_square(width_m), sigma_m, at.x_m, at.y_m, width_m,
-        certainty=s.max_obstacle_certainty, seen_s=contact.when_s, touched_s=contact.when_s,
-        by="touch", evidence=contact.sentence())
+        seen_s=contact.when_s, touched_s=contact.when_s, by="touch")
 
 
-def touch_again(world: Building, touched: Touched, known: Obstacle, settings: ActionSettings) -> Obstacle:
+def touch_again(world: Building, touched: Touched, known: Obstacle) -> Obstacle:
     """A known obstacle after it was touched: it reaches to where it was touched."""
     corner, when_s = build_polygon(touched.build_square(TOUCHED_SIDE_M)), touched.contact.when_s
     joined = shapely.convex_hull(shapely.union_all([build_polygon(known.footprint), corner]))
     core = list_corners(shapely.union(build_polygon(known.core), corner)) if known.core else ()
-    new = replace(known, footprint=list_corners(joined), core=core, certainty=settings.max_obstacle_certainty,
-                  seen_s=when_s, touched_s=when_s, status="there")
+    new = replace(known, footprint=list_corners(joined), core=core, seen_s=when_s, touched_s=when_s,
+                  status="there")
     return place(world, new, joined)

@@ -48,6 +48,15 @@ def test_the_same_look_twice_is_once(seen: list[Evidence], which: int, later_s: 
     assert read(weigh_rivals("hallway", [*seen, again])) == pytest.approx(read(weigh_rivals("hallway", seen)))
 
 
+@given(looks, evidence())
+def test_what_has_nothing_in_common_with_any_look_counts_whole(seen: list[Evidence], one: Evidence) -> None:
+    alone = replace(one, apart_m=0.0, apart_rad=0.0)
+    before, after = ({rival.kind: rival.log_odds for rival in weigh_rivals("hallway", told).rivals}
+                     for told in (seen, [*seen, alone]))
+    for e in alone.explanations:
+        assert after[e.kind] == pytest.approx(before.get(e.kind, PRIORS[e.kind]) + e.log_ratio)
+
+
 @given(looks, evidence(("wall",)))
 def test_one_rival_more_makes_no_other_surer(seen: list[Evidence], other: Evidence) -> None:
     before, after = read(weigh_rivals("hallway", seen)), read(weigh_rivals("hallway", [*seen, other]))

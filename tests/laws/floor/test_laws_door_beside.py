@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_sources.methods.floor import build_polygon
-from knowledge_sources.methods.floor.door_beside import MAX_BESIDE_M, find_jamb_beside
+from knowledge_sources.methods.floor.rivals_on_floor import MAX_BESIDE_M, find_jamb_beside
 from world_models.building.locales import Doorway
 from world_models.files.world_files import WORLDS, load_world
 

@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 
 from generated_boards import HALL, house, plain_robot, to_world
 from knowledge_sources.methods.floor import MIN_OBSTACLE_CERTAINTY, Sight, build_polygon, see_ranges, touch_again
-from knowledge_sources.methods.floor.found_things import find_same
+from knowledge_sources.methods.floor.found_things import ThingShape, find_same
 from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M
 from knowledge_sources.methods.floor.rivals_on_floor import Shown
-from knowledge_sources.methods.floor.thing_shapes import ThingShape
 from knowledge_sources.methods.floor.weigh_sight import see_again
 from knowledge_sources.methods.floor.weigh_touch import TOUCHED_SIDE_M, Touched
 from knowledge_sources.settings import DEFAULT
@@ -54,7 +53,7 @@ def test_touched_it_reaches_to_where_it_was_touched_and_what_was_seen_of_it_too(
     contact = Contact("bumper", 0.0, 0.2, 7.0)
     touched = Touched(np.array(here.position), np.array([math.cos(out), math.sin(out)]), contact)
     known = THING if has_core else replace(THING, core=())
-    new = touch_again(house(), touched, known, DEFAULT.action)
+    new = touch_again(house(), touched, known)
     square = touched.build_square(TOUCHED_SIDE_M)
     for before, after in ((known.footprint, new.footprint), (known.core, new.core)):
         assert bool(after) == bool(before)
@@ -63,7 +62,6 @@ def test_touched_it_reaches_to_where_it_was_touched_and_what_was_seen_of_it_too(
             assert build_polygon(after).hausdorff_distance(hull) < 8e-3
     assert not has_core or is_part(new.core, new.footprint)
     assert (new.status, new.seen_s, new.touched_s) == ("there", 7.0, 7.0)
-    assert new.certainty == DEFAULT.action.max_obstacle_certainty
 
 
 @pytest.mark.parametrize("core", [(), PART])
@@ -103,9 +101,8 @@ def look(*, p: float = 0.6, sigma_m: float = 0.05, sigma_height_m: float = 0.3, 
     eye = to_world(Pose2(1.5, 2.0, 0.0))
     floor = FreeFloor("camera", HALL, eye.x_m, eye.y_m, (0.0,), (1.0,), (1.0,), ("thing",), (0.02,), (), seen_s)
     thing = FloorThing(known.footprint, sigma_m, height_m, sigma_height_m, p, (0.0, 0.0, 9.0, 9.0), "unlike the floor")
-    known = replace(known, judged_from=(eye.x_m + way_m, eye.y_m))
-    sight = Sight(floor, "CameraPicture-1", house(), 0.4, NONE, NONE, plain_robot().camera, (),
-                  {known.name: known_by_sight(known)})
+    sight = Sight(floor, "CameraPicture-1", house(), 0.4, NONE, plain_robot().camera, (),
+                  {known.name: known_by_sight(known, (eye.x_m + way_m, eye.y_m))})
     again = see_again(sight, known, thing, shape or ThingShape.of(known), Shown(), free, DEFAULT.action)
     return None if again is None else again.obstacle
 

@@ -1,7 +1,8 @@
-"""Law of a halted leg: exactly what is suspected within the robot's next sweep is held to be there."""
+"""Law of what is ahead: exactly what is suspected within the robot's next sweep is held to be there."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import get_args
 
@@ -16,7 +17,7 @@ from knowledge_sources.model.halt_explainer import HaltExplainer
 from knowledge_sources.reads import SEEN_MARGIN_M
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall
-from world_models.entries import Leg, Obstacle, ObstacleStatus
+from world_models.entries import Goal, Leg, Obstacle, ObstacleStatus, Place, PlanSketch, Subgoal
 from world_models.entries.task import LegStatus
 
 SOURCE = HaltExplainer()
@@ -32,9 +33,29 @@ def leg_to(dx_m: float, dy_m: float, status: LegStatus = "halted") -> Leg:
 @pytest.mark.parametrize("status", get_args(LegStatus))
 def test_it_wakes_when_a_leg_is_halted(status: LegStatus) -> None:
     entry = Hall(()).put(leg_to(3.0, 0.0, status))
-    (watch,) = SOURCE.on
+    watch, _ = SOURCE.on
     assert watch.sees(Revised(entry)) == (status == "halted")
     assert not watch.sees(Posted(entry))
+
+
+@pytest.mark.parametrize("status", get_args(ObstacleStatus))
+@pytest.mark.parametrize(("turn_rad", "is_next"), [(0.0, True), (0.3, True), (-0.3, True), (0.9, False), (2.0, False)])
+def test_what_is_suspected_next_on_the_way_is_held_before_the_leg_is_halted(
+    turn_rad: float, is_next: bool, status: ObstacleStatus
+) -> None:
+    hall = Hall(())
+    here, there = (Place(HALL, x_m, 1.2) for x_m in (2.0, 6.0))
+    goal = hall.put(Goal(here, there))
+    sketch = hall.put(PlanSketch(goal.id, (), "", (Subgoal(here, there, primitive=True),), verified=True))
+    leg = hall.put(replace(leg_to(3.0 * math.cos(turn_rad), 3.0 * math.sin(turn_rad), "moving"), sketch=sketch.id))
+    near = tuple((x - 2.0 + DEFAULT.action.act_within_m, y) for x, y in CARTON)  # its front where the next way ends
+    thing = hall.put(Obstacle(f"{HALL}/obstacle-1", HALL, near, 0.05, 0.0, 0.0, 0.5, certainty=0.7, status=status))
+    _, watch = SOURCE.on
+    assert watch.sees(Posted(thing)) == watch.sees(Revised(thing)) == (status == "suspected")
+    (effect,) = answer(SOURCE, hall.board.view, Posted(thing)) or (None,)
+    assert (effect is not None) == (is_next and status == "suspected")
+    if effect is not None:
+        assert effect.value.is_there and set(effect.because) == {thing, leg, hall.belief()}
 
 
 @pytest.mark.parametrize(("beyond_rim_m", "is_met"), [(-0.01, True), (0.01, False)])

@@ -10,12 +10,9 @@ import pytest
 
 from blackboard import Entry, Level, Post, Posted
 from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
-from knowledge_sources.methods.belief import weigh_rivals
-from knowledge_sources.methods.floor import judge_thing
 from knowledge_sources.milestone.obstruction_finder import MIN_OBSTRUCTION_LOOKS, ObstructionFinder
-from knowledge_sources.settings import DEFAULT
 from things_in_hall import known_by_sight
-from world_models.entries import Evidence, FloorThing, FreeFloor, Obstruction, Segments
+from world_models.entries import Evidence, FloorThing, FreeFloor, Obstacle, Obstruction, Segments
 
 SOURCE = ObstructionFinder()
 CORNERS = np.array([(70.0, 90.0), (190.0, 90.0), (190.0, 230.0), (70.0, 230.0)])
@@ -90,18 +87,14 @@ def test_what_keeps_its_box_while_it_would_have_moved_is_before_the_camera_and_n
         left, *rest = LENS.box_px
         thing = replace(LENS, footprint=footprint, box_px=(left + shift_px, *rest))
         scan = bench.put(FreeFloor("camera", "hall", 0.0, 0.0, (), (), (), (), (), (thing,), 1.0))
-    told = made(bench.ask(SOURCE, scan), Evidence)
-    assert len(told) == (shifts[1] < 6.0 and moved_m > 0.3)
-    sure = bench.put(weigh_rivals("lens patch", told)) if told else None
-    effects = bench.ask(SOURCE, sure) or () if sure else ()
-    assert len(effects) == len(told)
+    effects = bench.ask(SOURCE, scan) or ()
+    assert len(effects) == (shifts[1] < 6.0 and moved_m > 0.3)
+    bench.put(known_by_sight(replace(held.value, certainty=0.95)))
     for shows in (*effects, Post(Obstruction(((0.0, 0.0), (90.0, 0.0), (90.0, 90.0))))):
         (found,) = bench.apply(shows)[:1]
-        (*taken,) = made(bench.ask(SOURCE, found.entry), Evidence)
-        known = known_by_sight(replace(held.value, certainty=0.95))
-        judged = [judge_thing(held.value, weigh_rivals(held.value.name, (*known.counted, one)), DEFAULT.action).status
-                  for one in taken]
-        assert judged == ["gone"] * (shows in effects)
+        taken = bench.ask(SOURCE, found.entry) or ()
+        assert [type(effect.value) for effect in taken] == [Evidence, Obstacle] * (shows in effects)
+        assert all(effect.value.status == "gone" for effect in taken[1:])
 
 
 def test_what_was_known_is_a_reason_of_what_is_known_now() -> None:

@@ -23,19 +23,14 @@ from knowledge_sources.methods.floor.weigh_sight import (
 )
 from knowledge_sources.model.thing_mapper import ThingMapper
 from knowledge_sources.settings import DEFAULT
-from things_in_hall import CARTON, HALL, HERE, Hall, carton, known_by_sight
+from things_in_hall import CARTON, HALL, Hall, carton, known_by_sight
 from world_models.entries import (
     CameraPicture,
     Discrepancy,
     Evidence,
     FreeFloor,
-    Goal,
-    Leg,
     Obstacle,
     ObstacleStatus,
-    Place,
-    PlanSketch,
-    Subgoal,
 )
 from world_models.entries.floor import FloorSense
 
@@ -62,9 +57,9 @@ def on_things(effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
     return things
 
 
-def hold(hall: Hall, thing: Obstacle, *because: Entry[object]) -> Entry[object]:
+def hold(hall: Hall, thing: Obstacle, *because: Entry[FreeFloor]) -> Entry[object]:
     """A thing that was seen, as certain as its difference."""
-    hall.put(known_by_sight(thing))
+    hall.put(known_by_sight(thing, *((scan.value.x_m, scan.value.y_m) for scan in because)))
     return hall.put(thing, *because)
 
 
@@ -137,7 +132,7 @@ def test_odds_multiply_only_where_it_is_seen_from_elsewhere(before: float, p_thi
     hall = Hall(())
     first = hall.put(hall.look(seen_s=1.0))
     status: ObstacleStatus = "there" if before >= MIN_OBSTACLE_CERTAINTY else "suspected"
-    old = hold(hall, replace(known(status, before), judged_from=(first.value.x_m, first.value.y_m)), first)
+    old = hold(hall, known(status, before), first)
     scan, effects = ask(hall, hall.look(carton(p_thing), seen_s=9.0, ahead_m=ahead_m))
     (effect,) = effects or ()
     is_elsewhere = ahead_m >= FLOOR_VIEW_DISTANCE_M / 2.0
@@ -157,8 +152,7 @@ def test_floor_that_is_seen_free_from_elsewhere_lowers_the_odds_by_a_stated_fact
     """By less where it only looks free; and what looks like the floor is gone only where it would be told."""
     hall = Hall(())
     first = hall.put(hall.look(seen_s=1.0))
-    old = hold(hall, replace(known("suspected", before), seen_s=2.0, is_camouflaged=is_camouflaged,
-                           judged_from=(first.value.x_m, first.value.y_m)), first)
+    old = hold(hall, replace(known("suspected", before), seen_s=2.0, is_camouflaged=is_camouflaged), first)
     look = hall.look(seen_s=6.0, ahead_m=ahead_m)
     scan, effects = ask(hall, look if is_told else replace(look, confirmed_m=()))
     assert effects is not None
@@ -215,21 +209,3 @@ def test_another_part_of_a_thing_in_the_same_sight_is_not_another_thing(part: fl
     aside_m = 0.4 * (1.0 - part)
     _, effects = ask(hall, hall.look(carton(), carton(by_m=aside_m), seen_s=9.0))
     assert len(effects or ()) == count
-
-
-@pytest.mark.parametrize(("turn_rad", "is_next"), [(0.0, True), (0.3, True), (-0.3, True), (0.9, False), (2.0, False)])
-def test_what_is_suspected_next_on_the_way_counts_as_there_and_the_leg_is_a_reason(
-    turn_rad: float, is_next: bool
-) -> None:
-    hall = Hall(())
-    here, there = (Place(HALL, x_m, 1.2) for x_m in (2.0, 6.0))
-    goal = hall.put(Goal(here, there))
-    steps = (Subgoal(here, there, primitive=True),)
-    sketch = hall.put(PlanSketch(goal.id, (), "", steps, verified=True))
-    end = HERE.x_m + 3.0 * math.cos(turn_rad), HERE.y_m + 3.0 * math.sin(turn_rad)
-    leg = hall.put(Leg(sketch.id, 0, HERE.x_m, HERE.y_m, *end, 0.05))
-    near = tuple((x - 2.0 + S.act_within_m, y) for x, y in CARTON)  # its front where the next way ends
-    scan, effects = ask(hall, hall.look(replace(carton(0.8), footprint=near), seen_s=7.0))
-    (effect,) = effects or ()
-    assert effect.value.status == ("there" if is_next else "suspected")
-    assert set(effect.because) == ({scan, leg} if is_next else {scan})

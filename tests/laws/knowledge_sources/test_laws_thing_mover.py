@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from acting import answer
 from blackboard import Blackboard, Post, Posted, Revise, Revised
-from knowledge_sources.methods.belief import weigh_rivals
-from knowledge_sources.methods.floor import judge_thing, move_thing
+from knowledge_sources.methods.floor import move_thing
 from knowledge_sources.model.thing_mover import MAX_DRIFT_M, MAX_DRIFT_RAD, ThingMover
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, known_by_sight
@@ -81,10 +80,8 @@ def find(by: Pose2) -> Obstacle:
     board, known = open_hall(), known_by_sight(thing())
     board.apply([Post(thing()), Post(known)], author="test", cycle=1)
     (found,) = board.apply([Post(replace(BELIEF, correction=by))], author="test", cycle=2)
-    (effect,) = answer(SOURCE, board.view, Revised(found.entry)) or ()
-    if isinstance(effect.value, Evidence):
-        return judge_thing(thing(), weigh_rivals(known.about, (*known.counted, effect.value)), S)
-    assert isinstance(effect, Revise)
+    *told, effect = answer(SOURCE, board.view, Revised(found.entry)) or ()
+    assert isinstance(effect, Revise) and all(isinstance(one.value, Evidence) for one in told)
     return effect.value
 
 

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 from acting import answer
 from blackboard import Post, Posted, Revise, Revised
+from knowledge_sources.methods.belief import weigh_rivals
+from knowledge_sources.methods.floor import judge_thing
 from knowledge_sources.model.touch_finder import MAX_TOUCH_SIGMA_RAD, TouchFinder
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, HERE, Hall
@@ -78,7 +80,7 @@ def test_a_sure_touch_is_a_square_behind_the_point_however_the_robot_has_turned_
     assert shapely.Polygon(found.footprint).exterior.is_ccw
     assert (found.name, found.locale, found.status, found.by) == (f"{HALL}/obstacle-1", HALL, "there", "touch")
     assert (found.seen_s, found.touched_s) == (3.0, 3.0)
-    assert found.certainty == DEFAULT.action.max_obstacle_certainty and found.width_m == side_m
+    assert found.certainty == pytest.approx(DEFAULT.action.max_obstacle_certainty) and found.width_m == side_m
     b = trigger.entry.value
     aside_m = hall.robot.radius_m * math.hypot(b.sigma_rad, sigma_rad)
     assert found.sigma_m == pytest.approx(math.hypot(b.sigma_m, aside_m))
@@ -110,6 +112,8 @@ def test_what_was_known_there_reaches_to_where_it_was_touched(gap_m: float, is_s
     trigger = verify(hall, pose)
     effect, told = answer(SOURCE, hall.board.view, trigger) or ()
     assert isinstance(effect, Revise) == is_same and told.value.about == effect.value.name
+    weighed = weigh_rivals(effect.value.name, (told.value,))
+    assert judge_thing(effect.value, weighed, DEFAULT.action) == effect.value
     if isinstance(effect, Revise):
         found: Obstacle = effect.value
         assert effect.entry is known and {entry.id for entry in effect.because} == {known.id, *ids, trigger.entry.id}

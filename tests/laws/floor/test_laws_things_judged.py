@@ -1,28 +1,30 @@
-"""Laws of the thing judge: a thing is as certain as its rivals leave it, and gone where one of them has won."""
+"""Laws of a thing that is judged: it is as certain as its rivals leave it, and gone where one of them has won."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generated_boards import Bench, effect_on, plain_robot, reasons
 from knowledge_sources.methods.belief import weigh_rivals
-from knowledge_sources.methods.floor.rivals_on_floor import BLOCKING, Shown, explain_sight, explain_touch, judge_thing
-from knowledge_sources.model.thing_judge import ThingJudge
+from knowledge_sources.methods.floor.rivals_on_floor import (
+    BLOCKING,
+    Shown,
+    explain_sight,
+    explain_touch,
+    judge_by,
+    judge_thing,
+)
 from knowledge_sources.settings import DEFAULT
-from things_in_hall import known_by_sight
-from world_models.entries import Evidence, Obstacle
+from world_models.entries import Difference, Evidence, Obstacle
 
-SOURCE, S = ThingJudge(), DEFAULT.action
+S = DEFAULT.action
 THING = Obstacle("hall/obstacle-1", "hall", ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), 0.05, 0.0, 0.0, 1.0, by="camera")
 sights = st.lists(st.tuples(st.floats(0.05, 0.95), st.integers(0, 2)), min_size=1, max_size=4)
 
 
 def see(p_thing: float, still: int, x_m: float) -> Evidence:
-    explanations = explain_sight(p_thing, Shown(still=still), None, S.max_obstacle_certainty)
+    explanations = explain_sight(p_thing, Shown(still=still), Difference.unknown(THING.name), S.max_obstacle_certainty)
     return Evidence(THING.name, "a region", explanations, x_m, 0.0, 0.0, 0.3, 6.3, x_m)
 
 
@@ -43,22 +45,11 @@ def test_it_is_as_certain_as_what_blocks_the_way_in_whatever_order_it_was_seen(
 
 @pytest.mark.parametrize("still", [1, 2])
 def test_what_keeps_its_pixels_in_two_looks_is_rather_dirt_until_it_is_touched(still: int) -> None:
-    bench = Bench(plain_robot())
-    thing = bench.put(replace(THING, certainty=0.95))
     seen = [see(0.95, 0, 0.0), see(0.95, still, 1.0), see(0.95, still, 2.0)]
-    found = bench.put(weigh_rivals(THING.name, seen))
-    effect = effect_on(bench.ask(SOURCE, found), Obstacle)
-    assert effect.value.status == "gone" and "dirt on the lens" in effect.value.evidence
-    assert reasons(effect) == {thing.id, found.id}
-    touch = explain_touch("the leaf of a-door, shut", found.value, S.max_obstacle_certainty)
+    known = weigh_rivals(THING.name, seen[:2])
+    judged = judge_by(seen[2], THING, known, S)
+    found = weigh_rivals(THING.name, seen)
+    assert judged.status == "gone" and "dirt on the lens" in judged.evidence
+    touch = explain_touch("the leaf of a-door, shut", found, S.max_obstacle_certainty)
     touched = Evidence(THING.name, "touched", touch, 3.0, 0.0, 0.0, 0.3, 6.3, 3.0)
     assert judge_thing(THING, weigh_rivals(THING.name, (*seen, touched)), S).is_there
-
-
-def test_of_what_is_no_thing_or_no_news_it_says_nothing() -> None:
-    bench = Bench(plain_robot())
-    assert bench.ask(SOURCE, bench.put(weigh_rivals("a-door", [see(0.9, 0, 0.0)]))) is None
-    known = weigh_rivals(THING.name, [see(0.9, 0, 0.0)])
-    bench.put(judge_thing(THING, known, S))
-    assert bench.ask(SOURCE, bench.put(known)) is None
-    assert known_by_sight(judge_thing(THING, known, S)).leader.kind == "thing"
