@@ -33,17 +33,8 @@ from knowledge_sources.reads import (
     unmeasured_doubt,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import (
-    BodyFault,
-    Discrepancy,
-    Drift,
-    Hypothesis,
-    Leg,
-    Milestone,
-    MotorCommand,
-    PlanSketch,
-    correct,
-)
+from world_models.entries import BodyFault, Drift, Hypothesis, Leg, Milestone, MotorCommand, PlanSketch
+from world_models.entries.discrepancy import Discrepancy, correct
 
 LOOKAHEAD_M = 1.2  # distance ahead on the line at which the motor steers (pure pursuit): two increments
 

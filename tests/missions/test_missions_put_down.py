@@ -13,7 +13,7 @@ from logs.timeline import Timeline
 from sim.scenario import load_scenario
 from sim.stage import Stage, build_stage
 
-FIRST_CYCLES = 14
+FIRST_CYCLES = 20
 
 
 @pytest.fixture(scope="module")

@@ -80,7 +80,7 @@ class JambBeside(NamedTuple):
         return f"{JAMB_OF}{self.door} that stands {abs(100.0 * self.off_m):.0f} cm beside"
 
 
-class Shown(NamedTuple):
+class ShownSight(NamedTuple):
     """What a sight shows of something, beside how it looks.
 
     Attributes:
@@ -94,7 +94,7 @@ class Shown(NamedTuple):
     still: int = 0
 
 
-def explain_sight(p_thing: float, shown: Shown, known: Difference, most: float) -> tuple[Explanation, ...]:
+def explain_sight(p_thing: float, shown: ShownSight, known: Difference, most: float) -> tuple[Explanation, ...]:
     """What each rival makes of a sight.
 
     Args:

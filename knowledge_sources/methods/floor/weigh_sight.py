@@ -32,7 +32,7 @@ from knowledge_sources.methods.floor.found_things import (
 )
 from knowledge_sources.methods.floor.rivals_on_floor import (
     MIN_MOVED_M,
-    Shown,
+    ShownSight,
     explain_free,
     explain_sight,
     find_fixed,
@@ -195,14 +195,14 @@ def weigh_sight(
                 yield gone._replace(known=id)
 
 
-def _show(sight: Sight, thing: FloorThing, shape: ThingShape) -> Shown:
+def _show(sight: Sight, thing: FloorThing, shape: ThingShape) -> ShownSight:
     """What a sight shows of a thing, beside how it looks."""
     if sight.floor.sense != "camera":
-        return Shown()
+        return ShownSight()
     within_m = 2.0 * thing.sigma_m
     jamb = find_jamb_beside(sight.world, sight.floor.locale, shape.seen, sight.eye) if thing.is_cut else None
     leaf = None if thing.is_cut else find_leaf(sight.world, sight.floor.locale, shape.seen, within_m)
-    return Shown(jamb, leaf, len(find_fixed(thing, sight.before, sight.camera)))
+    return ShownSight(jamb, leaf, len(find_fixed(thing, sight.before, sight.camera)))
 
 
 def _shape_of(sight: Sight, thing: FloorThing) -> ThingShape:
@@ -228,7 +228,7 @@ def _is_explained(sight: Sight, thing: FloorThing, shape: shapely.Polygon) -> bo
 
 
 def see_first(
-    sight: Sight, thing: FloorThing, shape: ThingShape, shown: Shown, number: int, settings: ActionSettings
+    sight: Sight, thing: FloorThing, shape: ThingShape, shown: ShownSight, number: int, settings: ActionSettings
 ) -> Sighted | None:
     """A thing that was not known; None where it stands on no floor."""
     f, world = sight.floor, sight.world
@@ -246,7 +246,7 @@ def see_first(
     return Sighted(None, judge_thing(place(world, found, own), difference, settings), told)
 
 
-def _explain(sight: Sight, name: str, thing: FloorThing, shown: Shown, settings: ActionSettings) -> Evidence:
+def _explain(sight: Sight, name: str, thing: FloorThing, shown: ShownSight, settings: ActionSettings) -> Evidence:
     """What a sight of a thing says of it. Where it is dirt, what it shows further on is no further evidence."""
     explanations = explain_sight(
         thing.p_thing, shown, sight.know(name), settings.max_obstacle_certainty)
@@ -254,7 +254,7 @@ def _explain(sight: Sight, name: str, thing: FloorThing, shown: Shown, settings:
 
 
 def see_again(
-    sight: Sight, known: Obstacle, thing: FloorThing, shape: ThingShape, shown: Shown, free: shapely.Geometry,
+    sight: Sight, known: Obstacle, thing: FloorThing, shape: ThingShape, shown: ShownSight, free: shapely.Geometry,
     settings: ActionSettings,
 ) -> Sighted | None:
     """A known obstacle after it was seen once more; None where that tells nothing that matters.

@@ -15,7 +15,7 @@ from generated_boards import HALL, house, plain_robot, to_world
 from knowledge_sources.methods.floor import MIN_OBSTACLE_CERTAINTY, Sight, build_polygon, see_ranges, touch_again
 from knowledge_sources.methods.floor.found_things import ThingShape, find_same
 from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M
-from knowledge_sources.methods.floor.rivals_on_floor import Shown
+from knowledge_sources.methods.floor.rivals_on_floor import ShownSight
 from knowledge_sources.methods.floor.weigh_sight import see_again
 from knowledge_sources.methods.floor.weigh_touch import TOUCHED_SIDE_M, Touched
 from knowledge_sources.settings import DEFAULT
@@ -103,7 +103,7 @@ def look(*, p: float = 0.6, sigma_m: float = 0.05, sigma_height_m: float = 0.3, 
     thing = FloorThing(known.footprint, sigma_m, height_m, sigma_height_m, p, (0.0, 0.0, 9.0, 9.0), "unlike the floor")
     sight = Sight(floor, "CameraPicture-1", house(), 0.4, NONE, plain_robot().camera, (),
                   {known.name: known_by_sight(known, (eye.x_m + way_m, eye.y_m))})
-    again = see_again(sight, known, thing, shape or ThingShape.of(known), Shown(), free, DEFAULT.action)
+    again = see_again(sight, known, thing, shape or ThingShape.of(known), ShownSight(), free, DEFAULT.action)
     return None if again is None else again.obstacle
 
 

@@ -31,12 +31,12 @@ from world_models import words
 from world_models.files.toml.mission import ROOT
 from world_models.frames import Pose2
 
-SHORT = ["--set", "limits.max_cycles=36"]
+SHORT = ["--set", "limits.max_cycles=40"]
 
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A mission that was given 36 cycles, in 6 of which an act only asks for locale frames, and its trace."""
+    """A mission that was given 40 cycles, in 6 of which an act only asks for locale frames, and its trace."""
     out, printed = tmp_path_factory.mktemp("runs") / "short", io.StringIO()
     with redirect_stdout(printed):
         assert main(["run", "lab-to-allens-office", *SHORT, "--out", str(out), "--trace"]) == 1
@@ -63,7 +63,7 @@ def test_a_run_leaves_its_files(run: Path) -> None:
     assert json.loads((run / "result.json").read_text())["outcome"] == "failed"
     head = json.loads((run / "run.json").read_text())
     assert (head["kind"], head["name"], head["seed"]) == ("simulator", "lab-to-allens-office", 0)
-    assert head["scenario"]["limits"] == {"max_cycles": 36}
+    assert head["scenario"]["limits"] == {"max_cycles": 40}
 
 
 def test_why_goes_down_to_the_command(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
