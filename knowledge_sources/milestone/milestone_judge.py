@@ -128,7 +128,7 @@ class MilestoneJudge(RobotKnowledgeSource):
         wrong = view.latest(Difference, lambda d: d.p_misled > MAX_P_RIVAL)
         rival = find_alias(view, case.fix, case.belief, weighed)
         p, said = p_alias, _ = (0.0, "") if rival is None else (rival.p, rival.said)
-        if wrong is not None:
+        if wrong is not None and wrong.value.p_misled > p:
             p, said = wrong.value.p_misled, f"{wrong.value.about} differs, {wrong.value.odds_in_words()}"
         if p <= MAX_P_RIVAL:
             return verdict

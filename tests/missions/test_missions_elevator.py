@@ -72,9 +72,8 @@ def test_the_wrong_button_is_noticed_by_the_next_milestone(tmp_path: Path) -> No
     result, decisions = driven(tmp_path, HELPER + 'presses = "car-3"\n', floors=3)
     (told, _), = made(decisions, "RideReport")
     after = [c["verdict"] for cycle, c in made(decisions, "Certificate") if cycle > told]
-    assert after and after[0] != "verified"
+    assert after and "verified" not in after
     assert result.outcome != "reached" and result.collisions == 0
-    assert any("the doors may have opened at" in c["reason"] for cycle, c in made(decisions, "Certificate"))
 
 
 def test_the_same_seed_gives_the_same_journal(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.methods.floor.rivals_on_floor import (
     BLOCKING,
-    Shown,
+    ShownSight,
     explain_sight,
     explain_touch,
     judge_by,
@@ -24,7 +24,8 @@ sights = st.lists(st.tuples(st.floats(0.05, 0.95), st.integers(0, 2)), min_size=
 
 
 def see(p_thing: float, still: int, x_m: float) -> Evidence:
-    explanations = explain_sight(p_thing, Shown(still=still), Difference.unknown(THING.name), S.max_obstacle_certainty)
+    nothing = Difference.unknown(THING.name)
+    explanations = explain_sight(p_thing, ShownSight(still=still), nothing, S.max_obstacle_certainty)
     return Evidence(THING.name, "a region", explanations, x_m, 0.0, 0.0, 0.3, 6.3, x_m)
 
 

@@ -272,7 +272,7 @@ def test_diff_names_the_first_decision_that_differs(
     assert "agree in all" in capsys.readouterr().out
     assert main(["diff", str(run), str(both[0] / "1")]) == 1
     out = capsys.readouterr().out
-    assert "agree for 9 decisions." in out
+    assert "agree for 15 decisions." in out
     assert "The first observation that differs is CameraPicture-1.0" in out
     assert "seed: 0 against 1" in out
 

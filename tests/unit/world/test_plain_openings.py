@@ -95,7 +95,7 @@ def test_what_has_no_known_colour_is_drawn_grey_in_the_simulator() -> None:
 
 
 def test_an_unknown_colour_has_no_texture() -> None:
-    with pytest.raises(BadInput, match="one of the keys colour, got 'texture'"):
+    with pytest.raises(BadInput, match="one of the keys colour, words, got 'texture'"):
         harvey.build_world(PLAN.format(defaults="", door="").replace('"unknown"', '"unknown", texture = "wood"'))
 
 
