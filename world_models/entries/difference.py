@@ -13,15 +13,13 @@ LAST_EVIDENCE = 64
 """The newest evidence that stays on the board; what it said stays in the difference."""
 
 RivalKind = Literal[
-    "chance", "thing", "door", "jamb", "leaf", "wall", "dirt", "still camera", "late pictures", "exposure", "lens",
-    "focal length", "mounting", "wheels", "bumper", "report", "elsewhere",
+    "chance", "thing", "jamb", "leaf", "wall", "dirt", "still camera", "lens", "focal length", "mounting", "wheels",
+    "elsewhere",
 ]
-SENSES: frozenset[RivalKind] = frozenset({
-    "dirt", "still camera", "late pictures", "exposure", "lens", "focal length", "mounting", "wheels", "bumper",
-    "report"})
+SENSES: frozenset[RivalKind] = frozenset({"dirt", "still camera", "lens", "focal length", "mounting", "wheels"})
 """Rivals by which not the building or the belief is wrong, but a sense is."""
 
-MISLEADING: frozenset[RivalKind] = frozenset({"still camera", "late pictures", "lens"})
+MISLEADING: frozenset[RivalKind] = frozenset({"still camera", "lens"})
 """Senses that tell wrong places, of which nothing is learnt on the way."""
 
 MODEL = "the model of the building"
@@ -155,8 +153,3 @@ class Difference:
         count = words.count(len(self.counted), "look")
         return (f"{self.about} differs: {self.odds_in_words()}; by {count}, the last: {self.counted[-1].shows}; at"
                 f" {self.seen_s:.1f} s")
-
-
-def bound_log(ratio: float) -> float:
-    """A log likelihood ratio that JSON can hold."""
-    return math.copysign(min(abs(ratio), 1e3), ratio)

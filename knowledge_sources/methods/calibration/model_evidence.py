@@ -11,14 +11,13 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.methods.calibration.camera_state import compute_first_covariance, compute_least_covariance
 from knowledge_sources.methods.pose import CameraEstimate, estimate_camera_and_pose
+from knowledge_sources.methods.pose.solution_separation import LINE_SIGMA_PX
 from world_models.building.model_errors import INEXACT_M, MEASURED_M, LineErrors
 from world_models.camera import CAMERA_UNKNOWNS
 from world_models.entries import CameraState, Evidence, Explanation
 from world_models.entries.difference import MODEL, RivalKind
 from world_models.frames import Pose2
 
-LINE_SIGMA_PX = 0.45
-"""Deviation of a segment's end across its line, as protection levels have it."""
 HEIGHT, FOCAL = (CAMERA_UNKNOWNS.index(name) for name in ("height_m", "focal"))
 IS_OF_LENS = np.equal.outer(np.arange(len(CAMERA_UNKNOWNS)) >= FOCAL, [True] * len(CAMERA_UNKNOWNS))
 """(7, 7) of a diagonal covariance what is the lens's."""
