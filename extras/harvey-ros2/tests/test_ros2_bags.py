@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
 import os
+import re
 import struct
 import zlib
 from collections.abc import Callable, Iterable
