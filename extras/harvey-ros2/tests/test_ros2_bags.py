@@ -151,7 +151,8 @@ def test_a_lens_that_bends_otherwise_than_is_told_is_named(
     assert main(["follow", str(bag), *given]) == 1
     said = capsys.readouterr().out
     named = re.search(r"a lens whose first term is ([+-][0-9.]+) more than stated", said)
-    assert named is not None and abs(float(named[1]) + term) <= 0.02 and " 0 certified" in said
+    assert named is not None and abs(float(named[1]) + term) <= 0.02
+    assert " 0 certified" in said or "within the alert limit of 100 mm in 0 of 1" in said  # nothing that could be used
 
 
 def as_ros_one(bag: Path, out: Path) -> Path:
