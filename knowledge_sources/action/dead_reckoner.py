@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
 from knowledge_sources.methods.calibration import compute_camera_covariance
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, PLACED_BY, find_camera, find_contact
+from knowledge_sources.reads import HELD, PLACED_BY, bound_wheels_m, find_camera, find_contact
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.camera import YAW
@@ -70,7 +71,9 @@ class DeadReckoner(RobotKnowledgeSource):
             missing = _compute_missing_motion(request.value, report, actuator)
             covariance = covariance + _compute_partial_covariance(pose, *missing)
         moved = held.moved_to(pose, covariance, "odometry", locale=str(locale), motion=reported.id)
-        step = Revise(belief, moved, (reported, belief) if fault is None else (reported, belief, fault))
+        more_m, suspected = bound_wheels_m(view, actuator, report.move_m)
+        moved = replace(moved, excess_m=moved.excess_m + more_m)
+        step = Revise(belief, moved, (reported, belief, *suspected, *(() if fault is None else (fault,))))
         yield step
         rolled = drift.after_motion(actuator, report.turn_rad, report.move_m, on_the_spot=not on_the_move)
         yield Post(rolled, (reported,)) if known is None else Revise(known, rolled, (reported, known))

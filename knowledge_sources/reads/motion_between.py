@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from statistics import NormalDist
 
 import numpy as np
 
@@ -16,9 +17,13 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import TYPICAL_M, MotionBetween
 from knowledge_sources.reads.conditions import Belief
 from world_models.actuator import ActuatorModel
-from world_models.entries import BodyFault, Drift, FloorView, MotionReport
+from world_models.entries import RISK, BodyFault, Difference, Drift, FloorView, MotionReport
 from world_models.frames import Pose2, wrap_angle
 
+MOTION = "motion"
+"""What differs where pictures and wheels do not agree on the way."""
+WHEELS_PART = 0.25
+"""Wheels that are wrong go by such a part more or less than they count, one standard deviation."""
 MAX_APART_SIGMAS = 3.0
 """Wheels that say otherwise than what is believed by more than this slipped, or the robot was pushed."""
 
@@ -51,6 +56,19 @@ def add_reports(actuator: ActuatorModel, drift: Drift, reports: list[MotionRepor
     known = replace(actuator, curvature_sigma_per_m=bent)
     return MotionBetween(moved, *_spread(known.motion_covariance(
         math.fsum(abs(report.turn_rad) for report in reports), math.fsum(report.move_m for report in reports))))
+
+
+def bound_wheels_m(view: View, actuator: ActuatorModel, way_m: float) -> tuple[float, tuple[Entry[Difference], ...]]:
+    """How much further off a belief may be after a way, at its risk, where the wheels are only suspected to go another
+    part of it, and what says so; not where they are known to go so.
+    """
+    known = view.latest(Difference, lambda difference: difference.about == MOTION)
+    wheels = None if known is None else known.value.find("wheels")
+    if known is None or wheels is None or wheels.p <= RISK:
+        return 0.0, ()
+    if abs(wheels.off - actuator.reach) <= MAX_APART_SIGMAS * math.hypot(wheels.sigma, actuator.reach_sigma):
+        return 0.0, ()
+    return WHEELS_PART * abs(way_m) * NormalDist().inv_cdf(1.0 - 0.5 * RISK / wheels.p), (known,)
 
 
 def _measure_unsure_m(motion: MotionBetween) -> float:

@@ -12,6 +12,7 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import hedge
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, add_reports, is_worth_telling
+from knowledge_sources.reads.motion_between import MOTION, WHEELS_PART
 from knowledge_sources.reads.place_believed import MAX_P_RIVAL
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
@@ -28,11 +29,12 @@ from world_models.entries import (
 )
 from world_models.frames import Pose2
 
-ABOUT = "motion"
 SHARED_SIGMA_RAD = 0.0014
 """What a model, a camera and a matcher share of the heading (as ``SHARED_SIGMA_M`` of the place)."""
-WHEELS_PART, BEND_RAD_PER_M, ASIDE_M_PER_RAD = 0.25, 0.1, 0.05
-"""Wheels that are wrong err by such a part of what they count, and so far aside, one standard deviation."""
+BEND_RAD_PER_M, ASIDE_M_PER_RAD = 0.1, 0.05
+"""Wheels that turn wrongly bend so much, and slip so far aside, one standard deviation."""
+MIN_REACH_M = 0.2
+"""A shorter way does not tell how far the wheels go."""
 ELSEWHERE_M, ELSEWHERE_RAD = 1.0, 1.0
 """How far off a robot is that was pushed or carried, or takes one place for another."""
 
@@ -45,7 +47,8 @@ def tells_place(certificate: Certificate) -> bool:
 class CorrectionMonitor(RobotKnowledgeSource):
     """Says where the motion from one picture to the next is not the one that the wheels counted.
 
-    A picture that never changes says that the robot stands; wheels that are wrong err by a part of what they count.
+    A picture that never changes says that the robot stands. Wheels may go another part of the way than they count, or
+    turn otherwise: that is told apart, as a turn says nothing of the first, nor a straight way of the second.
     """
 
     level, priority = Level.PLAN, Priority.ENTER
@@ -67,10 +70,10 @@ class CorrectionMonitor(RobotKnowledgeSource):
         known = Drift.unknown(actuator, here.heading_rad) if drift is None else drift.value
         spread = _spread(began.value, ended.value)
         explained = _explain(seen, spread, actuator, known, [one.value for one in reports])
-        if not is_worth_telling(view, ABOUT, explained):
+        if not is_worth_telling(view, MOTION, explained):
             return None
         shows = f"by pictures it moved {seen.x_m:+.2f} m ahead and {math.degrees(seen.heading_rad):+.0f} degrees"
-        told = Evidence(ABOUT, shows, explained, here.x_m, here.y_m, here.heading_rad, 0.0, 0.0,
+        told = Evidence(MOTION, shows, explained, here.x_m, here.y_m, here.heading_rad, 0.0, 0.0,
                         reports[-1].value.sim_time_s)
         return Post(told, (trigger.entry, began, ended, *reports))
 
@@ -98,18 +101,33 @@ def _explain(
     gone_m, turned_rad = (math.fsum(abs(part) for part in parts) for parts in (
         (one.move_m for one in reports), (one.turn_rad for one in reports)))
     aside_m = ASIDE_M_PER_RAD * turned_rad + BEND_RAD_PER_M * gone_m**2 / 2.0
-    wrong = WHEELS_PART * gone_m + aside_m, aside_m, WHEELS_PART * turned_rad + BEND_RAD_PER_M * gone_m
+    along = np.array([moved.x_m, moved.y_m, 0.0])
+    bent = np.diag(np.square([aside_m, aside_m, WHEELS_PART * turned_rad + BEND_RAD_PER_M * gone_m]))
     far = ELSEWHERE_M, ELSEWHERE_M, ELSEWHERE_RAD
     plain = _log_density(off, usual)
     ratios: dict[RivalKind, float] = {
-        "wheels": _log_density(off, usual + np.diag(np.square(wrong))) - plain,
+        "wheels": _log_density(off, usual + WHEELS_PART**2 * np.outer(along, along)) - plain,
+        "turns": _log_density(off, usual + bent) - plain,
         "still camera": _log_density(seen.minus(Pose2(0.0, 0.0, 0.0)), spread) - plain,
         "elsewhere": _log_density(off, usual + np.diag(np.square(far))) - plain}
-    ahead = f"{off[0]:+.2f} m of {moved.x_m:.2f} m ahead"
-    what = {"wheels": f"wheels that count wrongly by {ahead}", "still camera": "a camera whose picture does not change",
+    reach, sigma = _measure_reach(seen, moved, usual, actuator.reach)
+    what = {"wheels": f"wheels that go {reach:.2f} m a metre" if sigma else "wheels that go another part of the way",
+            "turns": f"wheels that turned by {math.degrees(off[2]):+.1f} degrees more than they count",
+            "still camera": "a camera whose picture does not change",
             "elsewhere": "a robot that was moved, or is elsewhere"}
+    sizes = {"wheels": (reach, sigma)}
     return (Explanation("chance", "chance", 0.0), *(
-        Explanation(kind, what[kind], left) for kind, left in hedge(ratios).items()))
+        Explanation(kind, what[kind], left, *sizes.get(kind, ())) for kind, left in hedge(ratios).items()))
+
+
+def _measure_reach(seen: Pose2, moved: Pose2, spread: Floats, reach: float) -> tuple[float, float]:
+    """How far the wheels go a metre commanded, by pictures, and its deviation; 0 where the way is too short to tell."""
+    way_m = math.hypot(moved.x_m, moved.y_m)
+    if way_m < MIN_REACH_M:
+        return 0.0, 0.0
+    along = np.array([moved.x_m, moved.y_m]) / way_m
+    return (reach * float(along @ (seen.x_m, seen.y_m)) / way_m,
+            reach * math.sqrt(float(along @ spread[:2, :2] @ along)) / way_m)
 
 
 def _log_density(off: Floats, covariance: Floats) -> float:

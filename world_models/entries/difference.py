@@ -14,9 +14,10 @@ LAST_EVIDENCE = 64
 
 RivalKind = Literal[
     "chance", "thing", "jamb", "leaf", "wall", "dirt", "still camera", "lens", "focal length", "mounting", "wheels",
-    "elsewhere",
+    "turns", "elsewhere",
 ]
-SENSES: frozenset[RivalKind] = frozenset({"dirt", "still camera", "lens", "focal length", "mounting", "wheels"})
+SENSES: frozenset[RivalKind] = frozenset({
+    "dirt", "still camera", "lens", "focal length", "mounting", "wheels", "turns"})
 """Rivals by which not the building or the belief is wrong, but a sense is."""
 
 MISLEADING: frozenset[RivalKind] = frozenset({"still camera", "lens"})

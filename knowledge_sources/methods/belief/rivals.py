@@ -3,12 +3,16 @@
 Each rival has a prior, by how often such a thing happens, and the log likelihood ratios of the evidence. Looks that are
 not independent count once (``odds``), for each rival by itself. What nobody has thought of stands at log odds 0 and is
 never left out: so no rival is surer than the evidence for it, and one rival more never makes another surer.
+
+Evidence that has nothing in common with any other comes of each stretch of a way anew, and what it speaks of may begin
+at any time: it is added up in the order of time, and no rival falls below its prior (Page's cumulative sum, 1954), so
+that what was well for long does not hide what has begun since.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from knowledge_sources.methods.belief.odds import Alike, Look, add_looks
 from world_models.entries import Difference, Evidence, Rival
@@ -18,20 +22,21 @@ from world_models.frames import Pose2
 PRIORS: Mapping[RivalKind, float] = {
     "chance": 3.0, "thing": 0.0, "leaf": -1.0, "jamb": 0.0, "wall": 0.0, "dirt": -1.0,
     "still camera": -4.0, "lens": -4.0, "focal length": -2.0,
-    "mounting": -2.0, "wheels": -2.0, "elsewhere": -3.0,
+    "mounting": -2.0, "wheels": -2.0, "turns": -2.0, "elsewhere": -3.0,
 }
 """Log odds of a rival before any evidence, against what nobody has thought of: what is ordinary first."""
 P_MISREAD = 0.02
 """Part of the looks that are misread as a whole: such a one looks as if its best rival were so (pictures of honest
 missions, development seeds: 1 of 67 matched wrongly)."""
 MAX_COUNTED = 12
-"""So much evidence of one difference is kept: the strongest."""
+"""So much evidence of one difference is kept: the strongest, and the newest of what is independent."""
 
 
 def weigh_rivals(about: str, evidence: Sequence[Evidence], priors: Mapping[RivalKind, float] = PRIORS) -> Difference:
     """The difference that evidence of one name makes, in whatever order it came."""
-    kept = sorted(sorted(evidence, key=_strength, reverse=True)[:MAX_COUNTED], key=_when)
-    sums = {kind: priors[kind] + _add(kind, kept) for kind in _list_kinds(kept)}
+    kept = sorted((*_keep([one for one in evidence if one.apart_m], _strength),
+                   *_keep([one for one in evidence if not one.apart_m], _when)), key=_when)
+    sums = {kind: _add(kind, priors[kind], kept) for kind in _list_kinds(kept)}
     most = max(0.0, *sums.values())
     total = math.exp(-most) + math.fsum(math.exp(log_odds - most) for log_odds in sums.values())
     rivals = [_tell(kind, kept, log_odds, math.exp(log_odds - most) / total) for kind, log_odds in sums.items()]
@@ -56,15 +61,21 @@ def _list_kinds(evidence: Sequence[Evidence]) -> tuple[RivalKind, ...]:
     return tuple(kind for kind in PRIORS if kind in named)
 
 
-def _add(kind: RivalKind, evidence: Sequence[Evidence]) -> float:
-    """The log odds that all evidence adds to a rival; what is nearest apart decides what is independent."""
+def _keep(evidence: Sequence[Evidence], first: Callable[[Evidence], tuple[float, ...]]) -> list[Evidence]:
+    return sorted(evidence, key=first, reverse=True)[:MAX_COUNTED]
+
+
+def _add(kind: RivalKind, prior: float, evidence: Sequence[Evidence]) -> float:
+    """The log odds of a rival by all evidence, the oldest first; what is nearest apart decides what is independent."""
     said = [(e.log_ratio, one) for one in evidence for e in one.explanations if e.kind == kind]
-    alone = math.fsum(ratio for ratio, one in said if not one.apart_m)
+    alone = 0.0
+    for ratio in (ratio for ratio, one in said if not one.apart_m):
+        alone = max(0.0, alone + ratio)
     looks = [(Look(Pose2(one.x_m, one.y_m, one.heading_rad), ratio), one) for ratio, one in said if one.apart_m]
     if not looks:
-        return alone
+        return prior + alone
     alike = Alike(max(one.apart_m for _, one in looks), max(one.apart_rad for _, one in looks))
-    return alone + add_looks([look for look, _ in looks], alike)
+    return prior + alone + add_looks([look for look, _ in looks], alike)
 
 
 def _tell(kind: RivalKind, evidence: Sequence[Evidence], log_odds: float, p: float) -> Rival:

@@ -49,12 +49,16 @@ def test_the_same_look_twice_is_once(seen: list[Evidence], which: int, later_s: 
 
 
 @given(looks, evidence())
-def test_what_has_nothing_in_common_with_any_look_counts_whole(seen: list[Evidence], one: Evidence) -> None:
-    alone = replace(one, apart_m=0.0, apart_rad=0.0)
-    before, after = ({rival.kind: rival.log_odds for rival in weigh_rivals("hallway", told).rivals}
-                     for told in (seen, [*seen, alone]))
+def test_what_has_nothing_in_common_with_any_look_counts_whole_and_acquits_only_of_what_it_charged(
+    seen: list[Evidence], one: Evidence
+) -> None:
+    alone = replace(one, apart_m=0.0, apart_rad=0.0, seen_s=100.0)
+    well = replace(alone, seen_s=0.0, explanations=tuple(replace(e, log_ratio=-e.log_ratio) for e in one.explanations))
+    before, after, late = ({rival.kind: rival.log_odds for rival in weigh_rivals("hallway", told).rivals}
+                           for told in (seen, [*seen, alone], [*seen, well, alone]))
     for e in alone.explanations:
-        assert after[e.kind] == pytest.approx(before.get(e.kind, PRIORS[e.kind]) + e.log_ratio)
+        assert after[e.kind] == pytest.approx(before.get(e.kind, PRIORS[e.kind]) + max(0.0, e.log_ratio))
+        assert late[e.kind] == pytest.approx(after[e.kind])  # that all was well before hides nothing
 
 
 @given(looks, evidence(("wall",)))

@@ -75,6 +75,17 @@ def test_wheels_that_count_wrongly_are_no_reason_to_mistrust_pictures(way_m: flo
     assert way_m < 0.5 or lead(seen).kind == "wheels"
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.6, 1.5), st.sampled_from((0.75, 0.9, 1.15, 1.25)), st.sampled_from((-1.0, 1.0)))
+def test_turns_neither_accuse_nor_acquit_wheels_that_go_too_short(way_m: float, part: float, side: float) -> None:
+    moved = WHEELS.predict_motion(0.0, way_m)
+    short = say(go(Pose2(part * moved.x_m, 0.0, 0.0), 0.0, way_m))
+    (turned,) = say(go(Pose2(0.0, 0.0, 0.8 * side), 0.5 * side, 0.0))
+    before, after = (weigh_rivals("motion", told).odds_of("wheels") for told in (short * 2, [*short * 2, turned]))
+    assert after == pytest.approx(before, abs=0.1)
+    assert turned.explanations[0].kind == "chance" and weigh_rivals("motion", [turned] * 4).leader.kind == "turns"
+
+
 @given(st.sampled_from(("verified", "not testable", "refuted")), st.floats(0.0, 1.0))
 def test_only_pictures_that_tell_the_place_count(verdict: str, p_false: float) -> None:
     tells = verdict != "refuted" and p_false <= 0.03
