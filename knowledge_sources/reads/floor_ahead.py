@@ -125,7 +125,7 @@ class FloorAhead:
         free_m = self._measure_to_things_m(move_m, touched=True)
         if free_m < min(MIN_CREEP_M, move_m):
             return Caution(0.0, True)
-        caution = limit_move(self._find_unseen(self._sweep(self._way, free_m)), free_m, self._settings)
+        caution = limit_move(self._find_unseen(self._sweep_ahead(free_m)), free_m, self._settings)
         if not caution.creeps:
             sure_m = self._measure_to_things_m(caution.move_m, UNSURE_GAP_M)
             if sure_m >= min(caution.move_m, MIN_INCREMENT_M):
@@ -183,7 +183,7 @@ class FloorAhead:
 
     def is_confirmed(self, move_m: float) -> bool:
         """Whether the floor of a move is seen free by more than looks, but for what is next to the model's walls."""
-        tested = self._ask(self._sweep(self._way, move_m))
+        tested = self._ask(self._sweep_ahead(move_m))
         unconfirmed = tested.only(~self._seen.ask_confirmed(tested.points))
         return measure_free_m(unconfirmed, move_m) >= move_m - SPACING_M  # it ends between two points
 
@@ -212,7 +212,7 @@ class FloorAhead:
     def measure_free_m(self, most_m: float) -> float:
         """How far towards the leg's end the floor is seen to be free, and leads not against what was touched."""
         free_m = self._measure_to_things_m(most_m, touched=True)
-        return measure_free_m(self._find_unseen(self._sweep(self._way, free_m)), free_m)
+        return measure_free_m(self._find_unseen(self._sweep_ahead(free_m)), free_m)
 
     def choose_look(self) -> Lookout | None:
         """A look from here at floor that is needed behind the end of this leg, where it is the best place for that."""
@@ -220,7 +220,8 @@ class FloorAhead:
         to_go_m = math.dist(end, self._here.position)
         if to_go_m > LOOK_FROM_M or not self._beyond or len(self._leg.looked_at) >= s.max_looks:
             return None
-        unseen = self._find_unseen(self._sweep([end, *self._beyond], LOOK_AHEAD_M))
+        swept = sample_sweep([end, *self._beyond], self._robot.radius_m + SEEN_MARGIN_M, LOOK_AHEAD_M)
+        unseen = self._find_unseen(swept)
         if len(unseen.points) == 0:
             return None
         actuator = self._robot.actuator
@@ -247,9 +248,11 @@ class FloorAhead:
         x, y = self._beyond[0]
         return [*poses, Pose2(leg.x1_m, leg.y1_m, math.atan2(y - leg.y1_m, x - leg.x1_m))]
 
-    def _sweep(self, way: Sequence[Point], most_m: float) -> Sweep:
-        """What the robot sweeps on a way, but for where it begins."""
-        return sample_sweep(way, self._robot.radius_m + SEEN_MARGIN_M, most_m)
+    def _sweep_ahead(self, most_m: float) -> Sweep:
+        """What the robot sweeps towards the leg's end, but for what it stands on, which is free, and leaves behind."""
+        sweep = sample_sweep(self._way, self._robot.radius_m + SEEN_MARGIN_M, most_m)
+        off, along = sweep.points - self._way[0], np.subtract(self._way[1], self._way[0])
+        return sweep.only((np.linalg.norm(off, axis=1) > self._robot.radius_m) & (off @ along > 0.0))
 
     def _ask(self, sweep: Sweep) -> Sweep:
         """The part of a sweep that is not next to something that the model has."""
