@@ -21,6 +21,9 @@ MOST_WORDS = 400
 SHORT, LONG = 4, 8
 """Letters of a word that may have one wrong, and two."""
 ARTICLES = frozenset(("the", "a", "an", "your", "this", "that", "of", "past", "to"))
+POINTING = frozenset(("the", "this", "that", "which", "each", "no"))
+TAKING = frozenset(("follow", "take", "taking", "following", "reach", "pass"))
+"""Words before ``one``, and before ``it`` or ``that``, that make them stand for something that was named."""
 Phrase = tuple[str, ...]
 
 
@@ -58,6 +61,7 @@ class Lexicon:
         self.related = frozenset((one, other) for group in groups for one in group for other in group if one != other)
         self.names = frozenset(name for name in names if not name.isdigit() and (name,) not in self.phrases)
         self.names -= {word for (word, *more) in self.skipped if not more}
+        self._naming = frozenset(data["NAMING"]["words"])
         self._nearest: dict[str, str] = {}
 
     @cached_property
@@ -83,6 +87,8 @@ class Lexicon:
         while place < len(pieces):
             length, sort, meaning = self._longest(corrected, place)
             own = pieces[place:place + length]
+            if self._says_nothing(corrected, place, sort, meaning):
+                sort = ""
             if sort == "STRANGE" and (place == 0 or pieces[place - 1] not in ARTICLES):
                 sort = ""
             if sort:
@@ -90,6 +96,23 @@ class Lexicon:
                 found.append(Word(sort, meaning, " ".join(own), place, guess))
             place += length
         return found
+
+    def _says_nothing(self, pieces: Sequence[str], place: int, sort: str, meaning: str) -> bool:
+        """Whether a word only stands for another, or is of a name: ``the blue one``, ``position 2``, ``this hall``."""
+        before = pieces[place - 1] if place else ""
+        if sort == "COUNT" and pieces[place] in ("one", "1"):
+            return before in self._naming or before in POINTING or self._sort(before) in ("COUNT", "MOD")
+        if sort == "COUNT":
+            return before in self._naming
+        if meaning != "it":
+            return False
+        after = self._longest(pieces, place + 1)[1] if place + 1 < len(pieces) else ""
+        return after in ("HEAD", "THING", "MOD", "COUNT") or not (
+            self._sort(before) == "PREP" or before in TAKING)
+
+    def _sort(self, piece: str) -> str:
+        """The class of a single word; '' of chatter."""
+        return self.phrases.get((piece,), ("",))[0]
 
     def _longest(self, pieces: Sequence[str], place: int) -> tuple[int, str, str]:
         """Words of the longest phrase that begins here, its class ('' for chatter) and meaning."""

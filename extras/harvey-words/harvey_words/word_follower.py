@@ -37,6 +37,10 @@ UNSAID_TURN, UNSAID_BACK, UNSAID_WALK, UNSAID_EXIT = -2.0, -2.6, -1.5, -0.3
 NO_WAY, MISSED, NOT_SEEN = -2.0, -3.0, -2.5
 """A turn to a wall; a count or a place that there is not; a thing that is not where it should be."""
 WRONG_RANK, WRONG_SIDE = -3.5, -4.0
+MISCOUNT, WRONG_COUNT = -0.7, -1.5
+"""A place that only leads on is counted, or is not; so many are counted, and the thing that is named is elsewhere."""
+ALONG, ALREADY = -0.7, -0.5
+"""A crossing called by the hall that one walks along; one stands already at what is to be reached."""
 OPEN_ONLY = -1.8
 """That only open doors were counted."""
 BEHIND = 1.5
@@ -121,7 +125,9 @@ class WordFollower:
         elif act.sort == "turn":
             yield from self._turn(state, act)
         elif act.sort == "go":
-            yield from self._go(state, act)
+            ends = list(self._go(state, act))
+            stopped = [end for end in ends if not end.moving] if is_last and act.until is not None else []
+            yield from stopped or ends
         elif act.sort == "find" and act.what is not None:
             yield from self._find(state, act.what)
         elif act.sort == "see" and act.what is not None:
@@ -132,7 +138,7 @@ class WordFollower:
         elif act.sort == "orient" and act.what is not None:
             yield from self._orient(state, act.what)
         else:
-            yield state
+            yield replace(state, moving=False)
 
     # -- places and ways ---------------------------------------------------------------------------------------------
 
@@ -188,14 +194,18 @@ class WordFollower:
             return state
         return replace(state, locale=name, at=at, way=(*state.way, (name, round(at[0], 2), round(at[1], 2))))
 
-    def nodes(self, state: State) -> list[NamedSight]:
-        """The crossings, corners and the end ahead, nearest first; where one stands is none."""
+    def nodes(self, state: State, through: bool = False) -> list[NamedSight]:
+        """The crossings, corners and the end ahead, nearest first; where one stands is none.
+
+        ``through``: also what is as short as a crossing and only leads on.
+        """
         found: list[NamedSight] = []
         for sight in self.sights(state):
             area = self.plan.areas[sight.locale]
             feature = sight.feature
             is_side = feature is not None and feature.sort == "opening" and sight.side in ("left", "right")
-            is_tile = feature is None and sight.side == "in" and bool(area.meanings & {"crossing", "corner"})
+            is_tile = feature is None and sight.side == "in" and (
+                bool(area.meanings & {"crossing", "corner"}) or (through and area.is_tile))
             is_end = feature is None and sight.side == "ahead"
             if not (is_side or is_tile or is_end) or sight.ahead_m < HERE_M:
                 continue
@@ -319,19 +329,18 @@ class WordFollower:
 
     def _go(self, state: State, act: Act) -> Iterator[State]:
         says_nothing = act.until is None and not act.past and not act.units and act.along is None
-        for facing in self._facings(state, act.along):
+        ends_hall = act.until is not None and act.until.heads >= {"end", "hall"} and act.until.names
+        for facing in self._facings(state, act.along or (act.until if ends_hall else None)):
             starts: Iterable[State] = (facing,)
             for passed in act.past:
                 starts = _best(new for one in starts for new in self._pass(one, passed))
-            if act.units and not act.past:
-                starts = [new for one in starts for new in self._count(one, act.units)]
-            elif act.units:
-                starts = [new for one in starts for new in self._count(replace(one, at=one.at), act.units)]
+            if act.units:
+                starts = [new for one in starts for new in self._count(one, act)]
             if act.metres:
                 starts = [self._walk(one, act.metres) for one in starts]
             for one in starts:
                 if act.until is not None and (act.units or act.metres):
-                    yield from self._see(replace(one, moving=False), act.until)
+                    yield from self._see(replace(one, moving=False), act.until, is_there=True)
                 elif act.until is not None:
                     yield from self._reach(one, act.until)
                 elif act.units or act.metres:
@@ -345,13 +354,20 @@ class WordFollower:
         locale = last.locale if last else state.locale
         return replace(state, locale=locale, at=moved(state.at, state.heading, metres))
 
-    def _count(self, state: State, units: int) -> Iterator[State]:
-        nodes = self.nodes(state)
-        for rank, sight in enumerate(nodes, 1):
-            if rank == units:
-                yield self.stand(state, sight)
-        if nodes and len(nodes) < units:
-            yield replace(self.stand(state, nodes[-1]), odds=state.odds + MISSED)
+    def _count(self, state: State, act: Act) -> Iterator[State]:
+        """So many crossings on; one that only leads straight on counts where it is of that kind, else perhaps."""
+        for through in (False, True):
+            nodes = self.nodes(state, through)
+            if through and len(nodes) == len(self.nodes(state)):
+                return
+            price = MISCOUNT if through else 0.0
+            if len(nodes) >= act.units:
+                yield replace(self.stand(state, nodes[act.units - 1]), odds=state.odds + price)
+            elif nodes:
+                yield replace(self.stand(state, nodes[-1]), odds=state.odds + price + MISSED)
+            if act.until is not None and act.until.names and not through:
+                for new in self._reach(state, act.until):
+                    yield replace(new, odds=new.odds + WRONG_COUNT)
 
     def _pass(self, state: State, what: ThingWords) -> Iterator[State]:
         """Beyond what is passed."""
@@ -381,6 +397,9 @@ class WordFollower:
                 yield replace(state, odds=state.odds - 0.3, moving=False)  # it is here
             return
         found = False
+        here, own = self._seen_from(state, what) if what.names and not what.is_stretch else (WORST, state.senses)
+        if here > -1.0:
+            yield replace(state, odds=state.odds + here + ALREADY, senses=own, moving=False)
         for sight, cost, senses in self._candidates(state, what):
             found = True
             yield replace(self.stand(state, sight), odds=state.odds + cost, senses=senses, moving=False)
@@ -411,7 +430,8 @@ class WordFollower:
             return self.nodes(state)
         least = 0.3 if self.area(state).is_tile else -0.1
         return [sight for sight in self.sights(state) if sight.feature is not None and sight.feature.sort != "opening"
-                and sight.ahead_m > least and sight.side != "behind"]
+                and sight.ahead_m > least and sight.side != "behind"
+                and (abs(sight.left_m) < NEAR_M or not self.area(state).is_hall)]
 
     def _fit_sight(self, state: State, sight: NamedSight, what: ThingWords) -> tuple[float, Senses]:
         if sight.feature is not None and sight.feature.sort != "opening":
@@ -422,18 +442,23 @@ class WordFollower:
         if what.is_stretch:
             fits = [self._match.fit_area(what, hall, state.senses) for hall in halls]
             return max(fits, key=lambda pair: pair[0], default=(MISFIT, state.senses))
-        if what.heads & {"crossing"} and not halls:
-            return -1.5, state.senses
-        if what.names:
-            return self._best_here(there, replace(what, heads=frozenset()), halls)
-        return 0.0, state.senses
+        cost = -1.5 if what.heads & {"crossing"} and not halls else 0.0
+        fit, senses = self._fit_place(there, what, halls)
+        return cost + fit, senses
 
-    def _best_here(self, state: State, what: ThingWords, halls: Sequence[Area]) -> tuple[float, Senses]:
-        """The best fit of the halls that leave here and of what stands here."""
-        fits = [self._match.fit_area(what, hall, state.senses) for hall in halls]
-        fits += [self._match.fit(what, feature, state.senses) for feature in self.area(state).features
-                 if math.dist(feature.at, state.at) < NEAR_M]
-        return max(fits, key=lambda pair: pair[0], default=(MISFIT, state.senses))
+    def _fit_place(self, state: State, what: ThingWords, halls: Sequence[Area]) -> tuple[float, Senses]:
+        """How well a place fits: each word by a hall that leaves to the side, by what stands there, or straight on."""
+        score, senses = 0.0, state.senses
+        onward = [self.hall_ahead(replace(state, heading=way)) for way in self.ways(state)]
+        for word in what.names:
+            one = ThingWords(names=(word,))
+            fits = [self._match.fit_area(one, hall, senses) for hall in halls]
+            fits += [self._match.fit(one, feature, senses) for feature in self.area(state).features
+                     if math.dist(feature.at, state.at) < NEAR_M and not (word.sort == "MOD" and "hall" in what.heads)]
+            fits += [(fit + ALONG, own) for fit, own in (self._match.fit_area(one, hall, senses) for hall in onward)]
+            fit, senses = max(fits, key=lambda pair: pair[0], default=(MISFIT, senses))
+            score += fit
+        return max(score, WORST), senses
 
     # -- the goal ------------------------------------------------------------------------------------------------------
 
@@ -486,12 +511,9 @@ class WordFollower:
         if (what.heads & {"end"} and len(ways) > 2) or (what.heads & {"corner"} and len(ways) != 2):
             return
         halls = [self.hall_ahead(replace(state, heading=way)) for way in ways]
-        odds, senses = state.odds, state.senses
-        for word in what.names:
-            fit, senses = self._best_here(replace(state, senses=senses), ThingWords(names=(word,)), halls)
-            odds += fit
-        if odds > state.odds + WORST:
-            yield replace(state, odds=odds, senses=senses)
+        fit, senses = self._fit_place(state, what, halls)
+        if fit > WORST:
+            yield replace(state, odds=state.odds + fit, senses=senses)
 
     def _find_from(self, facings: Iterable[State], what: ThingWords) -> Iterator[State]:
         """The doors that may be meant from where one stands, along the ways that one may face."""
@@ -614,10 +636,12 @@ class WordFollower:
 
     # -- what is seen --------------------------------------------------------------------------------------------------
 
-    def _see(self, state: State, what: ThingWords) -> Iterator[State]:
-        """Where a thing is as it is said; walking on to where it is, if one was walking."""
+    def _see(self, state: State, what: ThingWords, is_there: bool = False) -> Iterator[State]:
+        """Where a thing is as it is said; walking on to where it is, at a price if nobody was walking."""
         here, senses = self._seen_from(state, what)
         if not state.moving:
+            for there in self._reach(state, what) if here < UNSAID_WALK and what.names and not is_there else ():
+                yield replace(there, odds=there.odds + UNSAID_WALK)
             kept = senses if here > NOT_SEEN else state.senses
             yield replace(state, odds=state.odds + max(here, NOT_SEEN), senses=kept)
             return
