@@ -126,7 +126,8 @@ class _Reader:
             self._orient(things, ways, wheres)
         elif "exit" in verbs:
             self._exit(things, ways, wheres)
-        elif self.notes_on and not verbs and things and self.acts[-1].sort == "go":
+        elif things and self.acts and self.acts[-1].sort == "go" and self.acts[-1].until and (
+                (self.notes_on and not verbs) or verbs == {"note"}):
             self._note_before(things)
         elif ("note" in verbs or (self.notes_on and not verbs)) and things:
             self.acts += [Act("note", what=thing) for thing in things]
@@ -134,6 +135,10 @@ class _Reader:
             self._posture(things, wheres)
         elif "face" in verbs or (verbs & {"turn"} and not ways and wheres and wheres[0][0] in ("to", "away")):
             self._face(things, ways, wheres)
+        elif "take" in verbs and set(ways) <= {"ahead"} and any("unit" in thing.heads for thing in things):
+            self._go(things, ways, wheres)  # "take one step forward"
+        elif "go" in verbs and set(ways) & {"left", "right"} and not verbs & {"be"}:
+            self._turn(things, ways, wheres)  # "go left at the chair"
         elif verbs & {"turn", "take"} and (ways or any(thing.is_stretch for thing in things)):
             self._turn(things, ways, wheres)
         elif "stand" in verbs:
@@ -187,9 +192,10 @@ class _Reader:
                     things[-1] = replace(things[-1], relations=(
                         *things[-1].relations, *self._relation(part.meaning, part.words)))
                 else:
-                    wheres.append((part.meaning, describe(part.words) if part.words else self._it()))
-                    target, located = None, True
-                    continue
+                    if part.words or part.meaning != "at":
+                        wheres.append((part.meaning, describe(part.words) if part.words else self._it()))
+                        target, located = None, True
+                        continue
             elif part.sort == "where" and located and side in SIDES:
                 meaning, one = wheres[-1]
                 wheres[-1] = meaning, replace(one, side=side)  # "to the first hall on the right"
@@ -204,7 +210,11 @@ class _Reader:
                 ways.append(side)
             located = False
         return [self._resolve(thing, verbs) for thing in things], ways, [
-            (meaning, self._resolve(one, {meaning})) for meaning, one in wheres]
+            (self._by(meaning, one), self._resolve(one, {meaning})) for meaning, one in wheres]
+
+    def _by(self, meaning: str, thing: ThingWords) -> str:
+        """By a hall is along it, by a thing past it."""
+        return meaning if meaning != "by" else "along" if thing.is_stretch else "past"
 
     def _it(self) -> ThingWords:
         return self.last_thing or ThingWords()
@@ -275,7 +285,7 @@ class _Reader:
     def _turn(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         halls = [thing for thing in things if thing.is_stretch]
         onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch]
-        at = [one for meaning, one in wheres if meaning in ("at", "on") and not one.is_stretch
+        at = [one for meaning, one in wheres if (meaning == "at" or (meaning == "on" and not one.is_stretch))
               and (one.heads or one.names)]
         past = tuple(one for meaning, one in wheres if meaning in ("past", "before"))
         way = next((way for way in ways if way not in ("ahead", "behind")), "")
@@ -305,9 +315,11 @@ class _Reader:
         passed: list[ThingWords] = []
         along: ThingWords | None = None
         for meaning, one in [*(("", thing) for thing in things), *wheres]:
-            if one.heads & {"unit"} or (one.count.isdigit() and not one.heads and not one.names and not one.side):
+            counts = "crossing" in one.heads and one.number and meaning == "" and any(by == "to" for by, _ in wheres)
+            is_number = one.number and not one.heads and not one.names and not one.side
+            if one.heads & {"unit"} or counts or is_number:
                 units = one.number or 1
-                if one.names or one.heads - {"unit"}:
+                if not counts and (one.names or one.heads - {"unit"}):
                     along = along or replace(one, heads=frozenset(("hall",)), count="")
             elif one.heads & set(LENGTHS_M):
                 metres = one.number * LENGTHS_M[next(iter(one.heads & set(LENGTHS_M)))]
@@ -332,8 +344,11 @@ class _Reader:
             self.acts.append(Act("find", what=_at_end(replace(end, count=end.count), wheres)))
         else:
             self.acts.append(Act("go", until=end, past=tuple(passed), along=along, units=units, metres=metres))
-        for more in [one for one in ends[1:] if not (end and end.is_door and "end" in one.heads)]:
-            self.acts.append(Act("find", what=more) if more.is_door else Act("see", what=more))
+        onward = [one for meaning, one in wheres if meaning == "to"]
+        at_end = end is not None and (end.is_door or "wall" in end.heads)
+        for more in [one for one in ends[1:] if not (at_end and "end" in one.heads)]:
+            self.acts.append(Act("find", what=more) if more.is_door else
+                             Act("go", until=more) if more in onward else Act("see", what=more))
 
     def _enter(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         what = [thing for thing in things if not thing.is_stretch]
@@ -373,6 +388,9 @@ class _Reader:
             return
         elif not things and (related or side) and self.acts and self.acts[-1].sort == "find":
             self._amend(related, side)
+        elif not things and side and self.acts and self.acts[-1].sort == "go" and self.acts[-1].until:
+            until = self.acts[-1].until  # "the pink hall, which will be on your right"
+            self.acts[-1] = replace(self.acts[-1], until=replace(until, side=until.side or side))
         elif not things and (related or side):
             self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), side=side, relations=related)))
         ended = next((one for meaning, one in wheres if meaning in ("at", "in") and "end" in one.heads), None)
@@ -382,14 +400,20 @@ class _Reader:
         for thing in things:
             if thing.heads & {"unit"}:
                 self.acts.append(Act("go", units=thing.number or 1))
+        for thing in (*things, *(one for meaning, one in wheres if meaning == "at")):
+            if thing.number and thing.heads & POINTS:
+                self.acts.append(Act("go", until=thing))  # "it is the next crossing", "the chair is at the next one"
         for thing in things:
+            if thing.number and thing.heads & POINTS:
+                continue
             if "end" in thing.heads and thing not in doors:
                 self.acts.append(Act("go", until=thing))
             elif thing not in doors and not thing.heads & {"unit"}:
                 self.acts.append(Act("see", what=replace(thing, side=thing.side or (side if side in SIDES else ""))))
         places = [one for meaning, one in wheres if meaning in ("at", "in", "on", "to") and (one.heads or one.names)]
         self.acts += [Act("see", what=one) for one in places
-                      if not (doors and (one.is_stretch or one in doors)) and "end" not in one.heads]
+                      if not (doors and (one.is_stretch or one in doors)) and "end" not in one.heads
+                      and not (one.number and one.heads & POINTS)]
 
     def _terse(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         """No verb: ``second door on the right``, ``left``, ``past the machine room``."""

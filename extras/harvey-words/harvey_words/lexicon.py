@@ -106,7 +106,7 @@ class Lexicon:
             return before in self._naming
         if meaning != "it":
             return False
-        after = self._longest(pieces, place + 1)[1] if place + 1 < len(pieces) else ""
+        after = self._longest(pieces, place + 1)[1] if place + 1 < len(pieces) and pieces[place] != "it" else ""
         return after in ("HEAD", "THING", "MOD", "COUNT") or not (
             self._sort(before) == "PREP" or before in TAKING)
 
@@ -170,6 +170,8 @@ def split_text(text: str) -> list[str]:
     """The words of a text in small letters, full stops and commas; at most ``MOST_WORDS``."""
     plain = text[:40 * MOST_WORDS].lower().replace("’", "'")
     plain = re.sub(r"'s\b", " s", plain)
+    plain = re.sub(r"\b(can|don|won|isn|doesn)t\b", r"\1 t", plain)
+    plain = re.sub(r"\b(you|they|we)(re|ll)\b|\b(that|there|here)(s)\b", r"\1\3 \2\4", plain)
     pieces = re.findall(r"[a-z]+|\d+(?:st|nd|rd|th)?|[.,;:!?\n]", plain)[:MOST_WORDS]
     return [{";": ".", ":": ",", "!": ".", "?": ".", "\n": "."}.get(piece, piece) for piece in pieces]
 

@@ -94,6 +94,10 @@ def read_clauses(words: Sequence[Word]) -> tuple[Tree[Any], list[Clause]]:
                     one.sort in ("thing", "where", "way") or one.meaning == "exit" for one in clause.parts):
                 clauses.append(clause)
                 clause = Clause([part])
+            elif part.meaning in ("left", "right") and part.sort == "way" and clause.parts[-1:] and (
+                    clause.parts[-1].words and clause.parts[0].sort == "where"):
+                clauses.append(clause)
+                clause = Clause([part])  # "down the hall to the lamp left two blocks"
             else:
                 clause.parts.append(part)
         clauses.append(clause)
@@ -129,7 +133,9 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
         elif word.meaning == "of" and word.sort == "PREP":
             if is_joint:
                 yield word
-        elif word.meaning == "with" and is_joint and before and before.sort == "HEAD":
+        elif before and before.meaning == "unit" and word.sort in NOUNS:
+            yield from (Word("SEP", "comma", "", word.place), word)  # "two blocks chair"
+        elif word.meaning == "with" and is_joint and before and before.sort in ("HEAD", "MOD"):
             yield Word("PREP", "of", word.text, word.place)
         elif word.text == "where" and word.sort == "VERB" and (
                 before and before.meaning == "be" and after and after.sort in NOUNS):

@@ -39,6 +39,8 @@ NO_WAY, MISSED, NOT_SEEN = -2.0, -3.0, -2.5
 WRONG_RANK, WRONG_SIDE = -3.5, -4.0
 MISCOUNT, WRONG_COUNT = -0.7, -1.5
 """A place that only leads on is counted, or is not; so many are counted, and the thing that is named is elsewhere."""
+STRAIGHT_ON = -0.5
+"""A hall that is reached where it goes straight on."""
 ALONG, ALREADY = -0.7, -0.5
 """A crossing called by the hall that one walks along; one stands already at what is to be reached."""
 OPEN_ONLY = -1.8
@@ -207,7 +209,9 @@ class WordFollower:
             is_tile = feature is None and sight.side == "in" and (
                 bool(area.meanings & {"crossing", "corner"}) or (through and area.is_tile))
             is_end = feature is None and sight.side == "ahead"
-            if not (is_side or is_tile or is_end) or sight.ahead_m < HERE_M:
+            is_hall_across = feature is None and sight.side == "in" and area.is_hall and not area.is_tile and (
+                not is_level(area.axis, state.heading))
+            if not (is_side or is_tile or is_end or is_hall_across) or sight.ahead_m < HERE_M:
                 continue
             if found and (sight.ahead_m - found[-1].ahead_m < HERE_M):
                 continue
@@ -277,11 +281,11 @@ class WordFollower:
         for passed in act.past:
             starts = _best(new for one in starts for new in self._pass(one, passed))
         if act.until is not None:
-            starts = [new for one in starts for new in self._reach(one, act.until)]
+            starts = [new for one in starts for new in (*self._stay(one, act.until), *self._reach(one, act.until))]
         for one in starts:
             if act.way in COMPASS:
                 yield from self._turn_to(one, POINTS[act.way], act, 0.0)
-            elif act.units:
+            elif act.units and act.way in TURNS:
                 yield from self._turn_at(one, act)
             elif act.way:
                 yield from self._turn_here_or_on(one, act)
@@ -329,6 +333,8 @@ class WordFollower:
 
     def _go(self, state: State, act: Act) -> Iterator[State]:
         says_nothing = act.until is None and not act.past and not act.units and act.along is None
+        if act.until is not None and act.along is None and not act.units and not act.past:
+            yield from self._stay(state, act.until)
         ends_hall = act.until is not None and act.until.heads >= {"end", "hall"} and act.until.names
         for facing in self._facings(state, act.along or (act.until if ends_hall else None)):
             starts: Iterable[State] = (facing,)
@@ -397,9 +403,6 @@ class WordFollower:
                 yield replace(state, odds=state.odds - 0.3, moving=False)  # it is here
             return
         found = False
-        here, own = self._seen_from(state, what) if what.names and not what.is_stretch else (WORST, state.senses)
-        if here > -1.0:
-            yield replace(state, odds=state.odds + here + ALREADY, senses=own, moving=False)
         for sight, cost, senses in self._candidates(state, what):
             found = True
             yield replace(self.stand(state, sight), odds=state.odds + cost, senses=senses, moving=False)
@@ -407,22 +410,33 @@ class WordFollower:
         if not found or what.names:
             yield replace(state, odds=state.odds + (MISSED - 1.0 if known else UNKNOWN_HEAD), moving=True)
 
+    def _stay(self, state: State, what: ThingWords) -> Iterator[State]:
+        """Where one stands, if what is to be reached is here."""
+        here, senses = self._seen_from(state, what) if what.names and not what.is_stretch else (WORST, state.senses)
+        if here > -1.0:
+            yield replace(state, odds=state.odds + here + ALREADY, senses=senses, moving=False)
+
     def _candidates(self, state: State, what: ThingWords) -> Iterator[tuple[NamedSight, float, Senses]]:
         """What is seen ahead and fits, nearest first, each with its price."""
+        found: list[tuple[NamedSight, float, Senses, int]] = []
         rank = 0
         taken = -math.inf
         for sight in self._sights_for(state, what):
             fit, senses = self._fit_sight(state, sight, what)
             if fit <= MISFIT or (sight.ahead_m - taken < 0.3 and not sight.feature):
                 continue
-            if what.side in ("left", "right") and sight.side in ("left", "right") and sight.side != what.side:
+            if what.side in ("left", "right") and sight.side in ("left", "right") and sight.side != what.side and (
+                    not what.is_stretch):
                 fit += WRONG_SIDE
             if fit > -1.0:
                 rank += 1
                 taken = sight.ahead_m
-            cost = WRONG_RANK * (rank != what.number) if what.number else AGAIN * max(rank - 1, 0)
-            if fit + cost > WORST:
-                yield sight, fit + cost, senses
+            found.append((sight, fit, senses, rank))
+        for sight, fit, senses, own in found:
+            number = rank if what.count == "last" else what.number
+            cost = fit + (WRONG_RANK * (own != number) if number else AGAIN * max(own - 1, 0))
+            if cost > WORST:
+                yield sight, cost, senses
 
     def _sights_for(self, state: State, what: ThingWords) -> Iterable[NamedSight]:
         """The sights that a description may be of: crossings for a crossing or hall, features for the rest."""
@@ -437,14 +451,23 @@ class WordFollower:
         if sight.feature is not None and sight.feature.sort != "opening":
             return self._match.fit(what, sight.feature, state.senses)
         there = self.stand(state, sight)
-        halls = [self.hall_ahead(replace(there, heading=way)) for way in self.ways(there)
-                 if not is_level(way, state.heading)]
+        halls = self._halls_at(there, "")
         if what.is_stretch:
-            fits = [self._match.fit_area(what, hall, state.senses) for hall in halls]
+            fits = [self._match.fit_area(what, hall, state.senses) for hall in self._halls_at(there, what.side)]
+            onward, before = self.hall_ahead(there), self.hall_ahead(state)
+            if what.names and not what.side and onward.meanings != before.meanings:
+                fit, senses = self._match.fit_area(what, onward, state.senses)
+                fits.append((fit + STRAIGHT_ON, senses))
             return max(fits, key=lambda pair: pair[0], default=(MISFIT, state.senses))
         cost = -1.5 if what.heads & {"crossing"} and not halls else 0.0
         fit, senses = self._fit_place(there, what, halls)
         return cost + fit, senses
+
+    def _halls_at(self, state: State, side: str) -> list[Area]:
+        """The halls that leave a place to the sides, or to one of them."""
+        turns = [TURNS[side]] if side in ("left", "right") else [TURNS["left"], TURNS["right"]]
+        return [self.hall_ahead(replace(state, heading=way)) for way in self.ways(state)
+                if any(is_along(way, state.heading + turn) for turn in turns)]
 
     def _fit_place(self, state: State, what: ThingWords, halls: Sequence[Area]) -> tuple[float, Senses]:
         """How well a place fits: each word by a hall that leaves to the side, by what stands there, or straight on."""
