@@ -73,7 +73,7 @@ class Act:
 
     Attributes:
         sort: ``exit``, ``turn``, ``go``, ``find`` (the goal, or a door to go in at), ``see``, ``orient``,
-            ``note`` (that is passed somewhere on the walk).
+            ``note`` (that is passed somewhere on the walk), ``halt``.
         way: left, right, back, or a point of the compass, of a turn.
         what: that is found, seen, faced or left.
         until: where a walk or a turn ends; past: what is passed before; along: the hall that is taken.
@@ -101,19 +101,24 @@ class _Reader:
 
     acts: list[Act] = field(default_factory=list)
     last_thing: ThingWords | None = None
+    last_stretch: ThingWords | None = None
     wants_orient: bool = False
     side_before: bool = False
     goes_on: bool = False
+    notes_on: bool = False
 
     def read(self, clause: Clause) -> None:
         """Add the acts of one clause."""
         parts = clause.parts
         verbs = {part.meaning for part in parts if part.sort == "verb"}
+        verbs |= {"be"} if verbs & {"with", "meet", "there", "stand"} else set()
         things, ways, wheres = self._collect(parts, verbs)
-        begun = len(self.acts)
+        begun, before = len(self.acts), self.acts[-1] if self.acts else None
         if (self.goes_on and not verbs and things and self.acts[-1].until is None
                 and 0 < len(self.acts[-1].past) < MOST_PASSED):
-            self.acts[-1] = replace(self.acts[-1], past=(*self.acts[-1].past, things[0]))
+            last, more = self.acts[-1], things[0]
+            self.acts[-1] = (replace(last, units=more.number or 1) if "unit" in more.heads
+                             else replace(last, past=(*last.past, more)))
             wheres = [pair for pair in wheres if pair[1].heads or pair[1].names]
             if wheres:
                 self._go([], [], wheres)
@@ -121,14 +126,29 @@ class _Reader:
             self._orient(things, ways, wheres)
         elif "exit" in verbs:
             self._exit(things, ways, wheres)
-        elif "note" in verbs and things:
+        elif things and self.acts and self.acts[-1].sort == "go" and self.acts[-1].until and (
+                (self.notes_on and not verbs) or verbs == {"note"}):
+            self._note_before(things)
+        elif ("note" in verbs or (self.notes_on and not verbs)) and things:
             self.acts += [Act("note", what=thing) for thing in things]
         elif self._is_posture(parts, verbs):
             self._posture(things, wheres)
         elif "face" in verbs or (verbs & {"turn"} and not ways and wheres and wheres[0][0] in ("to", "away")):
             self._face(things, ways, wheres)
+        elif "take" in verbs and set(ways) <= {"ahead"} and any("unit" in thing.heads for thing in things):
+            self._go(things, ways, wheres)  # "take one step forward"
+        elif "go" in verbs and set(ways) & {"left", "right"} and not verbs & {"be"}:
+            self._turn(things, ways, wheres)  # "go left at the chair"
         elif verbs & {"turn", "take"} and (ways or any(thing.is_stretch for thing in things)):
             self._turn(things, ways, wheres)
+        elif "stand" in verbs:
+            self.acts += [Act("see", what=thing) for thing in (*things, *(one for _, one in wheres))
+                          if thing.heads or thing.names]
+        elif "halt" in verbs and not (things or wheres):
+            self.acts.append(Act("halt"))
+        elif "halt" in verbs:
+            self._go(things, ways, [("to" if one.heads & {"unit"} or meaning == "at" else meaning, one)
+                                    for meaning, one in wheres], until=True)
         elif "reach" in verbs and "be" not in verbs:
             self._go(things, ways, wheres, until=True)
         elif verbs & {"go", "pass"} and not (verbs & {"be"} and any(thing.is_door for thing in things)):
@@ -140,6 +160,8 @@ class _Reader:
         else:
             self._terse(things, ways, wheres)
         self.goes_on = clause.end == "and" and bool(self.acts) and self.acts[-1].sort == "go"
+        begun = len(self.acts) if begun and self.acts[-1] is before else begun
+        self.notes_on = clause.end == "and" and bool(self.acts) and (self.notes_on or self.acts[-1].sort == "note")
         self.wants_orient = clause.end == "so"
         self.side_before = bool(parts) and parts[-1].sort == "where" and bool(parts[-1].side) and clause.end == "and"
         if parts:
@@ -154,6 +176,7 @@ class _Reader:
         ways: list[str] = []
         wheres: list[tuple[str, ThingWords]] = []
         target: list[ThingWords] | None = None
+        located = False
         turning = bool(verbs & {"turn", "take"}) and not verbs & {"be"}
         for part in parts:
             side = part.side or (part.meaning if part.sort == "way" else "")
@@ -169,8 +192,13 @@ class _Reader:
                     things[-1] = replace(things[-1], relations=(
                         *things[-1].relations, *self._relation(part.meaning, part.words)))
                 else:
-                    wheres.append((part.meaning, describe(part.words) if part.words else self._it()))
-                    target = None
+                    if part.words or part.meaning != "at":
+                        wheres.append((part.meaning, describe(part.words) if part.words else self._it()))
+                        target, located = None, True
+                        continue
+            elif part.sort == "where" and located and side in SIDES:
+                meaning, one = wheres[-1]
+                wheres[-1] = meaning, replace(one, side=side)  # "to the first hall on the right"
             elif side in SIDES and target and (part.sort == "where" or (target[-1].is_door and not turning)
                                                or "be" in verbs):
                 target[-1] = replace(target[-1], side=side)
@@ -180,13 +208,28 @@ class _Reader:
                 wheres.append(("on", ThingWords(side=side)))
             elif part.sort == "way":
                 ways.append(side)
-        for thing in (*things, *(one for _, one in wheres)):
-            if thing.names or thing.heads - {"side", "unit", "end"}:
-                self.last_thing = thing
-        return things, ways, wheres
+            located = False
+        return [self._resolve(thing, verbs) for thing in things], ways, [
+            (self._by(meaning, one), self._resolve(one, {meaning})) for meaning, one in wheres]
+
+    def _by(self, meaning: str, thing: ThingWords) -> str:
+        """By a hall is along it, by a thing past it."""
+        return meaning if meaning != "by" else "along" if thing.is_stretch else "past"
 
     def _it(self) -> ThingWords:
         return self.last_thing or ThingWords()
+
+    def _resolve(self, thing: ThingWords, by: set[str]) -> ThingWords:
+        """What a pronoun stands for: the hall before, where one goes along it; and what the next one will stand for."""
+        stretch = self.last_stretch or ThingWords()
+        if "it" in thing.heads and len(thing.heads) > 1:  # "the end of it"
+            thing = replace(thing, heads=(thing.heads - {"it"}) | stretch.heads, names=thing.names + stretch.names)
+        elif "it" in thing.heads:
+            thing = replace(stretch if by & {"along", "go", "take"} else self._it(), side=thing.side, count="")
+        if thing.names or thing.heads - {"side", "unit", "end"}:
+            self.last_thing = thing
+            self.last_stretch = thing if thing.is_stretch else self.last_stretch
+        return thing
 
     def _relation(self, meaning: str, words: Sequence[Word]) -> Iterable[tuple[str, ThingWords]]:
         """A relation to a description; ``between`` is one to each of two."""
@@ -242,7 +285,7 @@ class _Reader:
     def _turn(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         halls = [thing for thing in things if thing.is_stretch]
         onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch]
-        at = [one for meaning, one in wheres if meaning in ("at", "on") and not one.is_stretch
+        at = [one for meaning, one in wheres if (meaning == "at" or (meaning == "on" and not one.is_stretch))
               and (one.heads or one.names)]
         past = tuple(one for meaning, one in wheres if meaning in ("past", "before"))
         way = next((way for way in ways if way not in ("ahead", "behind")), "")
@@ -252,6 +295,9 @@ class _Reader:
             way = next((one for one in (hall.side,) if one not in ("ahead", "")), "")
         self.acts.append(Act("turn", way, along=hall, until=at[0] if at and way else None, past=past if way else (),
                              units=number if not halls else 0))
+        blocks = [thing.number or 1 for thing in things if "unit" in thing.heads]
+        if blocks and halls:
+            self.acts.append(Act("go", along=hall, units=blocks[0]))
         rest = [(meaning, one) for meaning, one in wheres
                 if one is not hall and not (way and (one in at or one in past))
                 and meaning in ("to", "past", "along", "at") and one.text]
@@ -261,20 +307,25 @@ class _Reader:
     def _go(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]], *,
             until: bool = False, passing: bool = False) -> None:
         self.acts += [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
+        if len(wheres) > 1 and wheres[0][0] == "at" and not things and wheres[1][0] == "to":
+            self.acts.append(Act("go", until=wheres[0][1]))  # "at its end go to the corner"
+            wheres = wheres[1:]
         units, metres = 0, 0.0
         ends: list[ThingWords] = []
         passed: list[ThingWords] = []
         along: ThingWords | None = None
         for meaning, one in [*(("", thing) for thing in things), *wheres]:
-            if one.heads & {"unit"} or (one.count.isdigit() and not one.heads and not one.names and not one.side):
+            counts = "crossing" in one.heads and one.number and meaning == "" and any(by == "to" for by, _ in wheres)
+            is_number = one.number and not one.heads and not one.names and not one.side
+            if one.heads & {"unit"} or counts or is_number:
                 units = one.number or 1
-                if one.names or one.heads - {"unit"}:
+                if not counts and (one.names or one.heads - {"unit"}):
                     along = along or replace(one, heads=frozenset(("hall",)), count="")
             elif one.heads & set(LENGTHS_M):
                 metres = one.number * LENGTHS_M[next(iter(one.heads & set(LENGTHS_M)))]
             elif meaning in ("past", "across") or (meaning == "" and passing):
                 passed.append(one)
-            elif not one.heads & POINTS and (
+            elif not one.heads & POINTS and not (meaning == "" and one.number) and (
                     (meaning in ("along", "on", "in") and (one.is_stretch or not one.is_door))
                     or (meaning == "" and one.is_stretch and not until)):
                 along = along or one
@@ -293,8 +344,11 @@ class _Reader:
             self.acts.append(Act("find", what=_at_end(replace(end, count=end.count), wheres)))
         else:
             self.acts.append(Act("go", until=end, past=tuple(passed), along=along, units=units, metres=metres))
-        for more in [one for one in ends[1:] if not (end and end.is_door and "end" in one.heads)]:
-            self.acts.append(Act("find", what=more) if more.is_door else Act("see", what=more))
+        onward = [one for meaning, one in wheres if meaning == "to"]
+        at_end = end is not None and (end.is_door or "wall" in end.heads)
+        for more in [one for one in ends[1:] if not (at_end and "end" in one.heads)]:
+            self.acts.append(Act("find", what=more) if more.is_door else
+                             Act("go", until=more) if more in onward else Act("see", what=more))
 
     def _enter(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         what = [thing for thing in things if not thing.is_stretch]
@@ -314,6 +368,9 @@ class _Reader:
     def _state(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]],
                verbs: set[str]) -> None:
         """A sentence that says what is where."""
+        if len(things) > 1 and things[-1].names and not things[-1].heads and things[-1].is_stretch:
+            *things, kind = things  # "the next hall is yellow"
+            things[-1] = replace(things[-1], names=things[-1].names + kind.names)
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS)
         side = next((one.side for _, one in wheres if one.side), ways[0] if ways else "")
         doors = [thing for thing in things if thing.is_door or (
@@ -331,22 +388,32 @@ class _Reader:
             return
         elif not things and (related or side) and self.acts and self.acts[-1].sort == "find":
             self._amend(related, side)
+        elif not things and side and self.acts and self.acts[-1].sort == "go" and self.acts[-1].until:
+            until = self.acts[-1].until  # "the pink hall, which will be on your right"
+            self.acts[-1] = replace(self.acts[-1], until=replace(until, side=until.side or side))
         elif not things and (related or side):
             self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), side=side, relations=related)))
         ended = next((one for meaning, one in wheres if meaning in ("at", "in") and "end" in one.heads), None)
         if ended is not None and not doors:
-            self.acts.append(Act("go", until=ended))
+            on_the_way = any(act.sort in ("exit", "turn", "go") for act in self.acts)
+            self.acts.append(Act("go", until=ended) if on_the_way else Act("find", what=ended))
         for thing in things:
             if thing.heads & {"unit"}:
                 self.acts.append(Act("go", units=thing.number or 1))
+        for thing in (*things, *(one for meaning, one in wheres if meaning == "at")):
+            if thing.number and thing.heads & POINTS:
+                self.acts.append(Act("go", until=thing))  # "it is the next crossing", "the chair is at the next one"
         for thing in things:
+            if thing.number and thing.heads & POINTS:
+                continue
             if "end" in thing.heads and thing not in doors:
                 self.acts.append(Act("go", until=thing))
             elif thing not in doors and not thing.heads & {"unit"}:
                 self.acts.append(Act("see", what=replace(thing, side=thing.side or (side if side in SIDES else ""))))
         places = [one for meaning, one in wheres if meaning in ("at", "in", "on", "to") and (one.heads or one.names)]
         self.acts += [Act("see", what=one) for one in places
-                      if not (doors and (one.is_stretch or one in doors)) and "end" not in one.heads]
+                      if not (doors and (one.is_stretch or one in doors)) and "end" not in one.heads
+                      and not (one.number and one.heads & POINTS)]
 
     def _terse(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         """No verb: ``second door on the right``, ``left``, ``past the machine room``."""
@@ -355,10 +422,10 @@ class _Reader:
         last = self.acts[-1] if self.acts else None
         if not things and last is not None and last.sort in ("find", "see") and (related or side) and not ways:
             self._amend(related, side)
-        elif (self.side_before and not things and last is not None) or (
-                last is not None and last.sort == "go" and (last.units or last.until) and not things and not ways
-                and all(meaning == "past" for meaning, _ in wheres)):
+        elif self.side_before and not things and last is not None:
             return  # it tells of the walk before
+        elif wheres and self._is_walk_told(things, ways) and all(meaning == "past" for meaning, _ in wheres):
+            self._note_before([one for _, one in wheres])
         elif things and ways and things[0].number and not things[0].heads and not things[0].names:
             self.acts.append(Act("turn", ways[0], units=things[0].number))
         elif things and (things[0].is_door or (things[0].count and things[0].side and not things[0].is_stretch)):
@@ -374,6 +441,16 @@ class _Reader:
             self.acts += [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
             if "ahead" in ways:
                 self.acts.append(Act("go"))
+
+    def _is_walk_told(self, things: Sequence[ThingWords], ways: Sequence[str]) -> bool:
+        """Whether the act before is a walk with an end, and nothing is named to go to."""
+        last = self.acts[-1] if self.acts else None
+        return last is not None and last.sort == "go" and bool(last.units or last.until) and not things and not ways
+
+    def _note_before(self, passed: Iterable[ThingWords]) -> None:
+        """What is passed on the walk that was told last."""
+        self.acts[-1:-1] = [Act("note", what=one, text=one.text) for one in passed]
+        self.notes_on = True
 
     def _amend(self, related: Iterable[tuple[str, ThingWords]], side: str) -> None:
         """What is said afterwards of the thing before."""
@@ -417,6 +494,11 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     reader = _Reader()
     for clause in ordered:
         reader.read(clause)
+    if not any(act.sort in ("find", "exit", "turn", "go") for act in reader.acts):  # a goal, and no way
+        goal = next((index for index, act in enumerate(reader.acts) if act.sort == "see" and act.what
+                     and act.what.names), None)
+        if goal is not None:
+            reader.acts[goal] = replace(reader.acts[goal], sort="find")
     last = max((index for index, act in enumerate(reader.acts) if act.sort in ("go", "turn", "exit")), default=-1)
     return [replace(act, sort="see") if act.sort == "find" and index < last and not act.enters and reader.acts[
         index + 1].sort != "exit" else act for index, act in enumerate(reader.acts)]

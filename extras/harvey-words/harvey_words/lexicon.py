@@ -21,6 +21,9 @@ MOST_WORDS = 400
 SHORT, LONG = 4, 8
 """Letters of a word that may have one wrong, and two."""
 ARTICLES = frozenset(("the", "a", "an", "your", "this", "that", "of", "past", "to"))
+POINTING = frozenset(("the", "this", "that", "which", "each", "no"))
+TAKING = frozenset(("follow", "take", "taking", "following", "reach", "pass"))
+"""Words before ``one``, and before ``it`` or ``that``, that make them stand for something that was named."""
 Phrase = tuple[str, ...]
 
 
@@ -58,6 +61,7 @@ class Lexicon:
         self.related = frozenset((one, other) for group in groups for one in group for other in group if one != other)
         self.names = frozenset(name for name in names if not name.isdigit() and (name,) not in self.phrases)
         self.names -= {word for (word, *more) in self.skipped if not more}
+        self._naming = frozenset(data["NAMING"]["words"])
         self._nearest: dict[str, str] = {}
 
     @cached_property
@@ -83,6 +87,8 @@ class Lexicon:
         while place < len(pieces):
             length, sort, meaning = self._longest(corrected, place)
             own = pieces[place:place + length]
+            if self._says_nothing(corrected, place, sort, meaning):
+                sort = ""
             if sort == "STRANGE" and (place == 0 or pieces[place - 1] not in ARTICLES):
                 sort = ""
             if sort:
@@ -90,6 +96,23 @@ class Lexicon:
                 found.append(Word(sort, meaning, " ".join(own), place, guess))
             place += length
         return found
+
+    def _says_nothing(self, pieces: Sequence[str], place: int, sort: str, meaning: str) -> bool:
+        """Whether a word only stands for another, or is of a name: ``the blue one``, ``position 2``, ``this hall``."""
+        before = pieces[place - 1] if place else ""
+        if sort == "COUNT" and pieces[place] in ("one", "1"):
+            return before in self._naming or before in POINTING or self._sort(before) in ("COUNT", "MOD")
+        if sort == "COUNT":
+            return before in self._naming
+        if meaning != "it":
+            return False
+        after = self._longest(pieces, place + 1)[1] if place + 1 < len(pieces) and pieces[place] != "it" else ""
+        return after in ("HEAD", "THING", "MOD", "COUNT") or not (
+            self._sort(before) == "PREP" or before in TAKING)
+
+    def _sort(self, piece: str) -> str:
+        """The class of a single word; '' of chatter."""
+        return self.phrases.get((piece,), ("",))[0]
 
     def _longest(self, pieces: Sequence[str], place: int) -> tuple[int, str, str]:
         """Words of the longest phrase that begins here, its class ('' for chatter) and meaning."""
@@ -147,6 +170,8 @@ def split_text(text: str) -> list[str]:
     """The words of a text in small letters, full stops and commas; at most ``MOST_WORDS``."""
     plain = text[:40 * MOST_WORDS].lower().replace("’", "'")
     plain = re.sub(r"'s\b", " s", plain)
+    plain = re.sub(r"\b(can|don|won|isn|doesn)t\b", r"\1 t", plain)
+    plain = re.sub(r"\b(you|they|we)(re|ll)\b|\b(that|there|here)(s)\b", r"\1\3 \2\4", plain)
     pieces = re.findall(r"[a-z]+|\d+(?:st|nd|rd|th)?|[.,;:!?\n]", plain)[:MOST_WORDS]
     return [{";": ".", ":": ",", "!": ".", "?": ".", "\n": "."}.get(piece, piece) for piece in pieces]
 

@@ -20,6 +20,8 @@ MISFIT, UNKNOWN_HEAD, RELATED, UNKNOWN_MODIFIER = -4.5, -2.0, -1.2, -0.8
 """A word of the model that does not fit; one that the model lacks; a kindred thing; a property that the model lacks."""
 OTHER_KIND = -1.5
 """A kindred thing, where the building has the very thing too."""
+INSIDE = -0.3
+"""A hall that is called by what stands in it."""
 OTHER_SENSE = -1.0
 """A word for one kind of thing that had another before."""
 WORST = -7.0
@@ -56,8 +58,13 @@ class WordMatcher:
         if what.is_stretch and not area.is_hall:
             score += MISFIT
         for word in what.names:
-            own, senses = self._fit_word(word, area.meanings, area.colours, _kind(area), senses, id(area))
-            score += own
+            own, taken = self._fit_word(word, area.meanings, area.colours, _kind(area), senses, id(area))
+            if own < INSIDE and word.sort != "MOD":
+                inside = (self._fit_word(word, one.meanings, one.colours, _kind(one), senses, id(one))
+                          for one in area.features if one.sort == "thing")
+                best = max(inside, key=lambda pair: pair[0], default=(WORST, senses))
+                own, taken = max((own, taken), (best[0] + INSIDE, best[1]), key=lambda pair: pair[0])
+            score, senses = score + own, taken
         return max(score, WORST), senses
 
     def _fit_word(self, word: Word, meanings: frozenset[str], colours: tuple[tuple[float, float, float], ...],

@@ -21,6 +21,8 @@ SURE = 0.55
 """Least odds of an end that is taken without asking."""
 NOTHING_FITS = -7.5
 """Log odds that what is described is none of the places that were found, against a reading in which all fits."""
+NEAR_M = 2.0
+"""An end no further from a place is at it."""
 SAME_M = 1.5
 """Ends in a hall no further apart are one."""
 
@@ -47,6 +49,12 @@ class RouteEnd:
     heading_rad: float
     odds: float
     way: tuple[tuple[str, float, float], ...]
+
+    def is_at(self, place: str) -> bool:
+        """Whether it is a locale, a door, or no further than ``NEAR_M`` from x,y."""
+        point = _read_point(place)
+        return place in (self.locale, self.door) or (
+            point is not None and math.dist(point, (self.x_m, self.y_m)) <= NEAR_M)
 
     def as_data(self) -> dict[str, Any]:
         """For JSON."""

@@ -37,8 +37,11 @@ class WordLexer(Lexer):
 
 
 COMPASS = ("north", "south", "east", "west")
-STARTS = frozenset(("go", "turn", "take", "face"))
+STARTS = frozenset(("go", "turn", "take", "face", "reach", "enter", "exit", "pass", "halt", "stand", "there"))
 """Verbs with which another clause begins, also where nothing stands between."""
+NOUNS = frozenset(("HEAD", "THING", "MOD", "NAME", "STRANGE", "COUNT"))
+MOST_BETWEEN = 6
+"""Words between the two that are joined by ``and``."""
 
 
 @cache
@@ -91,6 +94,10 @@ def read_clauses(words: Sequence[Word]) -> tuple[Tree[Any], list[Clause]]:
                     one.sort in ("thing", "where", "way") or one.meaning == "exit" for one in clause.parts):
                 clauses.append(clause)
                 clause = Clause([part])
+            elif part.meaning in ("left", "right") and part.sort == "way" and clause.parts[-1:] and (
+                    clause.parts[-1].words and clause.parts[0].sort == "where"):
+                clauses.append(clause)
+                clause = Clause([part])  # "down the hall to the lamp left two blocks"
             else:
                 clause.parts.append(part)
         clauses.append(clause)
@@ -103,34 +110,59 @@ def _is_posture(clause: Clause, part: Part) -> bool:
 
 
 def _mend(words: Sequence[Word]) -> Iterator[Word]:
-    """Leave out what the grammar has no place for: an ``of`` between no two things; ``between A and B`` is one part."""
-    nouns = ("HEAD", "THING", "MOD", "NAME", "STRANGE", "COUNT")
-    joined, pair = False, 0
+    """Leave out what the grammar has no place for, and join what is one description.
+
+    ``Between A and B`` is one, so is ``where A and B meet``, and ``the corner with the chair``.
+    """
+    words = _join_meetings(words)
+    pair = 0
     for index, word in enumerate(words):
+        before = words[index - 1] if index else None
         after = words[index + 1] if index + 1 < len(words) else None
-        if word.text == "its" and index and words[index - 1].sort == "PREP":
+        is_joint = bool(before and after and before.sort in NOUNS and after.sort in NOUNS)
+        if word.text == "its" and before and before.sort == "PREP":
             continue
         if word.text == "once" and (after is None or after.sort == "SEP" or (
-                index and (words[index - 1].meaning in ("go", "ahead")))):
+                before and before.meaning in ("go", "ahead"))):
             yield Word("COUNT", "1", word.text, word.place)
-            continue
-        if word.meaning in COMPASS and after is not None and after.sort == "HEAD":
+        elif word.meaning in COMPASS and after is not None and after.sort == "HEAD":
             yield Word("NAME", word.meaning, word.text, word.place)
-            continue
-        if word.meaning == "between":
-            pair = index + 6
-        if word.meaning == "and" and index < pair:
+        elif word.meaning == "and" and index < pair:
             pair = 0
             yield Word("NAME", "&", word.text, word.place)
+        elif word.meaning == "of" and word.sort == "PREP":
+            if is_joint:
+                yield word
+        elif before and before.meaning == "unit" and word.sort in NOUNS:
+            yield from (Word("SEP", "comma", "", word.place), word)  # "two blocks chair"
+        elif word.meaning == "with" and is_joint and before and before.sort in ("HEAD", "MOD"):
+            yield Word("PREP", "of", word.text, word.place)
+        elif word.text == "where" and word.sort == "VERB" and (
+                before and before.meaning == "be" and after and after.sort in NOUNS):
+            yield Word("HEAD", "room", word.text, word.place)
+        elif word.text == "where" and word.sort == "VERB" and (after is None or after.sort in ("VERB", "SEP")):
             continue
-        if word.meaning == "of" and word.sort == "PREP":
-            before = words[index - 1] if index else None
-            if joined or not before or not after or before.sort not in nouns or after.sort not in nouns:
-                continue
-            joined = True
-        elif word.sort not in nouns:
-            joined = False
-        yield word
+        else:
+            if word.meaning == "between":
+                pair = index + MOST_BETWEEN
+            yield word
+
+
+def _join_meetings(words: Sequence[Word]) -> list[Word]:
+    """``Where the grass meets the bricks`` and ``where A and B come together`` are crossings."""
+    joined = list(words)
+    for index, word in enumerate(words):
+        if word.sort != "VERB" or word.meaning != "meet":
+            continue
+        begin = next((back for back in range(index - 1, max(index - 10, -1), -1)
+                      if words[back].text == "where" or words[back].meaning == "dot"), 0)
+        if words[begin].text != "where":
+            continue
+        for place in range(begin + 1, index + 1):
+            if joined[place].meaning in ("and", "meet"):
+                joined[place] = Word("PREP", "of", joined[place].text, joined[place].place)
+        joined[begin] = Word("HEAD", "crossing", "where", word.place)
+    return joined
 
 
 def _read_part(node: Any) -> Part:

@@ -37,6 +37,12 @@ UNSAID_TURN, UNSAID_BACK, UNSAID_WALK, UNSAID_EXIT = -2.0, -2.6, -1.5, -0.3
 NO_WAY, MISSED, NOT_SEEN = -2.0, -3.0, -2.5
 """A turn to a wall; a count or a place that there is not; a thing that is not where it should be."""
 WRONG_RANK, WRONG_SIDE = -3.5, -4.0
+MISCOUNT, WRONG_COUNT = -0.7, -1.5
+"""A place that only leads on is counted, or is not; so many are counted, and the thing that is named is elsewhere."""
+STRAIGHT_ON = -0.5
+"""A hall that is reached where it goes straight on."""
+ALONG, ALREADY = -0.7, -0.5
+"""A crossing called by the hall that one walks along; one stands already at what is to be reached."""
 OPEN_ONLY = -1.8
 """That only open doors were counted."""
 BEHIND = 1.5
@@ -121,7 +127,9 @@ class WordFollower:
         elif act.sort == "turn":
             yield from self._turn(state, act)
         elif act.sort == "go":
-            yield from self._go(state, act)
+            ends = list(self._go(state, act))
+            stopped = [end for end in ends if not end.moving] if is_last and act.until is not None else []
+            yield from stopped or ends
         elif act.sort == "find" and act.what is not None:
             yield from self._find(state, act.what)
         elif act.sort == "see" and act.what is not None:
@@ -132,7 +140,7 @@ class WordFollower:
         elif act.sort == "orient" and act.what is not None:
             yield from self._orient(state, act.what)
         else:
-            yield state
+            yield replace(state, moving=False)
 
     # -- places and ways ---------------------------------------------------------------------------------------------
 
@@ -188,16 +196,22 @@ class WordFollower:
             return state
         return replace(state, locale=name, at=at, way=(*state.way, (name, round(at[0], 2), round(at[1], 2))))
 
-    def nodes(self, state: State) -> list[NamedSight]:
-        """The crossings, corners and the end ahead, nearest first; where one stands is none."""
+    def nodes(self, state: State, through: bool = False) -> list[NamedSight]:
+        """The crossings, corners and the end ahead, nearest first; where one stands is none.
+
+        ``through``: also what is as short as a crossing and only leads on.
+        """
         found: list[NamedSight] = []
         for sight in self.sights(state):
             area = self.plan.areas[sight.locale]
             feature = sight.feature
             is_side = feature is not None and feature.sort == "opening" and sight.side in ("left", "right")
-            is_tile = feature is None and sight.side == "in" and bool(area.meanings & {"crossing", "corner"})
+            is_tile = feature is None and sight.side == "in" and (
+                bool(area.meanings & {"crossing", "corner"}) or (through and area.is_tile))
             is_end = feature is None and sight.side == "ahead"
-            if not (is_side or is_tile or is_end) or sight.ahead_m < HERE_M:
+            is_hall_across = feature is None and sight.side == "in" and area.is_hall and not area.is_tile and (
+                not is_level(area.axis, state.heading))
+            if not (is_side or is_tile or is_end or is_hall_across) or sight.ahead_m < HERE_M:
                 continue
             if found and (sight.ahead_m - found[-1].ahead_m < HERE_M):
                 continue
@@ -267,11 +281,11 @@ class WordFollower:
         for passed in act.past:
             starts = _best(new for one in starts for new in self._pass(one, passed))
         if act.until is not None:
-            starts = [new for one in starts for new in self._reach(one, act.until)]
+            starts = [new for one in starts for new in (*self._stay(one, act.until), *self._reach(one, act.until))]
         for one in starts:
             if act.way in COMPASS:
                 yield from self._turn_to(one, POINTS[act.way], act, 0.0)
-            elif act.units:
+            elif act.units and act.way in TURNS:
                 yield from self._turn_at(one, act)
             elif act.way:
                 yield from self._turn_here_or_on(one, act)
@@ -319,19 +333,20 @@ class WordFollower:
 
     def _go(self, state: State, act: Act) -> Iterator[State]:
         says_nothing = act.until is None and not act.past and not act.units and act.along is None
-        for facing in self._facings(state, act.along):
+        if act.until is not None and act.along is None and not act.units and not act.past:
+            yield from self._stay(state, act.until)
+        ends_hall = act.until is not None and act.until.heads >= {"end", "hall"} and act.until.names
+        for facing in self._facings(state, act.along or (act.until if ends_hall else None)):
             starts: Iterable[State] = (facing,)
             for passed in act.past:
                 starts = _best(new for one in starts for new in self._pass(one, passed))
-            if act.units and not act.past:
-                starts = [new for one in starts for new in self._count(one, act.units)]
-            elif act.units:
-                starts = [new for one in starts for new in self._count(replace(one, at=one.at), act.units)]
+            if act.units:
+                starts = [new for one in starts for new in self._count(one, act)]
             if act.metres:
                 starts = [self._walk(one, act.metres) for one in starts]
             for one in starts:
                 if act.until is not None and (act.units or act.metres):
-                    yield from self._see(replace(one, moving=False), act.until)
+                    yield from self._see(replace(one, moving=False), act.until, is_there=True)
                 elif act.until is not None:
                     yield from self._reach(one, act.until)
                 elif act.units or act.metres:
@@ -345,13 +360,20 @@ class WordFollower:
         locale = last.locale if last else state.locale
         return replace(state, locale=locale, at=moved(state.at, state.heading, metres))
 
-    def _count(self, state: State, units: int) -> Iterator[State]:
-        nodes = self.nodes(state)
-        for rank, sight in enumerate(nodes, 1):
-            if rank == units:
-                yield self.stand(state, sight)
-        if nodes and len(nodes) < units:
-            yield replace(self.stand(state, nodes[-1]), odds=state.odds + MISSED)
+    def _count(self, state: State, act: Act) -> Iterator[State]:
+        """So many crossings on; one that only leads straight on counts where it is of that kind, else perhaps."""
+        for through in (False, True):
+            nodes = self.nodes(state, through)
+            if through and len(nodes) == len(self.nodes(state)):
+                return
+            price = MISCOUNT if through else 0.0
+            if len(nodes) >= act.units:
+                yield replace(self.stand(state, nodes[act.units - 1]), odds=state.odds + price)
+            elif nodes:
+                yield replace(self.stand(state, nodes[-1]), odds=state.odds + price + MISSED)
+            if act.until is not None and act.until.names and not through:
+                for new in self._reach(state, act.until):
+                    yield replace(new, odds=new.odds + WRONG_COUNT)
 
     def _pass(self, state: State, what: ThingWords) -> Iterator[State]:
         """Beyond what is passed."""
@@ -388,22 +410,33 @@ class WordFollower:
         if not found or what.names:
             yield replace(state, odds=state.odds + (MISSED - 1.0 if known else UNKNOWN_HEAD), moving=True)
 
+    def _stay(self, state: State, what: ThingWords) -> Iterator[State]:
+        """Where one stands, if what is to be reached is here."""
+        here, senses = self._seen_from(state, what) if what.names and not what.is_stretch else (WORST, state.senses)
+        if here > -1.0:
+            yield replace(state, odds=state.odds + here + ALREADY, senses=senses, moving=False)
+
     def _candidates(self, state: State, what: ThingWords) -> Iterator[tuple[NamedSight, float, Senses]]:
         """What is seen ahead and fits, nearest first, each with its price."""
+        found: list[tuple[NamedSight, float, Senses, int]] = []
         rank = 0
         taken = -math.inf
         for sight in self._sights_for(state, what):
             fit, senses = self._fit_sight(state, sight, what)
             if fit <= MISFIT or (sight.ahead_m - taken < 0.3 and not sight.feature):
                 continue
-            if what.side in ("left", "right") and sight.side in ("left", "right") and sight.side != what.side:
+            if what.side in ("left", "right") and sight.side in ("left", "right") and sight.side != what.side and (
+                    not what.is_stretch):
                 fit += WRONG_SIDE
             if fit > -1.0:
                 rank += 1
                 taken = sight.ahead_m
-            cost = WRONG_RANK * (rank != what.number) if what.number else AGAIN * max(rank - 1, 0)
-            if fit + cost > WORST:
-                yield sight, fit + cost, senses
+            found.append((sight, fit, senses, rank))
+        for sight, fit, senses, own in found:
+            number = rank if what.count == "last" else what.number
+            cost = fit + (WRONG_RANK * (own != number) if number else AGAIN * max(own - 1, 0))
+            if cost > WORST:
+                yield sight, cost, senses
 
     def _sights_for(self, state: State, what: ThingWords) -> Iterable[NamedSight]:
         """The sights that a description may be of: crossings for a crossing or hall, features for the rest."""
@@ -411,29 +444,44 @@ class WordFollower:
             return self.nodes(state)
         least = 0.3 if self.area(state).is_tile else -0.1
         return [sight for sight in self.sights(state) if sight.feature is not None and sight.feature.sort != "opening"
-                and sight.ahead_m > least and sight.side != "behind"]
+                and sight.ahead_m > least and sight.side != "behind"
+                and (abs(sight.left_m) < NEAR_M or not self.area(state).is_hall)]
 
     def _fit_sight(self, state: State, sight: NamedSight, what: ThingWords) -> tuple[float, Senses]:
         if sight.feature is not None and sight.feature.sort != "opening":
             return self._match.fit(what, sight.feature, state.senses)
         there = self.stand(state, sight)
-        halls = [self.hall_ahead(replace(there, heading=way)) for way in self.ways(there)
-                 if not is_level(way, state.heading)]
+        halls = self._halls_at(there, "")
         if what.is_stretch:
-            fits = [self._match.fit_area(what, hall, state.senses) for hall in halls]
+            fits = [self._match.fit_area(what, hall, state.senses) for hall in self._halls_at(there, what.side)]
+            onward, before = self.hall_ahead(there), self.hall_ahead(state)
+            if what.names and not what.side and onward.meanings != before.meanings:
+                fit, senses = self._match.fit_area(what, onward, state.senses)
+                fits.append((fit + STRAIGHT_ON, senses))
             return max(fits, key=lambda pair: pair[0], default=(MISFIT, state.senses))
-        if what.heads & {"crossing"} and not halls:
-            return -1.5, state.senses
-        if what.names:
-            return self._best_here(there, replace(what, heads=frozenset()), halls)
-        return 0.0, state.senses
+        cost = -1.5 if what.heads & {"crossing"} and not halls else 0.0
+        fit, senses = self._fit_place(there, what, halls)
+        return cost + fit, senses
 
-    def _best_here(self, state: State, what: ThingWords, halls: Sequence[Area]) -> tuple[float, Senses]:
-        """The best fit of the halls that leave here and of what stands here."""
-        fits = [self._match.fit_area(what, hall, state.senses) for hall in halls]
-        fits += [self._match.fit(what, feature, state.senses) for feature in self.area(state).features
-                 if math.dist(feature.at, state.at) < NEAR_M]
-        return max(fits, key=lambda pair: pair[0], default=(MISFIT, state.senses))
+    def _halls_at(self, state: State, side: str) -> list[Area]:
+        """The halls that leave a place to the sides, or to one of them."""
+        turns = [TURNS[side]] if side in ("left", "right") else [TURNS["left"], TURNS["right"]]
+        return [self.hall_ahead(replace(state, heading=way)) for way in self.ways(state)
+                if any(is_along(way, state.heading + turn) for turn in turns)]
+
+    def _fit_place(self, state: State, what: ThingWords, halls: Sequence[Area]) -> tuple[float, Senses]:
+        """How well a place fits: each word by a hall that leaves to the side, by what stands there, or straight on."""
+        score, senses = 0.0, state.senses
+        onward = [self.hall_ahead(replace(state, heading=way)) for way in self.ways(state)]
+        for word in what.names:
+            one = ThingWords(names=(word,))
+            fits = [self._match.fit_area(one, hall, senses) for hall in halls]
+            fits += [self._match.fit(one, feature, senses) for feature in self.area(state).features
+                     if math.dist(feature.at, state.at) < NEAR_M and not (word.sort == "MOD" and "hall" in what.heads)]
+            fits += [(fit + ALONG, own) for fit, own in (self._match.fit_area(one, hall, senses) for hall in onward)]
+            fit, senses = max(fits, key=lambda pair: pair[0], default=(MISFIT, senses))
+            score += fit
+        return max(score, WORST), senses
 
     # -- the goal ------------------------------------------------------------------------------------------------------
 
@@ -486,12 +534,9 @@ class WordFollower:
         if (what.heads & {"end"} and len(ways) > 2) or (what.heads & {"corner"} and len(ways) != 2):
             return
         halls = [self.hall_ahead(replace(state, heading=way)) for way in ways]
-        odds, senses = state.odds, state.senses
-        for word in what.names:
-            fit, senses = self._best_here(replace(state, senses=senses), ThingWords(names=(word,)), halls)
-            odds += fit
-        if odds > state.odds + WORST:
-            yield replace(state, odds=odds, senses=senses)
+        fit, senses = self._fit_place(state, what, halls)
+        if fit > WORST:
+            yield replace(state, odds=state.odds + fit, senses=senses)
 
     def _find_from(self, facings: Iterable[State], what: ThingWords) -> Iterator[State]:
         """The doors that may be meant from where one stands, along the ways that one may face."""
@@ -614,10 +659,12 @@ class WordFollower:
 
     # -- what is seen --------------------------------------------------------------------------------------------------
 
-    def _see(self, state: State, what: ThingWords) -> Iterator[State]:
-        """Where a thing is as it is said; walking on to where it is, if one was walking."""
+    def _see(self, state: State, what: ThingWords, is_there: bool = False) -> Iterator[State]:
+        """Where a thing is as it is said; walking on to where it is, at a price if nobody was walking."""
         here, senses = self._seen_from(state, what)
         if not state.moving:
+            for there in self._reach(state, what) if here < UNSAID_WALK and what.names and not is_there else ():
+                yield replace(there, odds=there.odds + UNSAID_WALK)
             kept = senses if here > NOT_SEEN else state.senses
             yield replace(state, odds=state.odds + max(here, NOT_SEEN), senses=kept)
             return

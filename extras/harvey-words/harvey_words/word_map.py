@@ -20,7 +20,7 @@ from world_models.building.world import World, words_about
 Point = tuple[float, float]
 HALL_WORDS = frozenset(("hall", "crossing", "corner", "end"))
 """Meanings in a locale's kind or name that make it a place to walk along."""
-LONG_RATIO, TILE_RATIO = 3.0, 1.6
+LONG_RATIO, TILE_RATIO = 3.0, 1.1
 """Length over width of what is a hall by its form; and of a hall that is no longer than a crossing."""
 WALKED_M = 1.2
 """An opening ahead no further to the side than this is walked on through."""
