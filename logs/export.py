@@ -1,9 +1,11 @@
 """A run as tables for other programs, as CSV and as Parquet: decisions, believed poses with their covariance,
-milestones, turning points, and the true poses. Numbers come back as they were, to the last bit."""
+milestones, turning points, and the true poses. Numbers come back as they were, to the last bit. Both ways
+in TUM's format as well."""
 
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -145,3 +147,33 @@ def write_tables(tables: Iterable[Table], kind: str, folder: Path) -> list[Path]
         return [WRITERS[kind](table, folder) for table in tables]
     except OSError as error:
         raise BadInput(f"--{kind} {folder}: expected a directory to write to, got: {error.strerror or error}") from None
+
+
+def write_ways(tables: Iterable[Table], path: Path) -> Iterator[tuple[Path, int]]:
+    """The poses that were held, and the true ones beside them where they are known, in TUM's format; each file with
+    its number of poses.
+
+    Raises BadInput where none is placed in the world, or a file cannot be written.
+    """
+    for table in tables:
+        if table.name not in ("poses", "truth"):
+            continue
+        rows = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
+        poses = {row["time_s"]: tuple(row[name] for name in tuple(TRUTH)[2:]) for row in rows
+                 if row.get("status", "held") == "held" and None not in (row["time_s"], row["world_x_m"])}
+        if not poses:
+            raise BadInput(f"--tum {path}: expected poses with their times in a known world, got none")
+        out = path if table.name == "poses" else path.with_stem(f"{path.stem}-truth")
+        yield out, write_tum(poses.items(), out)
+
+
+def write_tum(poses: Iterable[tuple[Any, tuple[Any, ...]]], path: Path) -> int:
+    """Times [s] with x, y [m] and heading [rad] as lines of TUM's format, ``time x y z qx qy qz qw``, in the order of
+    time; returns their number. Raises BadInput where the file cannot be written."""
+    lines = [f"{time_s:.6f} {x_m:.6f} {y_m:.6f} 0 0 0 {math.sin(turn_rad / 2.0):.9f} {math.cos(turn_rad / 2.0):.9f}\n"
+             for time_s, (x_m, y_m, turn_rad) in sorted(poses)]
+    try:
+        path.write_text("".join(lines), encoding="utf-8")
+    except OSError as error:
+        raise BadInput(f"--tum {path}: expected a file to write to, got: {error.strerror}") from None
+    return len(lines)

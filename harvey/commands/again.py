@@ -67,19 +67,15 @@ def _otherwise(run: RunDirectory, args: Namespace, settings: tuple[tuple[str, st
 
 
 def _draw_ways(run: RunDirectory, other: RunDirectory) -> None:
-    """A picture of where the robot believed to be in both."""
+    """A picture of where the robot believed to be in both; none where the world's file is not as it was."""
     from harvey.commands.plan_picture import draw_ways
-    from harvey.report import data
-    from harvey.report.page import find_known
-    from logs.timeline import Timeline
 
-    world, picture = find_known(run)[0], other.path / "ways.png"
-    if world is not None:
-        named = (("as recorded", run), ("as it would have been", other))
-        beliefs = {name: data.beliefs(Timeline(that.journal), world) for name, that in named}
-        draw_ways(world, {name: [(one["locale"], one["x"], one["y"]) for one in believed]
-                          for name, believed in beliefs.items()}, picture)
-        print(f"{picture}: both ways on the plan\n")
+    picture = other.path / "ways.png"
+    try:
+        draw_ways({"as recorded": run, "as it would have been": other}, picture)
+    except BadInput:
+        return
+    print(f"{picture}: both ways on the plan\n")
 
 
 def _again(run: RunDirectory) -> int:

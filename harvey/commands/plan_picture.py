@@ -1,16 +1,24 @@
-"""The plan of a world as a picture (PNG), also with ways on it."""
+"""The plan of a world as a picture, also with the ways of runs on it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from bisect import bisect_right
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from harvey.errors import BadInput
 from world_models.building.plan_view import GROUND, Drawing, DrawnStorey, build_drawing, draw_storeys
 from world_models.building.world import World
 
+if TYPE_CHECKING:
+    from logs.run_directory import RunDirectory
+    from logs.run_head import RunHead
+
+PlacedPoint = tuple[str, float, float]
+"""A room, and x and y in the world frame [m]."""
 PIXELS_PER_M, MAX_PIXELS = 30.0, 6000.0
 LOOKS: Mapping[str, tuple[str, str]] = {
     "room": ("#f7f4ea", "#222222"), "outdoors": ("#b9cf9d", "#3c5a2c"), "obstacle": ("#c9a676", "#5b4327"),
@@ -22,31 +30,61 @@ LETTERS_M: Mapping[str, float] = {"title": 0.7, "name": 0.42, "note": 0.34, "doo
 """Size of the letters of each kind that is written."""
 
 
-WAY_COLOURS = "#0063a0", "#b3240f"
-
-
 def draw_plan(world: World, out: Path) -> None:
     """Write the plan as a PNG. Raises OSError."""
     figure, _ = _draw(build_drawing(world))
     figure.savefig(out, format="png")
 
 
-def draw_ways(world: World, ways: Mapping[str, Sequence[tuple[str, float, float]]], out: Path) -> None:
-    """Write two ways as a PNG, on the plan of the storey that most of them are on. Raises OSError.
+def draw_ways(runs: Mapping[str, RunDirectory], out: Path) -> None:
+    """Write where the robot of each run believed to be, and dashed where it truly was, on the plan of the storey that
+    most of it is on; PNG, PDF or SVG by the name's ending.
 
-    Args:
-        ways: by what they are called, locales with x, y [m, world].
+    Raises:
+        BadInput: a run's world cannot be read, two are of different worlds, or the file cannot be written.
     """
+    from logs.run_head import RunHead
+
+    heads = {name: RunHead.read(run.path) for name, run in runs.items()}
+    if len({head.world_sha256 for head in heads.values()}) > 1:
+        raise BadInput(f"expected runs of one world, got {', '.join(Path(head.world).name for head in heads.values())}")
+    world = next(iter(heads.values())).load_world()
+    ways = {name: _read_ways(run, heads[name], world) for name, run in runs.items()}
+
     def count(storey: DrawnStorey) -> int:
-        return len([room for way in ways.values() for room, _, _ in way if room in storey.rooms])
+        return len([room for believed, _ in ways.values() for room, _, _ in believed if room in storey.rooms])
 
     storey = max(draw_storeys(world), key=count)
     figure, axes = _draw(storey.drawing)
-    for number, ((name, way), colour) in enumerate(zip(ways.items(), WAY_COLOURS, strict=True)):
-        points = np.array([(x, y) for room, x, y in way if room in storey.rooms]).reshape(-1, 2) - storey.origin
-        axes.plot(*points.T, color=colour, linewidth=4.0 - 2.0 * number, label=name, zorder=1000 + number)
+    for number, (name, both) in enumerate(ways.items()):
+        for kind, way, style in zip(("believed", "true"), both, ("-", "--"), strict=True):
+            points = np.array([(x, y) for room, x, y in way if room in storey.rooms]).reshape(-1, 2) - storey.origin
+            if len(points):
+                axes.plot(*points.T, style, color=f"C{number}", linewidth=2.0 if style == "-" else 1.0,
+                          label=f"{name}, {kind}", zorder=1000 + number)
+                axes.plot(*points[-1], "o", color=f"C{number}", markersize=5, zorder=1000 + number)
     axes.legend(loc="lower center")
-    figure.savefig(out, format="png")
+    try:
+        figure.savefig(out)
+    except OSError as error:
+        raise BadInput(f"{out}: expected a file to write to, got: {error.strerror}") from None
+
+
+def _read_ways(run: RunDirectory, head: RunHead, world: World) -> tuple[list[PlacedPoint], list[PlacedPoint]]:
+    """Where the robot believed to be and where it truly was; of the truth the room is that of the belief."""
+    from harvey.report.data import beliefs
+    from logs.reader import read_true_track
+    from logs.run_head import SIMULATOR
+    from logs.timeline import Timeline
+
+    held = list(beliefs(Timeline(run.journal), world))
+    if not held or head.kind != SIMULATOR or not run.recording.is_file():
+        true = []
+    else:
+        cycles = [one["cycle"] for one in held]
+        true = [(held[max(0, bisect_right(cycles, cycle) - 1)]["locale"], x, y)
+                for cycle, x, y, _ in read_true_track(run.recording)]
+    return [(one["locale"], one["x"], one["y"]) for one in held], true
 
 
 def _draw(plan: Drawing) -> tuple[Any, Any]:

@@ -17,6 +17,8 @@ from world_models.words import count
 if TYPE_CHECKING:
     from harvey.report.several import MissionSummary
 
+PLOTS = (".png", ".pdf", ".svg")
+
 def _add_report_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("run", metavar="RUN", nargs="+",
                         help="a run directory, several of them, or the folder of a campaign")
@@ -24,11 +26,15 @@ def _add_report_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--each", action="store_true",
                         help="of several missions: also the report of each run that was kept, in a folder beside the"
                              " file; the table's names lead to them")
+    parser.add_argument("--plot", metavar="FILE", help="no page, but the ways of the runs on the plan, believed and"
+                        " true: .png, .pdf or .svg")
 
 
 def _run_report(args: Namespace) -> int:
     from harvey.report.several import find_runs, read_missions
 
+    if args.plot is not None:
+        return _plot(args.run, Path(args.plot))
     found = [find_runs(text) for text in dict.fromkeys(args.run)]
     first = found[0] if isinstance(found[0], Path) else found[0][0].path
     is_one = len(found) == 1 and not isinstance(found[0], Path) and len(found[0]) == 1
@@ -49,6 +55,16 @@ def _run_report(args: Namespace) -> int:
 
         write_page(out, build_page_of_several(missions, _title(args.run, missions), out))
     print(f"{out}: {out.stat().st_size / 1e6:.1f} MB; opens in any browser, without network")
+    return 0
+
+
+def _plot(runs: Sequence[str], out: Path) -> int:
+    from harvey.commands.plan_picture import draw_ways
+
+    if out.suffix not in PLOTS:
+        raise BadInput(f"--plot: expected a name that ends in {', '.join(PLOTS)}, got {str(out)!r}")
+    draw_ways({Path(text).name: open_run(text) for text in runs}, out)
+    print(f"{out}: the ways of {count(len(set(runs)), 'run')}")
     return 0
 
 
@@ -100,6 +116,7 @@ REPORT = CliCommand(
         ("harvey report runs/hallway-kidnap", "a campaign: its missions as a table, and their distributions"),
         ("harvey report runs/hallway-kidnap --each", "and the report of each run, to which the table leads"),
         ("harvey report runs/bump-0 runs/bump-1", "runs beside each other"),
+        ("harvey report runs/bump-0 runs/bump-1 --plot ways.pdf", "their ways over each other on the plan"),
     ),
     _add_report_arguments, _run_report,
     "The file asks the network for nothing. It has the believed path and, of a simulated run, the true one; a slider\n"
@@ -117,13 +134,15 @@ def _add_export_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--parquet", metavar="DIR", help="write them there as Parquet")
     parser.add_argument("--mcap", metavar="FILE", help="write it as one MCAP file of ROS 2 messages, for rerun,"
                         " Foxglove and others; needs harvey-ros2")
+    parser.add_argument("--tum", metavar="FILE", help="write the believed poses in TUM's format, for evo; the true"
+                        " ones of a simulated run beside it, as FILE-truth")
 
 
 def _run_export(args: Namespace) -> int:
     wanted = {kind: Path(folder) for kind in ("csv", "parquet") if (folder := getattr(args, kind)) is not None}
-    if not wanted and args.mcap is None:
-        raise BadInput("expected --csv DIR, --parquet DIR or --mcap FILE, got none of them")
-    from logs.export import read_tables, write_tables
+    if not wanted and args.mcap is None and args.tum is None:
+        raise BadInput("expected --csv DIR, --parquet DIR, --tum FILE or --mcap FILE, got none of them")
+    from logs.export import read_tables, write_tables, write_ways
     from logs.run_exporter import find_run_exporter
     from logs.timeline import Timeline
 
@@ -134,10 +153,12 @@ def _run_export(args: Namespace) -> int:
     if exporter is not None:
         print(f"{args.mcap}: {count(exporter.write(run, Path(args.mcap)), 'message')}")
     with reading(run.journal):
-        tables = list(read_tables(run, history)) if wanted else []
+        tables = list(read_tables(run, history)) if wanted or args.tum is not None else []
     for kind, folder in wanted.items():
         for path, table in zip(write_tables(tables, kind, folder), tables, strict=True):
             print(f"{path}: {count(len(table.rows), 'row')}")
+    for path, poses in write_ways(tables, Path(args.tum)) if args.tum is not None else ():
+        print(f"{path}: {count(poses, 'pose')}")
     return 0
 
 
@@ -146,6 +167,7 @@ EXPORT = CliCommand(
     (
         ("harvey export runs/lab-to-allens-office-0 --csv tables", "decisions.csv, poses.csv, milestones.csv, ..."),
         ("harvey export runs/lab-to-allens-office-0 --parquet tables", "the same for pandas, polars, DuckDB, Arrow"),
+        ("harvey export runs/lab-to-allens-office-0 --tum way.tum", "evo_ape tum way-truth.tum way.tum"),
         ("harvey export runs/lab-to-allens-office-0 --mcap run.mcap", "for rerun, Foxglove and tools that read bags"),
     ),
     _add_export_arguments, _run_export,
@@ -153,6 +175,7 @@ EXPORT = CliCommand(
     "frame and in the world's; milestones: each verdict; turning_points; of a simulated run also truth: where the\n"
     "robot truly was, from the recording. Units stand at the end of each column's name: _m, _rad, _s; time_s is the\n"
     "body's clock.\n"
+    "TUM: a pose a line, time x y z qx qy qz qw [s, m], in the world's frame, z 0; of one time only the last.\n"
     "The MCAP file has pictures, camera, odometry, transforms, believed poses, plan, landmarks and verdicts, by the\n"
     "run's time; a pose that no certificate vouches for has a covariance that says so.",
 )

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harvey.campaign.workers import choose_workers, count_processors, find_cluster
-from harvey.commands.command import CliCommand, add_worker_arguments, parse_pairs, parse_seeds, parse_workers
+from harvey.commands.command import CliCommand, add_worker_arguments, parse_pairs, parse_seeds, parse_workers, whole
 from harvey.errors import BadInput, Terminated
 from logs.run_directory import RUNS, check_vacant
 
@@ -19,7 +19,12 @@ if TYPE_CHECKING:
 
 
 def _add_run_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("scenario", metavar="SCENARIO", help="a name from harvey list, or a TOML file")
+    parser.add_argument("scenario", metavar="SCENARIO", nargs="?", default="",
+                        help="a name from harvey list, or a TOML file")
+    parser.add_argument("--random", metavar="N", type=whole,
+                        help="instead of its goal N missions between random places, of this seed and those after it")
+    parser.add_argument("--world", metavar="FILE",
+                        help="with --random, in place of a scenario: the building, a world file or a name")
     parser.add_argument("--seed", metavar="N", default="0",
                         help="seed of all random numbers: 3, 0..19 or 1,4,9; one run for each (0)")
     parser.add_argument("--out", metavar="DIR",
@@ -55,9 +60,16 @@ def _run_run(args: Namespace) -> int:
     from harvey.simulation.serial_body import body_kind
 
     body = body_kind(args.body)
+    if args.random is not None:
+        args.scenario, seeds, drawn = _draw_missions(args, seeds, settings)
+    else:
+        if args.world is not None or not args.scenario:
+            raise BadInput("expected a SCENARIO, or --random N with --world FILE")
+        drawn = [settings] * len(seeds)
+    many = len(seeds) > 1 or args.random is not None
     tasks = tuple(
-        Task(args.scenario, settings, seed, _out(args, seed, len(seeds) > 1), body, args.go_on, args.sync)
-        for seed in seeds)
+        Task(args.scenario, pairs, seed, _out(args, seed, many), body, args.go_on, args.sync)
+        for seed, pairs in zip(seeds, drawn, strict=True))
     if args.check:
         if also := [name for name in ("live", "trace", "go_on") if getattr(args, name)]:
             raise BadInput(f"--check: expected it without --{also[0].replace('_', '-')}, because nothing is driven")
@@ -72,6 +84,31 @@ def _run_run(args: Namespace) -> int:
         raise BadInput(f"--{'live' if args.live else 'trace'}: expected one seed, got {len(tasks)}")
     with choose_workers(workers):
         return _several(tasks, args.keep)
+
+
+def _draw_missions(
+    args: Namespace, seeds: tuple[int, ...], settings: tuple[tuple[str, str], ...]
+) -> tuple[str, tuple[int, ...], list[tuple[tuple[str, str], ...]]]:
+    """The scenario, the seeds and the settings of random missions; of a building its first mission becomes a file."""
+    from harvey.campaign.random_missions import draw_missions, format_mission
+    from sim.scenario import parse_scenario
+    from world_models.files.toml.mission import named_file
+    from world_models.files.toml.source import WORLDS
+
+    if len(seeds) != 1 or args.random < 1 or args.check or bool(args.scenario) == (args.world is not None):
+        raise BadInput("--random: expected N from 1, either a SCENARIO or --world FILE, one --seed, and no --check")
+    seeds = tuple(range(seeds[0], seeds[0] + args.random))
+    if args.scenario:
+        drawn = draw_missions(Task(args.scenario, settings, seeds[0]).load(), seeds)
+    else:
+        world = named_file(args.world, WORLDS, Path())
+        drawn = draw_missions(parse_scenario(format_mission(world), world.stem), seeds)
+        args.out = args.out or str(RUNS / f"random-{world.stem}")
+        mission = Path(args.out) / f"random-{world.stem}.toml"
+        mission.parent.mkdir(parents=True, exist_ok=True)
+        mission.write_text(format_mission(world, drawn[0][0][1], drawn[0][1][1]), encoding="utf-8")
+        args.scenario = str(mission)
+    return args.scenario, seeds, [(*settings, *pairs) for pairs in drawn]
 
 
 def _out(args: Namespace, seed: int, many: bool) -> Path:
@@ -131,6 +168,8 @@ def _several(tasks: tuple[Task, ...], keep: Keep) -> int:
     for task in tasks:
         if not isinstance(lost := done[task], MissionResult):
             print(f"seed {task.seed}: {lost.text}")
+        elif lost.outcome != "reached" and tasks[0].settings != tasks[-1].settings:
+            print(f"seed {task.seed}: {lost.reason}; {' '.join(f'{key}={value}' for key, value in task.settings)}")
     kept = {"all": "the runs are in", "failures": "the results, and the runs that did not reach the goal, are in",
             "none": "the results are in"}
     print(f"{kept[keep]} {folder}")
@@ -144,6 +183,7 @@ RUN = CliCommand(
         ("harvey run lab-to-allens-office --seed 0..19", "twenty of them, and a table"),
         ("harvey run lab-to-allens-office --seed 0..19 --go-on", "those that are still to be done, after a crash"),
         ("harvey run lab-to-allens-office --seed 0..999 --keep failures", "a thousand; only those that fail stay"),
+        ("harvey run --random 20 --world house.toml", "twenty missions between random places, and a table"),
         ("harvey run lab-to-allens-office --seed 0..19 --cluster local:4", "on a Dask cluster of this machine"),
         ("harvey run lab-to-allens-office --check", "which milestones it will have, and how well each tells the place"),
         ("harvey run hallway-kidnap --seed 3 --trace", "print who acts in each cycle, and what comes of it"),

@@ -7,16 +7,23 @@ from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from harvey.campaign import mission_task as missions
 from harvey.campaign.engine import Results
 from harvey.campaign.mission_task import Task
+from harvey.campaign.random_missions import draw_missions, format_mission
 from harvey.campaign.show import read_progress
 from harvey.campaign.workers import CaseAnswer, Workers, check_origin, choose_workers, chosen_workers, origin
 from harvey.cli import main
 from harvey.errors import BadInput
+from sim.scenario import parse_scenario
 from world_models import plugins
+from world_models.commands import parse_command
+from world_models.files.toml.mission import named_file
+from world_models.files.toml.source import WORLDS
+from world_models.files.world_files import load_world
 
 
 def campaign(folder: Path, outcomes: list[str], total: int = 40, killed: tuple[int, ...] = ()) -> str:
@@ -55,6 +62,20 @@ def test_a_worse_campaign_is_found(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "the second is better" in capsys.readouterr().out
     assert main(["campaign", "compare", good, bad, "--success", "final_error_m<0.05"]) == 0
     assert "0 of 20 went differently" in capsys.readouterr().out
+
+
+def test_random_missions_begin_and_end_on_free_floor_and_are_those_of_their_seed() -> None:
+    world = load_world(named_file("two_ways", WORLDS, Path()))
+    scenario = parse_scenario(format_mission(named_file("two_ways", WORLDS, Path())))
+    drawn = draw_missions(scenario, tuple(range(20)))
+    assert drawn[7:9] == draw_missions(scenario, (7, 8)) and len(set(drawn)) == 20
+    for (_, goal), (_, _heading) in drawn:
+        start, end = parse_command(goal, world)
+        assert start.locale != end.locale  # another room, which doors lead to
+        for place in (start, end):
+            x, y = place.in_world(world).position
+            gaps = [np.linalg.norm(corners - (x, y), axis=1).min() for corners in world.obstacles(place.locale)]
+            assert world.locale_at((x, y)) == place.locale and min(gaps, default=1.0) > 0.35
 
 
 @pytest.mark.parametrize(("argv", "told"), [

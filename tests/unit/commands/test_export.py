@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
@@ -14,7 +15,8 @@ from hypothesis import strategies as st
 
 from blackboard import decision_line
 from harvey.cli import main
-from logs.export import DECISIONS, MILESTONES, POSES, TURNS, Table, read_tables, write_csv, write_parquet
+from logs import export
+from logs.export import DECISIONS, MILESTONES, POSES, TRUTH, TURNS, Table, read_tables, write_csv, write_parquet
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline
 from scripted_turns import HELD, decisions
@@ -90,6 +92,21 @@ def test_what_cannot_be_exported_is_one_error(
     run.journal.write_bytes(journal)
     assert main(["export", str(run.path), "--csv", str(run.path.parent / "tables")]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1 and not (run.path.parent / "tables").exists()
+
+
+def test_both_ways_are_told_as_tum_once_a_time(tmp_path: Path, run: RunDirectory) -> None:
+    held = {**dict.fromkeys(POSES), "time_s": 1.5, "status": "held"}
+    told = (7.0, "held", 1.5), (1.0, "held", 1.5), (3.0, "candidate", 1.5), (0.5, "held", 0.25)
+    rows = [held | {"world_x_m": x, "world_y_m": 2.0, "world_heading_rad": 0.0, "status": status, "time_s": time_s}
+            for x, status, time_s in told]
+    truth = Table("truth", tuple(TRUTH), tuple(TRUTH.values()), [(3, 1.5, 1.0, 2.0, 3.141592653589793)])
+    both = [Table("poses", tuple(POSES), tuple(POSES.values()), [tuple(row.values()) for row in rows]), truth]
+    assert [(path.name, count) for path, count in export.write_ways(both, tmp_path / "way.tum")] == [
+        ("way.tum", 2), ("way-truth.tum", 1)]
+    believed, true = (np.loadtxt(tmp_path / f"way{which}.tum", ndmin=2) for which in ("", "-truth"))
+    assert believed.tolist() == [[0.25, 0.5, 2, 0, 0, 0, 0, 1], [1.5, 1, 2, 0, 0, 0, 0, 1]]
+    assert true[0].tolist() == pytest.approx([1.5, 1, 2, 0, 0, 0, 1, 0])
+    assert main(["export", str(run.path), "--tum", str(tmp_path / "x.tum")]) == 2  # a run without its world
 
 
 def test_where_it_cannot_be_written_is_one_error(run: RunDirectory, capsys: pytest.CaptureFixture[str]) -> None:
