@@ -11,19 +11,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry, Level, Posted
-from generated_boards import (
-    HALL,
-    LENGTH_M,
-    STUDY,
-    WIDTH_M,
-    Bench,
-    effect_on,
-    made,
-    plain_robot,
-    reasons,
-    to_world,
-    wakes,
-)
+from generated_boards import LENGTH_M, WIDTH_M, Bench, effect_on, made, reasons, to_world, wakes
+from harvey.testing import HALL, STUDY, plain_robot
 from knowledge_sources.methods.localization import (
     ALIKE_LOG_NOISE,
     LOST_AGAIN_ODDS,

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry, Level
-from generated_boards import Bench, effect_on, plain_robot, poses, reasons, to_world
+from generated_boards import Bench, effect_on, poses, reasons, to_world
+from harvey.testing import plain_robot
 from knowledge_sources.methods.verification import MIN_MATCHED_LINES, turn_headings
 from knowledge_sources.milestone_selector.belief_checker import BeliefChecker
 from knowledge_sources.reads import list_log_odds

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry, Posted, Revise
-from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
+from generated_boards import Bench, effect_on, made, reasons, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.methods.calibration import (
     LEAST_SIGMA_CENTRE_PX,
     LEAST_SIGMA_FOCAL,

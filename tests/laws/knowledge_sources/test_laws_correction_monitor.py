@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry, Posted
-from generated_boards import Bench, made, plain_robot, reasons, wakes
+from generated_boards import Bench, made, reasons, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.senses.correction_monitor import CorrectionMonitor
 from world_models.actuator import ActuatorModel

@@ -13,21 +13,17 @@ from hypothesis import strategies as st
 
 from blackboard import Effect, Entry, Level, Post, Revise
 from generated_boards import (
-    HALL,
-    STUDY,
-    SURE,
     Bench,
     covariances,
     effect_on,
-    house,
     made,
     mirrored,
     mirrored_covariance,
-    plain_robot,
     poses,
     reasons,
     to_world,
 )
+from harvey.testing import HALL, STUDY, SURE, house, plain_robot
 from knowledge_sources.action.dead_reckoner import MIN_CLAIMED_PART, DeadReckoner
 from knowledge_sources.methods.calibration import SIGMA_YAW_RAD
 from knowledge_sources.reads import PLACED_BY

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
 from blackboard import Blackboard, Entry, Post, Revise, Revised, View
-from generated_boards import HALL, STUDY, Bench, made, plain_robot, reasons, to_world
+from generated_boards import Bench, made, reasons, to_world
+from harvey.testing import HALL, STUDY, answer, plain_robot
 from knowledge_sources.methods.motion import CLEARANCES_M
 from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M
 from knowledge_sources.model.dependency_withdrawer import DependencyWithdrawer

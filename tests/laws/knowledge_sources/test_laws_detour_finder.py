@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from blackboard import Entry, Posted, Revised
-from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, wakes
+from generated_boards import Bench, effect_on, made, wakes
+from harvey.testing import HALL, STUDY, plain_robot
 from knowledge_sources.reads.sketches import MAX_ADJUSTMENTS
 from knowledge_sources.sketcher.detour_finder import DetourFinder
 from world_models.entries import Impasse, Leg, Place, PlanSketch

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acting import answer
 from archive_door import DOOR, before_door, photograph
 from blackboard import Effect, Level, Post, Posted, Revise, Revised
+from harvey.testing import answer
 from knowledge_sources.methods.doors import MAX_LOG_ODDS, PRIOR_LOG_ODDS
 from knowledge_sources.methods.doors.belief import MIN_PICTURES
 from knowledge_sources.model.door_watcher import DoorWatcher

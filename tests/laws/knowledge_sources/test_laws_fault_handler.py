@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
 from blackboard import Blackboard, Entry, Level, Post, Posted, Revise, Revised
-from generated_boards import Bench, made, plain_robot
+from generated_boards import Bench, made
+from harvey.testing import answer, plain_robot
 from knowledge_sources.action.fault_handler import (
     MAX_BROKEN_MOTIONS,
     MAX_FAULT_S,

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generated_boards import Bench, covariances, effect_on, made, plain_robot, reasons
+from generated_boards import Bench, covariances, effect_on, made, reasons
+from harvey.testing import plain_robot
 from knowledge_sources.action.floor_changer import ELEVATOR_SIGMA_M, ELEVATOR_SIGMA_RAD, floor_changer
 from towers import tower
 from world_models.building.world import World

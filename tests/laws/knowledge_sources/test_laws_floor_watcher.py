@@ -14,7 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Effect, Entry, Post, Posted, Revise, Revised
-from generated_boards import HALL, STUDY, Bench, made, plain_robot, reasons, to_world, wakes
+from generated_boards import Bench, made, reasons, to_world, wakes
+from harvey.testing import HALL, STUDY, plain_robot
 from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD
 from knowledge_sources.model import floor_watcher
 from knowledge_sources.model.floor_watcher import (

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from blackboard import Level, Post, Posted, Revise, Revised
 from generated_boards import (
-    HALL,
     WIDTH_M,
     Bench,
     all_reasons,
@@ -18,11 +17,11 @@ from generated_boards import (
     made,
     mirrored,
     mirrored_place,
-    plain_robot,
     poses,
     reasons,
     wakes,
 )
+from harvey.testing import HALL, plain_robot
 from knowledge_sources.goal.goal_renewer import goal_renewer
 from world_models.entries import Discrepancy, Goal, Place
 from world_models.frames import Pose2

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Posted, Revise, Revised
-from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, to_world, wakes
+from generated_boards import Bench, effect_on, made, poses, reasons, to_world, wakes
+from harvey.testing import HALL, STUDY, plain_robot
 from knowledge_sources.methods.floor import revise_by_thing
 from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.reads import find_frames

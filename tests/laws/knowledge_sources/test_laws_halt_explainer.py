@@ -11,8 +11,8 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from acting import answer
 from blackboard import Posted, Revise, Revised
+from harvey.testing import answer
 from knowledge_sources.model.halt_explainer import HaltExplainer
 from knowledge_sources.reads import SEEN_MARGIN_M
 from knowledge_sources.settings import DEFAULT

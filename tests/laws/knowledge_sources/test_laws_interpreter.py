@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import MissingEntryError, Posted, Revised
-from generated_boards import HALL, STUDY, Bench, covariances, effect_on, made, plain_robot, reasons, wakes
+from generated_boards import Bench, covariances, effect_on, made, reasons, wakes
+from harvey.testing import HALL, STUDY, plain_robot
 from knowledge_sources.goal.interpreter import interpreter
 from world_models.entries import Command, Goal, Hypothesis, Impasse
 from world_models.entries.location import Covariance

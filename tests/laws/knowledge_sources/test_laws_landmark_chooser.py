@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from blackboard import Effect, Level, Post, Posted, Revise, Revised
-from generated_boards import Bench, effect_on, made, plain_robot, reasons, to_world, wakes
+from generated_boards import Bench, effect_on, made, reasons, to_world, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.action.landmark_chooser import LandmarkChooser
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.tracking import edge_alignment, select_landmarks

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry
-from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world
+from generated_boards import Bench, effect_on, mirrored, reasons, to_world
+from harvey.testing import plain_robot
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.milestone.med_r_and_t import MedRAndT
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from blackboard import Entry, Posted, Revised
-from generated_boards import Bench, effect_on, plain_robot, reasons, wakes
+from generated_boards import Bench, effect_on, reasons, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.methods.features import find_lines, read_picture
 from knowledge_sources.milestone.line_finder import MIN_SEGMENT_LENGTH_PX, LineFinder
 from world_models.entries import CameraPicture, Segments

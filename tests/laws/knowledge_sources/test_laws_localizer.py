@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry, Level, Post, Posted, Retract
-from generated_boards import HALL, Bench, drive, go, made, motions, plain_robot, poses, reasons, to_world, wakes
+from generated_boards import Bench, drive, go, made, motions, poses, reasons, to_world, wakes
+from harvey.testing import HALL, plain_robot
 from knowledge_sources.methods.localization import (
     LOST_AGAIN_ODDS,
     MAX_FAR_PROBES,

@@ -8,19 +8,8 @@ from dataclasses import replace
 import pytest
 
 from blackboard import Entry, Posted, Revised
-from generated_boards import (
-    HALL,
-    LENGTH_M,
-    STUDY,
-    WIDTH_M,
-    Bench,
-    effect_on,
-    made,
-    plain_robot,
-    reasons,
-    to_world,
-    wakes,
-)
+from generated_boards import LENGTH_M, WIDTH_M, Bench, effect_on, made, reasons, to_world, wakes
+from harvey.testing import HALL, STUDY, plain_robot
 from knowledge_sources.methods.motion.subgoals import DOOR_LOOK_APART_M, MIN_DOOR_LOOK_SINE
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.sketcher.lookout_planner import LookoutPlanner

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from blackboard import Entry, Posted
-from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
+from generated_boards import Bench, effect_on, mirrored, reasons, to_world, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.methods.belief import MAX_CAMERA_CHI2
 from knowledge_sources.methods.calibration.camera_state import (
     PRIOR_COVARIANCE_FACTOR,

@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry, Posted
-from generated_boards import Bench, effect_on, mirrored, plain_robot, reasons, to_world, wakes
+from generated_boards import Bench, effect_on, mirrored, reasons, to_world, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.methods.calibration import (
     SIGMA_ROLL_RAD,
     SIGMA_TILT_RAD,

@@ -23,6 +23,7 @@ from blackboard.board import TracedView
 from experiments.generated.missions import OFFICE
 from generated_boards import effect_on, made, reasons
 from harvey.simulation.simulated_run import run_mission
+from harvey.testing import copy_of
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.belief import (
     MAX_CAMERA_CHI2,
@@ -60,7 +61,6 @@ from knowledge_sources.reads import find_belief, find_camera, find_followed, fin
 from knowledge_sources.reads.place_believed import MAX_P_FALSE_CLEAR, MAX_P_FALSE_UNMISTAKABLE, MAX_P_RIVAL
 from knowledge_sources.reads.questions import HELD, MIN_FOLLOWED_LANDMARKS
 from knowledge_sources.settings import DEFAULT, Settings
-from rebuilt_board import copy_of
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 from world_models.camera import YAW

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from blackboard import Effect, Level, Post, Posted, Retract, Revise, Revised
-from generated_boards import INEXACT, Bench, all_reasons, plain_robot, reasons, wakes
+from generated_boards import INEXACT, Bench, all_reasons, reasons, wakes
 from harvey.simulation.simulated_run import build_robot_model
+from harvey.testing import plain_robot
 from knowledge_sources.reads import has_missed
 from knowledge_sources.reads.sketches import GOAL_HEADING_TOLERANCE_RAD, INEXACT_TOLERANCE_SIGMAS, MAX_ADJUSTMENTS
 from knowledge_sources.settings import DEFAULT

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from blackboard import Entry, Level, Posted, Quiescence, Revised
-from generated_boards import HALL, Bench, all_reasons, made, plain_robot, wakes
+from generated_boards import Bench, all_reasons, made, wakes
+from harvey.testing import HALL, plain_robot
 from knowledge_sources.goal.mission_monitor import mission_monitor
 from world_models.entries import Alias, AliasOdds, Hypothesis, Impasse, Obstruction, Outcome, diagonal
 from world_models.frames import Pose2

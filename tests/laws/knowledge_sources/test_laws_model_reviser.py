@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
 from blackboard import Post, Posted, Retracted, Revise, Revised
+from harvey.testing import answer
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.reads import find_building

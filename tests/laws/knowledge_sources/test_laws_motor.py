@@ -13,20 +13,18 @@ from hypothesis import strategies as st
 
 from blackboard import Effect, Entry, Level, Posted, Revised
 from generated_boards import (
-    HALL,
     Bench,
     all_reasons,
     effect_on,
-    house,
     made,
     mirrored,
     mirrored_place,
-    plain_robot,
     poses,
     reasons,
     to_world,
     wakes,
 )
+from harvey.testing import HALL, house, plain_robot
 from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.motor import LOOKAHEAD_M, Motor
 from knowledge_sources.methods.floor import find_floor

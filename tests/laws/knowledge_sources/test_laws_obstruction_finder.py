@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from blackboard import Entry, Level, Post, Posted
-from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
+from generated_boards import Bench, effect_on, made, reasons, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.milestone.obstruction_finder import MIN_OBSTRUCTION_LOOKS, ObstructionFinder
 from things_in_hall import known_by_sight
 from world_models.entries import Evidence, FloorThing, FreeFloor, Obstacle, Obstruction, Segments

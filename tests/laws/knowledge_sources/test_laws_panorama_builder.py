@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 
 from blackboard import Entry, Posted
-from generated_boards import Bench, drive, effect_on, go, motions, plain_robot, reasons, wakes
+from generated_boards import Bench, drive, effect_on, go, motions, reasons, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.relocalizer.panorama_builder import PanoramaBuilder
 from world_models.actuator import ActuatorModel
 from world_models.entries import Panorama, Segments

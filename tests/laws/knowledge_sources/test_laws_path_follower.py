@@ -12,19 +12,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from blackboard import Effect, Entry, Level, Posted, Revise, Revised
-from generated_boards import (
-    HALL,
-    Bench,
-    effect_on,
-    house,
-    made,
-    mirrored,
-    mirrored_place,
-    plain_robot,
-    reasons,
-    to_world,
-    wakes,
-)
+from generated_boards import Bench, effect_on, made, mirrored, mirrored_place, reasons, to_world, wakes
+from harvey.testing import HALL, house, plain_robot
 from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.path_follower import (
     MAX_ROLLING_ERROR_RAD,

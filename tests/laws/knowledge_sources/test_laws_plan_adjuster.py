@@ -15,12 +15,12 @@ from generated_boards import (
     effect_on,
     mirrored,
     mirrored_covariance,
-    plain_robot,
     poses,
     reasons,
     to_world,
     wakes,
 )
+from harvey.testing import plain_robot
 from knowledge_sources.milestone.plan_adjuster import plan_adjuster
 from world_models.entries import Certificate, Discrepancy, Hypothesis, MilestoneVerdict, PoseFix
 from world_models.entries.location import Covariance

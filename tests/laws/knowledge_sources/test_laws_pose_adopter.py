@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry, Posted, Retract, Revise
-from generated_boards import HALL, STUDY, Bench, covariances, effect_on, made, plain_robot, poses, reasons, wakes
+from generated_boards import Bench, covariances, effect_on, made, poses, reasons, wakes
+from harvey.testing import HALL, STUDY, plain_robot
 from knowledge_sources.relocalizer.pose_adopter import pose_adopter
 from world_models.entries import CameraState, Hypothesis, PlaceSearch, diagonal
 from world_models.entries.location import Covariance

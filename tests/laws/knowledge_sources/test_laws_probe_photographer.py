@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from blackboard import Change, Entry, Level, Posted, Revised
-from generated_boards import Bench, all_reasons, plain_robot, wakes
+from generated_boards import Bench, all_reasons, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.reads import is_dark
 from knowledge_sources.relocalizer.probe_photographer import MAX_DARK_FRAMES, ProbePhotographer
 from world_models.entries import PictureRequest, Segments

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blackboard import Level, Posted
-from generated_boards import Bench, all_reasons, plain_robot, wakes
+from generated_boards import Bench, all_reasons, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.relocalizer.prober import Prober
 from knowledge_sources.settings import DEFAULT
 from world_models.entries import MotorCommand, PlaceSearch

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 
 from blackboard import Entry, Posted, Revised
-from generated_boards import HALL, HOUSE, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, wakes
+from generated_boards import Bench, effect_on, made, poses, reasons, wakes
+from harvey.testing import HALL, HOUSE, STUDY, plain_robot
 from knowledge_sources.sketcher.refiner import Refiner
 from world_models.entries import Impasse, Place, PlanSketch, Subgoal
 from world_models.files.toml.source import Source

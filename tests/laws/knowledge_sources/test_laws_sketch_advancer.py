@@ -8,7 +8,8 @@ from typing import get_args
 import pytest
 
 from blackboard import Posted, Revised
-from generated_boards import HALL, Bench, all_reasons, effect_on, wakes
+from generated_boards import Bench, all_reasons, effect_on, wakes
+from harvey.testing import HALL
 from knowledge_sources.sketcher.sketch_advancer import sketch_advancer
 from world_models.entries import Place, PlanSketch, SketchStatus
 from world_models.entries.task import LegStatus

@@ -11,8 +11,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
 from blackboard import Effect, Entry, Level, Post, Posted, Revise, Revised
+from harvey.testing import answer
 from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, MIN_OBSTACLE_CERTAINTY, MIN_THING_CERTAINTY
 from knowledge_sources.methods.floor.weigh_sight import (
     CAMOUFLAGED_FREE_ODDS,

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
 from blackboard import Blackboard, Post, Posted, Revise, Revised
+from harvey.testing import answer
 from knowledge_sources.methods.floor import move_thing
 from knowledge_sources.model.thing_mover import MAX_DRIFT_M, MAX_DRIFT_RAD, ThingMover
 from knowledge_sources.settings import DEFAULT

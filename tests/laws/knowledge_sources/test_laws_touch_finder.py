@@ -11,8 +11,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
 from blackboard import Post, Posted, Revise, Revised
+from harvey.testing import answer
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.methods.floor import judge_thing
 from knowledge_sources.model.touch_finder import MAX_TOUCH_SIGMA_RAD, TouchFinder

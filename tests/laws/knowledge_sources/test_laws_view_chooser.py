@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Effect, Entry, Level, Posted, Revised
-from generated_boards import Bench, effect_on, mirrored, mirrored_place, plain_robot, poses, reasons, to_world, wakes
+from generated_boards import Bench, effect_on, mirrored, mirrored_place, poses, reasons, to_world, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.methods.verification import turn_headings
 from knowledge_sources.milestone_selector.view_chooser import LONG_TURN_RAD, ViewChooser
 from knowledge_sources.reads import MAX_LOOK_ERROR_RAD

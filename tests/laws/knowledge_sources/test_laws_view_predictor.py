@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 
 from blackboard import Level, Posted, Revised
-from generated_boards import Bench, effect_on, made, plain_robot, poses, reasons, to_world, wakes
+from generated_boards import Bench, effect_on, made, poses, reasons, to_world, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.reads import MAX_LOOK_ERROR_RAD
 from world_models.entries import Milestone, Obstruction, PictureRequest

@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from blackboard import Entry, Posted, Revised
-from generated_boards import Bench, effect_on, plain_robot, reasons, to_world, wakes
+from generated_boards import Bench, effect_on, reasons, to_world, wakes
+from harvey.testing import plain_robot
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.milestone_selector.view_updater import ViewUpdater
 from world_models.entries import Milestone, Obstruction

@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Effect, Entry, Posted, Revised
-from generated_boards import INEXACT, Bench, effect_on, house, made, plain_robot, reasons, wakes
+from generated_boards import INEXACT, Bench, effect_on, made, reasons, wakes
+from harvey.testing import house, plain_robot
 from knowledge_sources.methods.calibration import (
     LEAST_SIGMA_RAD,
     SIGMA_CENTRE_PX,
