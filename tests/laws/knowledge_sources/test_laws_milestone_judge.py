@@ -23,7 +23,7 @@ from blackboard.board import TracedView
 from experiments.generated.missions import OFFICE
 from generated_boards import effect_on, made, reasons
 from harvey.simulation.simulated_run import run_mission
-from harvey.testing import copy_of
+from harvey.testing import Bench, check_source, copy_of
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.belief import (
     MAX_CAMERA_CHI2,
@@ -569,3 +569,11 @@ def test_a_place_that_may_be_off_by_more_than_the_alert_limit_is_looked_at_once_
     assert after.kind == ("not testable" if is_asked_again else "verified")
     assert "alert limit" in after.reason and "north-wall" in after.reason
     assert (after.p_wrong, after.most_p_wrong) == (before.p_wrong, before.most_p_wrong)
+
+
+def test_it_keeps_the_laws_of_all_sources(judged: list[Judged]) -> None:
+    for one in judged[:2]:
+        bench = Bench()
+        bench.board = one.board
+        milestone = case_on(one.board.view, one.trigger).milestone
+        check_source(MilestoneJudge, bench, one.trigger, without=(milestone.id,))
