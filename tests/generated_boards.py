@@ -8,42 +8,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
 from hypothesis import strategies as st
 
-from acting import answer
 from blackboard import (
-    Blackboard,
     Change,
     Effect,
     Entry,
     KnowledgeSource,
-    Level,
-    Post,
-    Posted,
     Ref,
     Retract,
-    Revise,
-    Revised,
-    View,
 )
+from harvey import testing
+from harvey.testing import HALL, house
 from knowledge_sources.model.model_reviser import ModelReviser
-from world_models.actuator import ActuatorModel
 from world_models.building.locale_frame import LocaleFrame
-from world_models.building.world import World
-from world_models.camera import Camera, CameraMount
 from world_models.entries import (
-    Discrepancy,
     Goal,
-    Hypothesis,
     Leg,
     Milestone,
-    MotionReport,
-    MotorCommand,
     Obstacle,
     Outcome,
     Place,
@@ -53,91 +39,16 @@ from world_models.entries import (
     diagonal,
 )
 from world_models.entries.location import Covariance
-from world_models.files.toml.source import Source
-from world_models.files.world_files import read_world
-from world_models.frame_store import FrameStore
 from world_models.frames import Pose2, flattened
-from world_models.robot import RobotModel
 
 T = TypeVar("T")
 
-HOUSE = """
-name = "plain"
-units = "metres"
-include = ["standard"]
-
-[locales.house]
-kind = "building"
-at = [3, -2]
-turn = 30
-
-[locales.hall]
-kind = "hallway"
-in = "house"
-at = [0, 0]
-size = [8, 4]
-
-[locales.study]
-kind = "office"
-in = "house"
-at = [8.2, 0]
-size = [6, 4]
-
-[doors]
-study-door = { between = ["hall", "study"], wall = "east", along = 2.0, width = 1.0, open = true }
-"""
-HALL, STUDY = "hall", "study"
 LENGTH_M, WIDTH_M = 8.0, 4.0
 """Of the hall; its frame begins in its south-west corner, and is turned in the world."""
-SURE = diagonal(0.01, 0.005)
 
 
-@cache
-def house() -> World:
-    """The building, read once."""
-    return read_world(Source.parse(HOUSE, "house.toml"))
-
-
-def plain_robot(world: World | None = None, *, continuous: bool = False,
-                actuator: ActuatorModel | None = None) -> RobotModel:
-    """A robot in the house, or in another world."""
-    camera = Camera.from_field_of_view(math.radians(65.0), 256, 256)
-    mount = CameraMount(height_m=1.0, forward_m=0.12, tilt_rad=0.1)
-    return RobotModel(world or house(), camera, mount, actuator or ActuatorModel(), continuous=continuous)
-
-
-class Bench:
-    """A board on which a law puts what it needs, one cycle after the other.
-
-    Args:
-        robot: whose camera, wheels and footprint are put there, with all frames of its world; None for an empty board.
-    """
-
-    def __init__(self, robot: RobotModel | None = None) -> None:
-        self.board = Blackboard()
-        self.cycle = 0
-        self.robot = robot
-        if robot is not None:
-            assert isinstance(robot.world, World)
-            store = FrameStore(robot.world)
-            for value in (*robot.entries(), *(store.frame(name) for name in ("", *robot.world.locales))):
-                self.put(value)
-
-    @property
-    def view(self) -> View:
-        return self.board.view
-
-    def put(self, value: Any, *because: Entry[Any]) -> Entry[Any]:
-        """A new entry."""
-        return self.apply(Post(value, because))[0].entry
-
-    def revise(self, entry: Entry[T], **fields: Any) -> Entry[T]:
-        """The current revision of an entry, with other values in some fields."""
-        now = self.view[entry.id]
-        return self.apply(Revise(now, replace(now.value, **fields), (now,)))[0].entry
-
-    def retract(self, entry: Entry[Any]) -> None:
-        self.apply(Retract(self.view[entry.id]))
+class Bench(testing.Bench):
+    """A bench on which a law puts also what stands in the house, and what is planned there."""
 
     def lack(self, what: str) -> None:
         """What a source may need is not so: one of ``LACKING``, or the entry of this id is withdrawn."""
@@ -145,20 +56,6 @@ class Bench:
             LACKING[what](self)
         elif what != "nothing":
             self.retract(self.view[what])
-
-    def apply(self, *effects: Effect) -> tuple[Change, ...]:
-        """The changes that effects make, in a cycle of their own."""
-        self.cycle += 1
-        return self.board.apply(effects, author="test", cycle=self.cycle)
-
-    def ask(self, source: KnowledgeSource, trigger: Entry[Any]) -> tuple[Effect, ...] | None:
-        """What a source makes of an entry that was just posted or revised; None where it does not act."""
-        return answer(source, self.view, Revised(trigger) if trigger.revision else Posted(trigger))
-
-    def believe(self, pose: Pose2 | None = None, covariance: Covariance = SURE, *, locale: str = HALL,
-                basis: str = "milestone", motion: str = "") -> Entry[Hypothesis]:
-        """A belief that is held; ``pose`` in the locale's frame."""
-        return self.put(Hypothesis(locale, pose or Pose2(2.0, 2.0, 0.0), covariance, basis, motion=motion))
 
     def pursue(self, destination: Place | None = None) -> Entry[Goal]:
         """A goal that is pursued."""
@@ -203,15 +100,6 @@ class Bench:
     def await_milestone(self, sketch: str = "", index: int = 0, **fields: Any) -> Entry[Milestone]:
         """A milestone that the robot has yet to turn to, unless ``fields`` say otherwise."""
         return self.put(Milestone(sketch, index, "M of a law", **{"look_heading_rad": 0.0, **fields}))
-
-    def doubt(self, level: Level = Level.GOAL, magnitude: float | None = None) -> Entry[Discrepancy]:
-        """A discrepancy that is open at a level; by default the robot is lost."""
-        return self.put(Discrepancy(level, "what a law says", magnitude, (5.0, 30.0), "px"))
-
-    def move(self, turn_rad: float = 0.0, move_m: float = 0.5) -> tuple[Entry[MotorCommand], Entry[MotionReport]]:
-        """A motor command, and the report that it was carried out; no belief has it yet."""
-        command = self.put(MotorCommand(turn_rad, move_m))
-        return command, self.put(MotionReport(turn_rad, move_m, 1.0, 1.0), command)
 
 
 INEXACT: Mapping[str, Any] = {"expected": (((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),), "displacement_modes": ("wall",),
@@ -280,7 +168,7 @@ def effect_on(effects: Iterable[Effect] | None, kind: type[Any]) -> Any:
 
 def reasons(effect: Effect) -> set[str]:
     """What an effect names, directly: ids of entries, and of its act's other effects the kinds of their values."""
-    return {r.id if isinstance(r, Entry | Ref) else type(r.value).__name__ for r in effect.because}
+    return set(testing.reasons(effect))
 
 
 def all_reasons(effects: Sequence[Effect]) -> set[str]:

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from acting import answer
 from blackboard import (
     Blackboard,
     Change,
@@ -25,6 +24,7 @@ from blackboard.board import TracedView
 from blackboard.journal import change_record
 from harvey.agent import build_agent
 from harvey.runner.replay import open_originals
+from harvey.testing import answer
 from harvey.wiring import KNOWLEDGE_SOURCES, build, load_kinds
 from knowledge_sources.settings import DEFAULT
 from logs.records import (
@@ -44,17 +44,6 @@ KINDS = load_kinds()
 TRACED = frozenset(kind for kind in KINDS.values() if kind_of(kind).traced)
 SOURCES = {source.called(): source for source in KNOWLEDGE_SOURCES}
 CHANGES: Mapping[str, type[Change]] = {kind.__name__: kind for kind in (Posted, Revised, Retracted)}
-
-
-def copy_of(board: Blackboard) -> Blackboard:
-    """A board with the same entries, that can be changed without it."""
-    other = Blackboard()
-    other._numbers.update(board._numbers)
-    for store in board._stores.values():
-        for entry in store.entries.values():
-            other._current[entry.id] = entry
-            other._store(type(entry.value)).put(entry)
-    return other
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 from blackboard import Change, Effect, Entry, KnowledgeSource, Post, Revise, Scheduler
 from harvey.runner.world_port import WorldPort
 from harvey.simulation.simulated_run import build_robot_model
+from harvey.testing import Bench
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.model.halt_explainer import HaltExplainer
 from knowledge_sources.model.model_reviser import ModelReviser
@@ -65,6 +66,13 @@ class Hall:
         """Something new, and all that follows; the entry as it was posted."""
         (change,) = self.apply(Post(value, because))
         return change.entry
+
+    @property
+    def bench(self) -> Bench:
+        """Its board, for laws that take one."""
+        bench = Bench()
+        bench.board = self.board
+        return bench
 
     def belief(self) -> Entry[Hypothesis]:
         belief = self.board.view.latest(Hypothesis)

@@ -53,7 +53,8 @@ GENERATORS: Mapping[str, Callable[[], str]] = {
     **{f"rows-{name}": partial(describe_rows, name)
        for name in ("table1", "figure12", "table2", "table3", "planning", "pose-speed")},
     "rows-fragments": partial(describe_rows, "table3", "60%"),
-    **{f"example-{name}": partial(show_example, name) for name in ("hearsay", "sudoku", "recorded_model")},
+    **{f"example-{name}": partial(show_example, name)
+       for name in ("hearsay", "sudoku", "recorded_model", "plugin/tests/test_timekeeper")},
 }
 """What makes Markdown from the code, by the name that pages use."""
 

@@ -100,6 +100,11 @@ def test_the_recording_has_the_foreign_panel(installed: Path, run: Path) -> None
     assert int(done.stdout or "0") > 3, done.stderr
 
 
+def test_its_source_keeps_the_laws_of_all_sources(installed: Path) -> None:
+    done = python(installed, "-m", "pytest", "-p", "no:cacheprovider", str(ROOT / "examples" / "plugin" / "tests"))
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_the_generated_table_has_its_row(installed: Path) -> None:
     done = python(installed, str(ROOT / "docs" / "tools" / "knowledge_source_table.py"))
     assert "| `timekeeper` action |" in done.stdout, done.stderr

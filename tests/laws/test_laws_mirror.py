@@ -13,7 +13,8 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from generated_boards import Bench, effect_on, mirrored, plain_robot, to_world
+from generated_boards import Bench, effect_on, mirrored, to_world
+from harvey.testing import plain_robot
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.doors import MAX_LOG_ODDS, MIN_LOG_RATIO, PRIOR_LOG_ODDS, update_door
 from knowledge_sources.methods.motion import (

@@ -11,7 +11,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generated_boards import HALL, HOUSE, mirrored, plain_robot, to_world
+from generated_boards import mirrored, to_world
+from harvey.testing import HALL, HOUSE, plain_robot
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.doors import predict_opening, update_door
 from knowledge_sources.methods.floor import build_free_floor, list_corners

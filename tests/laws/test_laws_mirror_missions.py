@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import pytest
 
 from blackboard import Decision, Post, Quiescence, Retracted
-from generated_boards import HALL, HOUSE, STUDY, WIDTH_M, plain_robot
+from generated_boards import WIDTH_M
 from harvey.dry_run import build_dry_run
+from harvey.testing import HALL, HOUSE, STUDY, plain_robot
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World

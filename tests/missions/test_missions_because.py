@@ -17,10 +17,11 @@ from typing import Any
 import pytest
 
 from blackboard import Blackboard, Change, Effect, KnowledgeSource, View
+from blackboard.board import TracedView
 from experiments.generated.missions import OFFICE, fault
 from harvey.simulation.simulated_run import run_mission
+from harvey.testing import copy_of, describe, find_named, list_unnamed
 from harvey.wiring import knowledge_sources
-from hidden_reasons import HidingView, describe, find_named, list_unnamed
 from knowledge_sources.settings import Settings
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
@@ -57,16 +58,14 @@ class Watched:
         return source
 
     def _check(self, name: str, act: Any, board: Blackboard, trigger: Change, effects: tuple[Effect, ...]) -> None:
-        seen = HidingView(board)
-        made = describe(act(seen, trigger))
-        assert made == describe(effects), f"{name} decides otherwise on the same board"
+        seen, made = TracedView(board, None), describe(effects)
+        assert describe(act(seen, trigger)) == made, f"{name} decides otherwise on the same board"
         self.acts += 1
-        named = find_named(board, trigger, effects)
-        for entry in list_unnamed(seen, named, MAX_HIDDEN):
+        for entry in list_unnamed(board, seen.used, find_named(board, trigger, effects), MAX_HIDDEN):
             self.hidden += 1
             try:
-                again = describe(act(HidingView(board, {entry.id}), trigger))
-            except (KeyError, LookupError, AttributeError):
+                again = describe(act(copy_of(board, entry.id).view, trigger))
+            except (LookupError, AttributeError):
                 again = ["it cannot decide"]
             key = name, type(entry.value).__name__
             if again and not set(made) <= set(again):

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generated_boards import Bench, plain_robot
+from generated_boards import Bench
+from harvey.testing import plain_robot
 from knowledge_sources.reads import is_standing, is_up_to_date, last_motion
 from world_models.entries import Course, MotionReport
 

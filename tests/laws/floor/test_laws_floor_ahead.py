@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry
-from generated_boards import HALL, HOUSE, STUDY, Bench, house, plain_robot, to_world
+from generated_boards import Bench, to_world
+from harvey.testing import HALL, HOUSE, STUDY, house, plain_robot
 from ideal_floor_watcher import scan_floor
 from knowledge_sources.methods.floor import Lookout, find_floor
 from knowledge_sources.reads import SEEN_MARGIN_M, FloorAhead, find_robot, floor_ahead

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry
-from generated_boards import Bench, plain_robot, to_world
+from generated_boards import Bench, to_world
+from harvey.testing import plain_robot
 from knowledge_sources.methods.floor import MotionBetween
 from knowledge_sources.reads import HELD, find_motion_between
 from knowledge_sources.reads.motion_between import MAX_APART_SIGMAS, add_reports

@@ -11,7 +11,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generated_boards import HALL, house, plain_robot, to_world
+from generated_boards import to_world
+from harvey.testing import HALL, house, plain_robot
 from knowledge_sources.methods.floor import MIN_OBSTACLE_CERTAINTY, Sight, build_polygon, see_ranges, touch_again
 from knowledge_sources.methods.floor.found_things import ThingShape, find_same
 from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M

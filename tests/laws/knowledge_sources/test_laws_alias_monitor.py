@@ -10,20 +10,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from blackboard import Entry, Level, Posted
-from generated_boards import (
-    HALL,
-    LENGTH_M,
-    STUDY,
-    WIDTH_M,
-    Bench,
-    effect_on,
-    made,
-    plain_robot,
-    reasons,
-    to_world,
-    wakes,
-)
+from blackboard import Entry, Level
+from generated_boards import LENGTH_M, WIDTH_M, Bench, effect_on, made, reasons, to_world
+from harvey.testing import HALL, STUDY, check_source, plain_robot
 from knowledge_sources.methods.localization import (
     ALIKE_LOG_NOISE,
     LOST_AGAIN_ODDS,
@@ -216,18 +205,6 @@ def test_only_another_view_counts(apart_m: float, turn_rad: float, counts: bool)
     assert (bench.ask(SOURCE, verify(bench)) is not None) == counts
 
 
-@pytest.mark.parametrize("lacks", [
-    "nothing", "belief", "PoseFix-1", "LineMatch-1", "Segments-1", "twins", "course of things", "place"])
-def test_it_weighs_only_what_it_has_seen_where_it_may_be_elsewhere(lacks: str) -> None:
-    bench = Bench(plain_robot())
-    bench.believe()
-    bench.put(known([] if lacks == "twins" else [0.0], 0.5, Pose2(HERE.x_m - 3.0, HERE.y_m, 0.0)))
-    certificate = verify(bench)
-    if lacks != "twins":
-        bench.lack(lacks)
-    assert (bench.ask(SOURCE, certificate) is not None) == (lacks == "nothing")
-
-
 @pytest.mark.parametrize("refuted", [0, 1, 3])
 def test_a_place_that_was_believed_by_odds_and_refuted_is_believed_less(refuted: int) -> None:
     """Each time the odds are a fifth; recomputed without the method."""
@@ -252,6 +229,11 @@ def test_found_again_it_begins_anew() -> None:
     assert effect.value.p_prior != old.value.p_prior and old.id not in reasons(effect)
 
 
-@pytest.mark.parametrize("verdict", ["verified", "refuted", "not testable"])
-def test_only_what_is_verified_wakes_it(verdict: MilestoneVerdict) -> None:
-    assert wakes(SOURCE, Posted(verify(Bench(), verdict=verdict))) == (verdict == "verified")
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(ROBOT)
+    bench.believe()
+    odds = bench.put(known([0.0], 0.5, Pose2(HERE.x_m - 3.0, HERE.y_m, 0.0)))
+    certificate = verify(bench)
+    check_source(SOURCE, bench, certificate, without=("PoseFix-1", "LineMatch-1", "Segments-1"))
+    bench.revise(odds, aliases=())
+    assert bench.ask(SOURCE, certificate) is None  # it can be nowhere else

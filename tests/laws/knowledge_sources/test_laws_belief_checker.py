@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry, Level
-from generated_boards import Bench, effect_on, plain_robot, poses, reasons, to_world
+from generated_boards import Bench, effect_on, poses, reasons, to_world
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.methods.verification import MIN_MATCHED_LINES, turn_headings
 from knowledge_sources.milestone_selector.belief_checker import BeliefChecker
 from knowledge_sources.reads import list_log_odds
@@ -82,18 +83,6 @@ def test_only_looks_since_the_doubt_that_told_nothing_were_in_vain(when: str, st
     assert check.tried == ((0.0,) if (when, status) == ("after", "not testable") else ())
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "measure", "belief", "rest", "course of things", "place", "look"])
-def test_it_checks_only_what_is_in_doubt_and_not_while_a_look_is_under_way(lacks: str) -> None:
-    bench = Bench(plain_robot())
-    bench.believe()
-    doubt = bench.doubt(Level.PLAN, 3.0 if lacks == "measure" else None)
-    if lacks == "look":
-        bench.await_milestone()
-    elif lacks != "measure":
-        bench.lack(lacks)
-    assert (bench.ask(SOURCE, doubt) is not None) == (lacks == "nothing")
-
-
 @settings(max_examples=100)
 @given(st.lists(st.floats(-3.0, 3.0), max_size=2), st.floats(0.0, 1.0), st.sampled_from((FEW - 1, FEW, FEW + 5)))
 def test_each_look_is_told_by_what_it_said_alone(before: list[float], p_false: float, matched: int) -> None:
@@ -119,3 +108,7 @@ def test_nothing_was_told_without_a_look_or_by_the_verdict_on_another() -> None:
     assert list_log_odds(bench.view, fresh) == () and list_log_odds(bench.view, again)[0] < 0.0
     certify(bench, "Milestone-9", 0.1, 20)
     assert list_log_odds(bench.view, again) == (0.0,)
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    check_source(SOURCE, *doubtful())

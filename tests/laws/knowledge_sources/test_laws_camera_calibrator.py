@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Entry, Posted, Revise
-from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
+from blackboard import Entry, Revise
+from generated_boards import Bench, effect_on, made, reasons
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.methods.calibration import (
     LEAST_SIGMA_CENTRE_PX,
     LEAST_SIGMA_FOCAL,
@@ -95,16 +96,7 @@ def test_only_where_the_yaw_is_less_sure_than_before_does_its_way_end(more: floa
         assert isinstance(effect, Revise) and effect.entry.id == travel.id and reasons(effect) == {"CameraState"}
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "step", "PoseFix-1", "CameraState-1"])
-def test_it_learns_only_where_the_lines_say_something(lacks: str) -> None:
+def test_it_keeps_the_laws_of_all_sources() -> None:
     bench = Bench(plain_robot())
-    _, certificate = verify(bench, () if lacks == "step" else (0.01,) * 7, (0.01,) * 7)
-    if lacks != "step":
-        bench.lack(lacks)
-    assert (bench.ask(SOURCE, certificate) is not None) == (lacks == "nothing")
-
-
-@pytest.mark.parametrize("verdict", ["verified", "refuted", "not testable"])
-def test_only_what_is_verified_wakes_it(verdict: MilestoneVerdict) -> None:
-    _, certificate = verify(Bench(), (0.01,) * 7, (0.01,) * 7, verdict=verdict)
-    assert wakes(SOURCE, Posted(certificate)) == (verdict == "verified")
+    check_source(SOURCE, bench, verify(bench, (0.01,) * 7, (0.01,) * 7)[1], without=("PoseFix-1", "CameraState-1"))
+    assert bench.ask(SOURCE, verify(bench, (), (0.01,) * 7)[1]) is None  # the lines say nothing of it

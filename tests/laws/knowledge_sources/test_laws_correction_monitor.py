@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Entry, Posted
-from generated_boards import Bench, made, plain_robot, reasons, wakes
+from generated_boards import Bench, made, reasons, wakes
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.senses.correction_monitor import CorrectionMonitor
 from world_models.actuator import ActuatorModel
@@ -100,3 +101,7 @@ def test_it_rests_on_all_that_was_counted_and_needs_all_of_it() -> None:
     assert reasons(effect) == {last.id, "PoseFix-1", "PoseFix-2", "MotionReport-1"}
     bench.lack("PoseFix-1")
     assert bench.ask(SOURCE, last) is None
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    check_source(SOURCE, *go(Pose2(0.0, 0.0, math.radians(1.0)), 0.0, 1.0), without=("PoseFix-1", "MotionReport-1"))

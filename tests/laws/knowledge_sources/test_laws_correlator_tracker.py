@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from blackboard import Effect, Level, Retract, Revise
+from blackboard import Effect, Entry, Level, Retract, Revise
 from generated_boards import Bench, reasons
+from harvey.testing import check_source
 from knowledge_sources.action import correlator_tracker
 from knowledge_sources.action.correlator_tracker import (
     ENOUGH_LANDMARKS,
@@ -85,11 +86,11 @@ def place_px(pose: Pose2, track: Track) -> tuple[float, float]:
     return float(u), float(v)
 
 
-def follow(
+def picture_of(
     found: int, hidden: int = 0, misses: int = 0, *, drift: Drift | None = None, doubt: Discrepancy | None = None,
     taken: int | None = None, unseen: int = 0, floors: Sequence[FreeFloor] = (),
-) -> list[Effect]:
-    """What the tracker does where so many landmarks are followed and so many of them are not to be found."""
+) -> tuple[Bench, Entry[CameraPicture]]:
+    """A picture in which so many landmarks that are followed are found, and so many are not."""
     seen = setting()
     tracks = [replace(track, misses=misses) for track in seen.tracks[:found + hidden]]
     image = read_picture(seen.after).grey.copy()
@@ -107,7 +108,12 @@ def follow(
     for value in (drift, doubt, *floors):
         if value is not None:
             bench.put(value)
-    picture = bench.put(CameraPicture(compress_jpeg(image, 95), 1, 1.0, "track"))
+    return bench, bench.put(CameraPicture(compress_jpeg(image, 95), 1, 1.0, "track"))
+
+
+def follow(*of: int, **more: Any) -> list[Effect]:
+    """What the tracker does with such a picture."""
+    bench, picture = picture_of(*of, **more)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(edge_alignment, "MIN_EDGE_LINES", 10**6)  # so that only landmarks correct the belief
         effects = bench.ask(CorrelatorTracker(), picture)
@@ -275,3 +281,8 @@ def test_landmarks_are_taken_anew_where_fewer_are_left_than_serve(
     followed = [*useless, *[follow(True, most - 1, "near")] * (least + more)]
     found: Any = CorrelatorTracker()._renew(case, np.zeros((2, 2), np.uint8), followed, belief)
     assert (found != "again") == (more >= 0)
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    for found, hidden in ((7, 0), (0, 6)):
+        check_source(CorrelatorTracker, *picture_of(found, hidden))

@@ -13,21 +13,17 @@ from hypothesis import strategies as st
 
 from blackboard import Effect, Entry, Level, Post, Revise
 from generated_boards import (
-    HALL,
-    STUDY,
-    SURE,
     Bench,
     covariances,
     effect_on,
-    house,
     made,
     mirrored,
     mirrored_covariance,
-    plain_robot,
     poses,
     reasons,
     to_world,
 )
+from harvey.testing import HALL, STUDY, SURE, check_source, house, plain_robot
 from knowledge_sources.action.dead_reckoner import MIN_CLAIMED_PART, DeadReckoner
 from knowledge_sources.methods.calibration import SIGMA_YAW_RAD
 from knowledge_sources.reads import PLACED_BY
@@ -282,3 +278,8 @@ def test_in_a_doorway_it_is_still_in_the_room_that_it_comes_from(x_m: float, loc
     told = reckon(Pose2(7.2, 2.0, 0.0), 0.0, (x_m - 7.2) / ACTUATOR.reach)
     assert told.moved.locale == locale
     assert np.allclose(told.moved.world_from_robot(house()).position, to_world(Pose2(x_m, 2.0, 0.0)).position)
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    told = reckon(Pose2(2.0, 2.0, 0.0), 0.1, 0.3, bend=0.01, fault=True)
+    check_source(DeadReckoner, told.bench, told.report)

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
 from blackboard import Blackboard, Entry, Post, Revise, Revised, View
-from generated_boards import HALL, STUDY, Bench, made, plain_robot, reasons, to_world
+from generated_boards import Bench, made, reasons, to_world
+from harvey.testing import HALL, STUDY, answer, check_source, plain_robot
 from knowledge_sources.methods.motion import CLEARANCES_M
 from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M
 from knowledge_sources.model.dependency_withdrawer import DependencyWithdrawer
@@ -205,3 +205,11 @@ def test_a_milestone_of_a_sketch_that_is_drawn_anew_is_not_awaited() -> None:
     effects = bench.ask(DependencyWithdrawer(), bench.revise(bench.frame(), changes=gone))
     ids = {effect.entry.id for effect in effects or () if not isinstance(effect, Post)}
     assert ids == {awaited.id, sketch.id} and other.id not in ids
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    bench.sketch(FROM, MIDDLE, TO)
+    gone = (FrameChange("gone", "hall/desk", "test"),)
+    check_source(DependencyWithdrawer, bench, bench.revise(bench.frame(), changes=gone))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from blackboard import Entry, Posted, Revised
-from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, wakes
+from blackboard import Entry
+from generated_boards import Bench, effect_on, made
+from harvey.testing import HALL, STUDY, check_source, plain_robot
 from knowledge_sources.reads.sketches import MAX_ADJUSTMENTS
 from knowledge_sources.sketcher.detour_finder import DetourFinder
 from world_models.entries import Impasse, Leg, Place, PlanSketch
-from world_models.entries.task import LegStatus
 from world_models.frames import Pose2
 
 SOURCE = DetourFinder()
@@ -70,8 +70,5 @@ def test_a_leg_of_a_plan_that_is_over_halts_nothing(stale: str) -> None:
     assert bench.ask(SOURCE, leg) is None
 
 
-@pytest.mark.parametrize("status", ["moving", "arrived", "halted"])
-def test_what_it_watches(status: LegStatus) -> None:
-    bench = Bench()
-    leg = bench.revise(bench.leg(bench.sketch(FROM, TO)), status=status)
-    assert wakes(SOURCE, Revised(leg)) == (status == "halted") and not wakes(SOURCE, Posted(leg))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    check_source(SOURCE, *halt(), without=("PlanSketch-2",))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from blackboard import Level, Posted, Revise
-from generated_boards import Bench, effect_on, made, reasons, wakes
+from blackboard import Level, Revise
+from generated_boards import Bench, effect_on, made, reasons
+from harvey.testing import check_source
 from knowledge_sources.goal.discrepancy_raiser import MAX_CHECKS_PER_SUBGOAL, MAX_LOST_PER_MISSION, DiscrepancyRaiser
 from world_models.entries import Discrepancy, Impasse, Outcome
 
@@ -15,13 +14,6 @@ SOURCE = DiscrepancyRaiser()
 BOUNDS = (5.0, 30.0)
 MOST = {Level.ACTION: MAX_CHECKS_PER_SUBGOAL, Level.PLAN: MAX_LOST_PER_MISSION}
 ABOVE = {Level.ACTION: Level.PLAN, Level.PLAN: Level.GOAL}
-
-
-@given(st.sampled_from((Level.ACTION, Level.PLAN)), st.none() | st.floats(0.0, 60.0))
-def test_it_wakes_only_beyond_the_bound_of_its_level(level: Level, magnitude: float | None) -> None:
-    bound = BOUNDS[0] if level is Level.ACTION else BOUNDS[1]
-    doubt = Bench().doubt(level, magnitude)
-    assert wakes(SOURCE, Posted(doubt)) == (magnitude is not None and magnitude > bound)
 
 
 @pytest.mark.parametrize("level", [Level.ACTION, Level.PLAN])
@@ -80,3 +72,9 @@ def test_when_the_mission_is_over_nobody_sees_no_way_on_again() -> None:
     bench.put(Outcome("failed", "over"))
     effects = bench.ask(SOURCE, bench.doubt(Level.PLAN, 99.0))
     assert made(effects, Impasse) == [] and made(effects, Discrepancy)[0].times == MOST[Level.PLAN]
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench()
+    bench.sketch()
+    check_source(SOURCE, bench, bench.doubt(Level.ACTION, 99.0))

@@ -6,22 +6,13 @@ from typing import Any
 
 import pytest
 
-from blackboard import Entry, Posted, Revised
-from generated_boards import (
-    HALL,
-    LENGTH_M,
-    STUDY,
-    WIDTH_M,
-    Bench,
-    effect_on,
-    plain_robot,
-    reasons,
-    wakes,
-)
+from blackboard import Entry
+from generated_boards import LENGTH_M, WIDTH_M, Bench, effect_on, reasons
+from harvey.testing import HALL, STUDY, check_source, plain_robot
 from knowledge_sources.methods.doors import MAX_LOG_ODDS, PRIOR_LOG_ODDS, SHUT_LOG_ODDS, touch_door, update_door
 from knowledge_sources.methods.doors.belief import MAX_TOUCH_M, TOUCH_LOG_RATIO
 from knowledge_sources.model.door_toucher import door_toucher
-from world_models.entries import Contact, DoorPicture, DoorState, Hypothesis, Outcome, diagonal
+from world_models.entries import Contact, DoorPicture, DoorState, Outcome, diagonal
 from world_models.frames import Pose2
 
 SOURCE, SMALL = door_toucher, 1e-3
@@ -98,9 +89,6 @@ def test_a_touch_counts_beside_pictures_whichever_comes_first_and_alone_shuts_no
     assert TOUCH_LOG_RATIO - PRIOR_LOG_ODDS < 0.0 < SHUT_LOG_ODDS
 
 
-def test_it_wakes_when_the_belief_has_the_motion() -> None:
-    bench = Bench(plain_robot())
-    belief = bench.believe()
-    assert wakes(SOURCE, Revised(belief)) and not wakes(SOURCE, Posted(belief))
-    lost = bench.put(Hypothesis(HALL, Pose2(2.0, 2.0, 0.0), diagonal(0.01, 0.01), "tracks", status="candidate"))
-    assert not wakes(SOURCE, Revised(lost))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench, known, _ = touch((LENGTH_M + 0.05, 0.5 * WIDTH_M))
+    check_source(SOURCE, bench, bench.view["Hypothesis-1"], without=(known.id, "Contact-1"))

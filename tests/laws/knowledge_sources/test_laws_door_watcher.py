@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acting import answer
 from archive_door import DOOR, before_door, photograph
-from blackboard import Effect, Level, Post, Posted, Revise, Revised
+from blackboard import Effect, Level, Post, Posted, Revise
+from harvey.testing import answer, check_source
 from knowledge_sources.methods.doors import MAX_LOG_ODDS, PRIOR_LOG_ODDS
 from knowledge_sources.methods.doors.belief import MIN_PICTURES
 from knowledge_sources.model.door_watcher import DoorWatcher
 from knowledge_sources.model.floor_watcher import FloorWatcher
 from knowledge_sources.reads import MAX_SIGMA_M, MAX_SIGMA_RAD
 from things_in_hall import HALL, Hall
-from world_models.entries import CameraPicture, Discrepancy, DoorState, Hypothesis, Milestone, Outcome, diagonal
+from world_models.entries import CameraPicture, Discrepancy, DoorState, Hypothesis, Outcome, diagonal
 from world_models.frames import Pose2
 
 SOURCE = DoorWatcher()
@@ -43,15 +43,6 @@ def ask(hall: Hall, frame: Any) -> Sequence[Effect] | None:
     """What it says of the door; other doors are left out."""
     effects = answer(SOURCE, hall.board.view, Posted(frame))
     return None if effects is None else [e for e in effects if e.value.door == DOOR]
-
-
-@pytest.mark.parametrize(("value", "wakes"), [
-    (CameraPicture(b"", 0, 1.0, "track"), {Posted}), (CameraPicture(b"", 0, 1.0, "milestone"), set()),
-    (Milestone("PlanSketch-1", 0, "a place", 0.0, (), status="verified"), {Revised}),
-    (Milestone("PlanSketch-1", 0, "a place", 0.0, (), status="refuted"), set())])
-def test_it_wakes_by_pictures_that_track_and_by_verified_milestones(value: Any, wakes: set[Any]) -> None:
-    entry = Hall(()).put(value)
-    assert {kind for kind in (Posted, Revised) if any(w.sees(kind(entry)) for w in SOURCE.on)} == wakes
 
 
 @pytest.mark.parametrize(("sigma_m", "sigma_rad", "acts"), [
@@ -105,3 +96,8 @@ def test_a_leaf_from_two_places_is_a_shut_door_and_what_is_beyond_opens_it_again
             hall.apply(effect)
     now_open = hall.board.view.latest(DoorState)
     assert now_open is not None and now_open.value.state == "open" and hall.frame.changes == ()
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    hall = Hall(())
+    check_source(SOURCE, hall.bench, Posted(look(hall, True, stand(hall, *PLACES[0]))))

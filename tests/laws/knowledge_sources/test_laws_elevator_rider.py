@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Level, Posted
-from generated_boards import Bench, all_reasons, effect_on, wakes
+from blackboard import Level
+from generated_boards import Bench, all_reasons, effect_on
+from harvey.testing import check_source
 from knowledge_sources.action.elevator_rider import elevator_rider
 from world_models.entries import Place, PlanSketch, Ride, Subgoal
 
@@ -71,8 +72,9 @@ def test_in_doubt_above_the_action_level_it_waits(level: Level) -> None:
     assert bench.ask(elevator_rider, sketch) is not None
 
 
-@pytest.mark.parametrize(("status", "verified"), [("active", True), ("active", False), ("superseded", True)])
-def test_it_wakes_for_a_verified_sketch_that_is_carried_out(status: str, verified: bool) -> None:
+def test_it_keeps_the_laws_of_all_sources() -> None:
     bench = Bench()
-    sketch = bench.put(PlanSketch("Goal-1", (), "", (UP,), 0, verified, status))  # type: ignore[arg-type]
-    assert wakes(elevator_rider, Posted(sketch)) == (status == "active" and verified)
+    bench.believe()
+    goal = bench.pursue(FAR)
+    sketch = bench.put(PlanSketch(goal.id, (), "", (UP,), 0, True), goal)
+    check_source(elevator_rider, bench, sketch, without=(goal.id,))

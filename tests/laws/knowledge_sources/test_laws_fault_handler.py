@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
 from blackboard import Blackboard, Entry, Level, Post, Posted, Revise, Revised
-from generated_boards import Bench, made, plain_robot
+from generated_boards import Bench, made
+from harvey.testing import answer, check_source, plain_robot
 from knowledge_sources.action.fault_handler import (
     MAX_BROKEN_MOTIONS,
     MAX_FAULT_S,
@@ -59,18 +59,6 @@ faults = st.lists(st.tuples(whats, st.booleans(), recoveries), min_size=1, max_s
 """What is wrong, whether it is over, and what was tried."""
 ends = st.sampled_from((None, Outcome("failed", ""), Impasse("failed", ""), Impasse("blocked", "", behind=("x",)),
                         Impasse("blocked", "", behind=("x",), is_open=False)))
-
-
-def test_it_wakes_by_a_new_fault_and_by_a_try_in_vain() -> None:
-    board = Blackboard()
-    for status in get_args(RecoveryStatus):
-        value = Recovery("BodyFault-1", "MotorCommand-1", 1.0, 0.1, status=status)
-        (change,) = board.apply([Post(value)], author="test", cycle=1)
-        assert any(w.sees(Revised(change.entry)) for w in SOURCE.on) == (status != "asked")
-        assert not any(w.sees(Posted(change.entry)) for w in SOURCE.on)
-    (change,) = board.apply([Post(BodyFault("base", "link lost", "", "", 1.0))], author="test", cycle=1)
-    assert any(w.sees(Posted(change.entry)) for w in SOURCE.on)
-    assert not any(w.sees(Revised(change.entry)) for w in SOURCE.on)
 
 
 @pytest.mark.parametrize("asks", [False, True])
@@ -195,3 +183,8 @@ def test_what_was_broken_off_is_a_doubt_and_so_many_in_a_row_are_the_end(
 def test_a_fault_that_is_forgotten_is_not_closed() -> None:
     (tried,) = Blackboard().apply([Post(Recovery("BodyFault-9", "x", 1.0, 0.1, status="over"))], author="t", cycle=1)
     assert answer(SOURCE, Blackboard().view, Revised(tried.entry)) is None
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(plain_robot())
+    check_source(SOURCE, bench, bench.put(BodyFault("base", "link lost", "", "MotorCommand-1", 1.0)))

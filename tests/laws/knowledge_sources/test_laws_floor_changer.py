@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generated_boards import Bench, covariances, effect_on, made, plain_robot, reasons
+from generated_boards import Bench, covariances, effect_on, made, reasons
+from harvey.testing import SURE, check_source, plain_robot
 from knowledge_sources.action.floor_changer import ELEVATOR_SIGMA_M, ELEVATOR_SIGMA_RAD, floor_changer
 from towers import tower
 from world_models.building.world import World
@@ -98,3 +99,8 @@ def test_without_a_ride_a_report_tells_nothing_and_the_last_one_counts() -> None
     bench.put(replace(bench.view["Ride-1"].value, origin="car-1", destination="car-2"))
     effects = bench.ask(floor_changer, report)
     assert [h.locale for h in made(effects, Hypothesis)] == ["car-2"] and len(effects or ()) == 1
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench, _ = ride(Pose2(1.0, 1.0, 0.0), SURE)
+    check_source(floor_changer, bench, bench.view["RideReport-1"], without=("Ride-1",))

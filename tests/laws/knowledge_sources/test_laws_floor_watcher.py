@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Effect, Entry, Post, Posted, Revise, Revised
-from generated_boards import HALL, STUDY, Bench, made, plain_robot, reasons, to_world, wakes
+from blackboard import Effect, Entry, Post, Revise
+from generated_boards import Bench, made, reasons, to_world
+from harvey.testing import HALL, STUDY, check_source, plain_robot
 from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD
 from knowledge_sources.model import floor_watcher
 from knowledge_sources.model.floor_watcher import (
-    CORRECTED_BY,
     FLOOR_STEP_M,
     MAX_FLOOR_SIGMA_M,
     MAX_FLOOR_SIGMA_RAD,
@@ -211,13 +211,8 @@ def test_the_light_of_a_picture_tells_that_of_those_shortly_after(eye: Eye, more
     assert (told.id in reasons(effects[0])) == is_told and dark.id not in reasons(effects[0])
 
 
-@pytest.mark.parametrize("purpose", ["track", "milestone", "probe", ""])
-def test_it_wakes_for_pictures_by_which_the_belief_is_corrected(purpose: str) -> None:
-    bench = Bench()
-    taken = bench.put(CameraPicture(b"", 0, 0.0, purpose))
-    assert wakes(FloorWatcher(), Posted(taken)) == (purpose not in ("milestone", "probe"))
-    belief = bench.believe(basis="odometry")
-    assert not wakes(FloorWatcher(), Revised(belief))
-    for basis in CORRECTED_BY:
-        assert wakes(FloorWatcher(), Revised(bench.revise(belief, basis=basis)))
-        assert not wakes(FloorWatcher(), Posted(bench.view[belief.id]))
+def test_it_keeps_the_laws_of_all_sources(eye: Eye) -> None:
+    room = Room()
+    room.view(0.9)
+    room.bench.put(looks(HALL))
+    check_source(FloorWatcher, room.bench, room.bench.put(CameraPicture(b"now", 1, NOW_S, "track")))

@@ -9,6 +9,7 @@ import pytest
 from blackboard import Effect, Post, Retract, Revise
 from generated_boards import Bench, reasons
 from harvey.simulation.simulated_run import build_robot_model
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.goal.goal_changer import goal_changer
 from sim.scenario import load_scenario
 from world_models.entries import Goal, Place, Redirection
@@ -101,3 +102,10 @@ def test_each_effect_names_what_was_asked_and_what_it_replaces(is_lost: bool, is
 def test_what_cannot_be_rests_on_what_was_asked_alone() -> None:
     (effect,) = decide("(archive 10)") or []
     assert reasons(effect) == {"Redirection-1"}
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    bench.pursue()
+    check_source(goal_changer, bench, bench.put(Redirection("(study (9,9,0))")))

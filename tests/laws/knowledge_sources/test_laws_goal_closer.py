@@ -7,25 +7,13 @@ from typing import get_args
 
 import pytest
 
-from blackboard import Posted, Revised
-from generated_boards import Bench, all_reasons, effect_on, wakes
+from generated_boards import Bench, all_reasons, effect_on
+from harvey.testing import check_source
 from knowledge_sources.goal.goal_closer import goal_closer
-from world_models.entries import Goal, SketchStatus
+from world_models.entries import Goal
 from world_models.entries.task import GoalStatus
 
 SOURCE = goal_closer
-
-
-@pytest.mark.parametrize("status", get_args(SketchStatus))
-@pytest.mark.parametrize("path", [(), (1,)])
-@pytest.mark.parametrize("is_look", [False, True])
-def test_only_the_end_of_a_sketch_from_locale_to_locale_wakes_it(
-    status: SketchStatus, path: tuple[int, ...], is_look: bool
-) -> None:
-    bench = Bench()
-    sketch = bench.revise(bench.sketch(path=path), status=status, is_look=is_look)
-    assert wakes(SOURCE, Revised(sketch)) == (status == "done" and not path and not is_look)
-    assert not wakes(SOURCE, Posted(sketch))
 
 
 @pytest.mark.parametrize("status", get_args(GoalStatus))
@@ -50,3 +38,10 @@ def test_a_goal_that_is_gone_cannot_be_reached() -> None:
     sketch = bench.revise(bench.sketch(goal=goal), status="done")
     bench.retract(goal)
     assert bench.ask(SOURCE, sketch) is None
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench()
+    goal = bench.pursue()
+    sketch = bench.revise(bench.sketch(goal=goal), status="done")
+    check_source(SOURCE, bench, sketch, without=(goal.id,))

@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Level, Post, Posted, Revise, Revised
+from blackboard import Level, Post, Revise
 from generated_boards import (
-    HALL,
     WIDTH_M,
     Bench,
     all_reasons,
@@ -18,11 +17,10 @@ from generated_boards import (
     made,
     mirrored,
     mirrored_place,
-    plain_robot,
     poses,
     reasons,
-    wakes,
 )
+from harvey.testing import HALL, check_source, plain_robot
 from knowledge_sources.goal.goal_renewer import goal_renewer
 from world_models.entries import Discrepancy, Goal, Place
 from world_models.frames import Pose2
@@ -88,10 +86,8 @@ def test_a_goal_that_was_given_up_is_not_renewed() -> None:
     assert effect_on(bench.ask(SOURCE, found), Discrepancy).value.status == "corrected"
 
 
-@pytest.mark.parametrize("basis", ["relocalization", "odometry", "milestone"])
-@pytest.mark.parametrize("status", ["held", "candidate"])
-def test_what_it_watches(basis: str, status: str) -> None:
-    bench = Bench()
-    belief = bench.revise(bench.believe(), basis=basis, status=status)
-    assert wakes(SOURCE, Revised(belief)) == (basis == "relocalization" and status == "held")
-    assert not wakes(SOURCE, Posted(belief))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(plain_robot())
+    bench.pursue(TO)
+    bench.doubt()
+    check_source(SOURCE, bench, bench.revise(bench.believe(), basis="relocalization"))

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Posted, Revise, Revised
-from generated_boards import HALL, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, to_world, wakes
+from blackboard import Revise
+from generated_boards import Bench, effect_on, made, poses, reasons, to_world
+from harvey.testing import HALL, STUDY, check_source, plain_robot
 from knowledge_sources.methods.floor import revise_by_thing
 from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.reads import find_frames
@@ -18,7 +19,6 @@ from knowledge_sources.sketcher.goal_sketcher import GoalSketcher
 from world_models.entries import (
     DoorPicture,
     DoorState,
-    Goal,
     Impasse,
     Obstacle,
     Place,
@@ -163,31 +163,6 @@ def test_where_the_robot_does_not_fit_at_the_goal_it_sees_no_way_on(
         assert effect.value.is_open and reasons(effect) == {goal.id, belief.id}
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "belief", "goal", "need", "course of things"])
-def test_it_draws_only_what_is_needed(lacks: str) -> None:
-    bench = Bench(plain_robot())
-    bench.believe()
-    goal = bench.pursue(AIM)
-    if lacks == "need":
-        bench.sketch(goal=goal)
-    else:
-        bench.lack(lacks)
-    assert (bench.ask(SOURCE, goal) is not None) == (lacks == "nothing")
-
-
-@pytest.mark.parametrize("status", ["active", "done", "halted", "superseded"])
-@pytest.mark.parametrize("path", [(), (0,)])
-@pytest.mark.parametrize("is_look", [False, True])
-def test_what_it_watches(status: SketchStatus, path: tuple[int, ...], is_look: bool) -> None:
-    bench = Bench()
-    sketch = bench.revise(bench.sketch(path=path), status=status, is_look=is_look)
-    leaves_open = status in ("halted", "superseded") or (status == "done" and is_look)
-    assert wakes(SOURCE, Revised(sketch)) == (leaves_open and not path)
-    goal = bench.pursue()
-    assert wakes(SOURCE, Posted(goal)) and isinstance(goal.value, Goal)
-    assert not wakes(SOURCE, Revised(bench.revise(goal, status="reached")))
-
-
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 @pytest.mark.parametrize(("off_m", "is_taken"), [(0.2, True), (1.2, False)])
 def test_a_goal_that_is_occupied_is_called_so(side: float, off_m: float, is_taken: bool) -> None:
@@ -206,3 +181,9 @@ def test_a_goal_that_is_occupied_is_called_so(side: float, off_m: float, is_take
     if is_taken:
         effect = effect_on(effects, Impasse)
         assert "is occupied by something 0.2 m wide" in effect.value.reason and effect.value.behind == (thing.id,)
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    check_source(SOURCE, bench, bench.pursue(AIM))

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import MissingEntryError, Posted, Revised
-from generated_boards import HALL, STUDY, Bench, covariances, effect_on, made, plain_robot, reasons, wakes
+from blackboard import MissingEntryError
+from generated_boards import Bench, covariances, effect_on, made, reasons
+from harvey.testing import HALL, STUDY, SURE, check_source, plain_robot
 from knowledge_sources.goal.interpreter import interpreter
 from world_models.entries import Command, Goal, Hypothesis, Impasse
 from world_models.entries.location import Covariance
@@ -55,6 +56,6 @@ def test_what_is_not_understood_ends_the_mission_with_the_reason(text: str) -> N
     assert effect.value.reason.startswith("the command was not understood: ") and reasons(effect) == {command.id}
 
 
-def test_it_hears_a_command_once() -> None:
-    command = Bench().put(Command("", 0.0, None, ((0.0,) * 3,) * 3))
-    assert wakes(SOURCE, Posted(command)) and not wakes(SOURCE, Revised(command))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(plain_robot())
+    check_source(SOURCE, bench, bench.put(Command(f"(ptrans ({HALL} (9,9,0)) ({STUDY} (9,9,0)))", 0.0, None, SURE)))

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from blackboard import Effect, Level, Post, Posted, Revise, Revised
-from generated_boards import Bench, effect_on, made, plain_robot, reasons, to_world, wakes
+from blackboard import Effect, Level, Post, Revise
+from generated_boards import Bench, effect_on, made, reasons, to_world
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.action.landmark_chooser import LandmarkChooser
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.tracking import edge_alignment, select_landmarks
@@ -131,10 +132,6 @@ def test_in_doubt_or_lost_it_chooses_nothing(level: Level | None, acts: bool) ->
     assert (choose(LandmarkChooser(), lost=level).effects is not None) == acts
 
 
-@pytest.mark.parametrize("basis", ["milestone", "relocalization", "tracks", "odometry"])
-def test_it_wakes_where_the_robot_knows_anew_where_it_is(basis: str) -> None:
-    bench = Bench()
-    belief = bench.believe(basis=basis)
-    source, known_anew = LandmarkChooser(), basis in ("milestone", "relocalization")
-    assert wakes(source, Revised(bench.revise(belief))) == known_anew and not wakes(source, Posted(belief))
-    assert not wakes(source, Revised(bench.revise(belief, status="candidate")))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = choose(LandmarkChooser()).bench
+    check_source(LandmarkChooser, bench, bench.view["Hypothesis-1"])

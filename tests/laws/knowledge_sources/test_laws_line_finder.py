@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from blackboard import Entry, Posted, Revised
-from generated_boards import Bench, effect_on, plain_robot, reasons, wakes
+from blackboard import Entry
+from generated_boards import Bench, effect_on, reasons
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.methods.features import find_lines, read_picture
 from knowledge_sources.milestone.line_finder import MIN_SEGMENT_LENGTH_PX, LineFinder
 from world_models.entries import CameraPicture, Segments
@@ -107,7 +108,7 @@ def test_only_a_picture_for_milestones_is_of_the_one_that_is_awaited(purpose: st
     assert reasons(effect) == ({frame.id, milestone.id} if is_its else {frame.id})
 
 
-@pytest.mark.parametrize("purpose", ["milestone", "probe", "track", ""])
-def test_what_it_watches(purpose: str) -> None:
-    frame = take(Bench(), draw(), purpose)
-    assert wakes(SOURCE, Posted(frame)) == (purpose in ("milestone", "probe")) and not wakes(SOURCE, Revised(frame))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(plain_robot())
+    bench.await_milestone(status="expected")
+    check_source(SOURCE, bench, take(bench, draw()))

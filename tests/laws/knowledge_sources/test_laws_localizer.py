@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Entry, Level, Post, Posted, Retract
-from generated_boards import HALL, Bench, drive, go, made, motions, plain_robot, poses, reasons, to_world, wakes
+from blackboard import Entry, Level, Post, Retract
+from generated_boards import Bench, drive, go, made, motions, poses, reasons, to_world
+from harvey.testing import HALL, check_source, plain_robot
 from knowledge_sources.methods.localization import (
     LOST_AGAIN_ODDS,
     MAX_FAR_PROBES,
@@ -282,12 +283,6 @@ def test_candidates_go_with_the_robot_from_when_they_were_found(
         assert math.remainder(there.heading_rad - heading, math.tau) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "doubt", "belief", "rest"])
-def test_places_are_searched_only_when_lost_and_standing(lacks: str) -> None:
-    bench = Bench(plain_robot())
-    bench.believe()
-    bench.doubt()
-    panorama = bench.put(Panorama(()))
-    bench.lack(lacks)
-    assert (SOURCE.find_case(bench.view, Posted(panorama)) is not None) == (lacks == "nothing")
-    assert wakes(SOURCE, Posted(panorama))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = lose()
+    check_source(SOURCE, bench, look_round(bench, (0.0,)), most_hidden=1)

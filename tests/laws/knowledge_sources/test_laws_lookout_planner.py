@@ -7,20 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from blackboard import Entry, Posted, Revised
-from generated_boards import (
-    HALL,
-    LENGTH_M,
-    STUDY,
-    WIDTH_M,
-    Bench,
-    effect_on,
-    made,
-    plain_robot,
-    reasons,
-    to_world,
-    wakes,
-)
+from blackboard import Entry
+from generated_boards import LENGTH_M, WIDTH_M, Bench, effect_on, made, reasons, to_world
+from harvey.testing import HALL, STUDY, check_source, plain_robot
 from knowledge_sources.methods.motion.subgoals import DOOR_LOOK_APART_M, MIN_DOOR_LOOK_SINE
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.sketcher.lookout_planner import LookoutPlanner
@@ -105,13 +94,6 @@ def test_there_is_nothing_to_look_at_or_nobody_to_look(stale: str) -> None:
     assert bench.ask(SOURCE, impasse) is None
 
 
-@pytest.mark.parametrize("is_open", [True, False])
-@pytest.mark.parametrize("behind", [(), ("Obstacle-1",)])
-def test_what_it_watches(is_open: bool, behind: tuple[str, ...]) -> None:
-    impasse = Bench().put(Impasse("blocked", "", "Goal-1", behind, is_open))
-    assert wakes(SOURCE, Posted(impasse)) == (is_open and bool(behind)) and not wakes(SOURCE, Revised(impasse))
-
-
 def see_door(bench: Bench, log_odds: float, state: DoorCondition, seen_from: tuple[float, float]) -> Entry[DoorState]:
     """What is believed of the study's door, by a picture from a place of the hall."""
     at = to_world(Pose2(*seen_from, 0.0))
@@ -153,3 +135,7 @@ def test_a_door_that_was_seen_from_everywhere_is_not_looked_at_again() -> None:
     door = bench.revise(door, views=pictures)
     effects = bench.ask(SOURCE, bench.put(Impasse("blocked", "no way", goal.id, (thing.id,))))
     assert effects is None or door.id not in reasons(effect_on(effects, PlanSketch))
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    check_source(SOURCE, *stuck(), without=("Goal-1", "Obstacle-1"))

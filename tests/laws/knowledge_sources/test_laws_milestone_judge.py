@@ -23,6 +23,7 @@ from blackboard.board import TracedView
 from experiments.generated.missions import OFFICE
 from generated_boards import effect_on, made, reasons
 from harvey.simulation.simulated_run import run_mission
+from harvey.testing import Bench, check_source, copy_of
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.belief import (
     MAX_CAMERA_CHI2,
@@ -60,7 +61,6 @@ from knowledge_sources.reads import find_belief, find_camera, find_followed, fin
 from knowledge_sources.reads.place_believed import MAX_P_FALSE_CLEAR, MAX_P_FALSE_UNMISTAKABLE, MAX_P_RIVAL
 from knowledge_sources.reads.questions import HELD, MIN_FOLLOWED_LANDMARKS
 from knowledge_sources.settings import DEFAULT, Settings
-from rebuilt_board import copy_of
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 from world_models.camera import YAW
@@ -569,3 +569,11 @@ def test_a_place_that_may_be_off_by_more_than_the_alert_limit_is_looked_at_once_
     assert after.kind == ("not testable" if is_asked_again else "verified")
     assert "alert limit" in after.reason and "north-wall" in after.reason
     assert (after.p_wrong, after.most_p_wrong) == (before.p_wrong, before.most_p_wrong)
+
+
+def test_it_keeps_the_laws_of_all_sources(judged: list[Judged]) -> None:
+    for one in judged[:2]:
+        bench = Bench()
+        bench.board = one.board
+        milestone = case_on(one.board.view, one.trigger).milestone
+        check_source(MilestoneJudge, bench, one.trigger, without=(milestone.id,))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from blackboard import Entry, Level, Posted, Quiescence, Revised
-from generated_boards import HALL, Bench, all_reasons, made, plain_robot, wakes
+from blackboard import Entry, Level, Quiescence
+from generated_boards import Bench, all_reasons, made
+from harvey.testing import HALL, check_source, plain_robot
 from knowledge_sources.goal.mission_monitor import mission_monitor
 from world_models.entries import Alias, AliasOdds, Hypothesis, Impasse, Obstruction, Outcome, diagonal
 from world_models.frames import Pose2
@@ -102,18 +103,6 @@ def test_it_names_the_milestone_for_which_nobody_answered() -> None:
     assert found is not None and found[2] == {still.id, goal.id}
 
 
-def test_what_it_watches() -> None:
-    bench = Bench()
-    goal = bench.pursue()
-    reached = bench.revise(goal, status="reached")
-    assert not wakes(SOURCE, Posted(goal)) and not wakes(SOURCE, Posted(reached)) and wakes(SOURCE, Revised(reached))
-    assert not wakes(SOURCE, Revised(bench.revise(goal, status="abandoned")))
-    assert wakes(SOURCE, Posted(be_still(bench)))
-    for is_open in (True, False):
-        impasse = bench.put(Impasse("lost", "", is_open=is_open))
-        assert wakes(SOURCE, Posted(impasse)) == is_open and not wakes(SOURCE, Revised(impasse))
-
-
 @pytest.mark.parametrize("is_reached", [True, False])
 @pytest.mark.parametrize("clockwise", [True, False])
 def test_what_hides_a_part_of_the_pictures_is_said_where_the_goal_is_not_reached(
@@ -130,3 +119,8 @@ def test_what_hides_a_part_of_the_pictures_is_said_where_the_goal_is_not_reached
     assert found is not None
     assert (hidden.id in found[2]) is not is_reached
     assert found[1].endswith("hides 12% of each picture") is not is_reached
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(plain_robot())
+    check_source(SOURCE, bench, bench.revise(bench.pursue(), status="reached"))

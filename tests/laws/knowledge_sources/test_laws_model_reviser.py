@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
-from blackboard import Post, Posted, Retracted, Revise, Revised
+from blackboard import Post, Posted, Revise
+from harvey.testing import answer, check_source
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.reads import find_building
@@ -57,14 +57,6 @@ def tell(hall: Hall, value: Any) -> Any:
     known = None if isinstance(value, UserReport) else hall.board.view.latest(type(value))
     (change,) = hall.apply(Post(value) if known is None else Revise(known, value, (known,)))
     return change
-
-
-def test_it_wakes_by_what_is_found_seen_or_told() -> None:
-    hall = Hall(())
-    for what, state, wakes in (("found", "there", 2), ("seen", "shut", 2), ("told", "shut", 1)):
-        entry = hall.put(make(what, state, 0.0))
-        kinds = [kind for kind in (Posted, Revised, Retracted) if any(w.sees(kind(entry)) for w in SOURCE.on)]
-        assert kinds == [Posted, Revised][:wakes]
 
 
 @given(st.lists(found | seen | told, max_size=6))
@@ -161,3 +153,9 @@ def test_what_the_model_has_not_is_answered_and_revises_nothing() -> None:
         change = tell(hall, UserReport(what, "shut"))
         assert hall.board.view[change.entry.id].value.answer.startswith("which cannot be")
     assert changes(hall, HALL) == ()
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    for what in (("found", "there", 0.0), ("seen", "shut", 0.0)):
+        hall = Hall(())
+        check_source(SOURCE, hall.bench, Posted(hall.put(make(*what))))

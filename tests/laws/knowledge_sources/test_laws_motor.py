@@ -11,22 +11,20 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from blackboard import Effect, Entry, Level, Posted, Revised
+from blackboard import Effect, Entry, Level, Posted
 from generated_boards import (
-    HALL,
     Bench,
     all_reasons,
     effect_on,
-    house,
     made,
     mirrored,
     mirrored_place,
-    plain_robot,
     poses,
     reasons,
     to_world,
     wakes,
 )
+from harvey.testing import HALL, check_source, house, plain_robot
 from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.motor import LOOKAHEAD_M, Motor
 from knowledge_sources.methods.floor import find_floor
@@ -36,7 +34,7 @@ from knowledge_sources.reads import FloorAhead
 from knowledge_sources.reads.floor_ahead import MIN_INCREMENT_M, TOUCH_HOLDS_M, UNSURE_GAP_M
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
-from world_models.entries import Contact, Discrepancy, Drift, Leg, Milestone, MotorCommand, Obstacle, Place
+from world_models.entries import Contact, Discrepancy, Drift, Leg, MotorCommand, Obstacle, Place
 from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 
@@ -339,16 +337,6 @@ def test_after_a_touch_that_the_model_explains_it_moves_away_from_it_once(
         assert 0.36 + 0.15 * math.sin(found.turn_rad) > 0.35  # not against the wall
 
 
-def test_what_it_watches() -> None:
-    bench, leg = start(Pose2(2.0, 2.0, 0.0))
-    belief, doubt, milestone = bench.view["Hypothesis-1"], bench.doubt(), bench.await_milestone()
-    assert wakes(BLIND, Posted(belief)) and wakes(BLIND, Revised(belief)) and wakes(BLIND, Posted(leg))
-    assert wakes(BLIND, Revised(doubt)) and not wakes(BLIND, Posted(doubt)) and not wakes(BLIND, Revised(leg))
-    assert wakes(BLIND, Posted(milestone)) and isinstance(milestone.value, Milestone)
-    candidate = bench.put(replace(belief.value, status="candidate"))
-    assert not wakes(BLIND, Posted(candidate))
-
-
 @settings(deadline=None, max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), gap_m=st.floats(0.011, 0.2))
 def test_a_leg_is_not_turned_to_for_ever(seed: int, gap_m: float) -> None:
@@ -366,3 +354,8 @@ def test_a_leg_is_not_turned_to_for_ever(seed: int, gap_m: float) -> None:
         assert command.move_m > 0.0 or looking.turned_rad == 0.0  # turns to look at the floor do not count
         assert leg.turned_rad == pytest.approx(turned_rad)
         assert turned_rad <= math.tau + ACTUATOR.turn_increment_rad
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    for source in (BLIND, Motor()):
+        check_source(source, *start(Pose2(2.0, 2.0, 0.0)), without=("PlanSketch-1",))

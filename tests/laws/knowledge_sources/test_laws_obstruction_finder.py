@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blackboard import Entry, Level, Post, Posted
-from generated_boards import Bench, effect_on, made, plain_robot, reasons, wakes
+from blackboard import Entry, Level, Post
+from generated_boards import Bench, effect_on, made, reasons
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.milestone.obstruction_finder import MIN_OBSTRUCTION_LOOKS, ObstructionFinder
 from things_in_hall import known_by_sight
 from world_models.entries import Evidence, FloorThing, FreeFloor, Obstacle, Obstruction, Segments
@@ -123,7 +124,5 @@ def test_it_asks_only_when_a_look_told_nothing_or_the_belief_is_in_doubt(was_tri
     assert (bench.ask(SOURCE, last) is not None) == (was_tried or in_doubt)
 
 
-def test_what_it_watches() -> None:
-    bench, last = looks(1)
-    assert wakes(SOURCE, Posted(last))
-    assert not wakes(SOURCE, Posted(bench.put(replace(last.value, milestone=""))))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    check_source(SOURCE, *looks(MIN_OBSTRUCTION_LOOKS))

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from blackboard import Entry, Posted
-from generated_boards import Bench, drive, effect_on, go, motions, plain_robot, reasons, wakes
+from blackboard import Entry
+from generated_boards import Bench, drive, effect_on, go, motions, reasons
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.relocalizer.panorama_builder import PanoramaBuilder
 from world_models.actuator import ActuatorModel
 from world_models.entries import Panorama, Segments
@@ -50,17 +51,6 @@ def test_a_look_is_where_the_robot_was_as_seen_from_where_it_is(way: list[tuple[
     assert reasons(effect) == {"Segments-2", doubt.id, "Panorama-1", *reports}
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "light", "doubt", "belief", "rest"])
-def test_it_looks_round_only_when_lost_and_standing_in_the_light(lacks: str) -> None:
-    bench = Bench(plain_robot())
-    bench.believe()
-    bench.doubt()
-    seen = looked(bench, 0.0, 0.0) if lacks == "light" else looked(bench)
-    if lacks != "light":
-        bench.lack(lacks)
-    assert (bench.ask(SOURCE, seen) is not None) == (lacks == "nothing")
-
-
 def test_lost_again_it_begins_a_new_panorama() -> None:
     bench = Bench(plain_robot())
     bench.believe()
@@ -72,7 +62,9 @@ def test_lost_again_it_begins_a_new_panorama() -> None:
     assert len(effect.value.glimpses) == 1 and "Panorama-1" not in reasons(effect)
 
 
-def test_only_pictures_of_no_milestone_are_of_a_panorama() -> None:
-    bench = Bench()
-    assert wakes(SOURCE, Posted(looked(bench)))
-    assert not wakes(SOURCE, Posted(looked(bench, milestone="Milestone-1")))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    bench.doubt()
+    check_source(SOURCE, bench, looked(bench))
+    assert bench.ask(SOURCE, looked(bench, 0.0, 0.0)) is None  # it is dark

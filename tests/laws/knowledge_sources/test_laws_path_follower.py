@@ -11,20 +11,9 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from blackboard import Effect, Entry, Level, Posted, Revise, Revised
-from generated_boards import (
-    HALL,
-    Bench,
-    effect_on,
-    house,
-    made,
-    mirrored,
-    mirrored_place,
-    plain_robot,
-    reasons,
-    to_world,
-    wakes,
-)
+from blackboard import Effect, Entry, Level, Revise, Revised
+from generated_boards import Bench, effect_on, made, mirrored, mirrored_place, reasons, to_world
+from harvey.testing import HALL, check_source, house, plain_robot
 from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.path_follower import (
     MAX_ROLLING_ERROR_RAD,
@@ -259,10 +248,7 @@ def test_it_never_rolls_slower_than_it_creeps() -> None:
         assert choose_speed(free_m, ACTUATOR.speed_m_per_s, ACTUATOR, creep) == creep
 
 
-def test_what_it_watches() -> None:
-    board = Rolling()
-    doubt = board.bench.doubt()
-    assert wakes(BLIND, Posted(board.leg)) and wakes(BLIND, Revised(board.belief)) and wakes(BLIND, Posted(doubt))
-    assert not wakes(BLIND, Revised(board.bench.revise(doubt, status="corrected")))
-    assert not wakes(BLIND, Revised(board.leg)) and wakes(BLIND, Revised(board.sketch))
-    assert wakes(BLIND, Posted(board.bench.await_milestone()))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    for rolls in (False, True):
+        board = Rolling(rolls=rolls)
+        check_source(BLIND, board.bench, board.bench.revise(board.belief))

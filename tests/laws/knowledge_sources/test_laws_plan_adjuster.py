@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from blackboard import Entry, Level, Posted
+from blackboard import Entry, Level
 from generated_boards import (
     Bench,
     covariances,
     effect_on,
     mirrored,
     mirrored_covariance,
-    plain_robot,
     poses,
     reasons,
     to_world,
-    wakes,
 )
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.milestone.plan_adjuster import plan_adjuster
 from world_models.entries import Certificate, Discrepancy, Hypothesis, MilestoneVerdict, PoseFix
 from world_models.entries.location import Covariance
@@ -95,17 +94,8 @@ def test_beyond_the_bound_the_level_above_decides(magnitude: float | None, acts:
     assert (bench.ask(SOURCE, certificate) is not None) == acts
 
 
-@pytest.mark.parametrize("lacks", ["belief", "PoseFix-1"])
-def test_without_a_pose_or_a_belief_nothing_is_corrected(lacks: str) -> None:
+def test_it_keeps_the_laws_of_all_sources() -> None:
     bench = Bench(plain_robot())
     bench.believe()
     bench.doubt(Level.PLAN, 3.0)
-    fix = fix_at(bench, Pose2(2.0, 2.0, 0.0), SLANTED)
-    certificate = certify(bench, fix.id)
-    bench.lack(lacks)
-    assert bench.ask(SOURCE, certificate) is None
-
-
-@pytest.mark.parametrize("verdict", ["verified", "refuted", "not testable"])
-def test_only_what_is_verified_wakes_it(verdict: MilestoneVerdict) -> None:
-    assert wakes(SOURCE, Posted(certify(Bench(), "PoseFix-1", verdict))) == (verdict == "verified")
+    check_source(SOURCE, bench, certify(bench, fix_at(bench, Pose2(2.0, 2.0, 0.0), SLANTED).id), without=("PoseFix-1",))

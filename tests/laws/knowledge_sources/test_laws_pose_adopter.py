@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Entry, Posted, Retract, Revise
-from generated_boards import HALL, STUDY, Bench, covariances, effect_on, made, plain_robot, poses, reasons, wakes
+from blackboard import Entry, Retract, Revise
+from generated_boards import Bench, covariances, effect_on, made, poses, reasons
+from harvey.testing import HALL, STUDY, check_source, plain_robot
 from knowledge_sources.relocalizer.pose_adopter import pose_adopter
 from world_models.entries import CameraState, Hypothesis, PlaceSearch, diagonal
 from world_models.entries.location import Covariance
@@ -62,16 +63,9 @@ def test_the_belief_is_what_was_found_with_the_motions_it_had(
     assert bench.ask(SOURCE, search) is None
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "doubt", "belief", "Hypothesis-2", "rest"])
-def test_it_adopts_only_when_lost_and_standing(lacks: str) -> None:
+def test_it_keeps_the_laws_of_all_sources() -> None:
     bench = Bench(plain_robot())
     bench.believe()
     bench.doubt()
-    _, search = find(bench, Pose2(3.0, 1.0, 0.5), diagonal(0.02, 0.01))
-    bench.lack(lacks)
-    assert (bench.ask(SOURCE, search) is not None) == (lacks == "nothing")
-
-
-@pytest.mark.parametrize("status", ["found", "probe", "ambiguous"])
-def test_only_a_search_that_found_the_place_wakes_it(status: str) -> None:
-    assert wakes(SOURCE, Posted(Bench().put(PlaceSearch(status, "")))) == (status == "found")
+    place, search = find(bench, Pose2(3.0, 1.0, 0.5), diagonal(0.02, 0.01))
+    check_source(SOURCE, bench, search, without=(place.id,))

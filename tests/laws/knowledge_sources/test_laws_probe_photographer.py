@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from blackboard import Change, Entry, Level, Posted, Revised
-from generated_boards import Bench, all_reasons, plain_robot, wakes
+from blackboard import Entry
+from generated_boards import Bench, all_reasons
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.reads import is_dark
 from knowledge_sources.relocalizer.probe_photographer import MAX_DARK_FRAMES, ProbePhotographer
 from world_models.entries import PictureRequest, Segments
@@ -72,13 +73,5 @@ def test_found_again_it_asks_for_none() -> None:
     assert bench.ask(SOURCE, doubt) is None
 
 
-def test_what_it_watches() -> None:
-    bench, doubt = lost()
-    belief = bench.view["Hypothesis-1"]
-    moved = bench.revise(belief, basis="odometry")
-    heard: list[tuple[Change, bool]] = [
-        (Posted(doubt), True), (Posted(bench.doubt(Level.PLAN)), False), (Revised(moved), True),
-        (Revised(bench.revise(belief, basis="milestone")), False),
-        (Posted(bench.put(looked())), True), (Posted(bench.put(looked(milestone="Milestone-1"))), False)]
-    for change, hears in heard:
-        assert wakes(SOURCE, change) == hears
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    check_source(SOURCE, *lost())

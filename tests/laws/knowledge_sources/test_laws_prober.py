@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard import Level, Posted
-from generated_boards import Bench, all_reasons, plain_robot, wakes
+from generated_boards import Bench, all_reasons
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.relocalizer.prober import Prober
 from knowledge_sources.settings import DEFAULT
 from world_models.entries import MotorCommand, PlaceSearch
@@ -32,21 +31,8 @@ def test_it_drives_what_the_search_says(turn_rad: float, move_m: float, keeps_to
     assert all_reasons(effects) == {search.id, doubt.id}
 
 
-@pytest.mark.parametrize(("status", "probe", "acts"), [
-    ("probe", (0.1, 0.0), True), ("probe", None, False), ("found", (0.1, 0.0), False)])
-def test_only_a_search_that_asks_for_a_motion_wakes_it(
-    status: str, probe: tuple[float, float] | None, acts: bool
-) -> None:
-    search = Bench().put(PlaceSearch(status, "", probe))
-    assert wakes(Prober(), Posted(search)) == acts
-
-
-@pytest.mark.parametrize("lacks", ["nothing", "belief", "doubt", "level", "rest"])
-def test_it_probes_only_when_lost_and_standing(lacks: str) -> None:
+def test_it_keeps_the_laws_of_all_sources() -> None:
     bench = Bench(plain_robot())
     bench.believe()
-    bench.doubt(Level.PLAN if lacks == "level" else Level.GOAL)
-    search = bench.put(PlaceSearch("probe", "", (0.1, 0.0)))
-    if lacks != "level":
-        bench.lack(lacks)
-    assert (bench.ask(Prober(), search) is not None) == (lacks == "nothing")
+    bench.doubt()
+    check_source(Prober, bench, bench.put(PlaceSearch("probe", "", (0.1, 0.0))))

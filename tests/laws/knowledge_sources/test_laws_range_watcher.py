@@ -11,17 +11,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generated_boards import (
-    HALL,
-    WIDTH_M,
-    Bench,
-    all_reasons,
-    effect_on,
-    made,
-    mirrored,
-    plain_robot,
-    to_world,
-)
+from generated_boards import WIDTH_M, Bench, all_reasons, effect_on, made, mirrored, to_world
+from harvey.testing import HALL, check_source, plain_robot
 from knowledge_sources.methods.floor import see_ranges
 from knowledge_sources.model.range_watcher import (
     MAX_BELIEF_SIGMA_M,
@@ -118,3 +109,9 @@ def test_a_thing_stands_on_the_side_on_which_it_was_heard() -> None:
         near[index] = 0.8  # type: ignore[call-overload]
         ((_, y_m, _),) = find_things(Pose2(4.0, 2.0, 0.0), tuple(near))
         assert side * (y_m - 2.0) > 0.5
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    check_source(RangeWatcher, bench, bench.put(reading()))

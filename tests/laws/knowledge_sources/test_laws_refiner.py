@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 
-from blackboard import Entry, Posted, Revised
-from generated_boards import HALL, HOUSE, STUDY, Bench, effect_on, made, plain_robot, poses, reasons, wakes
+from blackboard import Entry
+from generated_boards import Bench, effect_on, made, poses, reasons
+from harvey.testing import HALL, HOUSE, STUDY, check_source, plain_robot
 from knowledge_sources.sketcher.refiner import Refiner
 from world_models.entries import Impasse, Place, PlanSketch, Subgoal
 from world_models.files.toml.source import Source
@@ -107,18 +108,6 @@ def test_where_a_search_has_just_found_it_the_first_milestone_holds(basis: str) 
     assert drawn.verified is (basis == "relocalization")
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "belief", "Goal-1", "need", "course of things"])
-def test_it_refines_only_what_is_needed(lacks: str) -> None:
-    bench = Bench(plain_robot())
-    bench.believe()
-    sketch = bench.sketch(*WAY, primitive=False)
-    if lacks == "need":
-        bench.sketch(*WAY, goal=bench.view[sketch.value.goal], path=(0,))
-    else:
-        bench.lack(lacks)
-    assert (bench.ask(SOURCE, sketch) is not None) == (lacks == "nothing")
-
-
 def test_the_sketch_of_another_subgoal_or_goal_refines_nothing_here() -> None:
     bench = Bench(plain_robot())
     bench.believe()
@@ -128,14 +117,7 @@ def test_the_sketch_of_another_subgoal_or_goal_refines_nothing_here() -> None:
     assert bench.ask(SOURCE, sketch) is not None
 
 
-@pytest.mark.parametrize("is_active", [True, False])
-@pytest.mark.parametrize("verified", [True, False])
-@pytest.mark.parametrize("primitive", [True, False])
-@pytest.mark.parametrize("at", [0, 2])
-def test_what_it_watches(is_active: bool, verified: bool, primitive: bool, at: int) -> None:
-    bench = Bench()
-    sketch = bench.sketch(*WAY, at=at, verified=verified, primitive=primitive)
-    if not is_active:
-        sketch = bench.revise(sketch, status="superseded")
-    wakes_it = is_active and verified and not primitive and at < 2
-    assert wakes(SOURCE, Posted(sketch)) == wakes(SOURCE, Revised(sketch)) == wakes_it
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench(plain_robot())
+    bench.believe()
+    check_source(SOURCE, bench, bench.sketch(*WAY, primitive=False), without=("Goal-1",))

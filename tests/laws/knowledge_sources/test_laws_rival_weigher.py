@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from blackboard import Post, Posted, Revise
 from generated_boards import Bench, all_reasons, wakes
+from harvey.testing import check_source
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.model.rival_weigher import rival_weigher
 from world_models.entries import Evidence, Explanation
@@ -38,3 +39,8 @@ def test_each_difference_is_weighed_by_all_of_its_evidence_and_by_no_other(all_s
             assert effect.value == weigh_rivals(one.about, known)
             assert entry.id in all_reasons(effects)
             bench.apply(effect)
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench()
+    check_source(rival_weigher, bench, bench.put(build_evidence("camera", 1.0, 0.0)))

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from blackboard import Level, Posted
 from generated_boards import Bench, made, reasons, wakes
+from harvey.testing import check_source
 from knowledge_sources.senses.sense_judge import WRONG, sense_judge
 from world_models.entries import (
     MISLEADING,
@@ -58,3 +59,8 @@ def test_after_the_end_nothing_more_is_said(kind: RivalKind) -> None:
     bench = Bench()
     bench.put(Impasse("blocked", "so"))
     assert bench.ask(sense_judge, bench.put(differ(kind, 1.0))) is None
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench()
+    check_source(sense_judge, bench, bench.put(differ("lens", 1.0)))

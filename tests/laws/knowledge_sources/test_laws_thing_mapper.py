@@ -11,8 +11,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
-from blackboard import Effect, Entry, Level, Post, Posted, Revise, Revised
+from blackboard import Effect, Entry, Level, Post, Posted, Revise
+from harvey.testing import answer, check_source
 from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, MIN_OBSTACLE_CERTAINTY, MIN_THING_CERTAINTY
 from knowledge_sources.methods.floor.weigh_sight import (
     CAMOUFLAGED_FREE_ODDS,
@@ -74,12 +74,6 @@ def but_for_dirt(p: float) -> Any:
 
 def odds_of(p: float) -> float:
     return p / (1.0 - p)
-
-
-def test_it_wakes_by_each_new_sight() -> None:
-    entry = Hall(()).put(FreeFloor("camera", HALL, *[0.0] * 2, *[()] * 6, 1.0))
-    (watch,) = SOURCE.on
-    assert watch.sees(Posted(entry)) and not watch.sees(Revised(entry))
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.01, 0.5), st.sampled_from((None, "suspected", "there", "gone")),
@@ -209,3 +203,8 @@ def test_another_part_of_a_thing_in_the_same_sight_is_not_another_thing(part: fl
     aside_m = 0.4 * (1.0 - part)
     _, effects = ask(hall, hall.look(carton(), carton(by_m=aside_m), seen_s=9.0))
     assert len(effects or ()) == count
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    hall = Hall(())
+    check_source(SOURCE, hall.bench, Posted(hall.put(hall.look(carton(0.9), seen_s=9.0))))

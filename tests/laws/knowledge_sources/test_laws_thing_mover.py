@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
-from blackboard import Blackboard, Post, Posted, Revise, Revised
+from blackboard import Blackboard, Post, Revise, Revised
+from harvey.testing import Bench, answer, check_source
 from knowledge_sources.methods.floor import move_thing
 from knowledge_sources.model.thing_mover import MAX_DRIFT_M, MAX_DRIFT_RAD, ThingMover
 from knowledge_sources.settings import DEFAULT
@@ -43,16 +43,6 @@ def open_hall() -> Blackboard:
     frames = [Post(store.frame(name)) for name in ("", HALL, "reception", "archive")]
     board.apply(frames, author="test", cycle=0)
     return board
-
-
-@pytest.mark.parametrize("corrected", [True, False])
-@pytest.mark.parametrize("status", ["held", "candidate"])
-def test_it_wakes_when_a_lost_robot_is_found(corrected: bool, status: Any) -> None:
-    found = replace(BELIEF, status=status, correction=PLAIN if corrected else None)
-    (change,) = Blackboard().apply([Post(found)], author="test", cycle=1)
-    (watch,) = SOURCE.on
-    assert watch.sees(Revised(change.entry)) == (corrected and status == "held")
-    assert not watch.sees(Posted(change.entry))
 
 
 @given(st.lists(things | verdicts, max_size=8))
@@ -117,3 +107,11 @@ def test_what_was_seen_by_who_was_carried_off_stays_and_is_believed_less(by: Pos
     assert (now.footprint == CARTON) is is_carried
     assert now.certainty == pytest.approx(9.0 / 14.5 if is_carried else 0.9)  # half as likely elsewhere
     assert now.status == ("suspected" if is_carried else "there")
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench()
+    bench.board = open_hall()
+    known = bench.put(thing())
+    found = bench.put(replace(BELIEF, correction=PLAIN))
+    check_source(SOURCE, bench, Revised(found), without=(known.id,))

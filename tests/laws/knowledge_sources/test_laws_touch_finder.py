@@ -11,8 +11,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acting import answer
-from blackboard import Post, Posted, Revise, Revised
+from blackboard import Post, Revise, Revised
+from harvey.testing import answer, check_source
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.methods.floor import judge_thing
 from knowledge_sources.model.touch_finder import MAX_TOUCH_SIGMA_RAD, TouchFinder
@@ -38,17 +38,6 @@ def verify(hall: Hall, pose: Pose2 = HERE, sigma_m: float = 0.01, basis: str = "
     known = replace(known, covariance=diagonal(sigma_m, 0.005))
     (change,) = hall.apply(Revise(belief, known, (belief,)))
     return Revised(change.entry)
-
-
-@given(st.sampled_from(("command", "odometry", "tracks", "milestone", "relocalization", "ride")), st.booleans())
-def test_it_wakes_when_the_place_is_sure_again(basis: str, is_held: bool) -> None:
-    value = Hypothesis(HALL, Pose2(2.0, 1.2, 0.0), diagonal(0.01, 0.005), basis,
-                       status="held" if is_held else "candidate")
-    hall = Hall(())
-    entry = hall.put(value)
-    (watch,) = SOURCE.on
-    assert watch.sees(Revised(entry)) == (is_held and basis in ("milestone", "relocalization"))
-    assert not watch.sees(Posted(entry))
 
 
 @given(st.floats(-3.0, 3.0), st.lists(st.floats(-0.6, 0.6), max_size=3),
@@ -122,3 +111,9 @@ def test_what_was_known_there_reaches_to_where_it_was_touched(gap_m: float, is_s
         assert (found.name, found.is_there, found.touched_s) == (known.value.name, True, 3.0)
     else:
         assert effect.value.name == f"{HALL}/obstacle-2"
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    hall = Hall(())
+    contact, *_ = touch(hall, Contact("bumper", 0.0, 0.15, 3.0))
+    check_source(SOURCE, hall.bench, verify(hall), without=(contact,))

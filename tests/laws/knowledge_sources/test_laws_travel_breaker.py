@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard import Level, Posted, Revised
-from generated_boards import Bench, all_reasons, wakes
+from generated_boards import Bench, all_reasons
+from harvey.testing import check_source
 from knowledge_sources.senses.travel_breaker import travel_breaker
 from world_models.entries import begin_travel, diagonal
 from world_models.frames import Pose2
 
 lengths = st.floats(0.0, 9.0)
-
-
-@given(st.sampled_from(Level), st.sampled_from((None, 0.0, 1e9, math.inf)))
-def test_it_wakes_when_lost_or_when_a_difference_cannot_be_measured(level: Level, magnitude: float | None) -> None:
-    bench = Bench()
-    doubt = bench.doubt(level, magnitude)
-    assert wakes(travel_breaker, Posted(doubt)) == (level is Level.GOAL or magnitude == math.inf)
-    assert not wakes(travel_breaker, Revised(doubt))  # it broke the way when it was posted
 
 
 @given(st.booleans(), lengths, lengths, lengths)
@@ -43,3 +34,9 @@ def test_it_marks_the_newest_way_and_no_more(is_broken: bool, x_m: float, y_m: f
 def test_without_a_way_there_is_nothing_to_break() -> None:
     bench = Bench()
     assert bench.ask(travel_breaker, bench.doubt()) is None
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench = Bench()
+    bench.put(begin_travel(Pose2(0.0, 0.0, 0.0), diagonal(0.1, 0.1), 0.0, 0.1))
+    check_source(travel_breaker, bench, bench.doubt())

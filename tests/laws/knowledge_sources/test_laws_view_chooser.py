@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Effect, Entry, Level, Posted, Revised
-from generated_boards import Bench, effect_on, mirrored, mirrored_place, plain_robot, poses, reasons, to_world, wakes
+from blackboard import Effect, Entry, Level
+from generated_boards import Bench, effect_on, mirrored, mirrored_place, poses, reasons, to_world
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.methods.verification import turn_headings
 from knowledge_sources.milestone_selector.view_chooser import LONG_TURN_RAD, ViewChooser
 from knowledge_sources.reads import MAX_LOOK_ERROR_RAD
@@ -129,31 +130,11 @@ def test_where_the_same_milestone_was_not_testable_it_looks_elsewhere(status: Mi
         assert abs(wrap_angle(chosen.look_heading_rad - heading)) > MAX_LOOK_ERROR_RAD
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "belief", "sketch", "rest", "course of things", "place", "measure"])
-def test_it_chooses_only_when_the_robot_stands_and_knows_its_place(lacks: str) -> None:
-    bench = Bench(plain_robot())
-    bench.believe()
-    sketch = bench.sketch(FROM, TO, verified=False)
-    if lacks == "sketch":
-        bench.revise(sketch, verified=True)
-    elif lacks == "measure":
-        bench.doubt(Level.PLAN)
-    else:
-        bench.lack(lacks)
-    assert (bench.ask(SOURCE, sketch) is not None) == (lacks == "nothing")
-
-
 def test_a_doubt_that_is_measured_within_its_bound_does_not_keep_it_from_looking() -> None:
     bench, sketch = due()
     bench.doubt(Level.PLAN, 3.0)
     assert bench.ask(SOURCE, sketch) is not None
 
 
-def test_what_it_watches() -> None:
-    bench, sketch = due()
-    assert wakes(SOURCE, Posted(sketch)) and not wakes(SOURCE, Revised(bench.revise(sketch, verified=True)))
-    milestone = bench.await_milestone()
-    assert not wakes(SOURCE, Revised(bench.revise(milestone, status="expected")))
-    assert wakes(SOURCE, Revised(bench.revise(milestone, status="verified")))
-    belief = bench.view["Hypothesis-1"]
-    assert wakes(SOURCE, Revised(bench.revise(belief, basis="tracks"))) and not wakes(SOURCE, Posted(belief))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    check_source(SOURCE, *due(), without=("Goal-1",))

@@ -7,12 +7,12 @@ import math
 import pytest
 from hypothesis import given, settings
 
-from blackboard import Level, Posted, Revised
-from generated_boards import Bench, effect_on, made, plain_robot, poses, reasons, to_world, wakes
+from blackboard import Level
+from generated_boards import Bench, effect_on, made, poses, reasons, to_world
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.reads import MAX_LOOK_ERROR_RAD
 from world_models.entries import Milestone, Obstruction, PictureRequest
-from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 
 SOURCE = ViewPredictor()
@@ -80,19 +80,7 @@ def test_what_stands_before_the_camera_is_named(is_hidden: bool) -> None:
     assert bool(effect.value.expected) != is_hidden  # it covers the whole picture
 
 
-@pytest.mark.parametrize("lacks", ["nothing", "belief", "rest", "course of things", "place", "turn"])
-def test_it_predicts_only_for_a_robot_that_stands_and_knows_its_place(lacks: str) -> None:
+def test_it_keeps_the_laws_of_all_sources() -> None:
     bench = Bench(plain_robot())
     bench.believe()
-    milestone = bench.await_milestone(look_heading_rad=AHEAD, status="expected" if lacks == "turn" else "turning")
-    if lacks != "turn":
-        bench.lack(lacks)
-    assert (bench.ask(SOURCE, milestone) is not None) == (lacks == "nothing")
-
-
-@pytest.mark.parametrize("status", ["turning", "expected", "verified"])
-def test_what_it_watches(status: MilestoneStatus) -> None:
-    bench = Bench()
-    milestone = bench.await_milestone(status=status)
-    assert wakes(SOURCE, Posted(milestone)) == (status == "turning") and not wakes(SOURCE, Revised(milestone))
-    assert wakes(SOURCE, Revised(bench.revise(bench.believe(), basis="odometry")))
+    check_source(SOURCE, bench, bench.await_milestone(look_heading_rad=AHEAD))

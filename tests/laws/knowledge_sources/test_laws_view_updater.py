@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from blackboard import Entry, Posted, Revised
-from generated_boards import Bench, effect_on, plain_robot, reasons, to_world, wakes
+from generated_boards import Bench, effect_on, reasons, to_world, wakes
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.milestone_selector.view_updater import ViewUpdater
 from world_models.entries import Milestone, Obstruction
@@ -64,3 +65,8 @@ def test_only_a_milestone_whose_picture_is_taken_and_not_judged_is_predicted_aga
     hidden = bench.put(outline(0.0, 100.0))
     assert (bench.ask(SOURCE, hidden) is not None) == (status == "expected" and has_belief)
     assert wakes(SOURCE, Posted(hidden)) and wakes(SOURCE, Revised(hidden))
+
+
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    bench, milestone = expecting()
+    check_source(SOURCE, bench, bench.put(outline(0.0, 100.0)), without=(milestone.id,))

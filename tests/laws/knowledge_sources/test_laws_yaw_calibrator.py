@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Effect, Entry, Posted, Revised
-from generated_boards import INEXACT, Bench, effect_on, house, made, plain_robot, reasons, wakes
+from blackboard import Effect, Entry
+from generated_boards import INEXACT, Bench, effect_on, made, reasons
+from harvey.testing import check_source, house, plain_robot
 from knowledge_sources.methods.calibration import (
     LEAST_SIGMA_RAD,
     SIGMA_CENTRE_PX,
@@ -242,11 +243,6 @@ def test_where_the_model_is_inexact_nothing_is_told() -> None:
     assert come(0.01, modes=("wall",)).effects is None and come(0.01).effects is not None
 
 
-def test_it_wakes_where_a_milestone_has_corrected_the_belief() -> None:
-    bench = Bench()
-    belief = bench.believe()
-    for basis, status in (("milestone", "held"), ("tracks", "held"), ("milestone", "candidate"), ("command", "held"),
-                          ("odometry", "held"), ("relocalization", "held"), ("milestone", "candidate")):
-        revised = bench.revise(belief, basis=basis, status=status)
-        assert wakes(YawCalibrator(), Revised(revised)) == ((basis, status) == ("milestone", "held"))
-    assert not wakes(YawCalibrator(), Posted(belief))
+def test_it_keeps_the_laws_of_all_sources() -> None:
+    way = come(0.01)
+    check_source(YawCalibrator, way.bench, way.belief, without=("Travel-1", "CameraState-1"))

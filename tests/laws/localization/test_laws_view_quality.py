@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from generated_boards import Bench, effect_on, plain_robot
+from generated_boards import Bench, effect_on
+from harvey.testing import plain_robot
 from knowledge_sources.methods.verification import (
     MAX_SIGMA_PART,
     MAX_SIGMA_RAD,

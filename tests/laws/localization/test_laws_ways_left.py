@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from generated_boards import HALL, house, plain_robot, to_world
+from generated_boards import to_world
+from harvey.testing import HALL, house, plain_robot
 from knowledge_sources.methods.motion import CLEARANCES_M, meets
 from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M
 from knowledge_sources.settings import DEFAULT

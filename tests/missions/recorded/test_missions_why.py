@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from acting import rating
 from blackboard import registry_of
 from experiments.scale.explanations import write_hour
 from harvey.agent import Agent, build_agent
@@ -120,7 +119,8 @@ def test_who_is_not_named_could_not_act_and_who_is_says_so_again(
             for change in changes(history, cycle, KNOWN, agent.store):
                 key = (source.name, str(change.entry.ref))
                 if any(watch.sees(change) for watch in source.on) and board.view.is_current(change.entry):
-                    assert rating(source, board.view, change) == ratings.get(key)
+                    case = source.find_case(board.view, change)
+                    assert (None if case is None else source.rate(case)) == ratings.get(key)
                     asked += 1
         absent = [e for e in agent.sources if not in_cycle(history, e.name, cycle)]
         for source in absent[:: len(absent) // 2 or 1]:
