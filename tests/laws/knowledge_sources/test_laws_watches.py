@@ -206,6 +206,7 @@ WATCHES: Mapping[str, list[Row]] = {
                      (Milestone, AGAIN, is_judged)],
     "view_predictor": [(Milestone, NEW, lambda m: m.status == "turning"), DOUBTS, MOVED],
     "view_updater": [(Obstruction, EITHER, always)],
+    "wheels_calibrator": [(Difference, EITHER, lambda d: d.rivals[0].p >= SURE_P and d.rivals[0].kind == "wheels")],
     "yaw_calibrator": [(Hypothesis, AGAIN, lambda h: is_held(h) and h.basis == "milestone")],
 }
 

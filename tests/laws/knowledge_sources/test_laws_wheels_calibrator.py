@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard import Entry, Posted
-from generated_boards import Bench, made, plain_robot, reasons, wakes
+from blackboard import Entry
+from generated_boards import Bench, made, reasons
+from harvey.testing import check_source, plain_robot
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.senses.wheels_calibrator import wheels_calibrator
 from world_models.actuator import ActuatorModel
@@ -47,9 +48,7 @@ def test_it_takes_over_what_all_stretches_tell(reach: float, errors: list[float]
     assert not list(bench.ask(wheels_calibrator, found) or ())  # the same is not learnt twice
 
 
-@given(reaches)
-def test_what_is_not_surely_the_wheels_or_tells_no_way_changes_nothing(reach: float) -> None:
-    unsure, turns = [tell(reach, 0.02, 0.0)], [tell(reach, 0.02, 1.0, 3.9, "turns")] * 4
-    one, other = (Posted(ask(told)[1]) for told in (unsure, turns))
-    assert not wakes(wheels_calibrator, one) and not wakes(wheels_calibrator, other)
+def test_a_way_that_tells_nothing_changes_nothing_and_it_keeps_the_laws_of_all_sources() -> None:
     assert not ask([tell(0.0, 0.0, float(k)) for k in range(4)])[2]
+    bench, found, _ = ask([tell(0.7, 0.02, float(k)) for k in range(4)])
+    check_source(wheels_calibrator, bench, found)
