@@ -253,7 +253,8 @@ class _Reader:
             self.acts.append(Act("exit", what=own[0] if own else None, along=by[0] if by else None))
         self.acts += [Act("turn", way) for way in ways if way not in ("ahead", "behind")]
         rest = [(meaning, one) for meaning, one in wheres
-                if one not in by and meaning not in ("on", "at", "in", "away", "from") and not (meaning == "to" and one.is_stretch)]
+                if one not in by and meaning not in ("on", "at", "in", "away", "from")
+                and not (meaning == "to" and one.is_stretch)]
         if rest:
             self._go([], [], rest)
 
