@@ -230,7 +230,8 @@ class _Reader:
         elif "it" in thing.heads and len(thing.heads) > 1:  # "the end of it"
             thing = replace(thing, heads=(thing.heads - {"it"}) | stretch.heads, names=thing.names + stretch.names)
         elif "it" in thing.heads:
-            thing = replace(stretch if by & {"along", "go", "take"} else self._it(), side=thing.side, count="")
+            hall = self.last_stretch or ThingWords(frozenset(("hall",)))
+            thing = replace(hall if by & {"along", "go", "take"} else self._it(), side=thing.side, count="")
         if thing.names or thing.heads - {"side", "unit", "end"}:
             self.last_thing = thing
             self.last_stretch = thing if thing.is_stretch else self.last_stretch
@@ -296,7 +297,8 @@ class _Reader:
               and (one.heads or one.names)]
         past = tuple(one for meaning, one in wheres if meaning in ("past", "before"))
         way = next((way for way in ways if way not in ("ahead", "behind")), "")
-        number = next((thing.number for thing in things if thing.number), 0)
+        blocks = [thing for thing in things if "unit" in thing.heads]
+        number = next((thing.number for thing in things if thing.number and not blocks), 0)
         hall = next(iter((*halls, *onto)), None)
         if way == "" and hall is not None:
             way = next((one for one in (hall.side,) if one not in ("ahead", "")), "")
@@ -306,15 +308,12 @@ class _Reader:
             self.acts.pop()
         self.acts.append(Act("turn", way, along=hall, until=at[0] if at and way else None, past=past if way else (),
                              units=number if not halls else 0))
-        blocks = [thing.number or 1 for thing in things if "unit" in thing.heads]
-        if blocks and halls:
-            self.acts.append(Act("go", along=hall, units=blocks[0]))
         rest = [(meaning, one) for meaning, one in wheres
                 if one is not hall and not (way and (one in at or one in past))
                 and meaning in ("to", "past", "along", "at") and one.text]
         self.last_stretch = hall
-        if rest:
-            self._go([], [], rest)
+        if rest or blocks:
+            self._go(blocks, [], rest)
 
     def _go(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]], *,
             until: bool = False, passing: bool = False) -> None:
@@ -350,7 +349,7 @@ class _Reader:
                     self.acts.append(Act("orient", what=replace(one, side="behind")))
             elif one.heads or one.names or one.count:
                 ends.append(one)
-        if not (ends or passed or along or units or metres or things or ways) and self.acts and self.acts[
+        if not (ends or passed or along or units or metres or things or ways or wheres) and self.acts and self.acts[
                 -1].sort in ("orient", "see"):
             ends = [replace(self._it(), side="")]  # "go there"
         end = ends[0] if ends else None
@@ -393,8 +392,11 @@ class _Reader:
             *things, kind = things  # "the next hall is yellow"
             things[-1] = replace(things[-1], names=things[-1].names + kind.names)
         elif len(things) > 1 and things[-1].count and not things[-1].heads and not things[-1].names:
-            *things, rank = things  # "the pink carpet is the first on your left"
-            things[-1] = replace(things[-1], count=rank.count, side=rank.side)
+            *things, rank = things  # "the pink carpet is the first on your left", "the easel is one ahead"
+            if rank.side == "ahead" and rank.number:
+                self.acts.append(Act("go", units=rank.number))
+            else:
+                things[-1] = replace(things[-1], count=rank.count, side=rank.side)
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS)
         side = next((one.side for _, one in wheres if one.side), ways[0] if ways else "")
         blocks = [thing for thing in things if "unit" in thing.heads]
@@ -457,6 +459,8 @@ class _Reader:
             return  # it tells of the walk before
         elif wheres and self._is_walk_told(things, ways) and all(meaning == "past" for meaning, _ in wheres):
             self._note_before([one for _, one in wheres])
+        elif things and ways and "unit" in things[0].heads:
+            self._turn(things, ways, wheres)
         elif things and ways and things[0].number and not things[0].heads and not things[0].names:
             self.acts.append(Act("turn", ways[0], units=things[0].number))
         elif things and (things[0].is_door or (things[0].count and things[0].side and not things[0].is_stretch)):
@@ -466,7 +470,7 @@ class _Reader:
                 self._amend(related, side)  # "the library is opposite, one door to the left"
             else:
                 self.acts.append(Act("find", what=replace(goal, side=side, relations=related)))
-        elif things or any(one.heads or one.names for _, one in wheres):
+        elif things or any(one.heads or one.names or one.number for _, one in wheres):
             is_at = not things and not ways and all(meaning == "on" for meaning, _ in wheres)
             self._go(things, ways, [("at" if is_at else meaning, one) for meaning, one in wheres])
         else:

@@ -144,8 +144,10 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
                 before and before.meaning == "be" and after and after.sort in NOUNS):
             yield Word("HEAD", "room", word.text, word.place)
         elif word.text == "where" and word.sort == "VERB" and (after is None or after.sort in ("VERB", "SEP") or (
-                before and before.sort == "PREP")):
+                before and (before.sort == "PREP" or before.meaning == "reach"))):
             continue
+        elif word.text in ("is", "are") and before and before.sort in NOUNS and (after is None or after.sort == "SEP"):
+            continue  # "to where the chair is"
         else:
             if word.meaning == "between":
                 pair = index + MOST_BETWEEN

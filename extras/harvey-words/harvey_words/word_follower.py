@@ -717,7 +717,8 @@ class WordFollower:
         far = side in ("ahead", "behind", "left", "right") or not self.area(state).is_hall
         looking = replace(state, heading=turned(state.heading, TURNS.get(side, 0.0))) if side in TURNS else state
         for sight in self.sights(looking):
-            if sight.feature is None or sight.feature.sort == "opening":
+            if sight.feature is None or sight.feature.sort == "opening" or (
+                    what.is_stretch and sight.feature.sort == "thing"):
                 continue
             ahead = sight.ahead_m if far else abs(sight.ahead_m)
             if ahead < -0.5 or ahead > (40.0 if far else NEAR_M) or (far and ahead < 0.1 and side in ("left", "right")):
@@ -743,7 +744,8 @@ class WordFollower:
 
     def _halt(self, state: State) -> Iterator[State]:
         """Where a text that ends while one walks may end."""
-        yield replace(state, odds=state.odds - 0.7, moving=False)
+        has_walked = state.begun is None or math.dist(state.begun, state.at) > HERE_M
+        yield replace(state, odds=state.odds - (0.7 if has_walked else 2.5), moving=False)
         nodes = self.nodes(state)
         if nodes:
             yield replace(self.stand(state, nodes[-1]), odds=state.odds - 0.7, moving=False)
