@@ -127,7 +127,7 @@ class _Reader:
         elif "exit" in verbs:
             self._exit(things, ways, wheres)
         elif things and self.acts and self.acts[-1].sort == "go" and self.acts[-1].until and (
-                (self.notes_on and not verbs) or verbs == {"note"}):
+                (self.notes_on and not verbs) or verbs in ({"note"}, {"pass"})):
             self._note_before(things)
         elif ("note" in verbs or (self.notes_on and not verbs)) and things:
             self.acts += [Act("note", what=thing) for thing in things]
@@ -153,8 +153,11 @@ class _Reader:
             self._go(things, ways, wheres, until=True)
         elif verbs & {"go", "pass"} and not (verbs & {"be"} and any(thing.is_door for thing in things)):
             self._go(things, ways, wheres, passing="pass" in verbs and "go" not in verbs)
-        elif "enter" in verbs or "take" in verbs:
+        elif verbs & {"enter", "take", "through"}:
             self._enter(things, ways, wheres)
+            if "through" in verbs and self.acts[-1:] and self.acts[-1].sort == "turn" and self.acts[-1].along:
+                along = self.acts[-1].along  # through a hall is to its end
+                self.acts.append(Act("go", until=replace(along, heads=along.heads | {"end", "hall"})))
         elif verbs & {"be", "see"}:
             self._state(things, ways, wheres, verbs)
         else:
@@ -222,10 +225,13 @@ class _Reader:
     def _resolve(self, thing: ThingWords, by: set[str]) -> ThingWords:
         """What a pronoun stands for: the hall before, where one goes along it; and what the next one will stand for."""
         stretch = self.last_stretch or ThingWords()
-        if "it" in thing.heads and len(thing.heads) > 1:  # "the end of it"
+        if "ending" in thing.heads:  # "until it ends", "where the gravel ends"
+            thing = replace(thing, heads=frozenset(("end", "hall")), names=thing.names or stretch.names)
+        elif "it" in thing.heads and len(thing.heads) > 1:  # "the end of it"
             thing = replace(thing, heads=(thing.heads - {"it"}) | stretch.heads, names=thing.names + stretch.names)
         elif "it" in thing.heads:
-            thing = replace(stretch if by & {"along", "go", "take"} else self._it(), side=thing.side, count="")
+            hall = self.last_stretch or ThingWords(frozenset(("hall",)))
+            thing = replace(hall if by & {"along", "go", "take"} else self._it(), side=thing.side, count="")
         if thing.names or thing.heads - {"side", "unit", "end"}:
             self.last_thing = thing
             self.last_stretch = thing if thing.is_stretch else self.last_stretch
@@ -247,7 +253,8 @@ class _Reader:
         if not any(act.sort == "exit" for act in self.acts[-1:]):
             self.acts.append(Act("exit", what=own[0] if own else None, along=by[0] if by else None))
         self.acts += [Act("turn", way) for way in ways if way not in ("ahead", "behind")]
-        rest = [(meaning, one) for meaning, one in wheres if one not in by and meaning not in ("on", "at", "in", "away")
+        rest = [(meaning, one) for meaning, one in wheres
+                if one not in by and meaning not in ("on", "at", "in", "away", "from")
                 and not (meaning == "to" and one.is_stretch)]
         if rest:
             self._go([], [], rest)
@@ -255,7 +262,8 @@ class _Reader:
     def _is_posture(self, parts: Sequence[Part], verbs: set[str]) -> bool:
         """``(with) your back to the wall``."""
         back = [index for index, part in enumerate(parts) if part.meaning in ("back", "behind")]
-        return bool(back) and not verbs & {"turn", "take", "go"} and any(
+        turns = verbs & {"take", "go"} or ("turn" in verbs and parts[back[0]].meaning == "back") if back else True
+        return not turns and any(
             part.words and part.sort in ("where", "thing") for part in parts[back[0]:])
 
     def _posture(self, things: list[ThingWords], wheres: list[tuple[str, ThingWords]]) -> None:
@@ -289,27 +297,32 @@ class _Reader:
               and (one.heads or one.names)]
         past = tuple(one for meaning, one in wheres if meaning in ("past", "before"))
         way = next((way for way in ways if way not in ("ahead", "behind")), "")
-        number = next((thing.number for thing in things if thing.number), 0)
+        blocks = [thing for thing in things if "unit" in thing.heads]
+        number = next((thing.number for thing in things if thing.number and not blocks), 0)
         hall = next(iter((*halls, *onto)), None)
         if way == "" and hall is not None:
             way = next((one for one in (hall.side,) if one not in ("ahead", "")), "")
+        last = self.acts[-1] if self.acts else Act("")
+        if last == Act("turn", last.way, place=last.place, text=last.text) and not way and hall is not None:
+            way = last.way  # "right, through the brick hall"
+            self.acts.pop()
         self.acts.append(Act("turn", way, along=hall, until=at[0] if at and way else None, past=past if way else (),
                              units=number if not halls else 0))
-        blocks = [thing.number or 1 for thing in things if "unit" in thing.heads]
-        if blocks and halls:
-            self.acts.append(Act("go", along=hall, units=blocks[0]))
         rest = [(meaning, one) for meaning, one in wheres
                 if one is not hall and not (way and (one in at or one in past))
                 and meaning in ("to", "past", "along", "at") and one.text]
-        if rest:
-            self._go([], [], rest)
+        self.last_stretch = hall
+        if rest or blocks:
+            self._go(blocks, [], rest)
 
     def _go(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]], *,
             until: bool = False, passing: bool = False) -> None:
-        self.acts += [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
+        self._turn_only(ways)
         if len(wheres) > 1 and wheres[0][0] == "at" and not things and wheres[1][0] == "to":
             self.acts.append(Act("go", until=wheres[0][1]))  # "at its end go to the corner"
             wheres = wheres[1:]
+        if things and things[0].text.startswith("all the way") and (len(things) > 1 or wheres):
+            things = [replace(things[0], heads=frozenset(("hall",))), *things[1:]]  # "all the way down the hall to X"
         units, metres = 0, 0.0
         ends: list[ThingWords] = []
         passed: list[ThingWords] = []
@@ -329,12 +342,14 @@ class _Reader:
                     (meaning in ("along", "on", "in") and (one.is_stretch or not one.is_door))
                     or (meaning == "" and one.is_stretch and not until)):
                 along = along or one
+            elif meaning == "from":
+                self.acts.append(Act("see", what=one))
             elif meaning == "away":
                 if not one.is_door:
                     self.acts.append(Act("orient", what=replace(one, side="behind")))
             elif one.heads or one.names or one.count:
                 ends.append(one)
-        if not (ends or passed or along or units or metres or things or ways) and self.acts and self.acts[
+        if not (ends or passed or along or units or metres or things or ways or wheres) and self.acts and self.acts[
                 -1].sort in ("orient", "see"):
             ends = [replace(self._it(), side="")]  # "go there"
         end = ends[0] if ends else None
@@ -349,6 +364,11 @@ class _Reader:
         for more in [one for one in ends[1:] if not (at_end and "end" in one.heads)]:
             self.acts.append(Act("find", what=more) if more.is_door else
                              Act("go", until=more) if more in onward else Act("see", what=more))
+
+    def _turn_only(self, ways: Sequence[str]) -> None:
+        turns = [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
+        self.acts += turns
+        self.last_stretch = None if turns else self.last_stretch
 
     def _enter(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
         what = [thing for thing in things if not thing.is_stretch]
@@ -371,8 +391,21 @@ class _Reader:
         if len(things) > 1 and things[-1].names and not things[-1].heads and things[-1].is_stretch:
             *things, kind = things  # "the next hall is yellow"
             things[-1] = replace(things[-1], names=things[-1].names + kind.names)
+        elif len(things) > 1 and things[-1].count and not things[-1].heads and not things[-1].names:
+            *things, rank = things  # "the pink carpet is the first on your left", "the easel is one ahead"
+            if rank.side == "ahead" and rank.number:
+                self.acts.append(Act("go", units=rank.number))
+            else:
+                things[-1] = replace(things[-1], count=rank.count, side=rank.side)
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS)
         side = next((one.side for _, one in wheres if one.side), ways[0] if ways else "")
+        blocks = [thing for thing in things if "unit" in thing.heads]
+        if blocks and len(things) > 1:  # "an easel one block in front of you"
+            side = side or blocks[0].side
+            things = [thing for thing in things if "unit" not in thing.heads]
+        if any("unit" in one.heads for _, one in wheres) and things and self._is_walk_told([], []):
+            self._note_before(things)  # "the couch will be at the first block"
+            return
         doors = [thing for thing in things if thing.is_door or (
             thing.count and thing.side and not thing.heads and not thing.names)]
         if doors or not things:
@@ -426,6 +459,8 @@ class _Reader:
             return  # it tells of the walk before
         elif wheres and self._is_walk_told(things, ways) and all(meaning == "past" for meaning, _ in wheres):
             self._note_before([one for _, one in wheres])
+        elif things and ways and "unit" in things[0].heads:
+            self._turn(things, ways, wheres)
         elif things and ways and things[0].number and not things[0].heads and not things[0].names:
             self.acts.append(Act("turn", ways[0], units=things[0].number))
         elif things and (things[0].is_door or (things[0].count and things[0].side and not things[0].is_stretch)):
@@ -435,10 +470,11 @@ class _Reader:
                 self._amend(related, side)  # "the library is opposite, one door to the left"
             else:
                 self.acts.append(Act("find", what=replace(goal, side=side, relations=related)))
-        elif things or any(one.heads or one.names for _, one in wheres):
-            self._go(things, ways, wheres)
+        elif things or any(one.heads or one.names or one.number for _, one in wheres):
+            is_at = not things and not ways and all(meaning == "on" for meaning, _ in wheres)
+            self._go(things, ways, [("at" if is_at else meaning, one) for meaning, one in wheres])
         else:
-            self.acts += [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
+            self._turn_only(ways)
             if "ahead" in ways:
                 self.acts.append(Act("go"))
 
@@ -479,6 +515,7 @@ def _at_end(goal: ThingWords, wheres: Sequence[tuple[str, ThingWords]]) -> Thing
 
 def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     """The acts of a text in the order in which they are to be done."""
+    clauses = list(_leave_warnings(clauses))
     ordered: list[Clause] = []
     behind: Clause | None = None
     for clause in clauses:
@@ -502,3 +539,14 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     last = max((index for index, act in enumerate(reader.acts) if act.sort in ("go", "turn", "exit")), default=-1)
     return [replace(act, sort="see") if act.sort == "find" and index < last and not act.enters and reader.acts[
         index + 1].sort != "exit" else act for index, act in enumerate(reader.acts)]
+
+
+def _leave_warnings(clauses: Sequence[Clause]) -> Iterable[Clause]:
+    """All sentences but those that say where one is when one has gone too far."""
+    sentence: list[Clause] = []
+    for clause in clauses:
+        sentence.append(clause)
+        if clause.end == "dot" or clause is clauses[-1]:
+            if not any(part.meaning == "beyond" for one in sentence for part in one.parts):
+                yield from sentence
+            sentence = []

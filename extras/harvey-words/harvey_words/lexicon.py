@@ -22,7 +22,7 @@ SHORT, LONG = 4, 8
 """Letters of a word that may have one wrong, and two."""
 ARTICLES = frozenset(("the", "a", "an", "your", "this", "that", "of", "past", "to"))
 POINTING = frozenset(("the", "this", "that", "which", "each", "no"))
-TAKING = frozenset(("follow", "take", "taking", "following", "reach", "pass"))
+TAKING = frozenset(("follow", "take", "taking", "following", "reach", "pass", "walk", "go"))
 """Words before ``one``, and before ``it`` or ``that``, that make them stand for something that was named."""
 Phrase = tuple[str, ...]
 

@@ -37,7 +37,8 @@ class WordLexer(Lexer):
 
 
 COMPASS = ("north", "south", "east", "west")
-STARTS = frozenset(("go", "turn", "take", "face", "reach", "enter", "exit", "pass", "halt", "stand", "there"))
+STARTS = frozenset(
+    ("go", "turn", "take", "face", "reach", "enter", "through", "exit", "pass", "halt", "stand", "there"))
 """Verbs with which another clause begins, also where nothing stands between."""
 NOUNS = frozenset(("HEAD", "THING", "MOD", "NAME", "STRANGE", "COUNT"))
 MOST_BETWEEN = 6
@@ -132,16 +133,21 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
             yield Word("NAME", "&", word.text, word.place)
         elif word.meaning == "of" and word.sort == "PREP":
             if is_joint:
+                pair = index + MOST_BETWEEN if before and before.meaning == "crossing" else pair
                 yield word
-        elif before and before.meaning == "unit" and word.sort in NOUNS:
-            yield from (Word("SEP", "comma", "", word.place), word)  # "two blocks chair"
+        elif before and before.sort in NOUNS and (
+                word.text.startswith("all the way") or (before.meaning == "unit" and word.sort in NOUNS)):
+            yield from (Word("SEP", "comma", "", word.place), word)  # "two blocks chair", "the hall all the way down"
         elif word.meaning == "with" and is_joint and before and before.sort in ("HEAD", "MOD"):
             yield Word("PREP", "of", word.text, word.place)
         elif word.text == "where" and word.sort == "VERB" and (
                 before and before.meaning == "be" and after and after.sort in NOUNS):
             yield Word("HEAD", "room", word.text, word.place)
-        elif word.text == "where" and word.sort == "VERB" and (after is None or after.sort in ("VERB", "SEP")):
+        elif word.text == "where" and word.sort == "VERB" and (after is None or after.sort in ("VERB", "SEP") or (
+                before and (before.sort == "PREP" or before.meaning == "reach"))):
             continue
+        elif word.text in ("is", "are") and before and before.sort in NOUNS and (after is None or after.sort == "SEP"):
+            continue  # "to where the chair is"
         else:
             if word.meaning == "between":
                 pair = index + MOST_BETWEEN

@@ -39,6 +39,8 @@ NO_WAY, MISSED, NOT_SEEN = -2.0, -3.0, -2.5
 WRONG_RANK, WRONG_SIDE = -3.5, -4.0
 MISCOUNT, WRONG_COUNT = -0.7, -1.5
 """A place that only leads on is counted, or is not; so many are counted, and the thing that is named is elsewhere."""
+FLOOR_ENDS = -1.0
+"""By the end of a hall, that of its floor is meant where it goes on with another."""
 STRAIGHT_ON = -0.5
 """A hall that is reached where it goes straight on."""
 ALONG, ALREADY = -0.7, -0.5
@@ -361,17 +363,17 @@ class WordFollower:
         return replace(state, locale=locale, at=moved(state.at, state.heading, metres))
 
     def _count(self, state: State, act: Act) -> Iterator[State]:
-        """So many crossings on; one that only leads straight on counts where it is of that kind, else perhaps."""
-        for through in (False, True):
+        """So many places on; what only leads straight on counts, or else only what is seen to be a crossing does."""
+        for through in (True, False):
             nodes = self.nodes(state, through)
-            if through and len(nodes) == len(self.nodes(state)):
+            if not through and len(nodes) == len(self.nodes(state, True)):
                 return
-            price = MISCOUNT if through else 0.0
+            price = 0.0 if through else MISCOUNT
             if len(nodes) >= act.units:
                 yield replace(self.stand(state, nodes[act.units - 1]), odds=state.odds + price)
             elif nodes:
                 yield replace(self.stand(state, nodes[-1]), odds=state.odds + price + MISSED)
-            if act.until is not None and act.until.names and not through:
+            if act.until is not None and act.until.names and through:
                 for new in self._reach(state, act.until):
                     yield replace(new, odds=new.odds + WRONG_COUNT)
 
@@ -390,17 +392,7 @@ class WordFollower:
     def _reach(self, state: State, what: ThingWords) -> Iterator[State]:
         """At what is to be reached."""
         if what.heads & {"end", "wall"} or (what.heads & {"corner"} and not what.number):
-            last = self.nodes(state)[-1:]
-            for sight in last:
-                there = replace(self.stand(state, sight), moving=False)
-                if what.names:
-                    yield from self._see(there, replace(what, heads=what.heads - {"end", "wall"}))
-                else:
-                    yield there
-                if not self.plan.areas[sight.locale].is_tile:
-                    yield replace(state, odds=state.odds - 0.5, moving=True)  # what follows may be short of the end
-            if not last:
-                yield replace(state, odds=state.odds - 0.3, moving=False)  # it is here
+            yield from self._reach_end(state, what)
             return
         found = False
         for sight, cost, senses in self._candidates(state, what):
@@ -410,18 +402,42 @@ class WordFollower:
         if not found or what.names:
             yield replace(state, odds=state.odds + (MISSED - 1.0 if known else UNKNOWN_HEAD), moving=True)
 
+    def _reach_end(self, state: State, what: ThingWords) -> Iterator[State]:
+        """At the wall ahead, or where the floor that one walks on ends."""
+        nodes = self.nodes(state)
+        walked, is_named = self.hall_ahead(state), "hall" in what.heads and bool(what.names)
+        for sight in nodes[:-1]:
+            there = replace(self.stand(state, sight), moving=False)
+            if self.hall_ahead(there).meanings != walked.meanings and "end" in what.heads:
+                price = 0.0 if is_named else FLOOR_ENDS
+                yield from self._see(replace(there, odds=state.odds + price), replace(what, heads=frozenset()))
+                break
+        for sight in nodes[-1:]:
+            there = replace(self.stand(state, sight), moving=False)
+            if what.names:
+                yield from self._see(there, replace(what, heads=what.heads - {"end", "wall"}))
+            else:
+                yield there
+            if not self.plan.areas[sight.locale].is_tile:
+                yield replace(state, odds=state.odds - 0.5, moving=True)  # what follows may be short of the end
+        if not nodes:
+            yield replace(state, odds=state.odds - 0.3, moving=False)  # it is here
+
     def _stay(self, state: State, what: ThingWords) -> Iterator[State]:
         """Where one stands, if what is to be reached is here."""
-        here, senses = self._seen_from(state, what) if what.names and not what.is_stretch else (WORST, state.senses)
+        is_end = bool(what.heads & {"end", "wall"})
+        here, senses = self._seen_from(state, what) if what.names and not is_end else (WORST, state.senses)
+        if is_end and not what.names and not self.nodes(state):
+            here = -ALREADY
         if here > -1.0:
             yield replace(state, odds=state.odds + here + ALREADY, senses=senses, moving=False)
 
     def _candidates(self, state: State, what: ThingWords) -> Iterator[tuple[NamedSight, float, Senses]]:
         """What is seen ahead and fits, nearest first, each with its price."""
-        found: list[tuple[NamedSight, float, Senses, int]] = []
+        found: list[tuple[NamedSight, float, Senses, int, int]] = []
         rank = 0
         taken = -math.inf
-        for sight in self._sights_for(state, what):
+        for place, sight in enumerate(self._sights_for(state, what), 1):
             fit, senses = self._fit_sight(state, sight, what)
             if fit <= MISFIT or (sight.ahead_m - taken < 0.3 and not sight.feature):
                 continue
@@ -431,10 +447,11 @@ class WordFollower:
             if fit > -1.0:
                 rank += 1
                 taken = sight.ahead_m
-            found.append((sight, fit, senses, rank))
-        for sight, fit, senses, own in found:
+            found.append((sight, fit, senses, rank, place))
+        for sight, fit, senses, own, place in found:
             number = rank if what.count == "last" else what.number
-            cost = fit + (WRONG_RANK * (own != number) if number else AGAIN * max(own - 1, 0))
+            miscount = MISCOUNT if "crossing" in what.heads and place == number else WRONG_RANK
+            cost = fit + (miscount * (own != number) if number else AGAIN * max(own - 1, 0))
             if cost > WORST:
                 yield sight, cost, senses
 
@@ -678,7 +695,7 @@ class WordFollower:
         if not (what.heads - {"side"} or what.names):
             return 0.0, state.senses
         ways = self.ways(state) if self.area(state).is_hall else []
-        if what.heads & {"wall", "end"} and not what.names:
+        if what.heads & {"wall", "end"} and (not what.names or (what.side == "behind" and "wall" in what.heads)):
             turn = state.heading + TURNS.get(what.side, 0.0)
             return (NOT_SEEN if any(is_along(way, turn) for way in ways) else 0.0), state.senses
         if what.heads & {"corner"} and not what.names:
@@ -700,12 +717,13 @@ class WordFollower:
         far = side in ("ahead", "behind", "left", "right") or not self.area(state).is_hall
         looking = replace(state, heading=turned(state.heading, TURNS.get(side, 0.0))) if side in TURNS else state
         for sight in self.sights(looking):
-            if sight.feature is None or sight.feature.sort == "opening":
+            if sight.feature is None or sight.feature.sort == "opening" or (
+                    what.is_stretch and sight.feature.sort == "thing"):
                 continue
             ahead = sight.ahead_m if far else abs(sight.ahead_m)
             if ahead < -0.5 or ahead > (40.0 if far else NEAR_M) or (far and ahead < 0.1 and side in ("left", "right")):
                 continue
-            if far and self.area(state).is_hall and abs(sight.left_m) > NEAR_M:
+            if far and self.area(state).is_hall and abs(sight.left_m) > min(NEAR_M, max(ahead, HERE_M)):
                 continue
             fit = self._match.fit(what, sight.feature, state.senses)
             best = max(best, (fit[0] - 0.02 * abs(sight.ahead_m), fit[1]), key=lambda pair: pair[0])
@@ -726,7 +744,8 @@ class WordFollower:
 
     def _halt(self, state: State) -> Iterator[State]:
         """Where a text that ends while one walks may end."""
-        yield replace(state, odds=state.odds - 0.7, moving=False)
+        has_walked = state.begun is None or math.dist(state.begun, state.at) > HERE_M
+        yield replace(state, odds=state.odds - (0.7 if has_walked else 2.5), moving=False)
         nodes = self.nodes(state)
         if nodes:
             yield replace(self.stand(state, nodes[-1]), odds=state.odds - 0.7, moving=False)
