@@ -171,9 +171,9 @@ def write_tum(poses: Iterable[tuple[Any, tuple[Any, ...]]], path: Path) -> int:
     """Times [s] with x, y [m] and heading [rad] as lines of TUM's format, ``time x y z qx qy qz qw``, in the order of
     time; returns their number. Raises BadInput where the file cannot be written."""
     lines = [f"{time_s:.6f} {x_m:.6f} {y_m:.6f} 0 0 0 {math.sin(turn_rad / 2.0):.9f} {math.cos(turn_rad / 2.0):.9f}\n"
-             for time_s, (x_m, y_m, turn_rad) in sorted(poses)]
+             for time_s, (x_m, y_m, turn_rad) in sorted(poses, key=lambda one: one[0])]
     try:
         path.write_text("".join(lines), encoding="utf-8")
     except OSError as error:
-        raise BadInput(f"--tum {path}: expected a file to write to, got: {error.strerror}") from None
+        raise BadInput(f"{path}: expected a file to write to, got: {error.strerror}") from None
     return len(lines)

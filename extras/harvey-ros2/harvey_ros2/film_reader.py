@@ -1,9 +1,12 @@
-"""Pictures without odometry: a video, or a folder of pictures in the order of the numbers in their names."""
+"""Pictures that are no bag's: a video, or a folder in the order of the numbers in the names or of its list ``rgb.txt``;
+without odometry, or beside that of a file."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from heapq import merge
 from pathlib import Path
 
 import cv2
@@ -12,6 +15,7 @@ import numpy as np
 from harvey.errors import BadInput
 from harvey.hardware.drivers.capture import CapturedPicture, picture_of
 from harvey_ros2.bag_reader import BagItem
+from harvey_ros2.odometry_file import read_picture_times
 from harvey_ros2.picture_message import decompress_picture
 from world_models.camera import Camera
 from world_models.files.regular_files import expect_regular, read_regular
@@ -19,17 +23,19 @@ from world_models.words import by_numbers
 
 VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg")
 PICTURES = (".jpg", ".jpeg", ".png")
+LIST = "rgb.txt"
+"""Lines of time [s] and name: what TUM's data sets call it."""
 MOST_HZ = 1000.0
 
 
 def is_film(path: Path) -> bool:
     """Whether this is a video by its name, or a folder with pictures that is no bag."""
     return path.suffix.lower() in VIDEOS if not path.is_dir() else (
-        not (path / "metadata.yaml").exists() and bool(_list_pictures(path)))
+        not (path / "metadata.yaml").exists() and ((path / LIST).is_file() or bool(_list_pictures(path))))
 
 
 class Film:
-    """Pictures, so many a second.
+    """Pictures, so many a second, or by the times of a list.
 
     Attributes:
         left_out: what was, with how often: ``pictures that are not whole``.
@@ -38,7 +44,10 @@ class Film:
     def __init__(self, path: Path, rate_hz: float = 0.0) -> None:
         """``rate_hz``: pictures a second; 0 for what the video says. Raises BadInput."""
         self._path, self.left_out = path, Counter[str]()
-        if path.is_dir():
+        self._listed: list[tuple[float, Path]] | None = None
+        if path.is_dir() and (path / LIST).is_file() and not rate_hz:
+            self._listed, said_hz = read_picture_times(path / LIST), MOST_HZ
+        elif path.is_dir():
             said_hz = 0.0
         else:
             try:
@@ -71,9 +80,16 @@ class Film:
         for number, picture in self._read(self.left_out):
             size = size or picture.size
             if picture.size == size:
-                yield BagItem(number / self._rate_hz, jpeg=picture.jpeg)
+                time_s = number / self._rate_hz if self._listed is None else self._listed[number][0]
+                yield BagItem(time_s, jpeg=picture.jpeg)
             else:
                 self.left_out["pictures of another size than the first"] += 1
+
+    def beside(self, odometry: Sequence[BagItem]) -> Iterator[BagItem]:
+        """Pictures and odometry in the order of time; without a list they begin at the same time."""
+        begins_s = odometry[0].time_s if self._listed is None else 0.0
+        pictures = (replace(item, time_s=begins_s + item.time_s) for item in self.items())
+        yield from merge(odometry, pictures, key=lambda item: item.time_s)
 
     def _read(self, left_out: Counter[str]) -> Iterator[tuple[int, CapturedPicture]]:
         for number, retrieved in enumerate(self._retrieve()):
@@ -86,7 +102,7 @@ class Film:
     def _retrieve(self) -> Iterator[np.ndarray | None]:
         """JPEG bytes or pixels of each; None for one that cannot be read."""
         if self._path.is_dir():
-            for path in _list_pictures(self._path):
+            for path in _list_pictures(self._path) if self._listed is None else [path for _, path in self._listed]:
                 try:
                     pixels = decompress_picture(np.frombuffer(read_regular(path), np.uint8), path.suffix)
                 except OSError:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import statistics
-import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections import Counter
@@ -17,13 +16,14 @@ from harvey.commands.command import CliCommand
 from harvey.errors import BadInput
 from logs.run_directory import RUNS, check_vacant
 
+POSES = (".csv", ".tum")
 MOST_GAP_S = 2.0
 """Where the odometry pauses for longer, nobody knows how the robot moved meanwhile [s]."""
 
 if TYPE_CHECKING:
     from harvey_ros2.bag_reader import Bag, BagItem
+    from harvey_ros2.followed_poses import FollowedPoses
     from harvey_ros2.onlooker import FirstGuess, Onlooker
-    from harvey_ros2.run_messages import TimedMessage
     from world_models.building.world import World
     from world_models.frames import Pose2
     from world_models.robot import RobotModel
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("bag", metavar="BAG", help="a bag of ROS 2 (mcap, sqlite3) or ROS 1, its folder or a file;"
-                        " a video, or a folder of pictures, without odometry; a robot that goes on, as ros2:robot.toml")
+                        " a video, or a folder of pictures; a robot that goes on, as ros2:robot.toml")
     parser.add_argument("--world", metavar="FILE", required=True,
                         help="the building: a world file, or the name of one that comes with Harvey")
     parser.add_argument("--start", metavar="PLACE", help='where it was first, in feet, as "(hallway (4,4,0))";'
@@ -41,7 +41,9 @@ def _arguments(parser: ArgumentParser) -> None:
                         help="standard deviation of that place (0.2)")
     parser.add_argument("--calibration", metavar="FILE",
                         help="the camera's file; else CameraInfo and tf_static of the bag say it")
-    parser.add_argument("--odom", metavar="TOPIC", default="", help="the odometry, where there are several")
+    parser.add_argument("--odom", metavar="TOPIC|FILE", default="",
+                        help="of a bag the topic of the odometry, where there are several; of pictures its file: TUM's"
+                        " lines, or a .csv with time_s,x_m,y_m,heading_rad")
     parser.add_argument("--picture", metavar="TOPIC", default="", help="the pictures, where there are several")
     parser.add_argument("--base", metavar="FRAME", default="base_link", help="the robot's frame (base_link)")
     parser.add_argument("--distro", metavar="NAME", default="jazzy",
@@ -49,13 +51,18 @@ def _arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--reach", metavar="X", type=float, default=1.0,
                         help="what the tape says of what the wheels claim (1)")
     parser.add_argument("--rate", metavar="HZ", type=float, default=0.0,
-                        help="pictures a second of a folder of pictures, or of a video that does not say it rightly")
+                        help="pictures a second of a folder without a list rgb.txt, or of a video that does not say it"
+                        " rightly")
+    parser.add_argument("--poses", metavar="FILE", default="",
+                        help="write where it was: .csv, of each checked picture with protection level, or lost;"
+                        " .tum, what is certified, for evo; by the recording's times")
     parser.add_argument("--out", metavar="DIR", help="where the run is kept (runs/BAG-follow)")
 
 
 def _run(args: Namespace) -> int:
     from harvey_ros2.bag_reader import Bag
     from harvey_ros2.film_reader import is_film
+    from harvey_ros2.followed_poses import FollowedPoses
     from harvey_ros2.messages import message_types
     from harvey_ros2.onlooker import Onlooker, build_onlooker_head
     from harvey_ros2.run_messages import RunMessages
@@ -66,6 +73,8 @@ def _run(args: Namespace) -> int:
         return _run_live(args)
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a video is said by us
     path = Path(args.bag)
+    if args.poses and Path(args.poses).suffix not in POSES:
+        raise BadInput(f"--poses: expected a name that ends in {' or '.join(POSES)}, got {args.poses!r}")
     world = named_file(args.world, WORLDS, Path())
     if args.distro not in ("humble", "jazzy", "kilted"):
         raise BadInput(f"--distro: expected humble, jazzy or kilted, got {args.distro!r}")
@@ -74,43 +83,49 @@ def _run(args: Namespace) -> int:
         return _run_film(args, path, world, out)
     with Bag(path, odometry=args.odom, picture=args.picture, distro=args.distro) as bag:
         known, robot = build_robot(bag, world, args)
-        guess, events = _guess(args, known), _Events()
+        guess, events = _guess(args, known), FollowedPoses()
         messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
         onlooker = Onlooker(build_onlooker_head(path.stem, world, robot, guess), out, events.hear, messages=messages)
         took_s = follow_bag(bag.items(), onlooker, bag.left_out)
         for line in bag.tell():
             print(line)
-    return _end(onlooker, events, took_s, path, out)
+    return _end(onlooker, events, took_s, args, out)
 
 
-def _end(onlooker: Onlooker, events: _Events, took_s: list[float], path: Path, out: Path) -> int:
+def _end(onlooker: Onlooker, events: FollowedPoses, took_s: list[float], args: Namespace, out: Path) -> int:
     knows, said = onlooker.judge()
     why = f"the recording ends; {said}"
     onlooker.close(why)
     print(f"{why}: {onlooker.pictures} pictures checked, {onlooker.certified} certified, lost {events.lost} times\n"
           f"{_tell_protection(onlooker.protection_m)}{_tell_times(took_s)}\n\n"
           f"open it with    harvey view {out}\nhave it told    harvey story {out}\n"
-          f"for others      harvey export {out} --mcap {path.stem}.mcap")
+          f"for others      harvey export {out} --mcap {out.name}.mcap")
+    if args.poses:
+        events.write(Path(args.poses))
+        print(f"{args.poses}: where it was")
     return 0 if knows else 1
 
 
 def _run_film(args: Namespace, path: Path, world: Path, out: Path) -> int:
     from harvey_ros2.film_reader import Film
+    from harvey_ros2.followed_poses import FollowedPoses
     from harvey_ros2.messages import message_types
+    from harvey_ros2.odometry_file import read_odometry_file
     from harvey_ros2.onlooker import Onlooker, build_onlooker_head
     from harvey_ros2.run_messages import RunMessages
 
-    film = Film(path, args.rate)
+    film, counted = Film(path, args.rate), read_odometry_file(Path(args.odom)) if args.odom else []
     known, robot = build_robot(None, world, args)
     film.check_size(robot.lens)
-    guess, events = _guess(args, known), _Events()
+    guess, events = _guess(args, known), FollowedPoses()
     messages = RunMessages(message_types("jazzy"), known, robot.lens, robot.mount, counts=False)
     onlooker = Onlooker(build_onlooker_head(path.stem, world, robot, guess), out, events.hear, messages=messages,
-                        counts=False)
-    took_s = follow_film(film.items(), onlooker)
+                        counts=bool(counted))
+    took_s = follow_bag(film.beside(counted), onlooker, film.left_out) if counted else (
+        follow_film(film.items(), onlooker))
     for what, number in sorted(film.left_out.items()):
         print(f"left out: {number} {what}")
-    return _end(onlooker, events, took_s, path, out)
+    return _end(onlooker, events, took_s, args, out)
 
 
 def follow_film(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
@@ -126,6 +141,7 @@ def follow_film(items: Iterable[BagItem], onlooker: Onlooker) -> list[float]:
 
 
 def _run_live(args: Namespace) -> int:
+    from harvey_ros2.followed_poses import FollowedPoses
     from harvey_ros2.live_robot import follow_robot
     from world_models.files.toml.mission import named_file
     from world_models.files.toml.source import WORLDS
@@ -133,7 +149,7 @@ def _run_live(args: Namespace) -> int:
     world = named_file(args.world, WORLDS, Path())
     known, robot = build_robot(None, world, args)
     out = check_vacant(Path(args.out) if args.out else RUNS / "robot-follow")
-    events = _Events()
+    events = FollowedPoses()
     onlooker = follow_robot(args.bag.partition(":")[2], world, known, robot, _guess(args, known), out, events.hear)
     knows, said = onlooker.judge()
     end = "knowing where it is" if knows else f"not knowing where it is ({said})"
@@ -158,7 +174,7 @@ def follow_bag(
             yield item
 
     for time_s, counted, jpeg in pair_with_odometry(note_times(), left_out):
-        began_s = time_s if began_s is None else began_s
+        began_s = onlooker.messages.epoch_s = time_s if began_s is None else began_s
         if last is not None:
             onlooker.move(last.inverse() @ counted, time_s - began_s)
         last = onlooker.messages.odometry = counted
@@ -263,24 +279,6 @@ def _guess(args: Namespace, world: World) -> FirstGuess:
     return FirstGuess(f"({world.rooms[0]} (1,1,0))", sigma_m=None)
 
 
-class _Events:
-    """Prints when it is lost and found; counts how often it was lost."""
-
-    def __init__(self) -> None:
-        self.lost = 0
-        self._said = ""
-
-    def hear(self, messages: Iterable[TimedMessage]) -> None:
-        for item in messages:
-            if item.topic != "/diagnostics":
-                continue
-            status = item.message.status[0]
-            if status.message != self._said:
-                self.lost += status.level == 2
-                self._said = status.message
-                print(f"{item.time_s:8.1f} s  {status.message}", file=sys.stderr, flush=True)
-
-
 def _tell_protection(levels_m: Sequence[float]) -> str:
     """How far off the certified places may be, as a line; "" where there are none."""
     if not levels_m:
@@ -304,6 +302,7 @@ COMMAND = CliCommand(
     "follow", "a recording of a robot that somebody else drove: where it was, certified, or lost",
     (
         ('harvey follow bag --world research_center --start "(hallway (4,4,0))"', "a bag of ROS 2, and where it began"),
+        ("harvey follow pictures --odom odometry.tum --world house.toml --calibration camera.toml", "a folder"),
         ("harvey follow drive.mp4 --world house.toml --calibration camera.toml", "a video, without odometry"),
         ("harvey follow ros2:robot.toml --world house.toml --calibration camera.toml", "a robot that Nav2 drives"),
         ("harvey follow drive.mcap --world house.toml --calibration camera.toml", "it begins lost, and finds itself"),

@@ -36,6 +36,7 @@ from world_models.entries import (
 from world_models.frames import Pose2
 
 CAMERA_FRAME = "camera_optical"
+PROTECTION = "protection level [m]"
 UNKNOWN = 1e6
 """Variance of a pose that nothing vouches for [m^2, rad^2]."""
 DOUBTFUL = 0.5
@@ -110,11 +111,14 @@ class RunMessages:
             if not self._counts:
                 return
             self.odometry = self.odometry @ Pose2(0.0, 0.0, value.turn_rad) @ Pose2(value.move_m, 0.0, 0.0)
-            yield self._tell_odometry(value)
+            yield self._tell_odometry(value.move_m, value.turn_rad, value.duration_s)
             yield self._transform(self._frames.odom, self._frames.base, self.odometry)
         elif isinstance(value, CameraPicture):
+            stood = self._counts and value.sim_time_s > self.time_s  # since the last report
             self.time_s = max(self.time_s, value.sim_time_s)
             yield from self._tell_picture(value)
+            if stood:
+                yield self._tell_odometry()
         elif isinstance(value, Hypothesis) and value.is_held:
             yield from self._tell_protection(value)
             if self._counts:  # else who has the odometry tells the pose
@@ -176,12 +180,12 @@ class RunMessages:
             "transform": {"translation": {"x": there.x_m, "y": there.y_m, "z": height_m},
                           "rotation": _about_z(there.heading_rad)}}])
 
-    def _tell_odometry(self, report: MotionReport) -> TimedMessage:
-        took_s = max(report.duration_s, 1e-3)
+    def _tell_odometry(self, move_m: float = 0.0, turn_rad: float = 0.0, duration_s: float = 0.0) -> TimedMessage:
+        took_s = max(duration_s, 1e-3)
         here = self.odometry
         return self._out("odom", header=self._header(self._frames.odom), child_frame_id=self._frames.base, pose={
             "pose": {"position": {"x": here.x_m, "y": here.y_m}, "orientation": _about_z(here.heading_rad)}},
-            twist={"twist": {"linear": {"x": report.move_m / took_s}, "angular": {"z": report.turn_rad / took_s}}})
+            twist={"twist": {"linear": {"x": move_m / took_s}, "angular": {"z": turn_rad / took_s}}})
 
     def _tell_picture(self, picture: CameraPicture) -> Iterator[TimedMessage]:
         header = self._header(CAMERA_FRAME, picture.sim_time_s)
@@ -196,7 +200,7 @@ class RunMessages:
 
     def _tell_protection(self, belief: Hypothesis) -> Iterator[TimedMessage]:
         """How far off a place may be that a picture has just vouched for."""
-        self._protection = {"protection level [m]": f"{belief.protection_m:.4f}",
+        self._protection = {PROTECTION: f"{belief.protection_m:.4f}",
                             "protection level [rad]": f"{belief.protection_rad:.5f}",
                             "alert limit [m]": f"{ALERT_LIMIT_M:g}"}
         if self.is_certified and belief.basis == "milestone":

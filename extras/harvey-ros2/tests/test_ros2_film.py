@@ -23,7 +23,7 @@ from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
 from harvey_ros2.run_messages import RunMessages, TimedMessage
 from sim.faults.built_in_faults import Kidnap
 from world_models.files.toml.camera_file import camera_text
-from world_models.files.toml.mission import named_file
+from world_models.files.toml.mission import ROOT, named_file
 from world_models.files.toml.source import WORLDS
 
 HZ = 5
@@ -118,6 +118,37 @@ def test_a_video_has_its_rate_and_the_pictures_of_a_folder_come_in_the_order_of_
     pictures = Film(folder, 2.0)
     assert shades(pictures) == [(0.0, 6), (0.5, 5), (1.5, 4), (2.0, 3), (2.5, 2), (3.0, 1)]
     assert pictures.left_out == {"pictures that are not whole": 1}
+
+
+def test_the_recording_that_ships_is_followed_and_each_certified_pose_is_within_its_protection_level(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    flat, poses, table = ROOT / "docs" / "flat", tmp_path / "poses", tmp_path / "odometry.csv"
+    odometry = np.loadtxt(flat / "recording" / "odometry.tum")
+    turned = 2.0 * np.degrees(np.arctan2(odometry[:, 6], odometry[:, 7]))
+    table.write_text("time_s,y_m,x_m,heading_deg\n" + "".join(
+        f"{row[0]},{row[2]},{row[1]},{angle}\n" for row, angle in zip(odometry, turned, strict=True)))
+    given = ["follow", str(flat / "recording"), "--world", str(flat / "flat.toml"), "--start", "(hall (4,3,0))",
+             "--heading", "90", "--calibration", str(flat / "recording" / "camera.toml")]
+    for counted, kind in ((flat / "recording" / "odometry.tum", "csv"), (table, "tum")):
+        out = ["--out", str(tmp_path / kind), "--poses", f"{poses}.{kind}"]
+        assert main([*given, "--odom", str(counted), *out]) == 0
+        assert "certified, lost 0 times" in capfd.readouterr().out
+    truth = np.loadtxt(flat / "recording" / "truth.tum")
+    header, *rows = (line.split(",") for line in Path(f"{poses}.csv").read_text().splitlines())
+    certified = np.array([[float(row[n]) for n in (0, 2, 3, 5)] for row in rows if row[5]])
+    there = np.transpose([np.interp(certified[:, 0], truth[:, 0], column) for column in truth.T[1:3]])
+    assert header[1] == "state" and len(certified) > 20
+    assert np.all(np.hypot(*(certified[:, 1:3] - there).T) < certified[:, 3])
+    told = np.loadtxt(f"{poses}.tum")
+    assert np.allclose(told[np.isin(told[:, 0], certified[:, 0])][:, :3], certified[:, :3], atol=1e-3)
+    for text, said in (("a,b\n1,2\n", "expected a first line with time_s"), ("", "expected a first line"),
+                       ("time_s,x_m,y_m,heading_rad\n1,2,nan,3\n", "bad.csv:2: expected 4 finite numbers"),
+                       ("time_s,x_m,y_m,heading_rad\n1,0,0,0\n0,0,0,0\n", "expected times in order")):
+        (tmp_path / "bad.csv").write_text(text)
+        assert main([*given, "--odom", str(tmp_path / "bad.csv"), "--out", str(tmp_path / "bad")]) == 2
+        assert said in capfd.readouterr().err
+    assert main([*given, "--poses", "x.txt"]) == 2
 
 
 def test_what_cannot_be_followed_is_one_line(

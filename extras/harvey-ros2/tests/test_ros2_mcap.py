@@ -20,6 +20,7 @@ from harvey_ros2.messages import message_types, seconds
 from harvey_ros2.run_messages import quaternion
 from logs.pictures import open_pictures
 from logs.run_directory import RunDirectory
+from logs.run_head import RunHead
 from logs.timeline import Timeline
 from world_models.camera import CameraMount
 from world_models.entries import Hypothesis
@@ -79,6 +80,18 @@ def test_a_run_is_read_back_as_it_was(recorded: Any, tmp_path: Path) -> None:
     assert float(stated["protection level [m]"]) == pytest.approx(corrected.protection_m, abs=1e-4)
     marker = found["/harvey/landmarks"][0][1].markers[0]
     assert marker.type == 5 and len(marker.points) % 2 == 0 and len(found["/harvey/plan"][0][1].poses) >= 2
+
+
+def test_its_own_bag_is_followed_without_being_lost(
+    recorded: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = recorded("office")
+    export(run, tmp_path / "run.mcap")
+    command = RunHead.read(run.path).command
+    start = command["text"].removeprefix("(ptrans ").partition("))")[0] + "))"
+    assert main(["follow", str(tmp_path / "run.mcap"), "--world", "research_center", "--start", start, "--heading",
+                 str(math.degrees(command["start_heading_rad"])), "--out", str(tmp_path / "followed")]) == 0
+    assert "lost 0 times" in (said := capsys.readouterr().out) and "left out" not in said
 
 
 def test_the_same_run_gives_the_same_file_and_the_camera_stands_where_it_is_mounted(
