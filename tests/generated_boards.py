@@ -182,6 +182,13 @@ places = st.builds(Place, st.just(HALL), st.floats(0.8, LENGTH_M - 0.8), st.floa
 covariances = st.builds(diagonal, st.floats(0.002, 0.2), st.floats(0.001, 0.2))
 
 
+def near(*bounds: float) -> st.SearchStrategy[float]:
+    """Numbers on either side of a bound and of its opposite: just beyond, well beyond, and half or twice as much."""
+    by = (1.0 - 1e-4, 1.0 + 1e-4, 0.9, 1.1, 0.7, 1.4, 0.5, 2.0)
+    return st.builds(lambda bound, part, side: bound * part * side, st.sampled_from(bounds), st.sampled_from(by),
+                     st.sampled_from((-1.0, 1.0)))
+
+
 def wakes(source: KnowledgeSource, change: Change) -> bool:
     """Whether a source watches for a change."""
     return any(watch.sees(change) for watch in source.on)

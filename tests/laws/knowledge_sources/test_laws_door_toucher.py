@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
 from blackboard import Entry
 from generated_boards import LENGTH_M, WIDTH_M, Bench, effect_on, reasons
 from harvey.testing import HALL, STUDY, check_source, plain_robot
 from knowledge_sources.methods.doors import MAX_LOG_ODDS, PRIOR_LOG_ODDS, SHUT_LOG_ODDS, touch_door, update_door
-from knowledge_sources.methods.doors.belief import MAX_TOUCH_M, TOUCH_LOG_RATIO
+from knowledge_sources.methods.doors.belief import (
+    MAX_TOUCH_M,
+    MIN_LOG_RATIO,
+    MIN_PICTURES,
+    OPEN_LOG_ODDS,
+    TOUCH_LOG_RATIO,
+)
 from knowledge_sources.model.door_toucher import door_toucher
 from world_models.entries import Contact, DoorPicture, DoorState, Outcome, diagonal
 from world_models.frames import Pose2
@@ -78,17 +88,62 @@ def test_what_is_not_sure_or_was_counted_says_nothing(otherwise: dict[str, Any],
     assert (effects is not None) is counts
 
 
-def test_a_touch_counts_beside_pictures_whichever_comes_first_and_alone_shuts_no_door() -> None:
-    door, late = may_be_shut(4.5, 2.5), DoorPicture("p", (0.0, 0.0, 9.0, 9.0), 5.0, 0.0, 0.0, 2.5, "a leaf")
-    touched = touch_door(door, 9.0)
-    assert touched.log_odds == pytest.approx(min(door.log_odds + TOUCH_LOG_RATIO, MAX_LOG_ODDS))
-    after = update_door(touched, door.door, door.between, late, 2.0, is_believed_shut=False)
-    before = update_door(door, door.door, door.between, late, 2.0, is_believed_shut=False)
-    assert after is not None and before is not None and after.touched_s == 9.0
-    assert after.log_odds == pytest.approx(touch_door(before, 9.0).log_odds)
-    assert TOUCH_LOG_RATIO - PRIOR_LOG_ODDS < 0.0 < SHUT_LOG_ODDS
-
-
 def test_it_keeps_the_laws_of_all_sources() -> None:
     bench, known, _ = touch((LENGTH_M + 0.05, 0.5 * WIDTH_M))
     check_source(SOURCE, bench, bench.view["Hypothesis-1"], without=(known.id, "Contact-1"))
+
+
+class DoorMachine(RuleBasedStateMachine):
+    """Pictures from three places far apart and one touch, in any order, against plain odds."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.known: DoorState | None = None
+        self.views, self.is_touched, self.was_shut = dict[int, float](), False, False
+
+    @rule(place=st.integers(0, 2), ratio=st.floats(-7.0, 7.0) | st.sampled_from((3.0, 6.0)))
+    def see(self, place: int, ratio: float) -> None:
+        picture = DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), 9.0 * place, 0.0, 0.0, ratio, "a leaf")
+        now = update_door(self.known, "study-door", (HALL, STUDY), picture, 1.0, is_believed_shut=False)
+        old = self.views.get(place, 0.0)
+        if abs(ratio) < MIN_LOG_RATIO or (old * ratio > 0.0 and abs(old) >= abs(ratio)):
+            assert now is None  # it is too little, or was said already
+            return
+        views = {**{at: told for at, told in self.views.items() if at != place}, place: ratio}
+        if now is None:  # nothing is believed otherwise by it
+            assert self.known is not None and self.known.log_odds == pytest.approx(self.odds(views))
+            return
+        self.views, self.known = views, now
+        self.agree()
+
+    @precondition(lambda self: self.known is not None and not self.is_touched)
+    @rule()
+    def touch(self) -> None:
+        assert self.known is not None
+        now = touch_door(self.known, 9.0)
+        assert now.log_odds == pytest.approx(min(self.known.log_odds + TOUCH_LOG_RATIO, MAX_LOG_ODDS))
+        self.known, self.is_touched = now, True
+        self.name_state()
+
+    def odds(self, views: dict[int, float]) -> float:
+        told = -PRIOR_LOG_ODDS + math.fsum(views.values()) + TOUCH_LOG_RATIO * self.is_touched
+        return min(max(told, -MAX_LOG_ODDS), MAX_LOG_ODDS)
+
+    def agree(self) -> None:
+        assert self.known is not None and self.known.log_odds == pytest.approx(self.odds(self.views))
+        assert self.known.touched_s == (9.0 if self.is_touched else None)
+        assert self.known.pictures == len(self.views)
+        self.name_state()
+
+    def name_state(self) -> None:
+        """Two that tell so shut it; what shut it once is held until it is open."""
+        assert self.known is not None
+        enough = len(self.views) + self.is_touched >= MIN_PICTURES
+        is_shut = self.known.log_odds >= SHUT_LOG_ODDS and enough
+        is_open = self.known.log_odds <= OPEN_LOG_ODDS
+        self.was_shut = is_shut or (self.was_shut and not is_open)
+        assert self.known.state == ("open" if is_open else "shut" if self.was_shut else "unknown")
+
+
+TestDoor = DoorMachine.TestCase
+TestDoor.settings = settings(max_examples=150, stateful_step_count=8, deadline=None)

@@ -94,11 +94,13 @@ def test_there_is_nothing_to_look_at_or_nobody_to_look(stale: str) -> None:
     assert bench.ask(SOURCE, impasse) is None
 
 
-def see_door(bench: Bench, log_odds: float, state: DoorCondition, seen_from: tuple[float, float]) -> Entry[DoorState]:
-    """What is believed of the study's door, by a picture from a place of the hall."""
+def see_door(bench: Bench, log_odds: float, state: DoorCondition, seen_from: tuple[float, float], *,
+             has_views: bool = True) -> Entry[DoorState]:
+    """What is believed of the study's door, by a picture from there; that of a refuted milestone is no view."""
     at = to_world(Pose2(*seen_from, 0.0))
     picture = DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), at.x_m, at.y_m, 0.0, 4.5, "a leaf")
-    return bench.put(DoorState("study-door", (HALL, STUDY), state, 0.6, log_odds, 1, picture, 1.0, -4.0, (picture,)))
+    return bench.put(DoorState("study-door", (HALL, STUDY), state, 0.6, log_odds, 1, picture, 1.0, -4.0,
+                               (picture,) * has_views))
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -123,6 +125,21 @@ def test_a_door_that_may_be_shut_is_looked_at_from_the_front_before_it_ends(
         assert there.heading_rad == pytest.approx(math.atan2(away[1], away[0]), abs=0.05)
         assert away[0] >= (MIN_DOOR_LOOK_SINE - 0.02) * math.hypot(*away)
         assert math.hypot(there.x_m - before[0], there.y_m - before[1]) >= DOOR_LOOK_APART_M - 1e-6
+
+
+@pytest.mark.parametrize("has_views", [True, False])
+def test_it_is_looked_at_from_elsewhere_than_it_was_seen_from_last(has_views: bool) -> None:
+    """Also where the only picture of it is that of a refuted milestone: it would go there again."""
+    before = (1.0, 0.5)
+    for _ in range(3):
+        bench = Bench(plain_robot())
+        bench.believe(Pose2(5.5, 2.0, 0.0))
+        goal, thing = bench.pursue(Place(STUDY, 3.0, 2.0)), bench.stand(7.5, 2.0, 0.1, 0.4)
+        see_door(bench, 0.1, "unknown", before, has_views=has_views)
+        effects = bench.ask(SOURCE, bench.put(Impasse("blocked", "no way", goal.id, (thing.id,))))
+        there = effect_on(effects, PlanSketch).value.subgoals[0].destination
+        assert math.dist((there.x_m, there.y_m), before) >= DOOR_LOOK_APART_M - 1e-6
+        before = there.x_m, there.y_m
 
 
 def test_a_door_that_was_seen_from_everywhere_is_not_looked_at_again() -> None:

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from blackboard import Blackboard, Change, Effect, Entry, Index, Level, Post, Retract, Revise, View
 from blackboard.board import TracedView
 from experiments.generated.missions import OFFICE
-from generated_boards import effect_on, made, reasons
+from generated_boards import effect_on, made, near, reasons
 from harvey.simulation.simulated_run import run_mission
 from harvey.testing import Bench, check_source, copy_of
 from harvey.wiring import knowledge_sources
@@ -55,7 +55,13 @@ from knowledge_sources.methods.verification import (
 )
 from knowledge_sources.methods.verification import weigh as weigh_method
 from knowledge_sources.methods.verification.pose_confidence import compute_motion_tolerance_px
-from knowledge_sources.methods.verification.weigh import MAX_P_UNMISTAKABLE, _find_tolerance_px, _median_shift
+from knowledge_sources.methods.verification.weigh import (
+    MAX_P_UNMISTAKABLE,
+    OTHER_DIRECTIONS,
+    _find_tolerance_px,
+    _median_shift,
+    _sum_log_odds,
+)
 from knowledge_sources.milestone.milestone_judge import Case, MilestoneJudge
 from knowledge_sources.reads import find_belief, find_camera, find_followed, find_p_not_alias, place_believed
 from knowledge_sources.reads.place_believed import MAX_P_FALSE_CLEAR, MAX_P_FALSE_UNMISTAKABLE, MAX_P_RIVAL
@@ -88,6 +94,7 @@ T = TypeVar("T")
 PLAN = DEFAULT.plan
 SMALL = 1e-6
 NO_LINES = np.zeros((0, 2, 2))
+WIDE_RAD = OTHER_DIRECTIONS.turn_rad
 
 
 def weigh(**changed: Any) -> Any:
@@ -577,3 +584,11 @@ def test_it_keeps_the_laws_of_all_sources(judged: list[Judged]) -> None:
         bench.board = one.board
         milestone = case_on(one.board.view, one.trigger).milestone
         check_source(MilestoneJudge, bench, one.trigger, without=(milestone.id,))
+
+
+@given(st.lists(st.tuples(st.floats(-3.0, 3.0), near(WIDE_RAD, 0.5 * WIDE_RAD) | st.just(0.0)), min_size=1, max_size=1))
+def test_an_earlier_look_adds_only_what_this_one_does_not_show(looks: list[tuple[float, float]]) -> None:
+    """In proportion to how far it is turned from this one, up to the width of a picture; to either side."""
+    ((odds, aside_rad),) = looks
+    milestone = Milestone("", 0, "", 0.7, tried=(0.7 + aside_rad,), log_odds_so_far=(odds,))
+    assert _sum_log_odds(milestone) == pytest.approx(odds * min(abs(aside_rad) / WIDE_RAD, 1.0))

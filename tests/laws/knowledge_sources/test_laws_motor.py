@@ -19,6 +19,7 @@ from generated_boards import (
     made,
     mirrored,
     mirrored_place,
+    near,
     poses,
     reasons,
     to_world,
@@ -60,8 +61,9 @@ def command_of(effects: tuple[Effect, ...] | None) -> MotorCommand | None:
 
 
 @settings(max_examples=80)
-@given(st.floats(-3.1, 3.1), st.floats(-3.1, 3.1))
-def test_it_turns_to_a_milestone_in_equal_increments(heading: float, look: float) -> None:
+@given(st.floats(-3.1, 3.1), st.floats(-3.1, 3.1) | near(MAX_HEADING_ERROR_RAD, ACTUATOR.turn_increment_rad))
+def test_it_turns_to_a_milestone_in_equal_increments(heading: float, aside: float) -> None:
+    look = to_world(Pose2(0.0, 0.0, heading)).heading_rad + aside
     bench = Bench(plain_robot())
     belief = bench.believe(Pose2(2.0, 2.0, heading))
     milestone = bench.await_milestone(look_heading_rad=look)

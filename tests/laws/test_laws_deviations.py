@@ -1,0 +1,78 @@
+"""Each stated deviation counts: where one is made large, alone, something is wider, is refused, or more is let through.
+
+One table; a method that takes a standard deviation has its row.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+from generated_boards import LENGTH_M, WIDTH_M, Bench
+from harvey.testing import HALL, STUDY, plain_robot
+from knowledge_sources.methods.floor.found_things import find_same
+from knowledge_sources.methods.pose.displacements import _find_candidates
+from knowledge_sources.model.door_toucher import door_toucher
+from world_models.actuator import ActuatorModel
+from world_models.building.model_errors import LineErrors
+from world_models.camera import Camera, CameraMount
+from world_models.entries import Contact, DoorPicture, DoorState, Drift, Obstacle, diagonal
+from world_models.frames import Pose2
+
+CAMERA = Camera.from_field_of_view(math.radians(65.0))
+MOUNT = CameraMount(1.0, 0.1, 0.05).camera_from_robot
+POSTS = np.array([[(5.0, y, 0.5), (5.0, y, 1.5)] for y in (-1.0, 0.0, 1.0)])
+
+
+def refuse_touch(place_m: float, heading_rad: float, direction_rad: float) -> float:
+    """Whether a touch near a jamb may have been the jamb."""
+    bench, robot = Bench(plain_robot()), plain_robot()
+    picture = DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), 1.0, 0.0, 0.0, 4.5, "a leaf")
+    bench.put(DoorState("study-door", (HALL, STUDY), "unknown", 0.6, 0.5, 1, picture, 1.0, -4.0, (picture,)))
+    command, report = bench.move(0.0, 0.4)
+    bench.put(Contact("bumper", 0.0, direction_rad, 1.0), command)
+    here = Pose2(LENGTH_M + 0.05 - robot.radius_m, 0.5 * WIDTH_M + 0.25, 0.0)
+    belief = bench.believe(here, diagonal(place_m, heading_rad), motion=report.id)
+    return float(bench.ask(door_toucher, bench.revise(belief)) is None)
+
+
+def learn_drift(before_per_m: float, turned_rad: float, heading_rad: float) -> float:
+    """What is left open of the wheels' drift after a measured way."""
+    drift = Drift(0.0, before_per_m, 0.0, 0.2, turned_rad**2, 1.0)
+    return drift.update(ActuatorModel(), 0.2, heading_rad).sigma_per_m
+
+
+def count_candidates(place_m: float, heading_rad: float, model_m: float) -> float:
+    """How many segments may be of lines that stand elsewhere than the belief and the model say."""
+    shifted = POSTS + np.array([0.0, 0.1, 0.0])
+    segments = CAMERA.project((MOUNT @ Pose2(0.0, 0.0, 0.0).lifted().inverse()).apply(shifted))
+    errors = LineErrors(("walls",), np.tile([0.0, model_m, 0.0], (1, len(POSTS), 1)))
+    spread = np.diag([place_m, place_m, heading_rad]) ** 2
+    return len(_find_candidates(POSTS, errors, segments, CAMERA, MOUNT, np.zeros(3), spread)[0])
+
+
+def is_same_thing(known_m: float, seen_m: float) -> float:
+    """Whether what is seen beside a thing is that thing."""
+    known = Obstacle("hall/obstacle-1", HALL, ((0.0, 0.0), (0.3, 0.0), (0.3, 0.3), (0.0, 0.3)), known_m, 0.0, 0.0, 0.3)
+    return float(find_same({"Obstacle-1": known}, shapely.box(0.4, 0.0, 0.7, 0.3), seen_m, 2.0) is not None)
+
+
+ROWS: Mapping[str, tuple[Callable[..., float], dict[str, Any]]] = {
+    "a touch in a doorway": (refuse_touch, {"place_m": 0.005, "heading_rad": 0.005, "direction_rad": 0.05}),
+    "the drift of the wheels": (learn_drift, {"before_per_m": 0.002, "turned_rad": 0.002, "heading_rad": 0.002}),
+    "lines that stand elsewhere": (count_candidates, {"place_m": 0.001, "heading_rad": 0.001, "model_m": 0.001}),
+    "two sights of a thing": (is_same_thing, {"known_m": 0.005, "seen_m": 0.005}),
+}
+LARGE = 100.0
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_each_deviation_that_is_large_alone_counts(row: str) -> None:
+    measure, sigmas = ROWS[row]
+    plain = measure(**sigmas)
+    assert [name for name in sigmas if not measure(**{**sigmas, name: LARGE * sigmas[name]}) > plain] == []
