@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import networkx as nx
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -117,6 +116,8 @@ def _draw_walls(
     spec: WorldSpec, sigma_m: float, outward_m: float, rng: np.random.Generator
 ) -> dict[tuple[str, str], float]:
     """The displacement of each wall (locale, wall) into its room [m]; ``outward_m``: of a corridor's long walls."""
+    import networkx as nx  # slow to import, and few missions have such a building
+
     names, starts, ends, inward = _list_walls(spec)
     lengths = np.linalg.norm(ends - starts, axis=1)
     graph = nx.Graph()

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
 from world_models.building.geometry.outlines import distance_to_border, inside_polygon
 from world_models.building.locales import STEP_M, Finding, Locale, Thing
+from world_models.building.passages import find_firsts
 from world_models.building.world import World
 
 TOLERANCE_M = 0.01
@@ -163,12 +163,11 @@ def _reaches_into(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
 def _unreachable(world: World) -> Iterator[Finding]:
     if not world.rooms:
         return
-    joined = nx.Graph(world.passages)
-    joined.add_edges_from(link.between for link in world.links)
-    reached = nx.node_connected_component(joined, world.rooms[0])
+    joined = [*(doorway.between for doorway in world.doorways), *(link.between for link in world.links)]
+    firsts = find_firsts(world.rooms, joined)
     for name in world.rooms:
         locale = world.locales[name]
-        if name not in reached and not locale.properties.get("unreachable"):
+        if firsts[name] != world.rooms[0] and not locale.properties.get("unreachable"):
             yield Finding(locale.source, f"{name}: expected open doorways from {world.rooms[0]}, got none")
 
 

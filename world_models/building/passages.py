@@ -16,13 +16,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from world_models.building.locales import Doorway, Link
 
 if TYPE_CHECKING:
     from world_models.building.locale_frame import LocaleFrame
 
+Node = TypeVar("Node", bound=Hashable)
 Numbered = tuple[str, int]
 """A locale and the number of one of its components, all passages open."""
 
@@ -128,13 +129,26 @@ class _Hierarchy:
 
 def _number_components(nodes: list[Numbered], edges: list[PassageEdge]) -> dict[Numbered, int]:
     """The connected component of each node, numbered in the order of the nodes."""
-    import networkx as nx  # here, so that a frame can be read without it
+    firsts = find_firsts(nodes, (edge.between for edge in edges))
+    numbers = {first: number for number, first in enumerate(dict.fromkeys(firsts.values()))}
+    return {node: numbers[firsts[node]] for node in nodes}
 
-    graph: nx.Graph = nx.Graph()
-    graph.add_nodes_from(nodes)
-    graph.add_edges_from(edge.between for edge in edges)
-    numbers = {node: number for number, members in enumerate(nx.connected_components(graph)) for node in members}
-    return {node: numbers[node] for node in nodes}
+
+def find_firsts(nodes: Iterable[Node], pairs: Iterable[tuple[Node, Node]]) -> dict[Node, Node]:
+    """For each node, also those of the pairs alone, the first of all that pairs join it with, if not itself."""
+    beside: dict[Node, list[Node]] = {node: [] for node in nodes}
+    for a, b in pairs:
+        beside.setdefault(a, []).append(b)
+        beside.setdefault(b, []).append(a)
+    firsts: dict[Node, Node] = {}
+    for first in beside:
+        todo = [] if first in firsts else [first]
+        while todo:
+            node = todo.pop()
+            if node not in firsts:
+                firsts[node] = first
+                todo += beside[node]
+    return firsts
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,14 +276,7 @@ class OpenPassages:
     def _first_of(self, container: str, component: Component) -> Component:
         """The component by which all are named that open passages of a container join with this one."""
         if container not in self._groups:
-            import networkx as nx
-
-            graph: nx.Graph = nx.Graph(edge.between for edge in self.edges(container))
-            groups: dict[Component, Component] = {}
-            for first in graph:
-                if first not in groups:
-                    groups |= dict.fromkeys(nx.node_connected_component(graph, first), first)
-            self._groups[container] = groups
+            self._groups[container] = find_firsts((), (edge.between for edge in self.edges(container)))
         return self._groups[container].get(component, component)
 
     def _find_end(self, container: str, edge: PassageEdge, side: int) -> Component:

@@ -12,14 +12,19 @@ from dataclasses import dataclass
 from itertools import combinations, islice
 from typing import NamedTuple
 
-import networkx as nx
 import numpy as np
 import shapely
 from shapely import affinity
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import find_floor
-from knowledge_sources.methods.motion import SLACK_M, find_bends, find_free_space, is_clear
+from knowledge_sources.methods.motion import (
+    SLACK_M,
+    find_bends,
+    find_free_space,
+    is_clear,
+    list_shortest_routes,
+)
 from knowledge_sources.methods.verification import compute_coverage, predict_lines
 from world_models.building.building import Building
 from world_models.frames import Pose2, wrap_angle
@@ -323,14 +328,10 @@ def _list_ways(free: shapely.Geometry, step_m: float) -> Iterator[_Way]:
     slack = free.buffer(SLACK_M)
     shapely.prepare(slack)
     pairs = pairs[shapely.covers(slack, shapely.linestrings(nodes[pairs]))]
-    graph: nx.Graph = nx.Graph()
     lengths = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1)
-    graph.add_weighted_edges_from(zip(*pairs.T.tolist(), lengths.tolist(), strict=True))
-    if 0 not in graph:
-        return
-    away, routes = nx.single_source_dijkstra(graph, 0)
-    for node in sorted((k for k in away if k >= len(inner)), key=lambda k: (away[k], k)):
-        yield _Way(float(away[node]), nodes[routes[node][1:]])
+    routes = ((length_m, route) for length_m, route in list_shortest_routes(pairs, lengths) if route[-1] >= len(inner))
+    for length_m, route in sorted(routes, key=lambda found: (found[0], found[1][-1])):
+        yield _Way(length_m, nodes[route[1:]])
 
 
 def _find_last_heading(way: _Way) -> float:

@@ -5,7 +5,7 @@ from knowledge_sources.methods.motion.pure_pursuit import (
     find_aim, find_aim_point, lay_leg, measure_progress, plan_increment, plan_turn, steer_to, update_leg,
 )
 from knowledge_sources.methods.motion.routes import (
-    SLACK_M, compute_free_space, find_bends, find_free_space, find_nearest, is_clear,
+    SLACK_M, compute_free_space, find_bends, find_free_space, find_nearest, is_clear, list_shortest_routes,
 )
 from knowledge_sources.methods.motion.subgoals import CLEARANCES_M, SubgoalPlanner
 from knowledge_sources.methods.motion.ways_left import leads_through, meets
@@ -14,5 +14,5 @@ __all__ = [
     "CLEARANCES_M", "MAX_HEADING_ERROR_RAD", "MAX_LOOK_ERROR_RAD", "ROLLING_STOP_MARGIN_M", "SLACK_M",
     "SubgoalPlanner", "choose_speed", "compute_bearing", "compute_free_space", "count_increment", "find_aim",
     "find_aim_point", "find_bends", "find_free_space", "find_nearest", "is_clear", "lay_leg", "leads_through",
-    "measure_progress", "meets", "plan_increment", "plan_turn", "steer_to", "update_leg",
+    "list_shortest_routes", "measure_progress", "meets", "plan_increment", "plan_turn", "steer_to", "update_leg",
 ]

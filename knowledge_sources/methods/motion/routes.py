@@ -5,17 +5,18 @@ All coordinates are on the floor, in one frame, in metres.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from itertools import combinations
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from heapq import heappop, heappush
+from itertools import combinations, count
 from types import MappingProxyType
 from typing import Any
 
-import networkx as nx
 import numpy as np
 import shapely
 from shapely.geometry.polygon import orient
 
-from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.arrays import Floats, Ints
 from world_models.building.building import Building
 from world_models.building.locales import EXTRA_KIND
 
@@ -115,17 +116,38 @@ def find_shortest_route(
     nodes = np.array([*(p for p in inner if p is not None), *find_bends(free)])
     slack = free.buffer(SLACK_M)
     shapely.prepare(slack)
-    graph: nx.Graph = nx.Graph()
-    graph.add_nodes_from(range(len(nodes)))
     pairs = np.array(list(combinations(range(len(nodes)), 2)))
     pairs = pairs[shapely.covers(slack, shapely.linestrings(nodes[pairs]))]
     lengths = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1)
-    graph.add_weighted_edges_from(zip(*pairs.T.tolist(), lengths.tolist(), strict=True))
-    try:
-        route = nx.shortest_path(graph, 0, 1, weight="weight")
-    except nx.NetworkXNoPath:
-        return None
-    return _drop_repeats([ends[0], *(nodes[i] for i in route), ends[1]])
+    found = next((route for _, route in list_shortest_routes(pairs, lengths) if route[-1] == 1), None)
+    return None if found is None else _drop_repeats([ends[0], *(nodes[i] for i in found), ends[1]])
+
+
+def list_shortest_routes(pairs: Ints, lengths: Floats) -> Iterator[tuple[float, list[int]]]:
+    """The shortest route to each node that is joined with node 0, and its length, the shortest first (Dijkstra).
+
+    Not networkx, whose import takes longer than all searches of a mission.
+
+    Args:
+        pairs: (n, 2) nodes that are joined. lengths: (n,) of the way between.
+    """
+    beside: dict[int, list[tuple[int, float]]] = {}
+    for (a, b), length in zip(pairs.tolist(), lengths.tolist(), strict=True):
+        beside.setdefault(a, []).append((b, length))
+        beside.setdefault(b, []).append((a, length))
+    number = count()  # of routes of equal length the one that was found first comes first
+    todo: list[tuple[float, int, list[int]]] = [(0.0, next(number), [0])]
+    least, done = {0: 0.0}, set[int]()
+    while todo:
+        away, _, route = heappop(todo)
+        if route[-1] in done:
+            continue
+        done.add(route[-1])
+        yield away, route
+        for node, length in beside.get(route[-1], ()):
+            if node not in done and away + length < least.get(node, math.inf):
+                least[node] = away + length
+                heappush(todo, (away + length, next(number), [*route, node]))
 
 
 def measure_wall_distance_m(outline: Any, openings: Sequence[Any], point: Any) -> float:

@@ -27,7 +27,8 @@ class Listener(event.Listener):
     def on_end(self, event): pass
 event.register("numba:compile", Listener())
 import harvey
-harvey.run("lab-to-allens-office", seed=1, out="{out}")
+for mission in "lab-to-allens-office", "hallway-kidnap":
+    harvey.run(mission, seed=1, out="{out}/" + mission)
 print("compiled:", began)
 """
 
