@@ -211,7 +211,8 @@ class Bench:
     def move(self, turn_rad: float = 0.0, move_m: float = 0.5) -> tuple[Entry[MotorCommand], Entry[MotionReport]]:
         """A motor command, and the report that it was carried out; no belief has it yet."""
         command = self.put(MotorCommand(turn_rad, move_m))
-        return command, self.put(MotionReport(turn_rad, move_m, 1.0, 1.0), command)
+        until_s = 1.0 + len(self.view.all(MotionReport))
+        return command, self.put(MotionReport(turn_rad, move_m, 1.0, until_s), command)
 
 
 INEXACT: Mapping[str, Any] = {"expected": (((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),), "displacement_modes": ("wall",),

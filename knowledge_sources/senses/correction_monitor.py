@@ -11,7 +11,7 @@ from blackboard import Change, Effect, Level, Post, Posted, View, Watch
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import hedge
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, add_reports, is_worth_telling
+from knowledge_sources.reads import HELD, add_reports, follow_reports, is_worth_telling
 from knowledge_sources.reads.place_believed import MAX_P_RIVAL
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
@@ -33,6 +33,8 @@ SHARED_SIGMA_RAD = 0.0014
 """What a model, a camera and a matcher share of the heading (as ``SHARED_SIGMA_M`` of the place)."""
 WHEELS_PART, BEND_RAD_PER_M, ASIDE_M_PER_RAD = 0.25, 0.1, 0.05
 """Wheels that are wrong err by such a part of what they count, and so far aside, one standard deviation."""
+LAGS_S = tuple(0.1 * tenth for tenth in range(1, 11))
+"""So long before the wheels' report pictures may have been taken, one as likely as the other [s]: less does no harm."""
 ELSEWHERE_M, ELSEWHERE_RAD = 1.0, 1.0
 """How far off a robot is that was pushed or carried, or takes one place for another."""
 
@@ -45,7 +47,8 @@ def tells_place(certificate: Certificate) -> bool:
 class CorrectionMonitor(RobotKnowledgeSource):
     """Says where the motion from one picture to the next is not the one that the wheels counted.
 
-    A picture that never changes says that the robot stands; wheels that are wrong err by a part of what they count.
+    A picture that never changes says that the robot stands; wheels that are wrong err by a part of what they count; a
+    late picture shows where the robot was a while before, which is the same place only where it stood for so long.
     """
 
     level, priority = Level.PLAN, Priority.ENTER
@@ -66,7 +69,8 @@ class CorrectionMonitor(RobotKnowledgeSource):
         actuator, drift = HELD.of(view).robot.actuator, view.latest(Drift)
         known = Drift.unknown(actuator, here.heading_rad) if drift is None else drift.value
         spread = _spread(began.value, ended.value)
-        explained = _explain(seen, spread, actuator, known, [one.value for one in reports])
+        lagging = _list_lagging(view, actuator, known, len(reports))
+        explained = _explain(seen, spread, actuator, known, [one.value for one in reports], lagging)
         if not is_worth_telling(view, ABOUT, explained):
             return None
         shows = f"by pictures it moved {seen.x_m:+.2f} m ahead and {math.degrees(seen.heading_rad):+.0f} degrees"
@@ -88,8 +92,18 @@ def _spread(began: PoseFix, ended: PoseFix) -> Floats:
     return np.asarray(arm @ turn @ began.covariance @ turn.T @ arm.T + turn @ ended.covariance @ turn.T + 2.0 * shared)
 
 
+def _list_lagging(view: View, actuator: ActuatorModel, drift: Drift, since: int) -> tuple[Pose2, ...]:
+    """How the robot moved by so many of the last reports, had it each time been seen so much before, for each lag."""
+    reports = sorted((entry.value for entry in view.all(MotionReport)), key=lambda report: report.sim_time_s)
+    began_s = reports[-since].sim_time_s - reports[-since].duration_s
+    seen = ([follow_reports(actuator, drift, reports, at_s - lag) for at_s in (began_s, reports[-1].sim_time_s)]
+            for lag in LAGS_S)
+    return tuple(a.inverse() @ b for a, b in seen)
+
+
 def _explain(
-    seen: Pose2, spread: Floats, actuator: ActuatorModel, drift: Drift, reports: list[MotionReport]
+    seen: Pose2, spread: Floats, actuator: ActuatorModel, drift: Drift, reports: list[MotionReport],
+    lagging: tuple[Pose2, ...],
 ) -> tuple[Explanation, ...]:
     """What each rival makes of a motion by pictures, with its covariance, and of what the wheels report of it."""
     rolled = add_reports(actuator, drift, reports)
@@ -105,8 +119,12 @@ def _explain(
         "wheels": _log_density(off, usual + np.diag(np.square(wrong))) - plain,
         "still camera": _log_density(seen.minus(Pose2(0.0, 0.0, 0.0)), spread) - plain,
         "elsewhere": _log_density(off, usual + np.diag(np.square(far))) - plain}
+    late = [_log_density(seen.minus(moved), usual) - plain for moved in lagging]
+    if late:
+        ratios["late pictures"] = float(np.logaddexp.reduce(late)) - math.log(len(late))
     ahead = f"{off[0]:+.2f} m of {moved.x_m:.2f} m ahead"
     what = {"wheels": f"wheels that count wrongly by {ahead}", "still camera": "a camera whose picture does not change",
+            "late pictures": f"pictures that are {LAGS_S[int(np.argmax(late))] if late else 0.0:.1f} s late",
             "elsewhere": "a robot that was moved, or is elsewhere"}
     return (Explanation("chance", "chance", 0.0), *(
         Explanation(kind, what[kind], left) for kind, left in hedge(ratios).items()))

@@ -67,9 +67,9 @@ SLOW = {"localizer"}
 MAX_HIDDEN = 4
 """So many entries are hidden, one at a time, for each act."""
 ABROAD = {
-    "detour_finder", "door_toucher", "elevator_rider", "floor_changer", "goal_changer", "halt_explainer",
-    "lookout_planner", "obstruction_finder", "path_follower", "range_watcher", "rival_weigher", "sense_judge",
-    "shut_door_explainer", "thing_mover", "touch_finder", "view_updater"}
+    "correction_monitor", "detour_finder", "door_toucher", "elevator_rider", "floor_changer", "goal_changer",
+    "halt_explainer", "lens_monitor", "lookout_planner", "obstruction_finder", "path_follower", "range_watcher",
+    "rival_weigher", "sense_judge", "shut_door_explainer", "thing_mover", "touch_finder", "view_updater"}
 """They act in none of these runs: on one floor, of nothing touched or before the camera, without range sensors,
 with stops, and with senses that do not lie."""
 
