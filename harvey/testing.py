@@ -135,7 +135,8 @@ class Bench:
             Entry[entries.MotorCommand], Entry[entries.MotionReport]]:
         """A motor command, and the report that it was carried out; no belief has it yet."""
         command = self.put(entries.MotorCommand(turn_rad, move_m))
-        return command, self.put(entries.MotionReport(turn_rad, move_m, 1.0, 1.0), command)
+        until_s = 1.0 + len(self.view.all(entries.MotionReport))
+        return command, self.put(entries.MotionReport(turn_rad, move_m, 1.0, until_s), command)
 
 
 def change_of(entry: Entry[Any]) -> Change:

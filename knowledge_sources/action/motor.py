@@ -117,7 +117,7 @@ class Motor(RobotKnowledgeSource):
         command = plan_turn(seen.looking_rad, here, robot.actuator, MAX_LOOK_ERROR_RAD)
         if command is None:
             seen = replace(seen, looking_rad=None)
-            command = plan_increment(robot.actuator, seen, here, curvature_per_m, lookahead_m)
+            command = plan_increment(robot.actuator, seen, here, held.value.sigma_m, curvature_per_m, lookahead_m)
             if command is not None and command.move_m > 0.0 and self._settings.action.keeps_to_seen_floor:
                 floor = FloorAhead(view, seen, belief, self._settings)
                 (seen, command), reasons = floor.keep_to_seen(command), floor.because

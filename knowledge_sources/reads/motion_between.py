@@ -71,6 +71,17 @@ def bound_wheels_m(view: View, actuator: ActuatorModel, way_m: float) -> tuple[f
     return WHEELS_PART * abs(way_m) * NormalDist().inv_cdf(1.0 - 0.5 * RISK / wheels.p), (known,)
 
 
+def follow_reports(actuator: ActuatorModel, drift: Drift, reports: list[MotionReport], until_s: float) -> Pose2:
+    """Where the robot was at a time by what the wheels report, the oldest part first, in its frame before all of it."""
+    moved = Pose2(0.0, 0.0, 0.0)
+    for report in reports:
+        began_s = report.sim_time_s - report.duration_s
+        part = min(1.0, max(0.0, (until_s - began_s) / report.duration_s)) if report.duration_s else 1.0
+        turned = report.turn_rad if report.move_m and part else part * report.turn_rad  # it turns first, then moves
+        moved = moved @ actuator.predict_motion(turned, part * report.move_m, drift.curvature_per_m)
+    return moved
+
+
 def _measure_unsure_m(motion: MotionBetween) -> float:
     """How unsure it leaves where floor is seen that is so far away."""
     return motion.sigma_m + TYPICAL_M * motion.sigma_rad

@@ -11,7 +11,7 @@ from blackboard import Change, Effect, Level, Post, Posted, View, Watch
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import hedge
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, add_reports, is_worth_telling
+from knowledge_sources.reads import HELD, add_reports, follow_reports, is_worth_telling
 from knowledge_sources.reads.motion_between import MOTION, WHEELS_PART
 from knowledge_sources.reads.place_believed import MAX_P_RIVAL
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -35,8 +35,10 @@ BEND_RAD_PER_M, ASIDE_M_PER_RAD = 0.1, 0.05
 """Wheels that turn wrongly bend so much, and slip so far aside, one standard deviation."""
 MIN_REACH_M = 0.2
 """A shorter way does not tell how far the wheels go."""
-ELSEWHERE_M, ELSEWHERE_RAD = 1.0, 1.0
-"""How far off a robot is that was pushed or carried, or takes one place for another."""
+LAGS_S = tuple(0.1 * tenth for tenth in range(1, 11))
+"""So long before the wheels' report pictures may have been taken, each as likely [s]: less does no harm."""
+ELSEWHERE = 1.0, 1.0, 1.0
+"""How far off a robot is that was pushed or carried, or takes one place for another [m, m, rad]."""
 
 
 def tells_place(certificate: Certificate) -> bool:
@@ -49,6 +51,7 @@ class CorrectionMonitor(RobotKnowledgeSource):
 
     A picture that never changes says that the robot stands. Wheels may go another part of the way than they count, or
     turn otherwise: that is told apart, as a turn says nothing of the first, nor a straight way of the second.
+    A late picture shows where the robot was a while before, which is the same place only where it stood for so long.
     """
 
     level, priority = Level.PLAN, Priority.ENTER
@@ -68,8 +71,8 @@ class CorrectionMonitor(RobotKnowledgeSource):
         seen, here = began.value.world_from_robot.inverse() @ ended.value.world_from_robot, ended.value.world_from_robot
         actuator, drift = HELD.of(view).robot.actuator, view.latest(Drift)
         known = Drift.unknown(actuator, here.heading_rad) if drift is None else drift.value
-        spread = _spread(began.value, ended.value)
-        explained = _explain(seen, spread, actuator, known, [one.value for one in reports])
+        explained = _explain(seen, _spread(began.value, ended.value), actuator, known, [one.value for one in reports],
+                             _list_lagging(view, actuator, known, len(reports)))
         if not is_worth_telling(view, MOTION, explained):
             return None
         shows = f"by pictures it moved {seen.x_m:+.2f} m ahead and {math.degrees(seen.heading_rad):+.0f} degrees"
@@ -91,8 +94,18 @@ def _spread(began: PoseFix, ended: PoseFix) -> Floats:
     return np.asarray(arm @ turn @ began.covariance @ turn.T @ arm.T + turn @ ended.covariance @ turn.T + 2.0 * shared)
 
 
+def _list_lagging(view: View, actuator: ActuatorModel, drift: Drift, since: int) -> tuple[Pose2, ...]:
+    """How the robot moved by so many of the last reports, had it each time been seen so much before, for each lag."""
+    reports = sorted((entry.value for entry in view.all(MotionReport)), key=lambda report: report.sim_time_s)
+    began_s = reports[-since].sim_time_s - reports[-since].duration_s
+    seen = ([follow_reports(actuator, drift, reports, at_s - lag) for at_s in (began_s, reports[-1].sim_time_s)]
+            for lag in LAGS_S)
+    return tuple(a.inverse() @ b for a, b in seen)
+
+
 def _explain(
-    seen: Pose2, spread: Floats, actuator: ActuatorModel, drift: Drift, reports: list[MotionReport]
+    seen: Pose2, spread: Floats, actuator: ActuatorModel, drift: Drift, reports: list[MotionReport],
+    lagging: tuple[Pose2, ...],
 ) -> tuple[Explanation, ...]:
     """What each rival makes of a motion by pictures, with its covariance, and of what the wheels report of it."""
     rolled = add_reports(actuator, drift, reports)
@@ -101,23 +114,25 @@ def _explain(
     gone_m, turned_rad = (math.fsum(abs(part) for part in parts) for parts in (
         (one.move_m for one in reports), (one.turn_rad for one in reports)))
     aside_m = ASIDE_M_PER_RAD * turned_rad + BEND_RAD_PER_M * gone_m**2 / 2.0
-    along = np.array([moved.x_m, moved.y_m, 0.0])
+    along = np.array([*moved.position, 0.0])
     bent = np.diag(np.square([aside_m, aside_m, WHEELS_PART * turned_rad + BEND_RAD_PER_M * gone_m]))
-    far = ELSEWHERE_M, ELSEWHERE_M, ELSEWHERE_RAD
     plain = _log_density(off, usual)
+    late = [_log_density(seen.minus(moved), usual) - plain for moved in lagging]
     ratios: dict[RivalKind, float] = {
         "wheels": _log_density(off, usual + WHEELS_PART**2 * np.outer(along, along)) - plain,
         "turns": _log_density(off, usual + bent) - plain,
         "still camera": _log_density(seen.minus(Pose2(0.0, 0.0, 0.0)), spread) - plain,
-        "elsewhere": _log_density(off, usual + np.diag(np.square(far))) - plain}
+        "late pictures": float(np.logaddexp.reduce(late)) - math.log(len(late)),
+        "elsewhere": _log_density(off, usual + np.diag(np.square(ELSEWHERE))) - plain}
     reach, sigma = _measure_reach(seen, moved, usual, actuator.reach)
     what = {"wheels": f"wheels that go {reach:.2f} m a metre" if sigma else "wheels that go another part of the way",
             "turns": f"wheels that turned by {math.degrees(off[2]):+.1f} degrees more than they count",
+            "late pictures": f"pictures that are {LAGS_S[int(np.argmax(late))]:.1f} s late",
             "still camera": "a camera whose picture does not change",
             "elsewhere": "a robot that was moved, or is elsewhere"}
-    sizes = {"wheels": (reach, sigma)}
     return (Explanation("chance", "chance", 0.0), *(
-        Explanation(kind, what[kind], left, *sizes.get(kind, ())) for kind, left in hedge(ratios).items()))
+        Explanation(kind, what[kind], left, *((reach, sigma) if kind == "wheels" else ()))
+        for kind, left in hedge(ratios).items()))
 
 
 def _measure_reach(seen: Pose2, moved: Pose2, spread: Floats, reach: float) -> tuple[float, float]:
@@ -125,9 +140,9 @@ def _measure_reach(seen: Pose2, moved: Pose2, spread: Floats, reach: float) -> t
     way_m = math.hypot(moved.x_m, moved.y_m)
     if way_m < MIN_REACH_M:
         return 0.0, 0.0
-    along = np.array([moved.x_m, moved.y_m]) / way_m
-    return (reach * float(along @ (seen.x_m, seen.y_m)) / way_m,
-            reach * math.sqrt(float(along @ spread[:2, :2] @ along)) / way_m)
+    along = moved.position / way_m
+    sigma_m = math.sqrt(float(along @ spread[:2, :2] @ along))
+    return reach * float(along @ seen.position) / way_m, reach * sigma_m / way_m
 
 
 def _log_density(off: Floats, covariance: Floats) -> float:

@@ -10,7 +10,8 @@ from knowledge_sources.reads import GOING_ON, is_in_doubt
 from world_models.entries import MISLEADING, RISK, Difference, Discrepancy, Impasse, RivalKind
 
 WRONG: Mapping[RivalKind, str] = {
-    "lens": "the camera's lens is another", "still camera": "the camera stands still"}
+    "lens": "the camera's lens is another", "still camera": "the camera stands still",
+    "late pictures": "the camera's pictures come late"}
 """How a mission ends by a sense, in words."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -89,7 +90,7 @@ class SimulatedBody:
         self._touching_rad: float | None = None
         self._contact: Contact | None = None
         self._motion = ContinuousMotion()
-        self._frozen_until_s, self._delivered = 0.0, b""
+        self._frozen_until_s, self._lag_s, self._delivered = 0.0, 0.0, b""
         self._truth = Truth(start, locale=building.locale_at(start))
         there = self._draw_put_down(put_down_rng, put_down_sigma_m, put_down_sigma_rad)
         self._truth = Truth(there, locale=building.locale_at(there))
@@ -301,11 +302,19 @@ class SimulatedBody:
 
     def picture(self) -> bytes:
         """The JPEG bytes of a picture at this moment; it takes no time and is not counted."""
-        return self._deliver(self._camera.take_jpeg(self._building, self._truth, self._motion))
+        return self._deliver(self._camera.take_jpeg(self._building, self._seen, self._motion))
 
     def _take_frame(self, purpose: str) -> CameraPicture:
-        frame = self._camera.take_frame(self._building, self._truth, self._motion, purpose)
-        return replace(frame, jpeg=self._deliver(frame.jpeg))
+        frame = self._camera.take_frame(self._building, self._seen, self._motion, purpose)
+        return replace(frame, jpeg=self._deliver(frame.jpeg), sim_time_s=self._truth.time_s)
+
+    @property
+    def _seen(self) -> Truth:
+        """The state that a picture of now shows: an earlier one, where pictures come late."""
+        if not self._lag_s:
+            return self._truth
+        number = bisect_right(self._track, self._truth.time_s - self._lag_s, key=lambda truth: truth.time_s)
+        return self._track[max(0, number - 1)]
 
     def _deliver(self, jpeg: bytes) -> bytes:
         """A picture as it leaves the camera: the last one again, where that is frozen."""
@@ -410,6 +419,10 @@ class SimulatedBody:
     def freeze_camera(self, duration_s: float) -> None:
         """Have the camera deliver its last picture for a while."""
         self._frozen_until_s = self._truth.time_s + duration_s
+
+    def delay_camera(self, lag_s: float) -> None:
+        """Have the camera deliver what it saw so long ago from now on."""
+        self._lag_s = lag_s
 
     def add_occluder(self, occluder: Occluder) -> None:
         """Put something before the camera, until its time is over."""

@@ -284,6 +284,27 @@ class CameraFrozen(Fault):
 
 
 @dataclass(frozen=True, slots=True)
+class PicturesLag(Fault):
+    """From then on pictures show what was to be seen a while before, and nothing says so.
+
+    Attributes:
+        lag_s: how long before [s].
+    """
+
+    kind: ClassVar[str] = "pictures_lag"
+    bounds: ClassVar[Mapping[str, Bounds]] = {"lag_s": DURATION}
+
+    lag_s: float = 0.3
+
+    @property
+    def words(self) -> str:
+        return f"pictures come {self.lag_s:g} s late from then on"
+
+    def apply(self, body: FaultTarget) -> None:
+        body.delay_camera(self.lag_s)
+
+
+@dataclass(frozen=True, slots=True)
 class CameraKnocked(Fault):
     """Something knocks against the camera: its mounting is turned, and stays so.
 

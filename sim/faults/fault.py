@@ -57,6 +57,10 @@ class FaultTarget(Protocol):
         """Have the camera deliver its last picture from now on, for a while."""
         ...
 
+    def delay_camera(self, lag_s: float) -> None:
+        """Have the camera deliver what it saw so long ago from now on, as if it were new."""
+        ...
+
     def turn_camera(self, tilt_rad: float, roll_rad: float, yaw_rad: float) -> None:
         """Turn the camera's mounting from now on: downward, clockwise as it looks, to the left."""
         ...

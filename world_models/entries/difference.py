@@ -13,14 +13,14 @@ LAST_EVIDENCE = 64
 """The newest evidence that stays on the board; what it said stays in the difference."""
 
 RivalKind = Literal[
-    "chance", "thing", "jamb", "leaf", "wall", "dirt", "still camera", "lens", "focal length", "mounting", "wheels",
-    "turns", "elsewhere",
+    "chance", "thing", "jamb", "leaf", "wall", "dirt", "still camera", "late pictures", "lens", "focal length",
+    "mounting", "wheels", "turns", "elsewhere",
 ]
 SENSES: frozenset[RivalKind] = frozenset({
-    "dirt", "still camera", "lens", "focal length", "mounting", "wheels", "turns"})
+    "dirt", "still camera", "late pictures", "lens", "focal length", "mounting", "wheels", "turns"})
 """Rivals by which not the building or the belief is wrong, but a sense is."""
 
-MISLEADING: frozenset[RivalKind] = frozenset({"still camera", "lens"})
+MISLEADING: frozenset[RivalKind] = frozenset({"still camera", "late pictures", "lens"})
 """Senses that tell wrong places, of which nothing is learnt on the way."""
 
 MODEL = "the model of the building"

@@ -105,12 +105,14 @@ def choose_speed(free_m: float, most_m_per_s: float, actuator: ActuatorModel, cr
 
 
 def plan_increment(
-    actuator: ActuatorModel, leg: Leg, here: Pose2, curvature_per_m: float, lookahead_m: float
+    actuator: ActuatorModel, leg: Leg, here: Pose2, sigma_m: float, curvature_per_m: float, lookahead_m: float
 ) -> MotorCommand | None:
-    """The next increment from a pose (world); None on arrival. A move is an arc whose chord points at the aim.
+    """The next increment from a pose (world), known to ``sigma_m``; None on arrival. A move is an arc whose chord
+    points at the aim.
 
-    Near its end it may turn for nothing: what it follows shifts its belief in turning. After a full turn without a move
-    it has arrived: the look at the milestone tells by how far it missed.
+    It turns and looks before it moves, but not for less than what the direction of its aim is unknown by: what it
+    follows shifts its belief in turning, and so near its end it would turn for nothing. After a full turn without a
+    move it has arrived: the look at the milestone tells by how far it missed.
     """
     if leg.turned_rad > math.tau:
         return None
@@ -119,8 +121,10 @@ def plan_increment(
     away = math.hypot(leg.x1_m - here.x_m, leg.y1_m - here.y_m)
     if away <= within_m or (along <= 0.0 and abs(left) <= within_m):
         return plan_turn(leg.heading_rad, here, actuator, MAX_ARRIVAL_HEADING_ERROR_RAD)
-    turn = compute_bearing(find_aim(leg, here, lookahead_m), here)
-    if abs(turn) > MAX_HEADING_ERROR_RAD:
+    aim = find_aim(leg, here, lookahead_m)
+    turn = compute_bearing(aim, here)
+    unknown_rad = math.atan2(sigma_m, math.hypot(aim[0] - here.x_m, aim[1] - here.y_m))
+    if abs(turn) > max(MAX_HEADING_ERROR_RAD, min(unknown_rad, actuator.turn_increment_rad)):
         return MotorCommand(limit_turn(turn, actuator), 0.0)
     distance = min(actuator.increment_m, actuator.compute_command_m(away))
     turn = compute_chord_turn(turn, curvature_per_m, actuator.reach * distance)

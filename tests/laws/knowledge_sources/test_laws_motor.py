@@ -339,6 +339,18 @@ def test_after_a_touch_that_the_model_explains_it_moves_away_from_it_once(
         assert 0.36 + 0.15 * math.sin(found.turn_rad) > 0.35  # not against the wall
 
 
+@given(st.floats(-3.0, 3.0), st.floats(0.011, 0.2), st.floats(0.0, 0.05))
+def test_it_does_not_turn_for_less_than_what_the_direction_of_its_aim_is_unknown_by(
+    turn_rad: float, gap_m: float, sigma_m: float
+) -> None:
+    leg, here = Leg("PlanSketch-1", 0, 0.0, 0.0, 1.0, 0.0, 0.01), Pose2(1.0 - gap_m, 0.0, -turn_rad)
+    sure, unsure = (plan_increment(ACTUATOR, leg, here, sigma, 0.0, 0.5) for sigma in (0.0, sigma_m))
+    assert sure is not None and unsure is not None and (sure.move_m > 0.0) == (abs(turn_rad) <= math.radians(3.0))
+    most_rad = max(math.radians(3.0), min(math.atan2(sigma_m, gap_m), ACTUATOR.turn_increment_rad))
+    assert unsure == sure if abs(turn_rad) > most_rad else unsure.move_m > 0.0
+    assert unsure.move_m == 0.0 or unsure.turn_rad == pytest.approx(turn_rad, abs=0.001)
+
+
 @settings(deadline=None, max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), gap_m=st.floats(0.011, 0.2))
 def test_a_leg_is_not_turned_to_for_ever(seed: int, gap_m: float) -> None:
@@ -347,7 +359,7 @@ def test_a_leg_is_not_turned_to_for_ever(seed: int, gap_m: float) -> None:
     for _ in range(400):
         bearing, side = rng.uniform(-math.pi, math.pi, 2)
         here = Pose2(1.0 + gap_m * math.cos(bearing), gap_m * math.sin(bearing), side)
-        command = plan_increment(ACTUATOR, leg, here, 0.0, 0.5)
+        command = plan_increment(ACTUATOR, leg, here, 0.0, 0.0, 0.5)
         if command is None:
             break
         turned_rad = 0.0 if command.move_m > 0.0 else turned_rad + abs(command.turn_rad)
