@@ -23,7 +23,7 @@ from world_models.files.regular_files import read_regular
 
 RUNS = Path("runs")
 """Where runs are kept without ``--out``."""
-FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json", "camera.toml")
+FILES = ("run.json", "journal.jsonl", "camera.mjpeg", "recording.rrd", "result.json", "camera.toml", "told.txt")
 MOST_JSON_BYTES = 20_000_000
 """Of the files of a run that are read as a whole."""
 JOURNAL_VERSION = 3

@@ -103,10 +103,25 @@ class ScenarioLimits(Limits):
     max_collisions: int = bounded(3, 0, MAX_NUMBER)
 
 
+@dataclass(frozen=True, slots=True)
+class Attendant(Bounded):
+    """One of a scenario's ``[[helper]]``: a person in a room, who does what the robot waits for, and says so.
+
+    Attributes:
+        room: where this person is; "" for anywhere.
+        comes_s: how long the robot has waited when it is done [s].
+        says: the word; after a stop the robot needs "go on".
+    """
+
+    room: str = ""
+    comes_s: float = bounded(4.0, 0.0, 1e6)
+    says: str = "done"
+
+
 FORMAT = MissionFormat(
     {**TABLES, "limits": ScenarioLimits, "camera": CameraSettings, "render": Render, "actuator": ActuatorParameters,
      "sensor": SensorParameters, "bumper": Bumper, "ranges": RangeRing},
-    ("details", "faults", "light", "moved", "rides", "truth"),
+    ("details", "faults", "helper", "light", "moved", "rides", "truth"),
     {"truth.camera": TrueCamera, "truth.inexact": TrueInexact, "light": Lighting},
 )
 
@@ -118,6 +133,7 @@ class Scenario(Mission):
     Attributes:
         details: files of what the building has and the robot's model lacks.
         faults: what goes wrong, in the order of the file.
+        helper: who says the words for which the robot waits.
         moved: things that stand elsewhere than in the robot's model.
         rides: who presses the buttons of elevators.
         truth: what differs from the robot's model.
@@ -133,6 +149,7 @@ class Scenario(Mission):
     bumper: Bumper
     ranges: RangeRing
     faults: tuple[Fault, ...] = ()
+    helper: tuple[Attendant, ...] = ()
     moved: tuple[MovedThing, ...] = ()
     rides: tuple[Helper, ...] = ()
     truth: TruthTable = NO_DIFFERENCES
@@ -199,6 +216,7 @@ def _scenario(source: Source, name: str, folder: Path) -> Scenario:
     return Scenario(
         details=tuple(named_file(text, ROOT / "sim" / "buildings", folder) for text in details),
         faults=tuple(read_fault(item) for item in node["faults"].items()) if "faults" in node else (),
+        helper=read_all(node, "helper", Attendant),
         moved=read_all(node, "moved", MovedThing),
         rides=read_all(node, "rides", Helper),
         truth=read_settings(node["truth"], TruthTable) if "truth" in node else NO_DIFFERENCES,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
 
 import numpy as np
 
@@ -193,7 +194,9 @@ def _find_room_in(room_words: str, words: str, world: World, containers: Sequenc
     if len(rooms) == 1:
         return rooms[0]
     if not rooms:
-        raise ValueError(f"no room of {world.name} answers to {words!r}")
+        near = get_close_matches("-".join(sorted(words_of(words) - STOP_WORDS)), world.rooms, 3)
+        nearest = f"; the nearest are {' and '.join(near)}" if near else ""
+        raise ValueError(f"no room of {world.name} answers to {words!r}{nearest}")
     more = f" and {len(rooms) - MAX_NAMED} more" if len(rooms) > MAX_NAMED else ""
     raise ValueError(f"{NUMBERS.get(len(rooms), len(rooms))} rooms answer to {words!r}:"
                      f" {', '.join(rooms[:MAX_NAMED])}{more}")

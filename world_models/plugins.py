@@ -40,6 +40,7 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
         "imported-building": "harvey-buildings", "instructions": "harvey-words",
         "other-worlds": "harvey-miniworld", "rosmaps": "harvey-buildings",
         "watchers": "harvey-serve"},
+    SOURCES_GROUP: dict.fromkeys(("problem_solver", "step_closer", "task_reader"), "harvey-words"),
     PAGES_GROUP: {"live": "harvey-serve"}, WORKERS_GROUP: {"dask": "harvey-cluster"},
     RENDERERS_GROUP: {"lit": "harvey-light"},
     **{group: {"p2os": "harvey-bases", "create2": "harvey-bases", "ros2": "harvey-ros2"}

@@ -31,6 +31,7 @@ OPTIONS: Mapping[str, tuple[str, str, str]] = {
     "world": ("world", "FILE", "the building: a world file, or the name of one that comes with Harvey"),
     "goal": ("goal", "GOAL", 'from where to where: "Go from the hall to the kitchen", middle to middle; or in feet '
              'in each locale: "(ptrans (hall (3,4,0)) (kitchen (6,5,0)))"'),
+    "tell": ("task", "TASK", 'what to do from there, as "Fetch the book"; needs harvey-words'),
     "heading": ("start.heading_deg", "DEGREES", "where the robot looks at the start, in the first locale's frame"),
     "base": ("base.port", "BASE", "denning:PORT, as denning:/dev/ttyUSB0; with harvey-bases p2os:PORT or create2:PORT,"
              " with harvey-ros2 ros2:robot.toml"),

@@ -35,6 +35,9 @@ def _add_run_arguments(parser: ArgumentParser) -> None:
                         help="change a setting of the scenario, as servo.action=off, or a number of harvey settings,"
                              " as plan.max_leg_m=2; camera.tilt_deg, wheels.reach and the like change what the robot"
                              " believes of itself, not what is true; may be repeated")
+    parser.add_argument("--tell", metavar="TEXT",
+                        help='what to do from where it starts, instead of its goal, as "Fetch the book"; needs'
+                             " harvey-words; --set task=TEXT says the same")
     parser.add_argument("--body", metavar="BODY", default="simulated",
                         help="how the simulated body is reached: simulated, or over an emulated serial line as"
                              " serial:denning; with harvey-bases serial:p2os or serial:create2 (simulated)")
@@ -58,6 +61,8 @@ def _run_run(args: Namespace) -> int:
     workers, seeds, settings = parse_workers(args), parse_seeds(args.seed), parse_pairs(args.settings)
     from harvey.campaign.mission_task import Task
     from harvey.simulation.serial_body import body_kind
+
+    settings = settings if args.tell is None else (*settings, ("task", args.tell))
 
     body = body_kind(args.body)
     if args.random is not None:
@@ -188,6 +193,7 @@ RUN = CliCommand(
         ("harvey run lab-to-allens-office --check", "which milestones it will have, and how well each tells the place"),
         ("harvey run hallway-kidnap --seed 3 --trace", "print who acts in each cycle, and what comes of it"),
         ("harvey run shut-door", "told on the way that a door is shut ([[told]] in its file)"),
+        ("harvey run lab-to-allens-office --tell 'Fetch the book'", "to the shelves, a person loads it, and back"),
         ("harvey run bump --set servo.action=off", "without correcting on the move"),
         ("harvey run bump --set plan.max_leg_m=2", "with another number of harvey settings"),
         ("harvey run lab-to-allens-office --body serial:p2os", "the body behind an emulated Pioneer's serial line"),

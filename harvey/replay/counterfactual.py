@@ -21,7 +21,7 @@ from harvey.runner.replay import Live, ignore, open_originals
 from harvey.runner.result import UNFINISHED, MissionResult, format_error
 from harvey.runner.resume import RESUME
 from harvey.runner.run import Over, run_to_outcome
-from harvey.runner.teller import PAGE, USER
+from harvey.runner.teller import PAGE, SOMEBODY, USER
 from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.simulation.simulated_run import SimulatedRun, rebuild_stage
 from logs.explain.phrases import sentence
@@ -94,14 +94,14 @@ def what_if(
         make_room(out.path, head.name, head.seed)
     recorder = RunRecorder(out, head, agent.world, agent.robot)
     if head.kind != SIMULATOR:
-        ports, retold = (WorldPort(agent.store),), Retelling(player.records, (USER, PAGE), player.originals)
+        ports, retold = (WorldPort(agent.store),), Retelling(player.records, (USER, PAGE, SOMEBODY), player.originals)
         scheduler = agent.scheduler(ports=ports, sinks=(*recorder.sinks, player.compare))
         try:
             outcome = player.play(scheduler, agent, head, recorder, before=lambda: _ask(scheduler, agent, retold))
             return player.answer(outcome, None)
         finally:
             recorder.close()
-    retold = Retelling(player.records, (PAGE,), player.originals)
+    retold = Retelling(player.records, (PAGE, SOMEBODY), player.originals)
     with SimulatedRun(rebuild_stage(head), head, agent, recorder, (player.compare,), tell=retold.tell) as simulated:
         result = simulated.drive(out, lambda: _run_changed(simulated, agent, player, go_on))
     return player.answer(Outcome(result.outcome, result.reason), result)

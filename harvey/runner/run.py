@@ -15,7 +15,7 @@ from harvey.agent import Agent
 from harvey.errors import BadInput
 from harvey.runner.ports import Body, BodyPort
 from harvey.runner.result import UNFINISHED, MissionResult, RunCounts
-from harvey.runner.teller import Tell, Teller, tell_nothing
+from harvey.runner.teller import FileTeller, Tell, Teller, tell_each, tell_nothing
 from harvey.runner.world_port import WorldPort, tell_robot
 from logs.disk import CannotWriteError
 from logs.run_directory import RunDirectory
@@ -125,6 +125,7 @@ class Run:
             start: from where to where: :meth:`begin`, or what brings a run that was cut off to its end.
         """
         start = start or self.begin
+        self._tell = self._tell if files is None else tell_each(self._tell, FileTeller(files.path).tell)
         try:
             if files is not None:
                 files.write_result({"scenario": self.head.name, "seed": self.head.seed, "outcome": UNFINISHED})

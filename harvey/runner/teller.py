@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from blackboard import Post, Scheduler
 from world_models.entries import Redirection, UserReport
 from world_models.files.toml.mission import Telling
 
-USER, PAGE = "user", "live page"
+USER, PAGE, SOMEBODY = "user", "live page", "harvey tell"
 """Who tells: the mission's file, or somebody while the run goes on."""
+TOLD_FILE = "told.txt"
+"""In a run's folder: what it is told by another process."""
 Tell = Callable[[Scheduler], None]
 """Called before each cycle of a run; puts on the board what somebody tells the robot."""
 
@@ -60,6 +63,20 @@ class LiveTeller:
             except Empty:
                 return
             scheduler.post([Post(said)], PAGE)
+
+
+class FileTeller:
+    """Tells what ``harvey tell`` writes into a run's folder while it goes on, a line each; the board knows the last."""
+
+    def __init__(self, folder: Path) -> None:
+        self._file = folder / TOLD_FILE
+
+    def tell(self, scheduler: Scheduler) -> None:
+        """Tell the lines that are whole and were not told yet."""
+        if self._file.is_file():
+            lines = self._file.read_text(encoding="utf-8").split("\n")[:-1]
+            told = len(scheduler.view.where(Redirection, lambda asked: asked.by == SOMEBODY))
+            scheduler.post([Post(Redirection(line, SOMEBODY)) for line in lines[told:]], SOMEBODY)
 
 
 def _count_tellings(scheduler: Scheduler) -> int:

@@ -12,7 +12,7 @@ from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage
 from sim.truth import cross_track_m
 from world_models.building.world import World
-from world_models.entries import Certificate, Goal, Hypothesis, Leg, PoseFix, Redirection
+from world_models.entries import Certificate, Goal, Hypothesis, Leg, Place, PoseFix
 from world_models.frames import Pose2, wrap_angle
 
 MAX_TRUE_ERROR_M = 0.15
@@ -29,6 +29,7 @@ class Referee:
         self._false_accepts = 0
         self._max_cross_track_m = 0.0
         self._leg: Leg | None = None
+        self._destination: Place | None = None
         self._fix: Pose2 | None = None
         self._followed = 0
         self._contact_watch = ContactWatch(world, body)
@@ -39,11 +40,12 @@ class Referee:
     def __call__(self, decision: Decision) -> None:
         self._follow()
         self._note_events(decision.cycle)
-        is_redirected = any(isinstance(change.entry.value, Redirection) for change in decision.made)
         for change in decision.made:
             value = change.entry.value
-            if is_redirected and isinstance(value, Goal) and value.is_active:
-                self._stage = self._stage.going_to(value.destination)
+            if isinstance(value, Goal) and value.is_active and value.destination != self._destination:
+                if self._destination is not None:
+                    self._stage = self._stage.going_to(value.destination)
+                self._destination = value.destination
             elif isinstance(value, Leg):
                 self._leg = value if value.status == "moving" else None
             elif isinstance(value, PoseFix):

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
-from blackboard import Sink
+from blackboard import Post, Scheduler, Sink
 from harvey.agent import Agent, Sources, build_agent
 from harvey.agent_settings import Pairs
 from harvey.errors import BadInput
@@ -16,7 +17,7 @@ from harvey.runner.replay import check_same, open_originals, replay
 from harvey.runner.result import UNFINISHED, MissionResult
 from harvey.runner.resume import Remains, continue_run, find_remains, replay_run
 from harvey.runner.run import Run
-from harvey.runner.teller import Tell, tell_nothing
+from harvey.runner.teller import Tell, tell_each, tell_nothing
 from harvey.simulation.body_replay import BodyReplay
 from harvey.simulation.happenings import ContactWatch, HappeningWatch
 from harvey.simulation.referee import Referee
@@ -25,15 +26,19 @@ from harvey.wiring import knowledge_sources
 from logs.run_directory import RunDirectory
 from logs.run_head import HARDWARE, SIMULATOR, RunHead, load_known_world, portable
 from logs.run_recorder import RunRecorder
-from sim.scenario import Scenario, ScenarioError, scenario_from_tables
+from sim.body.simulated_body import SimulatedBody
+from sim.scenario import Attendant, Scenario, ScenarioError, scenario_from_tables
 from sim.stage import Stage, build_stage
 from world_models.actuator import ActuatorModel
 from world_models.building.geometry.faces import Face
 from world_models.building.world import World
+from world_models.entries import Recovery, Redirection
 from world_models.files.toml.mission import ROOT
 from world_models.files.world_files import load_world
 from world_models.robot import RobotModel
 
+HELPER = "helper"
+"""Who says the word for which the robot waits."""
 Around = Callable[[Body, Callable[[], bool]], Body]
 """Puts something between the agent and the body; the second argument says whether the run is only replayed."""
 
@@ -178,7 +183,8 @@ class SimulatedRun(Run):
         super().__init__(
             head, agent, reached, recorder, limits=stage.scenario.limits, clock=lambda: body.truth.time_s,
             referee=Referee(agent.world, stage, body), sinks=sinks,
-            told=stage.scenario.told, tell=tell, before_cycle=self._draw_truth)
+            told=stage.scenario.told, tell=tell_each(tell, partial(_let_help, stage.scenario.helper, body)),
+            before_cycle=self._draw_truth)
         self.body_replay = BodyReplay(self.port, body, head.seed, stage.scenario.actuator)
 
     def _draw_truth(self) -> None:
@@ -195,3 +201,14 @@ class SimulatedRun(Run):
 
     def __exit__(self, *_exception: object) -> None:
         self._line.close()
+
+
+def _let_help(people: Sequence[Attendant], body: SimulatedBody, scheduler: Scheduler) -> None:
+    """Once a person in the room has done what the robot waits for, they say so; after each wait once."""
+    wait, said = scheduler.view.latest(Recovery, lambda wait: not wait.request), scheduler.view.latest(Redirection)
+    if wait is None or wait.value.status != "still failing" or (said is not None and said.cycle >= wait.cycle):
+        return
+    for person in people:
+        if person.room in ("", body.truth.locale) and wait.value.waited_s >= person.comes_s:
+            scheduler.post([Post(Redirection(person.says, HELPER))], HELPER)
+            return

@@ -21,14 +21,16 @@ def find_asked(view: View, _trigger: Change) -> Asked | None:
 
 
 @rule(on=(Watch(Redirection, (Posted,)), Watch(Goal, (Posted,), lambda goal: goal.is_active)),
-      writes=(Redirection, Goal, Milestone, FrameRequest), needs=(GOAL, HELD), bind=find_asked, priority=Priority.ENTER)
+      writes=(Redirection, Goal, Milestone, FrameRequest), needs=(GOAL, HELD), bind=find_asked,
+      priority=Priority.REVISE)
 def goal_changer(view: View, case: Asked) -> Iterable[Effect]:
     """Abandons the goal for the one that somebody asks for, from where the robot believes to be.
 
     A milestone that waits to be judged is withdrawn; the goal sketcher supersedes the old goal's sketches. A robot that
     is lost keeps its goal, with the new destination, until it knows from where to go. What cannot be understood is
     answered, and the robot goes on as before. It acts at once, before the next increment; where there is no goal yet,
-    when there is one. Of what was asked meanwhile the last counts.
+    when there is one. Of what was asked meanwhile the last counts. A source of another package that understands more
+    than one place comes first, at the priority of what is entered.
     """
     (*overtaken, asked), goal, belief, building = case, GOAL.of(view), HELD.of(view), find_building(view)
     for earlier in overtaken:

@@ -330,7 +330,8 @@ def steps(subgoals: Iterable[Any]) -> str:
 
 
 def goal(value: Goal) -> str:
-    said = {"reached": "The goal was reached", "abandoned": "The goal was given up for a new one"}
+    said = {"reached": "The goal was reached", "visited": "The place was visited",
+            "abandoned": "The goal was given up for a new one"}
     way = f"from {place(value.origin)} to {place(value.destination)}"
     return f"{said.get(value.status, 'All of it serves the goal')}: {way}."
 

@@ -11,7 +11,7 @@ from world_models import words
 from world_models.building.model_errors import LineErrors, unpack_errors
 from world_models.entries.location import Covariance, Place
 
-GoalStatus = Literal["active", "reached", "abandoned"]
+GoalStatus = Literal["active", "reached", "visited", "abandoned"]
 SketchStatus = Literal["active", "done", "halted", "superseded"]
 LegStatus = Literal["moving", "arrived", "halted"]
 MilestoneVerdict = Literal["verified", "refuted", "not testable"]
@@ -62,7 +62,7 @@ class Goal:
     """A top-level goal: ptrans from one place to another.
 
     Attributes:
-        status: active, reached or abandoned (a new one replaces it, §2).
+        status: active, reached, visited (reached, and more are to come) or abandoned (a new one replaces it, §2).
     """
 
     origin: Place
@@ -368,7 +368,7 @@ class Impasse:
     is_open: bool = True
 
     def sentence(self) -> str:
-        return f"no way on: {self.reason}" if self.is_open else f"another look is taken, as {self.reason}"
+        return f"no way on: {self.reason}" if self.is_open else f"something else is tried, as {self.reason}"
 
 
 @inference()

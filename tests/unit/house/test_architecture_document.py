@@ -103,7 +103,7 @@ def test_what_is_told_in_the_document_of_locale_frames_is_told() -> None:
     told, = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     mission = parse_scenario(f'world = "two_ways"\ngoal = "(ptrans (reception (9,8,0)) (archive (9,6,0)))"\n{told}')
     assert mission.told == load_scenario("shut-door").told
-    assert {field.name for field in fields(Telling)} == {*tomllib.loads(told)["told"][0], "goal"}
+    assert {field.name for field in fields(Telling)} == {*tomllib.loads(told)["told"][0], "goal", "task"}
     assert "`goal = " in text
 
 

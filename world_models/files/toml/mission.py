@@ -28,6 +28,7 @@ from world_models.files.toml.settings_reader import (
     suggest_keys,
 )
 from world_models.files.toml.source import WORLDS, Node, Source, WorldError
+from world_models.plugins import SOURCES_GROUP, list_absent
 from world_models.units import Bounded, Bounds, bounded, check_bounds
 
 ROOT = WORLDS.parents[1]
@@ -81,15 +82,23 @@ class Telling(Bounded):
         what: name of a door or thing, as ``library-door`` or ``allens-office/desk``.
         state: shut or open (a door), gone or there (a thing).
         goal: where to go instead, as "Go to the library", or "go on"; then ``what`` and ``state`` are left out.
+        task: what to do instead, as "Fetch the book", read on the way (needs harvey-words); then all others are.
     """
 
     at_s: float = bounded(0.0, 0.0, MAX_NUMBER)
     what: str = ""
     state: str = ""
     goal: str = ""
+    task: str = ""
 
     def __post_init__(self) -> None:
         Bounded.__post_init__(self)
+        if self.task:
+            if self.goal or self.what or self.state:
+                raise ValueError("expected either task, or goal, or what and state, got several")
+            if TASK_READER in (absent := list_absent(SOURCES_GROUP)):
+                raise ValueError(f"expected what reads tasks to be installed, which needs {absent[TASK_READER]}")
+            return
         if self.goal:
             if self.what or self.state:
                 raise ValueError("expected either goal, or what and state, got both")
@@ -104,13 +113,15 @@ class Telling(Bounded):
     @property
     def entry(self) -> UserReport | Redirection:
         """What is put on the board."""
-        if self.goal:
-            return Redirection(self.goal)
+        if self.task or self.goal:
+            return Redirection(self.task or self.goal)
         state: ReportedState = next(state for state in get_args(ReportedState) if state == self.state)
         return UserReport(self.what, state)
 
     def find_fault(self, world: World) -> str:
         """What is wrong where a world has no such door, thing or room, in words; "" where it has."""
+        if self.task:
+            return ""
         if self.goal:
             try:
                 _ = self.goal == GO_ON or parse_destination(self.goal, world)
@@ -183,7 +194,8 @@ class Safety:
 TABLES: Mapping[str, type[Any]] = {
     "start": Start, "arrival": Arrival, "servo": Servo, "motion": Motion, "safety": Safety, "limits": Limits}
 """The tables that every mission may have."""
-TEXTS = ("description", "world", "goal")
+TASK_READER = "task_reader"
+TEXTS = ("description", "world", "goal", "task")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -194,7 +206,7 @@ class Mission:
         name: the file's, without its ending.
         world: the world file that the robot believes in.
         goal: in words, or in conceptual-dependency form with coordinates in feet.
-        told: what the robot is told on the way.
+        told: what the robot is told on the way; first the ``task`` of the file, if it has one.
         folder: where the file is; file names in it are relative to it.
         source: the file, with the settings that replaced some of its values.
     """
@@ -257,10 +269,11 @@ class MissionFormat:
 
     def read(self, source: Source, name: str, folder: Path) -> dict[str, Any]:
         """The attributes of a :class:`Mission`, and the other tables of the format. Raises WorldError."""
-        node = source.root.table(("world", "goal"), ("description", "told", *self.others, *self.tables))
+        node = source.root.table(("world", "goal"), ("description", "task", "told", *self.others, *self.tables))
         tables = {key: read_settings(node[key], kind) if key in node else kind() for key, kind in self.tables.items()}
+        first = (Telling(task=node["task"].text()),) if "task" in node else ()
         return {
-            "told": read_all(node, "told", Telling), "name": name,
+            "told": (*first, *read_all(node, "told", Telling)), "name": name,
             "description": node["description"].text() if "description" in node else "",
             "world": named_file(node["world"].text(), WORLDS, folder), "goal": _goal(node["goal"]),
             "folder": folder, "source": source, **tables,

@@ -1,0 +1,50 @@
+"""Tasks: what a text asks for, however it is said, and the shortest tour."""
+
+from __future__ import annotations
+
+import tomllib
+from itertools import pairwise, permutations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from harvey_words.task_tour import order_stops
+from harvey_words.task_words import TaskWordsError, read_wanted
+
+TEXTS = tomllib.loads((Path(__file__).parent / "data/tasks.toml").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("texts", TEXTS["alike"])
+def test_paraphrases_ask_for_the_same(texts: list[str]) -> None:
+    assert [read_wanted(text) for text in texts] == [read_wanted(texts[0])] * len(texts)
+
+
+@pytest.mark.parametrize("text", TEXTS["refused"])
+def test_what_is_not_understood_is_named(text: str) -> None:
+    with pytest.raises(TaskWordsError, match=TEXTS["refused"][text]):
+        read_wanted(text)
+
+
+@given(st.text(max_size=10_000) | st.lists(st.sampled_from(str(TEXTS).split())).map(" ".join))
+def test_no_text_raises_anything_else(text: str) -> None:
+    try:
+        assert read_wanted(text)
+    except TaskWordsError as error:
+        assert str(error).startswith("expected")
+
+
+@given(st.integers(1, 11), st.integers(0, 1000))
+def test_a_tour_is_the_shortest(n: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    places, ends = rng.uniform(0.0, 50.0, (n + 1, 2)), rng.uniform(0.0, 50.0, n) * (seed % 2)
+    ways = np.linalg.norm(places[:, None] - places, axis=2)
+
+    def measure(order: tuple[int, ...]) -> float:
+        return float(sum(ways[a, b] for a, b in pairwise((0, *(stop + 1 for stop in order)))) + ends[order[-1]])
+
+    order = order_stops(ways, ends)
+    assert sorted(order) == list(range(n))
+    assert n > 6 or measure(order) == pytest.approx(min(map(measure, permutations(range(n)))))
