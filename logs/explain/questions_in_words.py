@@ -26,6 +26,7 @@ from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import (
     CameraPicture,
     Contact,
+    Difference,
     DoorState,
     Leg,
     MotorCommand,
@@ -176,8 +177,18 @@ def _tell_things(asked: Asked, records: list[Record]) -> Iterator[Story]:
     """Each thing in the way, as it was known last, and how it came to be known."""
     for revisions in _by_entry(records):
         last = revisions[-1]
-        steps = (*_tell_sights(asked.history, revisions), *_tell_consequences(asked, last.value.name))
+        about = [one for one in asked.history.of_kind(Difference, until=asked.at) if one.value.about == last.value.name]
+        rivals = [said(plainly(one), one, label="rivals") for one in about[-1:]]
+        steps = (*_tell_sights(asked.history, revisions), *rivals, *_tell_consequences(asked, last.value.name))
         yield _story(asked, last, headline(last), steps)
+
+
+def _tell_differences(asked: Asked, records: list[Record]) -> Iterator[Story]:
+    """What differs, its rivals with their odds, and by what evidence these came about."""
+    for revisions in _by_entry(records):
+        shown = [said(f"In cycle {one.cycle}: {one.value.counted[-1].shows}; {one.value.odds_in_words()}.", one,
+                      label="evidence") for one in revisions[-MOST_SIGHTS:]]
+        yield _story(asked, revisions[-1], headline(revisions[-1]), shown)
 
 
 def _tell_sights(history: Timeline, revisions: list[Record]) -> Iterator[Sentence]:
@@ -322,6 +333,9 @@ KNOWN: Mapping[str, tuple[frozenset[str], Answer]] = {
         _words("touch touched contact contacts collide collided collision collisions hit"),
         _part(TOUCHED, "Up to then it touched nothing.")),
     "how far off was it?": (_words("far off truth truly error"), _tell_error),
+    "does a sense lie?": (
+        _words("sense senses lie lies differs differ difference differences rival rivals odds"),
+        _entries(_tell_differences, "Nothing was found to differ from model, belief or senses.", Difference)),
     "why that detour?": (
         _words("detour detours round around another other else withdrawn replan replanned instead"),
         _entries(_tell_detours, "It took no detour: no plan was withdrawn for anything in the way.", PlanSketch,

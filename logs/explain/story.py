@@ -302,8 +302,8 @@ def _tell_contacts(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sen
 
 
 def _tell_things(history: Timeline, _: Mapping[str, Any]) -> list[Sentence]:
-    """Doors found shut, things in the way, and what became of them; faults of its body."""
-    return _points(read_turning_points(history, main=True), "door", "thing", "fault", "resumed")
+    """Doors found shut, things in the way, and what became of them; what differs else; faults of its body."""
+    return _points(read_turning_points(history, main=True), "door", "thing", "differs", "fault", "resumed")
 
 
 def _points(turns: Iterable[TurningPoint], *kinds: str) -> list[Sentence]:

@@ -20,6 +20,7 @@ from world_models.entries import (
     BodyFault,
     Certificate,
     Contact,
+    Difference,
     Discrepancy,
     DoorState,
     Goal,
@@ -35,13 +36,15 @@ from world_models.entries import (
 )
 from world_models.words import count
 
-MAIN = ("refuted", "not testable", "lost", "found", "fault", "contact", "door", "thing", "resumed", "told")
+MAIN = (
+    "refuted", "not testable", "lost", "found", "fault", "contact", "door", "thing", "differs", "resumed", "told")
 """Kinds that a short account of a run must not leave out."""
 REMEMBERED = 8
 """The newest entries of a type that are looked back for."""
 MARKS, NOT_VERIFIED = ("escalated", "relocalization"), ("refuted", "not testable")
 """A turning point has one of these words in its line of the journal, or is of one of these kinds."""
-MAIN_KINDS: tuple[type[Any], ...] = (BodyFault, Contact, DoorState, Obstacle, Resumed, UserReport, Redirection)
+MAIN_KINDS: tuple[type[Any], ...] = (
+    BodyFault, Contact, Difference, DoorState, Obstacle, Resumed, UserReport, Redirection)
 KINDS: tuple[type[Any], ...] = (*MAIN_KINDS, Goal, PlanSketch, Certificate, Outcome)
 NOTHING = "Nothing went wrong on the way: it was never lost, each milestone was verified, and there was no fault."
 ENDED_EARLY = "Nothing had gone wrong when the run was cut off: what would have come of it nobody knows."
@@ -61,7 +64,7 @@ class TurningPoint:
 
     Attributes:
         cycle: when.
-        kind: goal, plan, a verdict, doubt, lost, found, fault, contact, door, thing, resumed, told or the end.
+        kind: goal, plan, a verdict, doubt, lost, found, fault, contact, door, thing, differs, resumed, told or the end.
         text: what happened, without a full stop.
         time_s: since the run began, by the body's clock: the newest time of any observation by then;
             None where nothing had, or in the results of older versions.
@@ -170,6 +173,20 @@ def _turns(
         yield from _turn(value, is_new, cycle, name_of, believed, states.get(id, ""))
         if isinstance(value, Obstacle | DoorState):
             states[id] = value.status if isinstance(value, Obstacle) else value.state
+        elif isinstance(value, Difference):
+            states[id] = _taken_for(value) or states.get(id, "")
+
+
+def _taken_for(value: Difference) -> str:
+    """The rival that is likelier than all others together, and whether that is sure."""
+    return "" if value.leader.p < 0.5 else f"{'surely ' * value.is_sure}{value.leader.kind}"
+
+
+def _is_decided(value: Difference, was: str) -> bool:
+    """Whether a rival becomes sure, or another one leads than before. That something stands there its thing tells."""
+    now = _taken_for(value)
+    leads_anew = was != "" and now != "" and now.removeprefix("surely ") != was.removeprefix("surely ")
+    return leads_anew or (value.is_sure and now != was and value.leader.kind != "thing")
 
 
 def _turn(
@@ -199,6 +216,8 @@ def _turn(
         yield TurningPoint(cycle, "door", words.brief(value))
     elif isinstance(value, Obstacle) and value.is_there is not (was == "there"):
         yield TurningPoint(cycle, "thing", words.brief(value))
+    elif isinstance(value, Difference) and _is_decided(value, was):
+        yield TurningPoint(cycle, "differs", f"{value.about}: {value.odds_in_words()}")
     elif isinstance(value, Resumed):
         yield TurningPoint(cycle, "resumed", f"after cycle {value.after_cycle}, where the run was cut off")
     elif isinstance(value, UserReport | Redirection) and value.answer:

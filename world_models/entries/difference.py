@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -22,6 +23,16 @@ SENSES: frozenset[RivalKind] = frozenset({
 
 MISLEADING: frozenset[RivalKind] = frozenset({"still camera", "late pictures", "lens"})
 """Senses that tell wrong places, of which nothing is learnt on the way."""
+
+TOLD_BY: Mapping[RivalKind, str] = {
+    "thing": "a look past it from the side", "jamb": "a look along its wall", "leaf": "a look from before its door",
+    "wall": "looks at other walls", "dirt": "a look in another direction, where dirt keeps its pixels",
+    "still camera": "a picture after a turn", "late pictures": "a picture after a turn, and one long after it",
+    "lens": "edges near the rim of the picture", "focal length": "the same edges from nearer and from further away",
+    "mounting": "looks at near floor and far walls", "wheels": "another way between two sure places",
+    "elsewhere": "what can be seen from here alone",
+}
+"""What would tell a rival from the others."""
 
 MODEL = "the model of the building"
 """What differs where walls and doors stand elsewhere in general, or the camera makes it seem so."""
@@ -150,7 +161,12 @@ class Difference:
         """``a jamb of bedroom-door that stands 9 cm beside 92%, a thing 6%, dirt on the lens 2%``."""
         return ", ".join(f"{rival.what} {rival.p:.0%}" for rival in self.rivals if rival.p >= 0.005)
 
+    def apart_in_words(self) -> str:
+        """What would tell the two likeliest rivals apart; "" where one is sure, or nothing would."""
+        two = () if self.leader.p >= SURE else self.rivals[:2]
+        return " or ".join(TOLD_BY[rival.kind] for rival in two if rival.kind in TOLD_BY)
+
     def sentence(self) -> str:
-        count = words.count(len(self.counted), "look")
+        count, would = words.count(len(self.counted), "look"), self.apart_in_words()
         return (f"{self.about} differs: {self.odds_in_words()}; by {count}, the last: {self.counted[-1].shows}; at"
-                f" {self.seen_s:.1f} s")
+                f" {self.seen_s:.1f} s{'; to be told apart by ' * bool(would)}{would}")

@@ -34,7 +34,20 @@ from scripted_mission import house
 from scripted_turns import HELD, decisions
 from sim.body.simulated_body import SimulatedBody
 from sim.truth import Truth
-from world_models.entries import BodyFault, Contact, DoorPicture, DoorState, Obstacle, Outcome, PlanSketch, Recovery
+from world_models.entries import (
+    BodyFault,
+    Contact,
+    Difference,
+    DoorPicture,
+    DoorState,
+    Evidence,
+    Obstacle,
+    Outcome,
+    PlanSketch,
+    Recovery,
+    Rival,
+)
+from world_models.entries.difference import SURE
 from world_models.frames import Pose2
 
 
@@ -78,6 +91,21 @@ def test_a_door_and_a_thing_are_told_when_they_change_and_not_each_time_that_the
     assert [point.text for point in found if point.kind == "thing"] == [
         "something 0.5 m wide at (0.20, 0.30) m of hallway is in the way (hallway/obstacle-1)",
         "something 0.5 m wide at (0.20, 0.30) m of hallway is gone (hallway/obstacle-1)"]
+
+
+def test_what_differs_is_told_when_a_rival_becomes_sure_or_another_leads() -> None:
+    board, found, finder = Blackboard(), list[TurningPoint](), TurningPointFinder()
+    odds = (("chance", 0.9), ("lens", 0.6), ("lens", 0.7), ("lens", 0.96), ("lens", 0.97), ("dirt", 0.4), ("wall", 0.8))
+    seen = Evidence("camera", "lines", (), 0.0, 0.0, 0.0, 1.0, 1.0, 2.0)
+    for cycle, (kind, p) in enumerate(odds, 1):
+        rivals = Rival(cast(Any, kind), kind, 1.0, p), Rival("wheels", "wheels", 0.0, 1.0 - p)
+        value, known = Difference("camera", rivals, (seen,), 2.0), board.view.get("Difference-1")
+        assert ("told apart" in value.sentence()) == (p < SURE)  # what would tell the two likeliest
+        made = board.apply([Post(value) if known is None else Revise(known, value)], author="a", cycle=cycle)
+        found += finder.find(Decision(cycle, (), (), Level.ACTION, (), (), None, None, 0, made, ""))
+    assert [(point.cycle, point.kind, point.text) for point in found] == [
+        (2, "differs", "camera: lens 60%, wheels 40%"), (4, "differs", "camera: lens 96%, wheels 4%"),
+        (7, "differs", "camera: wall 80%, wheels 20%")]
 
 
 def test_a_contact_is_told_with_the_place_where_it_believed_to_be() -> None:
