@@ -8,9 +8,15 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Posted, Revise, Revised, View, Watch
-from knowledge_sources.methods.floor import revise_by_difference, revise_by_door, revise_by_report, revise_by_thing
+from knowledge_sources.methods.floor import (
+    redraw_door,
+    revise_by_difference,
+    revise_by_door,
+    revise_by_report,
+    revise_by_thing,
+)
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_building, find_frames
+from knowledge_sources.reads import find_building, find_frames, list_filed_doors
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import Difference, DoorState, Obstacle, UserReport
@@ -42,7 +48,7 @@ class Case(NamedTuple):
 
 
 class ModelReviser(RobotKnowledgeSource):
-    """Alone revises what is known of locales: by things, doors, a model found inexact, and what somebody says.
+    """Alone revises what is known of locales: by things, doors, what surely differs, and what somebody says.
 
     Of two that say otherwise the newer counts. All that is new of a locale comes into its frame at once, so that who
     reads why it was revised finds all of it. A door is in the frames of both its rooms. A frame is revised only where a
@@ -52,7 +58,7 @@ class ModelReviser(RobotKnowledgeSource):
 
     level, priority = Level.ACTION, Priority.ENTER
     on = (Watch(UserReport, (Posted,)), Watch(Obstacle), Watch(DoorState),
-          Watch(Difference, (Posted, Revised), lambda d: d.about == MODEL))
+          Watch(Difference, (Posted, Revised), lambda d: d.about == MODEL or d.find("jamb") is not None))
     writes = (LocaleFrame, UserReport)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
@@ -95,9 +101,14 @@ class ModelReviser(RobotKnowledgeSource):
             yield Statement(entry, (entry.value.locale,), revise)
         for door in view.all(DoorState):
             yield Statement(door, door.value.between, partial(revise_by_door, door=door.value, by=door.author))
-        for found in view.where(Difference, lambda d: d.about == MODEL):
-            yield Statement(found, (find_building(view).root,),
-                            partial(revise_by_difference, found=found.value, by=found.author))
+        doors = list_filed_doors(view)
+        for found in view.all(Difference):
+            if found.value.about == MODEL:
+                yield Statement(found, (find_building(view).root,),
+                                partial(revise_by_difference, found=found.value, by=found.author))
+            elif (filed := doors.get(found.value.about)) is not None:
+                yield Statement(found, filed.between,
+                                partial(redraw_door, door=filed, found=found.value, by=found.author))
         for from_user in view.where(UserReport, lambda report: not report.answer):
             by_report = partial(revise_by_report, report=from_user.value, by=from_user.author)
             try:

@@ -30,6 +30,9 @@ WALL_DEPTH_M = 0.15
 """What lies no further than this from the plane of a wall is on it [m]."""
 MIN_LIFT_M = 0.3
 """Things on a wall that begin lower stand on the floor: their height is known [m]."""
+ALONG = " along"
+"""Ends the name of a mode of what is displaced along its wall; a door's begins with its name, a thing's with its room.
+"""
 JAMB_M = 0.2
 """What of a wall lies whole within this of a jamb ends at the door, and is displaced with it [m]."""
 MEASURED_M = 0.01
@@ -61,6 +64,12 @@ class LineErrors:
         """The same modes, each with this deviation [m]."""
         sizes = np.linalg.norm(self.displacements, axis=2).max(axis=1, initial=1e-12)
         return LineErrors(self.displacement_modes, sigma_m * self.displacements / sizes[:, None, None])
+
+    def restate_doors(self, sigma_m: float) -> LineErrors:
+        """The same modes, those of doors along their walls with this deviation [m]."""
+        is_door = [mode.endswith(ALONG) and "/" not in mode for mode in self.displacement_modes]
+        doors = self.restate(sigma_m).displacements
+        return LineErrors(self.displacement_modes, np.where(np.reshape(is_door, (-1, 1, 1)), doors, self.displacements))
 
     def take(self, lines: Sequence[int] | NDArray[np.int64]) -> LineErrors:
         """Those of some of the lines, which may be repeated."""
@@ -110,12 +119,15 @@ def find_line_errors(
 def find_sigma_m(building: Building, locale: str, name: str = "") -> float:
     """The stated deviation of a door or thing of a locale, or else of what is in it; 0 where nothing is stated.
 
-    Where the whole building was found to be inexact, it is no less than that.
+    Where the whole building was found to be inexact, it is no less than that; nor than how well is known what was found
+    to stand beside.
     """
     properties = building.locale(locale).properties
     sigmas: Mapping[str, float] = properties.get(SIGMAS, {})
     found_m = INEXACT_M * any(change.what == "inexact" for change in building.root_frame().changes)
-    return float(max(sigmas.get(name, properties.get(SIGMA, 0.0)), found_m))
+    changes = building.frame(locale).changes
+    beside = (change.sigma_m for change in changes if (change.what, change.name) == ("beside", name))
+    return float(max(sigmas.get(name, properties.get(SIGMA, 0.0)), found_m, *beside))
 
 
 def _find_modes(building: Building, mark: Landmark, unstated_m: float) -> Mapping[str, Floats]:
@@ -142,7 +154,7 @@ def _compute_modes(
             cut = np.linalg.norm(flat[:, None] - jambs[:, None], axis=3).max(axis=2).min(axis=1) <= JAMB_M
             if np.any(cut):
                 door_m = find_sigma_m(building, mark.locale, door.name) or unstated_m
-                found[f"{door.name} along"] = door_m * cut[:, None] * _find_along(door)
+                found[f"{door.name}{ALONG}"] = door_m * cut[:, None] * _find_along(door)
         return found
     thing = next((t for t in building.things_of(mark.locale) if t.name == mark.name), None)
     if thing is not None and thing.protrusion_m is None:
@@ -150,7 +162,7 @@ def _compute_modes(
                 for axis, direction in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)))}
     wall = int(np.argmin(np.abs(off_m).mean(axis=(1, 2)) + 10.0 * _miss_wall(flat, origins, inward)))
     along = _find_along(doors[mark.name]) if mark.name in doors else (inward[wall, 1], -inward[wall, 0], 0.0)
-    found = {walls[wall][0]: walls_m * _same(lines, walls[wall][1]), f"{mark.name} along": own_m * _same(lines, along)}
+    found = {walls[wall][0]: walls_m * _same(lines, walls[wall][1]), f"{mark.name}{ALONG}": own_m * _same(lines, along)}
     if thing is not None and thing.low_m >= MIN_LIFT_M:
         found[f"{mark.name} up"] = own_m * _same(lines, (0.0, 0.0, 1.0))
     return found

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 from knowledge_sources.methods.floor.footprints import measure_change_m
+from world_models.building.changes import find_along, outline_door
 from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
+from world_models.building.locales import Doorway
 from world_models.entries import DOOR_STATES, Difference, DoorState, Obstacle, UserReport
 
+MIN_BESIDE_SIGMAS = 3.0
+"""What stands beside is drawn there from so many standard deviations on."""
+MAX_BESIDE_SIGMA_M = 0.025  # and once its place is as well known as that
+MIN_BESIDE_CHANGE_M = 0.01  # a place that is found to be otherwise by less is drawn as it was: nothing is planned anew
 MIN_HEIGHT_CHANGE_M = 0.15  # a thing in a frame is revised where its top is so much higher or lower
 
 
@@ -44,6 +52,25 @@ def revise_by_difference(frame: LocaleFrame, found: Difference, by: str) -> Loca
     if is_known or not found.is_sure or found.leader.kind != "wall":
         return frame
     return frame.changed(FrameChange("inexact", frame.name, by))
+
+
+def redraw_door(frame: LocaleFrame, door: Doorway, found: Difference, by: str) -> LocaleFrame:
+    """A frame in which a door stands where it was surely found, or where the file has it again; else the same frame.
+
+    Args:
+        door: as the file has it.
+    """
+    known, jamb = next((c for c in frame.changes if (c.what, c.name) == ("beside", door.name)), None), found.leader
+    if found.is_sure and jamb.kind == "jamb":
+        if abs(jamb.off) < MIN_BESIDE_SIGMAS * jamb.sigma or jamb.sigma > MAX_BESIDE_SIGMA_M:
+            return frame
+        x_m, y_m = (jamb.off * find_along(door)).round(4).tolist()
+        change = FrameChange("beside", door.name, by, outline_door(door), 0.0, (x_m, y_m), round(jamb.sigma, 4))
+        if known is None:
+            return frame.changed(change)
+        moved_m = math.dist(known.by_m, change.by_m)
+        return frame if moved_m < MIN_BESIDE_CHANGE_M else frame.restored("beside", door.name).changed(change)
+    return frame.restored("beside", door.name) if known is not None and jamb.kind == "chance" else frame
 
 
 def revise_by_report(frame: LocaleFrame, report: UserReport, by: str) -> LocaleFrame:
