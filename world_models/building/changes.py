@@ -8,7 +8,7 @@ of it has a name still. What is displaced stretches what it is built to: walls a
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -209,9 +209,14 @@ class Shift:
     corners: NDArray[np.float64]
     by_m: NDArray[np.float64]
 
-    def move(self, points: Any) -> NDArray[np.float64]:
-        """Points (..., 2) or (..., 3), displaced where they stand in the area; the same array where none does."""
+    def move(self, points: Any, whole: bool | None = None) -> NDArray[np.float64]:
+        """Points (..., 2) or (..., 3), displaced where they stand in the area; the same array where none does.
+
+        ``whole``: all of them are displaced, or none, wherever they stand.
+        """
         known: NDArray[np.float64] = np.asarray(points, float)
+        if whole is not None:
+            return known + np.pad(self.by_m, (0, known.shape[-1] - 2)) if whole else known
         starts, sides = self.corners, np.roll(self.corners, -1, axis=0) - self.corners
         to = known[..., None, :2] - starts
         within = np.all(sides[:, 0] * to[..., 1] - sides[:, 1] * to[..., 0] >= 0.0, axis=-1)
@@ -221,32 +226,49 @@ class Shift:
         moved[within, :2] += self.by_m
         return moved
 
-    def move_parts(self, parts: Parts) -> Parts:
-        """The geometry of a locale; a part of which nothing stands in the area is the same."""
-        return tuple(self._move_part(part) for part in parts)
+    def move_parts(self, parts: Parts, things: Sequence[Thing]) -> Parts:
+        """The geometry of a locale; a part of which nothing stands in the area is the same. A thing moves as one."""
+        whole = {thing.name: self.moves_thing(thing) for thing in things}
+        return tuple(self._move_part(part, whole) for part in parts)
+
+    def moves_thing(self, thing: Thing) -> bool:
+        """Whether the middle of a thing stands in the area."""
+        middle = thing.footprint_world.mean(axis=0)
+        return self.move(middle) is not middle
+
+    def move_thing(self, thing: Thing) -> Thing:
+        if not self.moves_thing(thing):
+            return thing
+        return replace(thing, footprint_world=frozen(thing.footprint_world + self.by_m))
 
     def move_doorway(self, doorway: Doorway) -> Doorway:
         moved = self.move(doorway.thresholds_world)
         return doorway if moved is doorway.thresholds_world else replace(doorway, thresholds_world=moved)
 
-    def _move_part(self, part: LocaleGeometry) -> LocaleGeometry:
-        faces = tuple((number, self._move_face(face)) for number, face in part.faces)
-        marks = tuple((number, self._move_mark(mark)) for number, mark in part.landmarks)
+    def _move_part(self, part: LocaleGeometry, whole: Mapping[str, bool]) -> LocaleGeometry:
+        faces = tuple((number, self._move_face(face, whole.get(_name_thing(face.name)))) for number, face in part.faces)
+        marks = tuple((number, self._move_mark(mark, whole.get(mark.name))) for number, mark in part.landmarks)
         is_same = all(new is old for (_, new), (_, old) in zip((*faces, *marks), (*part.faces, *part.landmarks),
                                                                strict=True))
         return part if is_same else replace(part, faces=faces, landmarks=marks)
 
-    def _move_face(self, face: Face) -> Face:
-        polygon, sides = self.move(face.polygon_world), [self._move_regions(side) for side in (face.front, face.back)]
+    def _move_face(self, face: Face, whole: bool | None) -> Face:
+        polygon = self.move(face.polygon_world, whole)
+        sides = [self._move_regions(side, whole) for side in (face.front, face.back)]
         if polygon is face.polygon_world and sides == [face.front, face.back]:
             return face
         return replace(face, polygon_world=polygon, front=sides[0], back=sides[1])
 
-    def _move_regions(self, regions: Sequence[Region]) -> tuple[Region, ...]:
-        moved = [(region, self.move(region.polygon_world)) for region in regions]
+    def _move_regions(self, regions: Sequence[Region], whole: bool | None) -> tuple[Region, ...]:
+        moved = [(region, self.move(region.polygon_world, whole)) for region in regions]
         return tuple(region if polygon is region.polygon_world else replace(region, polygon_world=frozen(polygon))
                      for region, polygon in moved)
 
-    def _move_mark(self, mark: Landmark) -> Landmark:
-        lines = self.move(mark.lines_world)
+    def _move_mark(self, mark: Landmark, whole: bool | None) -> Landmark:
+        lines = self.move(mark.lines_world, whole)
         return mark if lines is mark.lines_world else replace(mark, edges=replace(mark.edges, lines_world=lines))
+
+
+def _name_thing(face: str) -> str:
+    """The name that a thing has whose face is called so."""
+    return "/".join(face.split("/")[:2])

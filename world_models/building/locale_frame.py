@@ -40,7 +40,7 @@ class FrameChange:
 
     Attributes:
         what: shut (a door), gone (a thing), removed (a landmark's lines, or a face), extra (something stands there
-            that the file lacks), beside (a door stands elsewhere in its wall), or inexact (the whole building: its
+            that the file lacks), beside (a door or a wall stands elsewhere), or inexact (the whole building: its
             walls and doors stand centimetres elsewhere).
         name: of the door, thing, landmark, face or building.
         by: who said so.
@@ -175,8 +175,10 @@ class LocaleFrame:
             doorways = tuple(d for d in self.doorways if d is not door)
             return replace(self, parts=parts, doorways=doorways, changes=changes, filed=filed, memo={})
         if change.what == "beside":
-            parts, doorways = change.shift.move_parts(self.parts), tuple(map(change.shift.move_doorway, self.doorways))
-            return replace(self, parts=parts, doorways=doorways, changes=changes, filed=filed, memo={})
+            shift = change.shift
+            return replace(
+                self, parts=shift.move_parts(self.parts, self.things), things=tuple(map(shift.move_thing, self.things)),
+                doorways=tuple(map(shift.move_doorway, self.doorways)), changes=changes, filed=filed, memo={})
         if change.what == "inexact":
             return replace(self, changes=changes, filed=filed, memo={})
         if change.what == "gone":

@@ -4,7 +4,6 @@ In reading order:
 
 * :mod:`rival_views`: how well a leaf explains what is seen, what is beyond, and a leaf that is ajar;
 * :mod:`leaf`: the part of a picture that looks through a doorway; is what the model has beyond seen there, or a leaf?
-* :mod:`beside`: does it stand beside its place in its wall, and how far?
 * :mod:`belief`: from the pictures of a door to its state; does a shut door explain a picture that is not as expected?
 """
 
@@ -12,11 +11,10 @@ from knowledge_sources.methods.doors.belief import (
     MAX_LOG_ODDS, MIN_FEW_LINES, MIN_LOG_RATIO, PRIOR_LOG_ODDS, SHUT_LOG_ODDS, explain_picture, is_explained,
     is_in_opening, is_near, touch_door, update_door,
 )
-from knowledge_sources.methods.doors.beside import find_beside
 from knowledge_sources.methods.doors.leaf import describe, is_in_view, measure_opening, predict_opening, weigh_leaf
 
 __all__ = [
     "MAX_LOG_ODDS", "MIN_FEW_LINES", "MIN_LOG_RATIO", "PRIOR_LOG_ODDS", "SHUT_LOG_ODDS", "describe",
-    "explain_picture", "find_beside", "is_explained", "is_in_opening", "is_in_view", "is_near", "measure_opening",
+    "explain_picture", "is_explained", "is_in_opening", "is_in_view", "is_near", "measure_opening",
     "predict_opening", "touch_door", "update_door", "weigh_leaf",
 ]
