@@ -7,12 +7,22 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
-from blackboard import Change, Effect, Entry, Level, Posted, Revise, Revised, View, Watch
-from knowledge_sources.methods.floor import revise_by_difference, revise_by_door, revise_by_report, revise_by_thing
+from blackboard import Change, Effect, Entry, Level, Posted, Retract, Revise, Revised, View, Watch
+from knowledge_sources.methods.floor import (
+    is_width,
+    place_walls,
+    redraw,
+    redraw_door,
+    revise_by_difference,
+    revise_by_door,
+    revise_by_report,
+    revise_by_thing,
+)
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_building, find_frames
+from knowledge_sources.reads import find_building, find_frames, list_filed_doors
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locale_frame import LocaleFrame
+from world_models.building.model_errors import find_facing
 from world_models.entries import Difference, DoorState, Obstacle, UserReport
 from world_models.entries.difference import MODEL
 
@@ -23,6 +33,7 @@ class Statement(NamedTuple):
     Attributes:
         locales: whose frames it concerns.
         revise: a frame as it is known by it; raises ValueError where the frame has nothing that could be so.
+        is_wall: whether it says where a wall stands.
         is_from_user: whether a user reported it, who is answered.
         error: why it concerns none, in words.
     """
@@ -30,30 +41,34 @@ class Statement(NamedTuple):
     entry: Entry[Any]
     locales: tuple[str, ...]
     revise: Callable[[LocaleFrame], LocaleFrame]
+    is_wall: bool = False
     is_from_user: bool = False
     error: str = ""
 
 
 class Case(NamedTuple):
-    """Frames as they are known now, each with what says so; and answers to reports, in words."""
+    """Frames as they are known now, each with what says so; answers to reports, in words; and what is explained now."""
 
     frames: tuple[tuple[Entry[LocaleFrame], LocaleFrame, tuple[Entry[Any], ...]], ...]
     answers: tuple[tuple[Entry[UserReport], str], ...]
+    explained: tuple[Entry[Difference], ...]
 
 
 class ModelReviser(RobotKnowledgeSource):
-    """Alone revises what is known of locales: by things, doors, a model found inexact, and what somebody says.
+    """Alone revises what is known of locales: by things, doors, what surely differs, and what somebody says.
 
     Of two that say otherwise the newer counts. All that is new of a locale comes into its frame at once, so that who
-    reads why it was revised finds all of it. A door is in the frames of both its rooms. A frame is revised only where a
-    plan may change by it. What cannot be taken up, because the model has nothing of that name, is answered. It acts at
-    once, before the next increment: the door may be just ahead.
+    reads why it was revised finds all of it. A door is in the frames of both its rooms, a wall in those of all at it.
+    Walls are redrawn once it is sure that walls are elsewhere, and not the camera is otherwise; that is explained then,
+    and where no wall explains it the whole building is inexact. A frame is revised only where a plan may change by it.
+    What cannot be taken up, because the model has nothing of that name, is answered. It acts at once, before the next
+    increment: the door may be just ahead.
     """
 
     level, priority = Level.ACTION, Priority.ENTER
     on = (Watch(UserReport, (Posted,)), Watch(Obstacle), Watch(DoorState),
-          Watch(Difference, (Posted, Revised), lambda d: d.about == MODEL))
-    writes = (LocaleFrame, UserReport)
+          Watch(Difference, (Posted, Revised), lambda d: bool({"jamb", "wall"} & {rival.kind for rival in d.rivals})))
+    writes = (LocaleFrame, UserReport, Difference)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         """The frames that differ by what is new, and all reports that are not answered yet."""
@@ -79,13 +94,17 @@ class ModelReviser(RobotKnowledgeSource):
                 taken.update(entry.id for entry in reasons)
         from_user = [said.entry for said in statements if said.is_from_user]
         answers = tuple((entry, _answer(entry.id in taken, errors.get(entry.id))) for entry in from_user)
-        return Case(tuple(frames), answers) if frames or answers else None
+        found = {said.entry for said in statements if said.is_wall and said.entry.id in taken}
+        explained = tuple(view.where(Difference, lambda d: d.about == MODEL)) if found else ()
+        return Case(tuple(frames), answers, explained) if frames or answers else None
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         for report, answer in case.answers:
             yield Revise(report, replace(report.value, answer=answer), (report,))
         for frame, value, reasons in case.frames:
             yield Revise(frame, value, (*reasons, frame))
+        for difference in case.explained:
+            yield Retract(difference)
 
     def _list_statements(self, view: View) -> Iterator[Statement]:
         """What things on the floor and doors say, and reports that are not answered."""
@@ -95,9 +114,7 @@ class ModelReviser(RobotKnowledgeSource):
             yield Statement(entry, (entry.value.locale,), revise)
         for door in view.all(DoorState):
             yield Statement(door, door.value.between, partial(revise_by_door, door=door.value, by=door.author))
-        for found in view.where(Difference, lambda d: d.about == MODEL):
-            yield Statement(found, (find_building(view).root,),
-                            partial(revise_by_difference, found=found.value, by=found.author))
+        yield from self._list_differences(view)
         for from_user in view.where(UserReport, lambda report: not report.answer):
             by_report = partial(revise_by_report, report=from_user.value, by=from_user.author)
             try:
@@ -106,6 +123,24 @@ class ModelReviser(RobotKnowledgeSource):
                 yield Statement(from_user, (), by_report, is_from_user=True, error=str(error))
             else:
                 yield Statement(from_user, locales, by_report, is_from_user=True)
+
+
+    def _list_differences(self, view: View) -> Iterator[Statement]:
+        """What differences say of doors, of walls, and of all of the building where no wall explains it."""
+        doors, building = list_filed_doors(view), find_building(view)
+        for found in view.where(Difference, lambda d: d.about in doors):
+            door = doors[found.value.about]
+            yield Statement(found, door.between, partial(redraw_door, door=door, found=found.value, by=found.author))
+        for model in view.where(Difference, lambda d: d.about == MODEL and d.is_sure and d.leader.kind == "wall"):
+            widths = view.where(Difference, is_width)
+            pairs = [(one.value, find_facing(building, one.value.about)) for one in widths]
+            placed = place_walls(pairs, model.author)
+            newest = max((model, *widths), key=lambda entry: entry.cycle)
+            for side, change in placed:
+                yield Statement(newest, side.rooms, partial(redraw, change=change), is_wall=True)
+            is_drawn = all(redraw(frame := building.frame(side.rooms[0]), change) is frame for side, change in placed)
+            yield Statement(newest, (building.root,), partial(
+                revise_by_difference, found=model.value, by=model.author, is_explained=not is_drawn))
 
 
 def _answer(is_taken: bool, error: str | None) -> str:

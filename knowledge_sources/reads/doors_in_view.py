@@ -36,6 +36,12 @@ def list_doors_in_view(view: View, belief: Hypothesis) -> Iterator[Watched]:
         yield from (w for w in doors if is_in_view(robot, pose, w.doorway, belief.locale))
 
 
+def list_filed_doors(view: View) -> dict[str, Doorway]:
+    """The doorways of the frames on the board, as the file has them, by name."""
+    frames = (entry.value for entry in view.all(LocaleFrame))
+    return {door.name: door for frame in frames for door in (frame.filed or frame).doorways}
+
+
 def find_door_state(view: View, door: str) -> Entry[DoorState] | None:
     """What is known of a door."""
     return view.latest(DoorState, lambda state: state.door == door)

@@ -1,23 +1,25 @@
 """What is believed differently than the world file says: pure functions on the geometry and the things of a locale.
 
-A doorway found shut; a thing, a landmark or a face that is gone; something that stands there and the file lacks. A
-landmark that is gone keeps its number and its name, but has no lines any more: what was seen of it has a name still.
+A doorway found shut; a thing, a landmark or a face that is gone; something that stands there and the file lacks; a
+door that stands beside. A landmark that is gone keeps its number and its name, but has no lines any more: what was seen
+of it has a name still. What is displaced stretches what it is built to: walls and trim end at a door's new place.
 """
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.faces import UNKNOWN, Face, build_barrier
-from world_models.building.geometry.landmarks import Edges
+from world_models.building.geometry.faces import UNKNOWN, Face, Region, build_barrier
+from world_models.building.geometry.landmarks import Edges, Landmark
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.building.locales import Doorway, Thing
+from world_models.frames import frozen
 
 SAME_PLACE_M = 1e-3
 """Corners no further apart than this on the plan are the same."""
@@ -175,3 +177,98 @@ def build_extra_faces(name: str, locale: str, footprint: Any, floor_m: float, he
     top = [(float(x), float(y), top_m) for x, y in ring]
     return tuple(build_barrier(f"{name}/{index}", locale, corners, UNKNOWN)
                  for index, corners in enumerate([*sides, top]))
+
+
+BOARDS_M = 0.11
+"""The boards round a door reach so far along its wall, and stand before it by less [m]."""
+
+
+def outline_door(doorway: Doorway) -> tuple[tuple[float, float], ...]:
+    """(4, 2) the floor that a door takes with its boards, through its wall, counter-clockwise [m, world]."""
+    (a, b), (d, c) = doorway.threshold_of(doorway.between[0]), doorway.threshold_of(doorway.between[1])[::-1]
+    along, ahead = BOARDS_M * (b - a) / doorway.width_m, BOARDS_M * doorway.outward_from(doorway.between[0])
+    corners = np.array([a - along - ahead, b + along - ahead, c + along + ahead, d - along + ahead])
+    return tuple((float(x), float(y)) for x, y in corners)
+
+
+def find_along(doorway: Doorway) -> NDArray[np.float64]:
+    """(2,) unit direction along the wall of a door, to the right as seen from its first room [world]."""
+    ahead = doorway.outward_from(doorway.between[0])
+    return np.array([ahead[1], -ahead[0]])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Shift:
+    """A displacement of all that stands in an area of the floor, at whatever height.
+
+    Attributes:
+        corners: (k, 2) of the area, which is convex, counter-clockwise [m, world].
+        by_m: (2,) how far it is displaced [m, world].
+    """
+
+    corners: NDArray[np.float64]
+    by_m: NDArray[np.float64]
+
+    def move(self, points: Any, whole: bool | None = None) -> NDArray[np.float64]:
+        """Points (..., 2) or (..., 3), displaced where they stand in the area; the same array where none does.
+
+        ``whole``: all of them are displaced, or none, wherever they stand.
+        """
+        known: NDArray[np.float64] = np.asarray(points, float)
+        if whole is not None:
+            return known + np.pad(self.by_m, (0, known.shape[-1] - 2)) if whole else known
+        starts, sides = self.corners, np.roll(self.corners, -1, axis=0) - self.corners
+        to = known[..., None, :2] - starts
+        within = np.all(sides[:, 0] * to[..., 1] - sides[:, 1] * to[..., 0] >= 0.0, axis=-1)
+        if not np.any(within):
+            return known
+        moved = known.copy()
+        moved[within, :2] += self.by_m
+        return moved
+
+    def move_parts(self, parts: Parts, things: Sequence[Thing]) -> Parts:
+        """The geometry of a locale; a part of which nothing stands in the area is the same. A thing moves as one."""
+        whole = {thing.name: self.moves_thing(thing) for thing in things}
+        return tuple(self._move_part(part, whole) for part in parts)
+
+    def moves_thing(self, thing: Thing) -> bool:
+        """Whether the middle of a thing stands in the area."""
+        middle = thing.footprint_world.mean(axis=0)
+        return self.move(middle) is not middle
+
+    def move_thing(self, thing: Thing) -> Thing:
+        if not self.moves_thing(thing):
+            return thing
+        return replace(thing, footprint_world=frozen(thing.footprint_world + self.by_m))
+
+    def move_doorway(self, doorway: Doorway) -> Doorway:
+        moved = self.move(doorway.thresholds_world)
+        return doorway if moved is doorway.thresholds_world else replace(doorway, thresholds_world=moved)
+
+    def _move_part(self, part: LocaleGeometry, whole: Mapping[str, bool]) -> LocaleGeometry:
+        faces = tuple((number, self._move_face(face, whole.get(_name_thing(face.name)))) for number, face in part.faces)
+        marks = tuple((number, self._move_mark(mark, whole.get(mark.name))) for number, mark in part.landmarks)
+        is_same = all(new is old for (_, new), (_, old) in zip((*faces, *marks), (*part.faces, *part.landmarks),
+                                                               strict=True))
+        return part if is_same else replace(part, faces=faces, landmarks=marks)
+
+    def _move_face(self, face: Face, whole: bool | None) -> Face:
+        polygon = self.move(face.polygon_world, whole)
+        sides = [self._move_regions(side, whole) for side in (face.front, face.back)]
+        if polygon is face.polygon_world and sides == [face.front, face.back]:
+            return face
+        return replace(face, polygon_world=polygon, front=sides[0], back=sides[1])
+
+    def _move_regions(self, regions: Sequence[Region], whole: bool | None) -> tuple[Region, ...]:
+        moved = [(region, self.move(region.polygon_world, whole)) for region in regions]
+        return tuple(region if polygon is region.polygon_world else replace(region, polygon_world=frozen(polygon))
+                     for region, polygon in moved)
+
+    def _move_mark(self, mark: Landmark, whole: bool | None) -> Landmark:
+        lines = self.move(mark.lines_world, whole)
+        return mark if lines is mark.lines_world else replace(mark, edges=replace(mark.edges, lines_world=lines))
+
+
+def _name_thing(face: str) -> str:
+    """The name that a thing has whose face is called so."""
+    return "/".join(face.split("/")[:2])

@@ -7,6 +7,7 @@ learnt of the locale revises its frame.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
@@ -14,7 +15,7 @@ from typing import Any, Literal
 
 from blackboard import Entry, Index, Level, View, observation, request
 from world_models import words
-from world_models.building.changes import add_extra, remove_element, remove_thing, shut_door
+from world_models.building.changes import Shift, add_extra, remove_element, remove_thing, shut_door
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.building.locales import EXTRA_KIND, ROBOT_TOP_M, Doorway, Link, Locale, LocaleExtent, Thing
 from world_models.building.passages import PassageEdge
@@ -23,7 +24,7 @@ from world_models.entries.location import Hypothesis
 from world_models.entries.task import Goal, PlanSketch
 from world_models.frames import frozen
 
-ChangeKind = Literal["shut", "gone", "removed", "extra", "inexact"]
+ChangeKind = Literal["shut", "gone", "removed", "extra", "beside", "inexact"]
 UNDONE: Mapping[str, ChangeKind] = {"open": "shut", "there": "gone"}
 """What takes back which change."""
 RequestStatus = Literal["asked", "answered"]
@@ -39,11 +40,13 @@ class FrameChange:
 
     Attributes:
         what: shut (a door), gone (a thing), removed (a landmark's lines, or a face), extra (something stands there
-            that the file lacks), or inexact (the whole building: its walls and doors stand centimetres elsewhere).
+            that the file lacks), beside (a door or a wall stands elsewhere), or inexact (the whole building: its
+            walls and doors stand centimetres elsewhere).
         name: of the door, thing, landmark, face or building.
         by: who said so.
-        footprint: of what is extra: the corners, counter-clockwise, of what it takes of the floor [m, world].
+        footprint: of what is extra or beside: the corners, counter-clockwise, of what it takes of the floor [m, world].
         height_m: of what is extra: up to here it hides what is behind it; 0 where nothing tells how high it is.
+        by_m, sigma_m: of what stands beside: how far from its place in the file, and how well that is known [m, world].
     """
 
     what: ChangeKind
@@ -51,10 +54,18 @@ class FrameChange:
     by: str
     footprint: tuple[tuple[float, float], ...] = ()
     height_m: float = 0.0
+    by_m: tuple[float, float] = (0.0, 0.0)
+    sigma_m: float = 0.0
+
+    @property
+    def shift(self) -> Shift:
+        """Of what stands beside: what of the geometry is displaced, and by how much."""
+        return Shift(frozen(self.footprint, (None, 2)), frozen(self.by_m, (2,)))
 
     def sentence(self) -> str:
+        beside = f"stands {100.0 * math.hypot(*self.by_m):.1f} cm beside, to {100.0 * self.sigma_m:.1f} cm"
         said = {"shut": "is shut", "gone": "is gone", "removed": "is left out", "extra": "stands in the way",
-                "inexact": "is known to centimetres only"}[self.what]
+                "beside": beside, "inexact": "is known to centimetres only"}[self.what]
         return f"{self.name} {said} ({self.by})"
 
 
@@ -163,6 +174,11 @@ class LocaleFrame:
             parts = shut_door(self.parts, door, self.extent.reach[2])
             doorways = tuple(d for d in self.doorways if d is not door)
             return replace(self, parts=parts, doorways=doorways, changes=changes, filed=filed, memo={})
+        if change.what == "beside":
+            shift = change.shift
+            return replace(
+                self, parts=shift.move_parts(self.parts, self.things), things=tuple(map(shift.move_thing, self.things)),
+                doorways=tuple(map(shift.move_doorway, self.doorways)), changes=changes, filed=filed, memo={})
         if change.what == "inexact":
             return replace(self, changes=changes, filed=filed, memo={})
         if change.what == "gone":

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +31,23 @@ WALL_DEPTH_M = 0.15
 """What lies no further than this from the plane of a wall is on it [m]."""
 MIN_LIFT_M = 0.3
 """Things on a wall that begin lower stand on the floor: their height is known [m]."""
+WALL = " wall "
+"""Between the name of a room and the number of its wall, in the name of a mode."""
+BETWEEN = " from wall "
+"""The same in the name of what is between two walls that face each other."""
+ALONG = " along"
+"""Ends the name of a mode of what is displaced along its wall; a door's begins with its name, a thing's with its room.
+"""
 JAMB_M = 0.2
 """What of a wall lies whole within this of a jamb ends at the door, and is displaced with it [m]."""
 MEASURED_M = 0.01
 """Deviation of a model of which nothing is stated: as of what is measured by hand with a tape [m]."""
 INEXACT_M = 0.05
 """Deviation of a model that is found to be inexact: as of a plan that was traced [m]."""
+PARALLEL = 0.999
+"""Cosine between the normals of walls that face each other."""
+BOARDS_M, TOUCHING_M = 0.11, 0.01
+"""What stands before a wall by less is on it; and what ends at its ends reaches them within this [m]."""
 MAX_MARKS = 4096
 """Landmarks whose modes are kept."""
 
@@ -61,6 +73,12 @@ class LineErrors:
         """The same modes, each with this deviation [m]."""
         sizes = np.linalg.norm(self.displacements, axis=2).max(axis=1, initial=1e-12)
         return LineErrors(self.displacement_modes, sigma_m * self.displacements / sizes[:, None, None])
+
+    def restate_doors(self, sigma_m: float) -> LineErrors:
+        """The same modes, those of doors along their walls with this deviation [m]."""
+        is_door = [mode.endswith(ALONG) and "/" not in mode for mode in self.displacement_modes]
+        doors = self.restate(sigma_m).displacements
+        return LineErrors(self.displacement_modes, np.where(np.reshape(is_door, (-1, 1, 1)), doors, self.displacements))
 
     def take(self, lines: Sequence[int] | NDArray[np.int64]) -> LineErrors:
         """Those of some of the lines, which may be repeated."""
@@ -110,18 +128,21 @@ def find_line_errors(
 def find_sigma_m(building: Building, locale: str, name: str = "") -> float:
     """The stated deviation of a door or thing of a locale, or else of what is in it; 0 where nothing is stated.
 
-    Where the whole building was found to be inexact, it is no less than that.
+    Where the whole building was found to be inexact, it is no less than that; nor than how well is known what was found
+    to stand beside: a door, or a wall by the name of its mode.
     """
     properties = building.locale(locale).properties
     sigmas: Mapping[str, float] = properties.get(SIGMAS, {})
     found_m = INEXACT_M * any(change.what == "inexact" for change in building.root_frame().changes)
-    return float(max(sigmas.get(name, properties.get(SIGMA, 0.0)), found_m))
+    changes = building.frame(locale).changes
+    beside = (change.sigma_m for change in changes if (change.what, change.name) == ("beside", name))
+    return float(max(sigmas.get(name, properties.get(SIGMA, 0.0)), found_m, *beside))
 
 
 def _find_modes(building: Building, mark: Landmark, unstated_m: float) -> Mapping[str, Floats]:
     """For each mode of a landmark, by name, the displacement (lines, 3) of its lines [m, world]."""
     own_m, walls_m = (find_sigma_m(building, mark.locale, name) or unstated_m for name in (mark.name, ""))
-    if not own_m and not walls_m:
+    if not own_m and not walls_m and not building.frame(mark.locale).changes:
         return {}
     return building.cached("model errors", MAX_MARKS, (mark.name, unstated_m),
                            lambda: _compute_modes(building, mark, own_m, walls_m, unstated_m))
@@ -131,18 +152,19 @@ def _compute_modes(
     building: Building, mark: Landmark, own_m: float, walls_m: float, unstated_m: float
 ) -> dict[str, Floats]:
     walls, origins, inward = _list_walls(building, mark.locale)
+    sigmas = [find_sigma_m(building, mark.locale, name) or walls_m for name, _ in walls]
     lines, doors = mark.lines_world, {door.name: door for door in building.doorways_of(mark.locale)}
     flat = lines[..., :2]
     off_m = np.einsum("nei,wi->wne", flat, inward) - np.sum(origins * inward, axis=1)[:, None, None]
     if mark.kind == "wall":
         near = np.abs(off_m).max(axis=2) <= WALL_DEPTH_M
-        found = {walls[w][0]: walls_m * near[w][:, None] * walls[w][1] for w in np.flatnonzero(near.any(axis=1))}
+        found = {walls[w][0]: sigmas[w] * near[w][:, None] * walls[w][1] for w in np.flatnonzero(near.any(axis=1))}
         for door in doors.values():
             jambs = door.threshold_of(mark.locale)
             cut = np.linalg.norm(flat[:, None] - jambs[:, None], axis=3).max(axis=2).min(axis=1) <= JAMB_M
             if np.any(cut):
                 door_m = find_sigma_m(building, mark.locale, door.name) or unstated_m
-                found[f"{door.name} along"] = door_m * cut[:, None] * _find_along(door)
+                found[f"{door.name}{ALONG}"] = door_m * cut[:, None] * _find_along(door)
         return found
     thing = next((t for t in building.things_of(mark.locale) if t.name == mark.name), None)
     if thing is not None and thing.protrusion_m is None:
@@ -150,10 +172,64 @@ def _compute_modes(
                 for axis, direction in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)))}
     wall = int(np.argmin(np.abs(off_m).mean(axis=(1, 2)) + 10.0 * _miss_wall(flat, origins, inward)))
     along = _find_along(doors[mark.name]) if mark.name in doors else (inward[wall, 1], -inward[wall, 0], 0.0)
-    found = {walls[wall][0]: walls_m * _same(lines, walls[wall][1]), f"{mark.name} along": own_m * _same(lines, along)}
+    found = {walls[wall][0]: sigmas[wall] * _same(lines, walls[wall][1]),
+             f"{mark.name}{ALONG}": own_m * _same(lines, along)}
     if thing is not None and thing.low_m >= MIN_LIFT_M:
         found[f"{mark.name} up"] = own_m * _same(lines, (0.0, 0.0, 1.0))
     return found
+
+
+class Side(NamedTuple):
+    """A wall of a room, as one of two that face each other.
+
+    Attributes:
+        mode: its name as a mode: that of the room on whose side it is longer.
+        outward: (3,) unit normal out of the room that is asked about; inward: into the one of its mode [world].
+        corners: (4, 2) the floor that it takes with the boards on both its sides, counter-clockwise [m, world].
+        rooms: whose wall it is: that of its mode, and those to which doors in it lead.
+    """
+
+    mode: str
+    outward: Floats
+    inward: Floats
+    corners: tuple[tuple[float, float], ...]
+    rooms: tuple[str, ...]
+
+
+def list_facing(building: Building, locale: str) -> Mapping[str, tuple[Side, Side]]:
+    """The walls of a room that face each other, in pairs, by the name of what is between them."""
+    walls, origins, inward = _list_walls(building, locale)
+    lengths = np.linalg.norm(np.roll(origins, -1, axis=0) - origins, axis=1)
+    found = {}
+    for i, k in combinations(range(len(walls)), 2):
+        along = np.array([inward[i, 1], -inward[i, 0]])
+        ends = np.sort([(origins[k] - origins[i]) @ along, (origins[(k + 1) % len(walls)] - origins[i]) @ along])
+        shared_m = min(ends[1], lengths[i]) - max(ends[0], 0.0)
+        if inward[i] @ inward[k] < -PARALLEL and (origins[k] - origins[i]) @ inward[i] > 0.0 and shared_m > 0.0:
+            sides = [_build_side(building, walls[w][0], inward[w]) for w in (i, k)]
+            found[f"{locale}{BETWEEN}{i} to wall {k}"] = sides[0], sides[1]
+    return found
+
+
+def find_facing(building: Building, between: str) -> tuple[Side, Side]:
+    """The two walls of such a name. Raises KeyError where there are none."""
+    return list_facing(building, between.partition(BETWEEN)[0])[between]
+
+
+def _build_side(building: Building, mode: str, into: Floats) -> Side:
+    locale, _, number = mode.rpartition(WALL)
+    start, inward, length_m = (one[int(number)] for one in _measure_walls(building.outline(locale)))
+    along = np.array([inward[1], -inward[0]])
+    doors: list[Doorway] = []
+    for door in building.doorways_of(locale):
+        at = door.threshold_of(locale).mean(axis=0) - start
+        if abs(at @ inward) <= WALL_DEPTH_M and 0.0 <= at @ along <= length_m:
+            doors.append(door)
+    back_m = BOARDS_M + max((door.depth_m for door in doors), default=0.0)
+    a, b = start - TOUCHING_M * along, start + (length_m + TOUCHING_M) * along
+    corners = [a - back_m * inward, b - back_m * inward, b + BOARDS_M * inward, a + BOARDS_M * inward]
+    return Side(mode, _level(-into), _level(inward), tuple((float(x), float(y)) for x, y in corners),
+                (locale, *(door.other(locale) for door in doors)))
 
 
 def _list_walls(building: Building, locale: str) -> tuple[list[tuple[str, Floats]], Floats, Floats]:
@@ -162,7 +238,7 @@ def _list_walls(building: Building, locale: str) -> tuple[list[tuple[str, Floats
     The two sides of a wall with a door are one, named after the longer side.
     """
     origins, inward, lengths = _measure_walls(building.outline(locale))
-    walls = [(f"{locale} wall {i}", _level(inward[i])) for i in range(len(origins))]
+    walls = [(f"{locale}{WALL}{i}", _level(inward[i])) for i in range(len(origins))]
     for door in building.doorways_of(locale):
         other = door.other(locale)
         theirs, into, long = _measure_walls(building.outline(other))
@@ -170,7 +246,7 @@ def _list_walls(building: Building, locale: str) -> tuple[list[tuple[str, Floats
                               + 10.0 * _miss_wall(door.threshold_of(room), starts, normals)))
                 for room, starts, normals in ((locale, origins, inward), (other, theirs, into)))
         if (long[k], other) > (lengths[i], locale):
-            walls[i] = f"{other} wall {k}", _level(into[k])
+            walls[i] = f"{other}{WALL}{k}", _level(into[k])
     return walls, origins, inward
 
 

@@ -94,7 +94,7 @@ class Rival:
     """One explanation of a difference, by all of its evidence.
 
     Attributes:
-        kind, what, off, sigma: as in :class:`Explanation`, by the evidence that is strongest for it.
+        kind, what: as in :class:`Explanation`, by the evidence that is surest of its size; off, sigma: by all of it.
         log_odds: prior and evidence together, against what nobody has thought of.
         p: its probability among all rivals.
     """

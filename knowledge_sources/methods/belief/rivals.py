@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 
-from knowledge_sources.methods.belief.odds import Alike, Look, add_looks
-from world_models.entries import Difference, Evidence, Rival
+from knowledge_sources.methods.belief.odds import Alike, Look, add_looks, measure_common
+from world_models.entries import Difference, Evidence, Explanation, Rival
 from world_models.entries.difference import RivalKind
 from world_models.frames import Pose2
 
@@ -79,10 +79,32 @@ def _add(kind: RivalKind, prior: float, evidence: Sequence[Evidence]) -> float:
 
 
 def _tell(kind: RivalKind, evidence: Sequence[Evidence], log_odds: float, p: float) -> Rival:
-    """A rival in the words of the evidence that is strongest for it, the newest of equals."""
-    said = [e for one in evidence for e in one.explanations if e.kind == kind]
-    best = max(reversed(said), key=lambda e: e.log_ratio)
-    return Rival(kind, best.what, log_odds, p, best.off, best.sigma)
+    """A rival in the words of the evidence that is surest of its size, the strongest of these; its size by all of it.
+    """
+    said = [(e, one) for one in evidence for e in one.explanations if e.kind == kind]
+    best = max(reversed(said), key=lambda told: (-told[0].sigma, told[0].log_ratio))[0]
+    return Rival(kind, best.what, log_odds, p, *_measure(said))
+
+
+def _measure(said: Sequence[tuple[Explanation, Evidence]]) -> tuple[float, float]:
+    """The size that independent evidence has in the mean, and its deviation: no less than how far apart they are.
+
+    The surest counts whole; each other by what it has in common with none of the surer ones.
+    """
+    ordered = sorted(said, key=lambda told: (told[0].sigma, told[0].off, *_when(told[1])))
+    looks, weights = list[Pose2](), list[float]()
+    if ordered[0][0].sigma <= 0.0:
+        return ordered[0][0].off, 0.0
+    for told, one in ordered:
+        alike, here = Alike(one.apart_m, one.apart_rad), Pose2(one.x_m, one.y_m, one.heading_rad)
+        common = max((measure_common(here, other, alike) for other in looks), default=0.0) if one.apart_m else 0.0
+        looks.append(here)
+        weights.append((1.0 - common) / told.sigma**2)
+    total = math.fsum(weights)
+    off = math.fsum(w * told.off for w, (told, _) in zip(weights, ordered, strict=True)) / total
+    chi2 = math.fsum(w * (told.off - off) ** 2 for w, (told, _) in zip(weights, ordered, strict=True))
+    freedom = math.fsum(w * told.sigma**2 for w, (told, _) in zip(weights, ordered, strict=True)) - 1.0
+    return off, math.sqrt(max(1.0, chi2 / freedom if freedom > 0.0 else 1.0) / total)
 
 
 def _strength(one: Evidence) -> tuple[float, ...]:

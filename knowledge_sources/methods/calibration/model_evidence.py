@@ -37,13 +37,14 @@ def find_model_evidence(
     """What matched lines (n, 2, 3) [m] and segments (n, 2, 2) say for a wrong model, a wrong camera, or neither.
 
     Every picture is weighed from the camera as it was set up: what was learnt of it before may be the model's error.
-    A camera that is mounted otherwise may have another lens too: it was taken for another one.
+    A camera that is mounted otherwise may have another lens too: it was taken for another one. Doors may stand beside
+    with each of them: of each door that is a difference of its own.
     """
     as_set_up = camera.as_nominal()
     fit = partial(estimate_camera_and_pose, lines_world, segments_px, as_set_up.pinhole, as_set_up.mount, belief,
                   covariance, sigma_px=LINE_SIGMA_PX)
     nominal, opened = compute_least_covariance(), compute_first_covariance(as_set_up)
-    fine, coarse = errors.restate(MEASURED_M), errors.restate(INEXACT_M)
+    fine, coarse = (errors.restate(sigma_m).restate_doors(INEXACT_M) for sigma_m in (MEASURED_M, INEXACT_M))
     freest = (fit(opened, errors=coarse).world_from_robot,)
     lens = np.where(IS_OF_LENS, opened, nominal)
     fits: dict[RivalKind, CameraEstimate] = {

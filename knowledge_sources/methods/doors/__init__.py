@@ -15,6 +15,6 @@ from knowledge_sources.methods.doors.leaf import describe, is_in_view, measure_o
 
 __all__ = [
     "MAX_LOG_ODDS", "MIN_FEW_LINES", "MIN_LOG_RATIO", "PRIOR_LOG_ODDS", "SHUT_LOG_ODDS", "describe",
-    "explain_picture", "is_explained", "is_in_opening", "is_in_view", "is_near", "measure_opening", "predict_opening",
-    "touch_door", "update_door", "weigh_leaf",
+    "explain_picture", "is_explained", "is_in_opening", "is_in_view", "is_near", "measure_opening",
+    "predict_opening", "touch_door", "update_door", "weigh_leaf",
 ]

@@ -15,7 +15,7 @@ from knowledge_sources.methods.floor.found_things import may_be_there, move_thin
 from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.methods.floor.relief import TYPICAL_M
 from knowledge_sources.methods.floor.revise_frame import (
-    revise_by_difference, revise_by_door, revise_by_report, revise_by_thing,
+    is_width, place_walls, redraw, redraw_door, revise_by_difference, revise_by_door, revise_by_report, revise_by_thing,
 )
 from knowledge_sources.methods.floor.see_floor import (
     FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD, MotionBetween, Seen, see_free_floor,
@@ -38,8 +38,8 @@ __all__ = [
     "MIN_SIDE_M", "MIN_THING_CERTAINTY", "SPACING_M", "TOUCH_MARGIN_M", "TYPICAL_M", "Costs", "Lookout",
     "MotionBetween", "Seen", "SeenFloor", "Sight", "Sweep", "build_free_floor", "build_polygon", "choose_look",
     "enclose", "explain_seen_elsewhere", "explain_seen_in_patch", "explain_touch", "find_fixed", "find_floor",
-    "find_touched", "is_behind", "is_telling", "judge_by", "judge_thing", "list_corners", "locate_touch",
+    "find_touched", "is_behind", "is_telling", "is_width", "judge_by", "judge_thing", "list_corners", "locate_touch",
     "may_be_there", "measure_approach_m", "measure_blind_end_m", "measure_first_seen_m", "measure_free_m", "move_thing",
-    "revise_by_difference", "revise_by_door", "revise_by_report", "revise_by_thing", "sample_sweep", "see_free_floor",
-    "see_ranges", "take_as_jamb", "touch_again", "touch_first",
+    "place_walls", "redraw", "redraw_door", "revise_by_difference", "revise_by_door", "revise_by_report",
+    "revise_by_thing", "sample_sweep", "see_free_floor", "see_ranges", "take_as_jamb", "touch_again", "touch_first",
 ]

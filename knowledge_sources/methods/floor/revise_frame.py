@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
 from knowledge_sources.methods.floor.footprints import measure_change_m
+from world_models.building.changes import find_along, outline_door
 from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
+from world_models.building.locales import Doorway
+from world_models.building.model_errors import BETWEEN, INEXACT_M, Side
 from world_models.entries import DOOR_STATES, Difference, DoorState, Obstacle, UserReport
 
+MIN_BESIDE_SIGMAS = 3.0
+"""What stands beside is drawn there from so many standard deviations on."""
+MAX_BESIDE_SIGMA_M = 0.025  # and once its place is as well known as that
+MIN_BESIDE_CHANGE_M = 0.005  # a place that is found to be otherwise by less is drawn as it was: nothing is planned anew
 MIN_HEIGHT_CHANGE_M = 0.15  # a thing in a frame is revised where its top is so much higher or lower
 
 
@@ -38,12 +50,71 @@ def revise_by_door(frame: LocaleFrame, door: DoorState, by: str) -> LocaleFrame:
     return frame.restored("shut", door.door) if door.state == "open" and is_shut else frame
 
 
-def revise_by_difference(frame: LocaleFrame, found: Difference, by: str) -> LocaleFrame:
-    """The building's frame, once its model is surely inexact; what was found is not taken back."""
+def revise_by_difference(frame: LocaleFrame, found: Difference, by: str, *, is_explained: bool) -> LocaleFrame:
+    """The building's frame, once its model is surely inexact; or as filed, where a wall that is redrawn explains it."""
     is_known = any(change.what == "inexact" for change in frame.changes)
+    if is_explained:
+        return frame.restored("inexact", frame.name) if is_known else frame
     if is_known or not found.is_sure or found.leader.kind != "wall":
         return frame
     return frame.changed(FrameChange("inexact", frame.name, by))
+
+
+def redraw_door(frame: LocaleFrame, door: Doorway, found: Difference, by: str) -> LocaleFrame:
+    """A frame in which a door stands where it was surely found, or where the file has it again; else the same frame.
+
+    Args:
+        door: as the file has it.
+    """
+    known, jamb = next((c for c in frame.changes if (c.what, c.name) == ("beside", door.name)), None), found.leader
+    if found.is_sure and jamb.kind == "jamb":
+        if abs(jamb.off) < MIN_BESIDE_SIGMAS * jamb.sigma or jamb.sigma > MAX_BESIDE_SIGMA_M:
+            return frame
+        x_m, y_m = (jamb.off * find_along(door)).round(4).tolist()
+        return redraw(frame, FrameChange("beside", door.name, by, outline_door(door), 0.0, (x_m, y_m),
+                                         round(jamb.sigma, 4)))
+    return frame.restored("beside", door.name) if known is not None and jamb.kind == "chance" else frame
+
+
+def redraw(frame: LocaleFrame, change: FrameChange) -> LocaleFrame:
+    """A frame in which something stands beside; the same frame where that is drawn already, as near as it matters."""
+    known = next((c for c in frame.changes if (c.what, c.name) == ("beside", change.name)), None)
+    if known is None:
+        return frame.changed(change)
+    moved_m = math.dist(known.by_m, change.by_m)
+    return frame if moved_m < MIN_BESIDE_CHANGE_M else frame.restored("beside", change.name).changed(change)
+
+
+def is_width(found: Difference) -> bool:
+    """Whether two walls that face each other are surely farther apart, or nearer, than in the file."""
+    wall = found.leader
+    return BETWEEN in found.about and found.is_sure and wall.kind == "wall" and (
+        abs(wall.off) >= MIN_BESIDE_SIGMAS * wall.sigma)
+
+
+def place_walls(found: Sequence[tuple[Difference, tuple[Side, Side]]], by: str) -> list[tuple[Side, FrameChange]]:
+    """Where the walls stand of which it is known how far apart they are: the likeliest places, all at once.
+
+    Each may be displaced alike before anything is measured. Distances leave open where both of two walls are, and so
+    does the covariance. The deviations that are stated count as independent errors: of each wall the sum of its row,
+    which is never less.
+    """
+    sides = {side.mode: side for _, pair in found for side in pair}
+    names, information, gradient = list(sides), np.eye(len(sides)) / INEXACT_M**2, np.zeros(len(sides))
+    for difference, pair in found:
+        row = np.zeros(len(names))
+        for side in pair:
+            row[names.index(side.mode)] += float(side.outward @ side.inward)
+        weight = 1.0 / difference.leader.sigma**2
+        information += weight * np.outer(row, row)
+        gradient += weight * difference.leader.off * row
+    covariance = np.linalg.inv(information)
+    placed = []
+    for name, off_m, sigma_m in zip(names, covariance @ gradient, np.sqrt(np.abs(covariance).sum(axis=1)), strict=True):
+        x_m, y_m = (off_m * sides[name].inward[:2]).round(4).tolist()
+        placed.append((sides[name], FrameChange("beside", name, by, sides[name].corners, 0.0, (x_m, y_m),
+                                                round(float(sigma_m), 4))))
+    return placed
 
 
 def revise_by_report(frame: LocaleFrame, report: UserReport, by: str) -> LocaleFrame:

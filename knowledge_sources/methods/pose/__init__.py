@@ -64,6 +64,7 @@ from knowledge_sources.methods.pose.r_and_t import (
     MIN_NOISE_PART, SUBSET_SIZE, add_concentrated, keep_possible, med_r_and_t, r_and_t_ml, solve_from_subsets,
 )
 from knowledge_sources.methods.pose.solution_separation import Rests, compute_protection, tell_unavailable
+from knowledge_sources.methods.pose.standing_beside import find_beside, find_width, weigh_places
 from knowledge_sources.methods.pose.with_camera import CameraEstimate, compute_pose_slopes, estimate_camera_and_pose
 
 __all__ = [
@@ -73,8 +74,9 @@ __all__ = [
     "PlanarEstimate", "PoseEstimate", "Rests", "RigidMotion", "add_concentrated", "build_estimate", "build_line_set",
     "build_prior_estimate", "check_landmarks", "compute_camera_poses", "compute_covariance", "compute_image_jacobian",
     "compute_point_jacobian", "compute_pose_slopes", "compute_protection", "compute_squared_distances",
-    "compute_weak_information", "cross", "estimate_camera_and_pose", "fit_displacements",
+    "compute_weak_information", "cross", "estimate_camera_and_pose", "find_beside", "find_width",
+    "fit_displacements",
     "invert_information", "keep_possible", "knows_more", "measure_lines", "med_r_and_t", "minimise",
     "planar_from_lines", "planar_from_points", "r_and_t_ml", "reject_behind", "solve_from_subsets", "tell_unavailable",
-    "to_pose2",
+    "to_pose2", "weigh_places",
 ]

@@ -1,0 +1,124 @@
+"""Surveyor (§4: models are incomplete): do doors and walls stand where the model has them, by a picture's lines?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
+from knowledge_sources.methods.arrays import Floats, Mask
+from knowledge_sources.methods.belief import hedge
+from knowledge_sources.methods.calibration import MIN_MOVE_M, MIN_TURN_RAD
+from knowledge_sources.methods.pose import find_beside, find_width, weigh_places
+from knowledge_sources.methods.pose.standing_beside import FoundBeside
+from knowledge_sources.priority import Priority
+from knowledge_sources.reads import HELD, find_difference, list_filed_doors
+from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.building.changes import find_along
+from world_models.building.locale_frame import LocaleFrame
+from world_models.building.model_errors import list_facing
+from world_models.camera import Camera
+from world_models.entries import (
+    SHARED_SIGMA_M,
+    Certificate,
+    Evidence,
+    Explanation,
+    Milestone,
+    PoseFix,
+    Segments,
+)
+from world_models.frames import Pose, Pose2
+
+Sight = tuple[Floats, Floats, float, Floats, Camera, Pose, Pose2]
+"""What :func:`find_beside` goes by, but for how well the pose is known."""
+
+
+class Surveyed(NamedTuple):
+    """A picture with its place, and whether that is verified and protected."""
+
+    fix: Entry[PoseFix]
+    milestone: Entry[Milestone]
+    segments: Entry[Segments]
+    is_sure: bool
+
+
+class Surveyor(RobotKnowledgeSource):
+    """Says where along its wall a door's edges are found in a picture, and how far apart two walls are.
+
+    Only a place that is verified and protected tells of doors, and no surer than it is known, with what all pictures
+    share. Walls that face each other tell how far they are apart wherever the robot is between them. Nothing is said
+    of what stands in its place until something else was.
+    """
+
+    level, priority = Level.PLAN, Priority.ENTER
+    on = (Watch(Certificate, (Posted,), lambda c: c.verdict != "refuted"),)
+    needs = (HELD,)
+    writes = (Evidence,)
+
+    def bind(self, view: View, trigger: Change) -> Surveyed | None:
+        certificate: Certificate = trigger.entry.value
+        fix, milestone = view.get(certificate.fix), view.get(certificate.milestone)
+        match = None if fix is None else view.get(fix.value.match)
+        segments = None if match is None else view.get(match.value.segments)
+        if fix is None or milestone is None or segments is None:
+            return None
+        is_sure = certificate.verdict == "verified" and fix.value.protection.is_available
+        return Surveyed(fix, milestone, segments, is_sure)
+
+    def act(self, view: View, case: Surveyed) -> Iterable[Effect]:
+        told = [*self._survey_doors(view, case), *self._survey_widths(view, case)]
+        for evidence in told:
+            yield Post(evidence, (case.fix, case.milestone, case.segments))
+
+    def _survey_doors(self, view: View, case: Surveyed) -> Iterator[Evidence]:
+        m, filed, covariance = case.milestone.value, list_filed_doors(view), case.fix.value.covariance
+        for door in (filed[name] for name in m.landmarks if name in filed and case.is_sure):
+            along = np.array([*find_along(door), 0.0])
+            sigma_m = math.sqrt(float(along[:2] @ covariance[:2, :2] @ along[:2]) + SHARED_SIGMA_M**2)
+            of_door = np.array([m.landmarks[i] == door.name for i in m.landmark_of])
+            found = find_beside(*self._see(view, case, of_door, along, door.name), sigma_m)
+            yield from _tell(view, case, door.name, found, "jamb")
+
+    def _survey_widths(self, view: View, case: Surveyed) -> Iterator[Evidence]:
+        m, building = case.milestone.value, HELD.of(view).world
+        moved = {mode: np.any(shifts != 0.0, axis=1)
+                 for mode, shifts in zip(m.errors.displacement_modes, m.errors.displacements, strict=True)}
+        rooms = dict.fromkeys(room for name in m.landmarks if (room := name.rpartition("/")[0]))
+        for about, sides in (pair for room in rooms for pair in list_facing(building, room).items()):
+            if all(side.mode in moved for side in sides):
+                seen = [weigh_places(*self._see(view, case, moved[side.mode], side.outward, side.mode))
+                        for side in sides]
+                if seen[0] is not None and seen[1] is not None:
+                    found = find_width(seen[0], seen[1])
+                    found = replace(found, sigma_m=math.hypot(found.sigma_m, SHARED_SIGMA_M))
+                    yield from _tell(view, case, about, found, "wall")
+
+    def _see(self, view: View, case: Surveyed, of: Mask, along: Floats, name: str) -> Sight:
+        """What a search for some of the expected lines goes by."""
+        robot = HELD.of(view).robot
+        changes = (change for entry in view.all(LocaleFrame) for change in entry.value.changes)
+        known_m = next((float(along[:2] @ change.by_m) for change in changes
+                        if (change.what, change.name) == ("beside", name)), 0.0)
+        return (np.asarray(case.milestone.value.expected)[of], along, known_m, case.segments.value.segments_px,
+                robot.camera, robot.mount.camera_from_robot, case.fix.value.world_from_robot)
+
+
+def _tell(
+    view: View, case: Surveyed, about: str, found: FoundBeside | None, kind: Literal["jamb", "wall"]
+) -> Iterator[Evidence]:
+    """What the picture says, where that was not expected."""
+    if found is None or (found.log_ratio <= 0.0 and not find_difference(view, about).rivals):
+        return
+    here, frame = case.fix.value.world_from_robot, view.get(case.segments.value.frame)
+    beside_cm = 100.0 * found.off_m
+    what = (f"{about} that stands {abs(beside_cm):.0f} cm beside" if kind == "jamb" else
+            f"{about} {abs(beside_cm):.0f} cm {'farther' if beside_cm > 0.0 else 'nearer'}")
+    told = (Explanation("chance", f"{about} as in the file", 0.0),
+            Explanation(kind, what, hedge({kind: found.log_ratio})[kind], round(found.off_m, 4),
+                        round(found.sigma_m, 4)))
+    yield Evidence(about, f"{found.edges} of its edges from {case.fix.id}", told, here.x_m, here.y_m, here.heading_rad,
+                   MIN_MOVE_M, MIN_TURN_RAD, 0.0 if frame is None else frame.value.sim_time_s)
