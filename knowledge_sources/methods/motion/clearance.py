@@ -24,7 +24,7 @@ from world_models.actuator import ActuatorModel
 
 LATENCY_S = 0.2  # from what the robot learns to when it brakes
 END_M = 0.05  # so far behind where a touch may happen it no longer does
-MIN_MOVE_M = 0.05  # shortest move, but for one that ends where it was to end
+MIN_MOVE_M = 0.05  # shortest move, but for what is left of one
 
 
 class Clearance(NamedTuple):
@@ -75,7 +75,7 @@ def choose_move(
     """
     most_m = min(wanted_m, clearance.room_m)
     ends = np.concatenate([clearance.at_m, clearance.at_m + END_M])
-    ends = np.unique(np.round(ends[(ends >= MIN_MOVE_M) & (ends <= most_m - MIN_MOVE_M)], 3))
+    ends = np.unique(np.round(ends[(ends >= MIN_MOVE_M) & (ends < most_m)], 3))
     places = [0.0, *ends.tolist(), most_m]
     left_s, chosen = [0.0] * len(places), (most_m, borne)
     for k in range(len(places) - 2, -1, -1):

@@ -31,7 +31,7 @@ from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.motor import LOOKAHEAD_M, Motor
 from knowledge_sources.methods.floor import find_floor
 from knowledge_sources.methods.motion import MAX_HEADING_ERROR_RAD, count_increment, plan_increment
-from knowledge_sources.methods.motion.clearance import LATENCY_S
+from knowledge_sources.methods.motion.clearance import LATENCY_S, MIN_MOVE_M, Clearance, choose_move
 from knowledge_sources.methods.motion.pure_pursuit import MAX_START_OFFSET_M
 from knowledge_sources.reads import FloorAhead
 from knowledge_sources.reads.floor_ahead import P_CAMOUFLAGED, TOUCH_HOLDS_M
@@ -303,6 +303,20 @@ def test_it_does_not_creep_to_where_something_may_stand_but_halts_the_leg() -> N
     effect = effect_on(halted, Leg)
     assert (effect.value.status, effect.value.increments) == ("halted", 0)
     assert {"Leg-1", "Hypothesis-1", "Obstacle-1"} <= reasons(effect)
+
+
+@given(st.floats(MIN_MOVE_M, 0.57), st.sampled_from([0.05, 0.5, 1.0]), st.floats(0.0, 0.2))
+def test_free_way_is_driven_before_a_risk_and_none_is_crept_over_behind_it(at: float, p: float, wide: float) -> None:
+    """Moves that end, or begin anew, where a risk begins or ends take less time than one at the speed of the worst."""
+    at_m = np.arange(round(at, 3), at + wide + SMALL, 0.05)
+    clearance, gone_m, takes_s = Clearance(at_m, np.full(len(at_m), p), 2.0), 0.0, 0.0
+    while gone_m < 0.58 - SMALL:
+        ahead = Clearance(at_m[at_m >= gone_m - SMALL] - gone_m, clearance.p[at_m >= gone_m - SMALL], 2.0)
+        move_m, speed = choose_move(ahead, 0.58 - gone_m, ACTUATOR, CREEP_M_PER_S, 0.2)
+        gone_m, takes_s = gone_m + move_m, takes_s + move_m / speed + 0.2
+    worst = min(ACTUATOR.speed_m_per_s, CREEP_M_PER_S / math.sqrt(p))
+    assert takes_s <= 0.58 / worst + 0.2 + SMALL
+    assert p < 1.0 or takes_s < 0.58 / 0.3 + (wide + 0.06) / worst + 0.8
 
 
 @pytest.mark.parametrize("suspected", [None, 0.7, 0.8, 0.9, 1.1, 1.2, 1.5])
