@@ -43,10 +43,9 @@ class ActionSettings:
         True, "yes/no",
         "Whether the robot drives only where it has seen the floor free; else it looks or creeps.", "§4")
     max_seen_age_s: float = setting(60.0, "s", "What was seen to be free longer ago must be seen again.")
-    creep_speed_m_per_s: float = setting(0.09, "m/s", "Speed into floor that was not seen to be free.")
-    wary_speed_m_per_s: float = setting(
-        0.4, "m/s", "Speed into floor that looks free, where no earlier picture would tell what stands on it.")
-    max_creep_m: float = setting(0.6, "m", "Longest move at that speed before the next picture.")
+    creep_speed_m_per_s: float = setting(
+        0.09, "m/s", "Speed into floor that was not seen to be free: a certain touch is borne at it. At any other speed"
+        " the expected harm of a touch, its probability times its squared speed, is no greater.")
     max_looks: int = setting(4, "count", "Most looks round on one leg.")
 
     # Things on the floor
@@ -73,7 +72,7 @@ class PlanSettings:
     overhang_m: float = setting(
         0.15, "m",
         "So much wider than its feet something that the model lacks may be: where there is room, the way is led so"
-        " much farther round it, and nearer to it the robot creeps.")
+        " much farther round it, and nearer to it the robot drives slower.")
     max_lookouts: int = setting(
         6, "count", "So often the robot looks again, from elsewhere, at what leaves no way; then it is blocked.")
     max_leg_m: float = setting(3.6, "m", "Longest leg without a milestone in between.")

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.methods.motion import (
     ROLLING_STOP_MARGIN_M,
-    choose_speed,
     compute_bearing,
     find_aim_point,
+    limit_speed,
     measure_progress,
     steer_to,
     update_leg,
@@ -43,10 +43,10 @@ MIN_FREE_M = 2.0 * ROLLING_STOP_MARGIN_M  # with less floor seen to be free ahea
 
 
 class Ahead(NamedTuple):
-    """How far ahead the floor is seen to be free, as far as that matters; the highest speed; what tells that."""
+    """How far ahead the floor is seen to be free, as far as that matters; the speed that it allows; what tells that."""
 
     free_m: float
-    most_m_per_s: float
+    speed_m_per_s: float
     because: tuple[Entry[Any], ...]
 
 
@@ -114,15 +114,15 @@ class PathFollower(RobotKnowledgeSource):
         self, view: View, course: Entry[Course] | None, leg: Entry[Leg], ahead: Ahead, held: Belief
     ) -> Iterable[Effect]:
         """Steer an arc to the point of the line ahead, less the curvature that the wheels add."""
-        (wheels, here, belief), drift = (held.robot.actuator, held.pose, held.entry), view.latest(Drift)
+        (here, belief), drift = (held.pose, held.entry), view.latest(Drift)
         point = find_aim_point(leg.value, measure_progress(leg.value, here)[0], ROLLING_LOOKAHEAD_M)
         corrected = correct(view, Level.ACTION, (belief,))
         yield from corrected
         seen = update_leg(leg.value, here, point)
         step = Revise(leg, replace(seen, increments=seen.increments + (course is None)), (leg, belief, *corrected))
         yield step
-        speed = choose_speed(ahead.free_m, ahead.most_m_per_s, wheels, self._settings.action.creep_speed_m_per_s)
-        new = Course(leg.id, speed, steer_to(point, here, 0.0 if drift is None else drift.value.curvature_per_m))
+        bend_per_m = steer_to(point, here, 0.0 if drift is None else drift.value.curvature_per_m)
+        new = Course(leg.id, ahead.speed_m_per_s, bend_per_m)
         because = (step, belief, *(() if drift is None else (drift,)), *ahead.because)
         yield Post(new, because) if course is None else Revise(course, new, (course, *because))
 
@@ -132,8 +132,9 @@ class PathFollower(RobotKnowledgeSource):
         if not self._settings.action.keeps_to_seen_floor:
             return Ahead(most_m, full, ())
         floor = FloorAhead(view, leg, belief.entry, self._settings)
-        free_m = floor.measure_free_m(most_m)
-        return Ahead(free_m, full if floor.is_confirmed(free_m) else floor.wary_m_per_s, floor.because)
+        clearance = floor.measure_clearance(most_m)
+        borne, before = self._settings.action.creep_speed_m_per_s, clearance.nearer(ROLLING_STOP_MARGIN_M)
+        return Ahead(clearance.free_m, limit_speed(before, 0.0, 0.0, wheels, borne), floor.because)
 
 
 def _is_on_line(leg: Leg, belief: Belief, most_rad: float) -> bool:

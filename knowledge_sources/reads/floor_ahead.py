@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -15,7 +15,6 @@ import shapely
 from blackboard import Entry, View
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import (
-    SPACING_M,
     Costs,
     Lookout,
     SeenFloor,
@@ -23,19 +22,18 @@ from knowledge_sources.methods.floor import (
     build_free_floor,
     build_polygon,
     choose_look,
+    find_blind,
     find_floor,
-    measure_blind_end_m,
-    measure_free_m,
     sample_sweep,
     take_as_jamb,
 )
-from knowledge_sources.methods.motion import MAX_LOOK_ERROR_RAD, plan_turn
+from knowledge_sources.methods.motion import MAX_LOOK_ERROR_RAD, Clearance, choose_move, plan_turn
 from knowledge_sources.reads.conditions import Belief
 from knowledge_sources.reads.lost import locate_contact
 from knowledge_sources.reads.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.building import Building
-from world_models.building.locales import EXTRA_KIND, Thing
+from world_models.building.locales import EXTRA_KIND
 from world_models.entries import (
     AROUND_SIGMA_RAD,
     CameraPicture,
@@ -57,9 +55,11 @@ from world_models.robot import RobotModel
 SEEN_MARGIN_M = 0.03  # margin round the robot's disc within which the floor must be seen to be free
 PUT_DOWN_FREE_M = 0.75  # round where it was put down the floor is free to this distance: a person sees it
 NEAR_MODEL_M = 0.08  # nearer to a wall or a thing of the model the floor need not be seen
-MIN_INCREMENT_M = 0.2  # shortest move at full speed into floor that is seen to be free; less of it is crept
-MIN_CREEP_M = 0.05  # shortest move into floor that was not seen to be free
-UNSURE_GAP_M = 0.3  # nearer to what is only suspected it creeps: what was seen of it may be a part of it
+STEP_M = 0.05  # of the way, along which distances to things are measured
+MIN_MOVE_M = 0.05  # where there is less room before what may stand there, the leg is halted
+MAX_BRAKING_M = 0.6  # so far ahead the way is asked after: more than the robot needs to stop
+UNSURE_GAP_M = 0.3  # what was seen of what is only suspected may be a part of it, which reaches so much further
+P_CAMOUFLAGED = 0.05  # that something stands on floor that looks free, and that no earlier picture would tell
 TOUCHED_GAP_M = 0.02  # what was touched is not come so near to again
 TOUCHED_AWAY = 0.2  # nearer to it than that a move must lead away from it by this part of the way
 TOUCH_HOLDS_M = 0.5  # after so much of the way a touch that is no obstacle tells no more where not to go
@@ -74,20 +74,6 @@ LOOK_PICTURE_S = 0.2  # time that a picture with its command takes, weighed like
 Point = tuple[float, float]
 
 
-class Caution(NamedTuple):
-    """How the next move is limited by what is not seen.
-
-    Attributes:
-        move_m: at most so far [m, true]; 0 where something may stand in what is not seen.
-        creeps: whether that leads into floor that was not seen to be free.
-        is_confirmed: whether it is seen free by more than looks.
-    """
-
-    move_m: float
-    creeps: bool
-    is_confirmed: bool = False
-
-
 class FloorAhead:
     """What the board tells of the floor along the way of one leg."""
 
@@ -96,7 +82,8 @@ class FloorAhead:
         self._settings, self._leg = settings, leg
         self._robot = find_robot(view)
         self._here = belief.value.world_from_robot(self._robot.world)
-        self._way: list[Point] = [(self._here.x_m, self._here.y_m), (leg.x1_m, leg.y1_m)]
+        self._ahead_rad = math.atan2(leg.y1_m - self._here.y_m, leg.x1_m - self._here.x_m)
+        self._to_go_m = math.dist((leg.x1_m, leg.y1_m), self._here.position)
         self._beyond, locales = _find_way_beyond(view, self._robot)
         self._locales = tuple(sorted({belief.value.locale, *locales}))
         self._floor = find_floor(self._robot.world, self._locales)
@@ -111,8 +98,11 @@ class FloorAhead:
         self._reasons: dict[str, Entry[Any]] = {} if search is None else {search.id: search}
         self._seen = SeenFloor(
             tuple(entry.value for entry in self._scans), np.array([disc.circle for disc in self._discs]),
-            tuple(_list_taken(thing, whole.plan.overhang_m) for name in self._locales
+            tuple(thing.footprint_world for name in self._locales
                   for thing in self._robot.world.things_of(name) if thing.is_obstacle))
+        self._wider = [(polygon, 1.0, whole.plan.overhang_m) for polygon in found]
+        self._wider += [(polygon, entry.value.certainty, UNSURE_GAP_M) for entry, polygon in self._suspected
+                        if not entry.value.is_there]
 
     @property
     def because(self) -> tuple[Entry[Any], ...]:
@@ -120,18 +110,26 @@ class FloorAhead:
         """
         return tuple(sorted(self._reasons.values(), key=lambda entry: (entry.cycle, entry.id)))
 
-    def limit_move(self, move_m: float) -> Caution:
-        """How far, of a move to the leg's end, the robot may go at once; a move of any other kind is no longer."""
-        free_m = self._measure_to_things_m(move_m, touched=True)
-        if free_m < min(MIN_CREEP_M, move_m):
-            return Caution(0.0, True)
-        caution = limit_move(self._find_unseen(self._sweep_ahead(free_m)), free_m, self._settings)
-        if not caution.creeps:
-            sure_m = self._measure_to_things_m(caution.move_m, UNSURE_GAP_M)
-            if sure_m >= min(caution.move_m, MIN_INCREMENT_M):
-                return caution._replace(move_m=sure_m, is_confirmed=self.is_confirmed(sure_m))
-            caution = Caution(min(caution.move_m, self._settings.max_creep_m), True)
-        return caution._replace(move_m=min(caution.move_m, self._measure_to_things_m(move_m)))
+    def measure_clearance(self, way_m: float) -> Clearance:
+        """Where straight ahead a touch may happen on so much of the way, and how probably; beyond the leg's end too.
+
+        Something stands, as far as is known, on each floor that was not seen free. On floor that only looks free it
+        rarely does. What was found, or is suspected, may reach further than was seen of it, by any length up to the
+        longest that is likely.
+        """
+        room_m = self._measure_room_m(way_m)
+        tested = self._ask(self._sweep_ahead(room_m))
+        unconfirmed = tested.only(~self._seen.ask_confirmed(tested.points))
+        stands = [find_blind(self._find_unseen(tested)), self._find_wall(room_m),
+                  np.array([room_m] if room_m < way_m else [])]
+        risks = [(at, np.ones(len(at))) for at in stands]
+        may_stand = find_blind(unconfirmed)
+        risks += [(may_stand, np.full(len(may_stand), P_CAMOUFLAGED)), *self._find_near(room_m)]
+        at_m, p = (np.concatenate(column) for column in zip(*risks, strict=True))
+        places, number = np.unique(np.round(at_m, 3), return_inverse=True)
+        worst = np.zeros(len(places))
+        np.maximum.at(worst, number, p)
+        return Clearance(places, worst, room_m)
 
     def keep_to_seen(self, command: MotorCommand) -> tuple[Leg, MotorCommand | None]:
         """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
@@ -148,76 +146,82 @@ class FloorAhead:
             if turned is not None:
                 return looking, turned
         wanted_m = actuator.reach * command.move_m
-        caution = self.limit_move(wanted_m)
-        if caution.creeps and caution.move_m < min(MIN_CREEP_M, wanted_m):
+        clearance = self.measure_clearance(wanted_m + MAX_BRAKING_M)
+        if clearance.room_m < min(MIN_MOVE_M, wanted_m):
             return leg, self._lead_away() if self._touches else None
-        move_m = min(command.move_m, actuator.compute_command_m(caution.move_m))
-        s = self._settings
-        slowly = s.creep_speed_m_per_s if caution.creeps else None if caution.is_confirmed else self.wary_m_per_s
-        return leg, MotorCommand(command.turn_rad, move_m, slowly)
+        free_m, speed = choose_move(
+            clearance, wanted_m, actuator, self._settings.creep_speed_m_per_s, LOOK_PICTURE_S)
+        move_m = min(command.move_m, actuator.compute_command_m(free_m))
+        return leg, MotorCommand(command.turn_rad, move_m, None if speed >= actuator.speed_m_per_s else speed)
 
     def _lead_away(self) -> MotorCommand | None:
         """A turn and a short move away from what was touched, as near as may be to the way; None: there is no room.
 
         So the next motion never repeats the one that ended in a touch, also where the model explains it.
         """
-        here, (x_m, y_m) = self._here, self._way[1]
-        aim_rad = math.atan2(y_m - here.y_m, x_m - here.x_m)
+        here = self._here
         walls = shapely.boundary(self._floor)
         rim_m = min(self._robot.radius_m, shapely.distance(walls, shapely.Point(here.position)))
         for turn_rad in sorted(np.arange(-math.pi, math.pi, AWAY_STEP_RAD).tolist(), key=abs):
-            heading_rad = aim_rad + turn_rad
+            heading_rad = self._ahead_rad + turn_rad
             there = here.x_m + AWAY_M * math.cos(heading_rad), here.y_m + AWAY_M * math.sin(heading_rad)
             aside = copy.copy(self)
-            aside._way = [self._way[0], there]
-            if shapely.distance(walls, shapely.Point(there)) >= rim_m and aside.limit_move(AWAY_M).move_m >= AWAY_M:
+            aside._ahead_rad = heading_rad
+            if shapely.distance(walls, shapely.Point(there)) >= rim_m and aside._measure_room_m(AWAY_M) >= AWAY_M:
                 turned_rad = wrap_angle(heading_rad - here.heading_rad)
                 move_m = self._robot.actuator.compute_command_m(AWAY_M)
                 return MotorCommand(turned_rad, move_m, self._settings.creep_speed_m_per_s)
         return None
 
-    @property
-    def wary_m_per_s(self) -> float:
-        """The highest speed into floor that only looks free."""
-        return min(self._settings.wary_speed_m_per_s, self._robot.actuator.speed_m_per_s)
+    def _measure_room_m(self, way_m: float) -> float:
+        """How far the robot can go straight ahead before its rim comes to what may stand there; 0..way."""
+        return min(self._measure_to_things_m(way_m, touched=True), self._measure_to_things_m(way_m))
 
-    def is_confirmed(self, move_m: float) -> bool:
-        """Whether the floor of a move is seen free by more than looks, but for what is next to the model's walls."""
-        tested = self._ask(self._sweep_ahead(move_m))
-        unconfirmed = tested.only(~self._seen.ask_confirmed(tested.points))
-        return measure_free_m(unconfirmed, move_m) >= move_m - SPACING_M  # it ends between two points
-
-    def _measure_to_things_m(self, most_m: float, gap_m: float = 0.0, *, touched: bool = False) -> float:
-        """How far the robot can go towards the leg's end before it comes nearer to what may stand there; 0..most.
-
-        Args:
-            gap_m: of its rim; of what is only suspected, where it is not 0.
-            touched: only what was touched is asked; the robot does not go along that, but away from it.
+    def _measure_to_things_m(self, way_m: float, *, touched: bool = False) -> float:
+        """The same of what was touched, along which the robot does not go, but away from it; or of all else.
         """
-        way, step_m = shapely.LineString(self._way), MIN_CREEP_M
-        along = np.arange(0.0, most_m + step_m, step_m)
-        points = shapely.line_interpolate_point(way, along)
-        free_m = most_m
+        along, points = self._list_places(way_m)
+        free_m = way_m
         stands = [(entry, polygon) for entry, polygon in self._suspected
-                  if not ((touched and entry.value.touched_s is None) or (gap_m and entry.value.is_there))]
+                  if not touched or entry.value.touched_s is not None]
         for entry, polygon in [*stands, *(self._touches if touched else ())]:
             gaps = shapely.distance(points, polygon)
-            near_m, away_m = (TOUCHED_GAP_M, TOUCHED_AWAY * step_m) if touched else (gap_m, -1e-9)
+            near_m, away_m = (TOUCHED_GAP_M, TOUCHED_AWAY * STEP_M) if touched else (0.0, -1e-9)
             met = np.flatnonzero((gaps[1:] < self._robot.radius_m + near_m) & (gaps[1:] < gaps[:-1] + away_m))
             if len(met):
                 free_m = min(free_m, float(along[met[0]]))
                 self._reasons[entry.id] = entry
         return free_m
 
-    def measure_free_m(self, most_m: float) -> float:
-        """How far towards the leg's end the floor is seen to be free, and leads not against what was touched."""
-        free_m = self._measure_to_things_m(most_m, touched=True)
-        return measure_free_m(self._find_unseen(self._sweep_ahead(free_m)), free_m)
+    def _find_near(self, way_m: float) -> Iterator[tuple[Floats, Floats]]:
+        """Where the robot passes what may be wider than is known of it, and how probably it is so wide."""
+        along, points = self._list_places(way_m)
+        for polygon, certainty, wider_m in self._wider:
+            gaps = shapely.distance(points, polygon) - self._robot.radius_m
+            near = (gaps[:-1] < wider_m) & (gaps[1:] <= gaps[:-1] + 1e-3)
+            yield along[:-1][near], certainty * np.clip(1.0 - gaps[:-1][near] / wider_m, 1e-3, 1.0)
+
+    def _find_wall(self, way_m: float) -> Floats:
+        """Where straight behind the leg's end the robot would come to a wall or a thing of the model."""
+        along, points = self._list_places(way_m)
+        gaps = shapely.distance(points, shapely.boundary(self._floor))
+        met = (along[1:] > self._to_go_m) & (gaps[1:] < self._robot.radius_m) & (gaps[1:] < gaps[:-1])
+        return np.asarray(along[:-1][met])
+
+    def _find_ahead(self, along_m: Floats) -> Floats:
+        """(n, 2) places so far straight ahead [m, world]."""
+        ahead = np.array([math.cos(self._ahead_rad), math.sin(self._ahead_rad)])
+        return np.asarray(self._here.position + along_m[:, None] * ahead)
+
+    def _list_places(self, way_m: float) -> tuple[Floats, Any]:
+        """How far along the way, and where, the robot's axis is on it."""
+        along = np.arange(0.0, way_m + STEP_M, STEP_M)
+        return along, shapely.points(self._find_ahead(along))
 
     def choose_look(self) -> Lookout | None:
         """A look from here at floor that is needed behind the end of this leg, where it is the best place for that."""
         s, end = self._settings, (self._leg.x1_m, self._leg.y1_m)
-        to_go_m = math.dist(end, self._here.position)
+        to_go_m = self._to_go_m
         if to_go_m > LOOK_FROM_M or not self._beyond or len(self._leg.looked_at) >= s.max_looks:
             return None
         swept = sample_sweep([end, *self._beyond], self._robot.radius_m + SEEN_MARGIN_M, LOOK_AHEAD_M)
@@ -249,10 +253,11 @@ class FloorAhead:
         return [*poses, Pose2(leg.x1_m, leg.y1_m, math.atan2(y - leg.y1_m, x - leg.x1_m))]
 
     def _sweep_ahead(self, most_m: float) -> Sweep:
-        """What the robot sweeps towards the leg's end, but for what it stands on, which is free, and leaves behind."""
-        sweep = sample_sweep(self._way, self._robot.radius_m + SEEN_MARGIN_M, most_m)
-        off, along = sweep.points - self._way[0], np.subtract(self._way[1], self._way[0])
-        return sweep.only((np.linalg.norm(off, axis=1) > self._robot.radius_m) & (off @ along > 0.0))
+        """What the robot sweeps straight ahead, but for what it stands on, which is free, and leaves behind."""
+        (here, there) = self._find_ahead(np.array([0.0, most_m]))
+        sweep = sample_sweep([here, there], self._robot.radius_m + SEEN_MARGIN_M, most_m)
+        off = sweep.points - here
+        return sweep.only((np.linalg.norm(off, axis=1) > self._robot.radius_m) & (off @ (there - here) > 0.0))
 
     def _ask(self, sweep: Sweep) -> Sweep:
         """The part of a sweep that is not next to something that the model has."""
@@ -266,14 +271,6 @@ class FloorAhead:
         reasons += [entry for k in np.flatnonzero(discs) for entry in self._discs[k].because]
         self._reasons.update((entry.id, entry) for entry in reasons)
         return tested.only(~free)
-
-
-def _list_taken(thing: Thing, overhang_m: float) -> Floats:
-    """(k, 2) corners of the floor that a thing takes; of what the model lacks the top may be wider than its feet."""
-    if thing.kind != EXTRA_KIND:
-        return thing.footprint_world
-    wide = shapely.buffer(build_polygon(thing.footprint_world), overhang_m, join_style="mitre")
-    return np.asarray(shapely.get_coordinates(wide)[:-1])
 
 
 def _list_what_may_stand(view: View, world: Building) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
@@ -359,14 +356,6 @@ def _find_put_down(view: View, robot: RobotModel, goal: Goal) -> FreeDisc:
     if math.dist((x_m, y_m), start.position) > MAX_DRIVEN_GAP_M:
         return FreeDisc((start.x_m, start.y_m, PUT_DOWN_FREE_M), (first,))
     return FreeDisc((x_m, y_m, PUT_DOWN_FREE_M), (first,))
-
-
-def limit_move(unseen: Sweep, move_m: float, settings: ActionSettings) -> Caution:
-    """How far of a move the robot may go, by what of its sweep is not seen; it creeps where the rest is too short."""
-    free_m = measure_free_m(unseen, move_m)
-    if free_m >= min(move_m, MIN_INCREMENT_M):
-        return Caution(free_m, False)
-    return Caution(min(move_m, settings.max_creep_m, measure_blind_end_m(unseen, MIN_INCREMENT_M)), True)
 
 
 def _find_scans(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> tuple[Entry[FreeFloor], ...]:

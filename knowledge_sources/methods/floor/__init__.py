@@ -25,8 +25,8 @@ from knowledge_sources.methods.floor.rivals_on_floor import (
     explain_touch, find_fixed, is_behind, judge_by, judge_thing, take_as_jamb,
 )
 from knowledge_sources.methods.floor.seen_floor import (
-    Costs, Lookout, SPACING_M, SeenFloor, Sweep, choose_look, find_floor, measure_blind_end_m, measure_first_seen_m,
-    measure_free_m, sample_sweep,
+    Costs, Lookout, SPACING_M, SeenFloor, Sweep, choose_look, find_blind, find_floor, measure_first_seen_m,
+    sample_sweep,
 )
 from knowledge_sources.methods.floor.weigh_sight import MIN_THING_CERTAINTY, Sight, is_telling
 from knowledge_sources.methods.floor.weigh_touch import (
@@ -37,9 +37,9 @@ __all__ = [
     "FLOOR_VIEW_DISTANCE_M", "FLOOR_VIEW_TURN_RAD", "MAX_FIXED_LOOKS", "MIN_MOVED_M", "MIN_OBSTACLE_CERTAINTY",
     "MIN_SIDE_M", "MIN_THING_CERTAINTY", "SPACING_M", "TOUCH_MARGIN_M", "TYPICAL_M", "Costs", "Lookout",
     "MotionBetween", "Seen", "SeenFloor", "Sight", "Sweep", "build_free_floor", "build_polygon", "choose_look",
-    "enclose", "explain_seen_elsewhere", "explain_seen_in_patch", "explain_touch", "find_fixed", "find_floor",
-    "find_touched", "is_behind", "is_telling", "is_width", "judge_by", "judge_thing", "list_corners", "locate_touch",
-    "may_be_there", "measure_approach_m", "measure_blind_end_m", "measure_first_seen_m", "measure_free_m", "move_thing",
-    "place_walls", "redraw", "redraw_door", "revise_by_difference", "revise_by_door", "revise_by_report",
-    "revise_by_thing", "sample_sweep", "see_free_floor", "see_ranges", "take_as_jamb", "touch_again", "touch_first",
+    "enclose", "explain_seen_elsewhere", "explain_seen_in_patch", "explain_touch", "find_blind", "find_fixed",
+    "find_floor", "find_touched", "is_behind", "is_telling", "is_width", "judge_by", "judge_thing", "list_corners",
+    "locate_touch", "may_be_there", "measure_approach_m", "measure_first_seen_m", "move_thing", "place_walls", "redraw",
+    "redraw_door", "revise_by_difference", "revise_by_door", "revise_by_report", "revise_by_thing", "sample_sweep",
+    "see_free_floor", "see_ranges", "take_as_jamb", "touch_again", "touch_first",
 ]

@@ -172,26 +172,6 @@ def measure_blind_m(unseen: Sweep) -> float:
     return SPACING_M * len(np.unique(np.floor(find_blind(unseen) / SPACING_M)))
 
 
-def measure_free_m(unseen: Sweep, length_m: float) -> float:
-    """How far the disc can go before it covers unseen floor."""
-    blind = find_blind(unseen)
-    return min(length_m, float(blind[0])) if len(blind) else length_m
-
-
-def measure_blind_end_m(unseen: Sweep, gap_m: float) -> float:
-    """How far the disc has come when it has covered the first unseen floor, and what follows within ``gap_m``."""
-    blind = find_blind(unseen)
-    if not len(blind):
-        return 0.0
-    at = np.sort(unseen.at_m)
-    last = blind[0]
-    for there in at[at >= last]:
-        if there - last > gap_m:
-            break
-        last = there
-    return float(last) + SPACING_M
-
-
 MAX_HIDDEN_M = 0.2  # floor counts as seen where nothing higher than this can hide below the picture's lower border
 
 MAX_FLOORS = 64

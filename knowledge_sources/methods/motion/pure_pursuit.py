@@ -97,13 +97,6 @@ def steer_to(point: tuple[float, float], here: Pose2, drift_per_m: float) -> flo
     return min(max(wanted, -MAX_CURVATURE_PER_M), MAX_CURVATURE_PER_M)
 
 
-def choose_speed(free_m: float, most_m_per_s: float, actuator: ActuatorModel, creep_speed_m_per_s: float) -> float:
-    """The highest speed, or what can be stopped from before the floor ends that is seen to be free [m/s]."""
-    room_m = max(0.0, free_m - ROLLING_STOP_MARGIN_M)
-    fastest = math.sqrt(2.0 * actuator.brake_m_per_s2 * room_m)
-    return min(most_m_per_s, max(fastest, creep_speed_m_per_s))
-
-
 def plan_increment(
     actuator: ActuatorModel, leg: Leg, here: Pose2, sigma_m: float, curvature_per_m: float, lookahead_m: float
 ) -> MotorCommand | None:

@@ -153,7 +153,7 @@ def test_floor_that_was_seen_before_it_was_found_elsewhere_tells_nothing(status:
     scan = scan_floor(find_floor(house(), [HALL]), to_world(here), HALL, near_m=0.05, forward_m=0.0, half_rad=1.5)
     for value, free in ((scan, True), (PlaceSearch(status, ""), is_free), (scan, True)):
         bench.put(value, belief)
-        assert (FloorAhead(bench.view, leg.value, belief, DEFAULT).measure_free_m(1.0) == 1.0) == free
+        assert (FloorAhead(bench.view, leg.value, belief, DEFAULT).measure_clearance(1.0).free_m == 1.0) == free
 
 
 @pytest.mark.parametrize(("ahead_m", "is_free"), [(-0.45, True), (-0.1, True), (0.7, False)])
@@ -163,7 +163,7 @@ def test_what_was_seen_where_it_stands_or_leaves_behind_holds_it_up_no_more(ahea
     floor, thing = find_floor(house(), [HALL]), shapely.Point(to_world(Pose2(3.0 + ahead_m, 2.0, 0.0)).position)
     bench.put(scan_floor(floor, to_world(here), HALL, near_m=0.05, forward_m=0.0, half_rad=3.1), belief)
     bench.put(scan_floor(floor, to_world(Pose2(1.0, 2.0, 0.0)), HALL, things=[thing.buffer(0.1)]), belief)
-    assert (FloorAhead(bench.view, leg.value, belief, DEFAULT).measure_free_m(1.0) == 1.0) == is_free
+    assert (FloorAhead(bench.view, leg.value, belief, DEFAULT).measure_clearance(1.0).free_m == 1.0) == is_free
 
 
 RIDE = Subgoal(Place(HALL, 5.0, 2.0), Place(STUDY, 3.0, 2.0), primitive=False, passage="lift")

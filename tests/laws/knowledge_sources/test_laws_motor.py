@@ -30,9 +30,10 @@ from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.motor import LOOKAHEAD_M, Motor
 from knowledge_sources.methods.floor import find_floor
 from knowledge_sources.methods.motion import MAX_HEADING_ERROR_RAD, count_increment, plan_increment
+from knowledge_sources.methods.motion.clearance import LATENCY_S, MIN_MOVE_M, Clearance, choose_move
 from knowledge_sources.methods.motion.pure_pursuit import MAX_START_OFFSET_M
 from knowledge_sources.reads import FloorAhead
-from knowledge_sources.reads.floor_ahead import MIN_INCREMENT_M, TOUCH_HOLDS_M, UNSURE_GAP_M
+from knowledge_sources.reads.floor_ahead import P_CAMOUFLAGED, TOUCH_HOLDS_M
 from knowledge_sources.settings import DEFAULT
 from world_models.actuator import ActuatorModel
 from world_models.entries import Contact, Discrepancy, Drift, Leg, MotorCommand, Obstacle, Place
@@ -40,6 +41,7 @@ from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 
 ACTUATOR = ActuatorModel()
+CREEP_M_PER_S = DEFAULT.action.creep_speed_m_per_s
 BLIND = Motor(replace(DEFAULT, action=replace(DEFAULT.action, keeps_to_seen_floor=False)))
 """One that does not ask what of the floor is seen."""
 SMALL = 1e-6
@@ -215,7 +217,8 @@ def test_turned_left_and_right_the_mirrored_board_gives_the_mirrored_command(
         assert one.turn_rad == pytest.approx(-other.turn_rad, abs=1e-9)
         # The floor is asked point by point of a grid in the world, which is not mirrored.
         assert one.move_m == pytest.approx(other.move_m, abs=1e-9 if is_blind else 0.06)
-        assert one.speed_m_per_s == other.speed_m_per_s
+        speeds = [command.speed_m_per_s or ACTUATOR.speed_m_per_s for command in commands if command is not None]
+        assert speeds[0] == pytest.approx(speeds[1], abs=1e-9 if is_blind else 0.06)
 
 
 @pytest.mark.parametrize("magnitude", [1.0, 4.9])
@@ -271,28 +274,25 @@ def test_the_robot_drives_as_far_as_the_floor_is_seen_and_creeps_where_it_is_not
     for gap_m in (0.65, 0.7, 0.8):  # the floor is asked at points 5 cm apart
         _, near = drive_to_thing(gap_m)
         command = command_of(near)
-        assert command is not None and command.speed_m_per_s is None
+        assert command is not None and (command.speed_m_per_s or 1.0) > 0.4
         free_m = gap_m - 0.35 - 0.03  # up to where the disc, with its margin, would cover what is not seen
         assert free_m - 0.06 < ACTUATOR.reach * command.move_m <= free_m + 0.06
-    for gap_m in (0.5, 0.55):
-        _, close = drive_to_thing(gap_m)
-        command = command_of(close)
-        assert command is not None and command.speed_m_per_s == DEFAULT.action.creep_speed_m_per_s
-        assert ACTUATOR.reach * command.move_m <= DEFAULT.action.max_creep_m + SMALL
+    command = command_of(drive_to_thing(0.38)[1])
+    assert command is not None and command.speed_m_per_s == CREEP_M_PER_S
 
 
-@pytest.mark.parametrize(("confirmed_m", "is_wary"), [((), True), (0.8, True), (3.0, False)])
+@pytest.mark.parametrize(("confirmed_m", "is_wary"), [((), True), (0.6, True), (3.0, False)])
 def test_full_speed_is_for_floor_that_more_than_looks_tells_to_be_free(
     confirmed_m: float | tuple[()], is_wary: bool
 ) -> None:
-    """The sweep of a move of 0.58 m ends 0.96 m before the axis."""
+    """What may be camouflaged 0.2 m before it is driven over at the speed that its probability bears."""
     bench, _ = drive_to_thing(3.0)
     scan = bench.view["FreeFloor-1"]
     told = tuple(confirmed_m for _ in scan.value.bearings_rad) if isinstance(confirmed_m, float) else confirmed_m
     bench.revise(scan, confirmed_m=told)
     command = command_of(bench.ask(Motor(), bench.view["Leg-1"]))
-    assert command is not None and command.move_m == pytest.approx(ACTUATOR.increment_m)
-    assert command.speed_m_per_s == (DEFAULT.action.wary_speed_m_per_s if is_wary else None)
+    wary = CREEP_M_PER_S / math.sqrt(P_CAMOUFLAGED)
+    assert command is not None and command.speed_m_per_s == (pytest.approx(wary, abs=0.1) if is_wary else None)
 
 
 def test_it_does_not_creep_to_where_something_may_stand_but_halts_the_leg() -> None:
@@ -305,14 +305,33 @@ def test_it_does_not_creep_to_where_something_may_stand_but_halts_the_leg() -> N
     assert {"Leg-1", "Hypothesis-1", "Obstacle-1"} <= reasons(effect)
 
 
-@pytest.mark.parametrize("suspected", [0.7, 0.8, 0.9, 1.1, 1.2, 1.5])
-def test_it_creeps_past_what_is_only_suspected_though_the_floor_is_seen_free(suspected: float) -> None:
-    """At full speed up to 0.3 m before it; from there slowly, and not to where it may stand."""
-    command = command_of(drive_to_thing(3.0, suspected=suspected)[1])
+@given(st.floats(MIN_MOVE_M, 0.57), st.sampled_from([0.05, 0.5, 1.0]), st.floats(0.0, 0.2))
+def test_free_way_is_driven_before_a_risk_and_none_is_crept_over_behind_it(at: float, p: float, wide: float) -> None:
+    """Moves that end, or begin anew, where a risk begins or ends take less time than one at the speed of the worst."""
+    at_m = np.arange(round(at, 3), at + wide + SMALL, 0.05)
+    clearance, gone_m, takes_s = Clearance(at_m, np.full(len(at_m), p), 2.0), 0.0, 0.0
+    while gone_m < 0.58 - SMALL:
+        ahead = Clearance(at_m[at_m >= gone_m - SMALL] - gone_m, clearance.p[at_m >= gone_m - SMALL], 2.0)
+        move_m, speed = choose_move(ahead, 0.58 - gone_m, ACTUATOR, CREEP_M_PER_S, 0.2)
+        gone_m, takes_s = gone_m + move_m, takes_s + move_m / speed + 0.2
+    worst = min(ACTUATOR.speed_m_per_s, CREEP_M_PER_S / math.sqrt(p))
+    assert takes_s <= 0.58 / worst + 0.2 + SMALL
+    assert p < 1.0 or takes_s < 0.58 / 0.3 + (wide + 0.06) / worst + 0.8
+
+
+@pytest.mark.parametrize("suspected", [None, 0.7, 0.8, 0.9, 1.1, 1.2, 1.5])
+@pytest.mark.parametrize("gap_m", [0.4, 0.5, 0.7, 0.8, 3.0])
+def test_the_harm_of_a_touch_is_borne_wherever_one_may_happen(gap_m: float, suspected: float | None) -> None:
+    """What stands within the move is met at its speed, what stands behind it at what is left after braking."""
+    bench, effects = drive_to_thing(gap_m, suspected=suspected)
+    ahead = FloorAhead(bench.view, bench.view["Leg-1"].value, bench.view["Hypothesis-1"], DEFAULT)
+    clearance, command = ahead.measure_clearance(1.5), command_of(effects)
     assert command is not None
-    move_m, before_m = ACTUATOR.reach * command.move_m, suspected - 0.1 - plain_robot().radius_m
-    assert (command.speed_m_per_s is None) == (before_m - UNSURE_GAP_M >= MIN_INCREMENT_M)
-    assert move_m <= max(before_m - UNSURE_GAP_M, 0.0 if command.speed_m_per_s is None else before_m) + 0.05 + SMALL
+    speed, move_m = command.speed_m_per_s or ACTUATOR.speed_m_per_s, ACTUATOR.reach * command.move_m
+    brakes_m = np.where(clearance.at_m < move_m - SMALL, 0.0, np.maximum(clearance.at_m - LATENCY_S * speed, 0.0))
+    met = np.maximum(speed**2 - 2.0 * ACTUATOR.brake_m_per_s2 * brakes_m, 0.0)
+    assert (clearance.p * met <= CREEP_M_PER_S**2 + SMALL).all() and move_m <= clearance.room_m + SMALL
+    assert speed >= CREEP_M_PER_S
 
 
 @pytest.mark.parametrize("direction_deg", [-100.0, -60.0, 0.0, 60.0])
@@ -331,7 +350,7 @@ def test_after_a_touch_that_the_model_explains_it_moves_away_from_it_once(
                          count=400), belief)
     effects = bench.ask(Motor(), leg)
     found, is_on = command_of(effects), abs(direction_deg) > 90.0 or gone_m > 0.0
-    free_m = FloorAhead(bench.view, leg.value, bench.view["Hypothesis-1"], DEFAULT).measure_free_m(1.0)
+    free_m = FloorAhead(bench.view, leg.value, bench.view["Hypothesis-1"], DEFAULT).measure_clearance(1.0).free_m
     assert found is not None and free_m == (1.0 if is_on else 0.0)
     assert found.is_creeping != is_on and (contact.id in reasons(effect_on(effects, MotorCommand))) != is_on
     if not is_on:
