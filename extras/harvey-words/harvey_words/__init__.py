@@ -1,5 +1,7 @@
 """Words for Harvey: route instructions of people, read on the model of a building."""
 
+from harvey_words.directions import Directions as Directions
+from harvey_words.directions import write_directions as write_directions
 from harvey_words.reading import RouteEnd as RouteEnd
 from harvey_words.reading import Reading as Reading
 from harvey_words.reading import RouteError as RouteError

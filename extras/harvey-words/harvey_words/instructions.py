@@ -12,9 +12,10 @@ import numpy as np
 
 from experiments.generated.floors import generated_floor
 from experiments.report import Cell, Report
+from harvey_words.directions import write_directions
 from harvey_words.lexicon import split_text
 from harvey_words.mazes import write_maze
-from harvey_words.reading import Reading, read_route
+from harvey_words.reading import Reading, RouteError, read_route
 from harvey_words.told_routes import Told, draw_maze, tell_maze, tell_rooms
 from harvey_words.word_map import WordMap
 from world_models.files.toml.source import Source
@@ -27,7 +28,7 @@ PARAGRAPHS = Path(str(files("harvey_words"))).parent / "tests" / "data" / "parag
 DEVELOPMENT = PARAGRAPHS.with_name("development.txt")
 COLUMNS = ("what", "texts", "arrive", "ask, the right place first", "ask, another first", "silently elsewhere",
            "ms a sentence")
-LEAST = {"routes": (0.95, 0.01), "paragraphs": (0.85, 0.02)}
+LEAST = {"routes": (0.95, 0.01), "paragraphs": (0.85, 0.02), "directions": (0.99, 0.01)}
 """Least share that arrives, and greatest that is elsewhere without a question."""
 
 
@@ -87,6 +88,30 @@ def draw_routes(count: int, seed: int) -> Iterator[tuple[str, WordMap, Told]]:
                     yield kind, plan, route
 
 
+def draw_directions(count: int, seed: int) -> Iterator[tuple[WordMap, Told]]:
+    """Directions written between rooms and crossings that are drawn on the same kinds of buildings."""
+    rng = np.random.default_rng([seed, 63])
+    centre = WordMap(load_world(WORLDS / "research_center.toml"))
+    for kind in ("research centre", "generated floors", "mazes"):
+        written = 0
+        while written < count // 3:
+            if kind == "generated floors":
+                plan = WordMap(generated_floor(int(rng.integers(10**6)), 10, open_share=0.8).world)
+            else:
+                plan = centre if kind == "research centre" else WordMap(
+                    read_world(Source.parse(write_maze(*draw_maze(rng)), "maze")))
+            places = [name for name, area in sorted(plan.areas.items()) if area.is_hall == (kind == "mazes")
+                      and area.is_tile == area.is_hall]
+            for _ in range(min(TOLD_ON_ONE, count // 3 - written)):
+                start, end = rng.choice(places, 2, replace=False)
+                try:
+                    text = write_directions(plan, str(start), str(end)).text
+                except RouteError:
+                    continue  # a room whose door is shut
+                written += 1
+                yield plan, Told(str(start), str(end), text)
+
+
 def read_paragraphs(path: Path = PARAGRAPHS) -> Iterator[tuple[str, WordMap, str, float | None, str, str]]:
     """The style, map, start, heading [degrees], end and text of each."""
     plans: dict[str, WordMap] = {}
@@ -120,12 +145,17 @@ def run(quick: bool, seed: int) -> Report:
             taken = time.perf_counter() - begin
             for tally in (sums, *([tallies.setdefault(f"paragraphs: {style}", Tally())] if sums is paragraphs else [])):
                 tally.add(reading, end, taken)
+    directions = Tally()
+    for plan, told in draw_directions(QUICK_ROUTES if quick else ROUTES, seed):
+        begin = time.perf_counter()
+        reading = read_route(told.text, plan, told.start)
+        directions.add(reading, told.end, time.perf_counter() - begin)
     rows = tuple(tally.row(what) for what, tally in (
-        ("routes", routes), ("paragraphs", paragraphs), ("of development", development),
+        ("routes", routes), ("paragraphs", paragraphs), ("of development", development), ("directions", directions),
         *tallies.items()))
     claims = tuple(
         (f"{what}: at least {least:.0%} arrive, at most {silent:.0%} silently elsewhere", tally.reaches(least, silent))
-        for (what, (least, silent)), tally in zip(LEAST.items(), (routes, paragraphs), strict=True))
+        for (what, (least, silent)), tally in zip(LEAST.items(), (routes, paragraphs, directions), strict=True))
     return Report("Ways that are told in words", COLUMNS, rows, NOTES, claims)
 
 
@@ -134,4 +164,5 @@ NOTES = (
     " generated floors, and from crossing to crossing in drawn mazes; nobody says which way the body faces.",
     "Paragraphs: written down before the grammar, in differing styles; an installed package has none. Those of"
     " development are others, of other mazes: the reader is bettered by them, so they claim nothing.",
+    "Directions: written from room to room, and from crossing to crossing, and read again from the same start.",
 )

@@ -660,7 +660,7 @@ class WordFollower:
                 fit += -max(abs(gap) - 1.5, 0.0) / 2.0
             best = max(best, fit)
         if relation == "across" and not other.names:
-            best = max(best, -abs(sight.ahead_m) / 2.0)
+            best = max(best, -2.0 * abs(sight.ahead_m))
         return best
 
     def _at_door(self, state: State, sight: NamedSight, odds: float, senses: Senses) -> State:

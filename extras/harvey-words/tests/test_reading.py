@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from harvey.cli import main
-from harvey_words import Reading, RouteError, read_route
+from harvey_words import Reading, RouteError, read_route, write_directions
 from harvey_words.instructions import draw_routes, read_paragraphs, run
 from harvey_words.lexicon import Lexicon, edit_distance, lexicon_data
 from harvey_words.mazes import HALLS, THINGS, write_maze
@@ -117,7 +117,9 @@ def test_left_for_right_in_a_mirrored_maze_ends_at_the_mirrored_place(seed: int)
 
 
 WORDS = ("go", "turn", "left", "right", "back", "past", "between", "of", "and", "the", "once", "two", "last", "door",
-         "hall", "brick", "lamp", "until", "with", "so that", ",", ".", "when", "end", "is", "its", "on", "to", "xyzzy")
+         "hall", "brick", "lamp", "until", "with", "so that", ",", ".", "when", "end", "is", "its", "on", "to", "xyzzy",
+         "it", "one", "block", "where", "meet", "you are", "take", "through", "through the", "too far", "ends", "stop",
+         "corner", "crossing", "blue", "chair", "passing", "from", "by", "no", "all the way down", "ahead", "behind")
 
 
 @SPEEDY
@@ -131,7 +133,8 @@ def test_no_text_makes_it_raise_and_odds_are_odds(text: str) -> None:
 
 
 @pytest.mark.parametrize("piece", ["go past the sign and ", "turn left ", "it is the second door on the right. ",
-                                   "abcdefgh ijklmnop ", "between and of past ", "past the lamp "])
+                                   "abcdefgh ijklmnop ", "where the blue meets it and all the way down ",
+                                   "between and of past ", "past the lamp "])
 def test_ten_thousand_characters_take_less_than_a_second(piece: str) -> None:
     text = (piece * 10_000)[:10_000]
     for plan, start in ((centre(), LAB), (maze(), "c-1-1")):
@@ -197,4 +200,36 @@ def test_the_command(text: str, more: tuple[str, ...], code: int, says: str,
 def test_the_experiment_reads_routes_and_paragraphs() -> None:
     assert len(list(read_paragraphs())) == 80
     report = run(quick=True, seed=3)
-    assert report.claims[0][1] and report.rows[0][1] == 30 and report.rows[1][1] == 80
+    assert all(claim[1] for claim in report.claims) and report.rows[0][1] == 30 and report.rows[1][1] == 80
+    name, texts, arrive, *_, elsewhere, _ = report.rows[2]
+    assert name == "of development" and isinstance(arrive, int) and isinstance(elsewhere, int)
+    assert texts == 160 and arrive >= 0.9 * 160 and elsewhere <= 0.02 * 160
+
+
+# -- directions ------------------------------------------------------------------------------------------------------
+
+@SPEEDY
+@given(st.sampled_from(sorted(name for name in maze().areas if name.startswith("c-"))),
+       st.sampled_from(sorted(name for name in maze().areas if name.startswith("c-"))))
+def test_directions_lead_there_when_they_are_read_again(start: str, goal: str) -> None:
+    if start == goal:
+        with pytest.raises(RouteError, match="expected a way"):
+            write_directions(maze(), start, goal)
+        return
+    written = write_directions(maze(), start, goal)
+    assert written.is_clear and end_of(read_route(written.text, maze(), start)) == goal
+
+
+@pytest.mark.parametrize(("start", "goal", "world", "code", "says"), [
+    (LAB, "library", "research_center", 0, "It is the next door on the right."),
+    ("library", LAB, "research_center", 0, "Turn left."),
+    ("reception", "archive", "two_ways", 0, "Leave the room"),
+    (LAB, "nowhere", "research_center", 2, ""),
+])
+def test_the_command_for_directions(start: str, goal: str, world: str, code: int, says: str,
+                                    capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["directions", start, goal, "--world", world]) == code
+    assert says in capsys.readouterr().out
+    if code == 0:
+        assert main(["directions", start, goal, "--world", world, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["clear"]
