@@ -20,6 +20,7 @@ from logs.run_head import SIMULATOR, RunHead
 from logs.timeline import Timeline
 from world_models.building.world import World
 from world_models.entries import Hypothesis
+from world_models.plugins import RUN_EXPORTERS_GROUP, list_absent, load_plugins
 
 Cell = str | int | float | bool | None
 SEPARATOR = " "
@@ -177,3 +178,22 @@ def write_tum(poses: Iterable[tuple[Any, tuple[Any, ...]]], path: Path) -> int:
     except OSError as error:
         raise BadInput(f"{path}: expected a file to write to, got: {error.strerror}") from None
     return len(lines)
+
+
+@dataclass(frozen=True, slots=True)
+class RunExporter:
+    """What writes a run as one file for other programs: an extra brings it.
+
+    Attributes:
+        write: writes a run there, and returns the number of messages; raises BadInput and RecordingError.
+    """
+
+    write: Callable[[RunDirectory, Path], int]
+
+
+def find_run_exporter(name: str) -> RunExporter:
+    """The one of this name. Raises BadInput, which says what to install, where there is none."""
+    if needs := list_absent(RUN_EXPORTERS_GROUP).get(name):
+        raise BadInput(f"--{name} needs {needs}")
+    exporter: RunExporter = load_plugins(RUN_EXPORTERS_GROUP, RunExporter, name)[name]
+    return exporter

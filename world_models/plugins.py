@@ -14,7 +14,7 @@
 ``harvey.renderers``          a ``sim.render.lights.LitRenderers``, named ``lit``
 ``harvey.experiments``        the ``run`` of an experiment, by its name
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
-``harvey.run_exporters``      a ``logs.run_exporter.RunExporter``, named ``mcap``
+``harvey.run_exporters``      a ``logs.export.RunExporter``, named ``mcap``
 ``harvey.exporters``          a ``harvey_buildings.exporters.Exporter``
 ``harvey.experiments``        a module as those of ``experiments``
 ============================  ==========================================================================

@@ -142,8 +142,7 @@ def _run_export(args: Namespace) -> int:
     wanted = {kind: Path(folder) for kind in ("csv", "parquet") if (folder := getattr(args, kind)) is not None}
     if not wanted and args.mcap is None and args.tum is None:
         raise BadInput("expected --csv DIR, --parquet DIR, --tum FILE or --mcap FILE, got none of them")
-    from logs.export import read_tables, write_tables, write_ways
-    from logs.run_exporter import find_run_exporter
+    from logs.export import find_run_exporter, read_tables, write_tables, write_ways
     from logs.timeline import Timeline
 
     run = open_run(args.run)

@@ -53,8 +53,6 @@ WITHOUT: Mapping[str, str] = {
 """What it means that a level is off."""
 WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, UserReport, Redirection)
 """What changes the knowledge of a locale."""
-MOST_PLACES = 4
-"""Most candidate places that are named, the newest."""
 COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong", "at most")
 MOST_ROWS = 60
 """Of more rows only those are printed that were not verified, and the last ones."""
@@ -142,8 +140,8 @@ def levels_off(run: RunDirectory) -> Iterator[str]:
             yield f"The {level} level of servoing was off in this run: {WITHOUT.get(level, 'nobody closed it')}."
 
 
-def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
-    """Which run it is, how it ended, and what went wrong on the way: the first lines of a story.
+def opening(run: RunDirectory, history: Timeline, *, is_short: bool = False) -> Iterator[str]:
+    """Which run it is, how it ended, and, unless it is to be short, what went wrong on the way: a story's first lines.
 
     Raises BadInput where the journal has no decision, or ``result.json`` is malformed.
     """
@@ -154,6 +152,8 @@ def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
         end = "cut off" if outcome is None else outcome.value.kind
         yield f"{run_name(run)}: {end} in {phrases.moment(history, cycle)}."
         yield from levels_off(run)
+        if is_short:
+            return
         yield from turn_lines(history, run.read_result(), is_whole=outcome is not None)
 
 
@@ -276,9 +276,9 @@ def _tell_search(history: Timeline, lost: EntryRecord[Any], last: int) -> Iterat
     if not looks and not candidates:
         return
     text = f"To find out where it was it took {count(len(looks), 'picture')}"
+    candidates = [one for one in candidates if one.cycle == candidates[-1].cycle]  # what was weighed together last
     if candidates:
-        places = [f"{record.value.place()} ({record.value.weight:.0%})" for record in candidates]
-        text += f"; it may have stood at {listed(places, MOST_PLACES)}"
+        text += f"; in the end it may have stood at {phrases.perhaps(one.value for one in candidates)}"
     first = min((*looks, *candidates), key=lambda record: record.cycle)
     yield said(f"{text}.", first, *candidates)
 

@@ -15,10 +15,10 @@ from harvey.errors import BadInput
 from harvey_ros2.messages import message_types
 from harvey_ros2.middleware import Delivery
 from harvey_ros2.run_messages import KINDS, RunMessages, TimedMessage, topic_of
+from logs.export import RunExporter
 from logs.pictures import open_pictures
 from logs.records import is_a
 from logs.run_directory import RunDirectory
-from logs.run_exporter import RunExporter
 from logs.run_head import RunHead
 from logs.timeline import Timeline
 from world_models.entries import CameraPicture
