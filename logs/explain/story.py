@@ -53,7 +53,7 @@ WITHOUT: Mapping[str, str] = {
 """What it means that a level is off."""
 WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, UserReport, Redirection)
 """What changes the knowledge of a locale."""
-COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong", "at most")
+COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "chance elsewhere", "bound")
 MOST_ROWS = 60
 """Of more rows only those are printed that were not verified, and the last ones."""
 MILESTONES = "Milestones"
@@ -98,7 +98,9 @@ class MilestoneRow:
             unknown if self.time_s is None else f"{self.time_s:.1f}", f"{self.matched} of {self.expected}",
             unknown if off_m is None else f"{1e3 * off_m:.1f}",
             unknown if off_rad is None else f"{math.degrees(abs(off_rad)):.1f}",
-            *(unknown if p is None else f"{p:.2g}" for p in (self.p_wrong, self.most_p_wrong)))
+            unknown if self.p_wrong is None else f"{self.p_wrong:.2g}",
+            unknown if self.most_p_wrong is None else (
+                f"{'from ' if self.verdict == 'refuted' else ''}{self.most_p_wrong:.2g}"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,7 +296,7 @@ def _tell_contacts(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sen
     """What it felt; and, where the simulator says so, what it truly touched."""
     yield from _points(read_turning_points(history, main=True), "contact") or [Sentence("It felt no contact.")]
     truly = [point for point in read_truth(history, result) if point.kind == COLLISION]
-    yield from (Sentence(f"It truly touched something at {point.text}.", cycle=point.cycle) for point in truly)
+    yield from (Sentence(f"It truly touched {point.text}.", cycle=point.cycle) for point in truly)
     if result.get("collisions") is None:
         yield Sentence("What it touched without feeling it nobody recorded: there is no result of the simulator.")
     elif (missing := result["collisions"] - len(truly)) > 0:
