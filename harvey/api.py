@@ -32,8 +32,10 @@ from harvey.runner.result import MissionResult
 from harvey.simulation.simulated_run import build_head, run_mission
 from knowledge_sources.settings import Settings
 from logs import run_directory
+from logs.explain.in_short import tell_end
 from logs.explain.model import WorldFile
 from logs.explain.phrases import Story
+from logs.explain.questions_in_words import answers, is_question
 from logs.explain.subjects import stories_of
 from logs.explain.why import lines_of
 from logs.pictures import open_pictures
@@ -241,19 +243,24 @@ class RecordedRun:
         """Why something came about, in sentences, as ``harvey why`` says it.
 
         Args:
-            what: an entry, as ``"MotorCommand-12"``; a landmark, door, thing or room, as ``"allens-office/desk"``; the
-                number of a cycle; None for the outcome.
+            what: an entry, as ``"MotorCommand-12"``; a landmark, door, thing or room, as ``"allens-office/desk"``; a
+                question, as ``"what is in the way?"``; the number of a cycle; None for the outcome, in short.
 
         Raises:
             BadInput: the run has none of that name; near ones are listed.
         """
         with knowing(self._kinds):
-            return "\n\n".join("\n".join(lines_of(one)) for one in self.stories(what))
+            history = Timeline(self._files.journal)
+            stories = self.stories(what) if what is not None or history.cut_off is not None else [
+                tell_end(self._files, history)]
+            return "\n\n".join("\n".join(lines_of(one)) for one in stories)
 
     def stories(self, what: str | int | None = None) -> Sequence[Story]:
         """The same as data: headline, decision and reasons with the entries that say so."""
         history = Timeline(self._files.journal)
         with knowing(self._kinds):
+            if isinstance(what, str) and is_question(what):
+                return list(answers(history, what, run=self._files))
             return list(stories_of(history, what, WorldFile(self._files)))
 
     def replay(self) -> int | None:

@@ -131,7 +131,7 @@ def draw_architecture(sources: Iterable[type[KnowledgeSource]], kinds: Registry)
 def level_lines(level: Level, sources: Iterable[type[KnowledgeSource]]) -> list[Line]:
     """A level's knowledge sources, and what it asks and corrects."""
     names = [name_of(source) for source in sources if source.level is level]
-    shown = [" · ".join(names)] if level is Level.GOAL else names
+    shown = wrap_names(names) if level is Level.GOAL else names
     question, correction = QUESTIONS[level]
     return [("head", f"{level} level"), *(("", name) for name in shown), ("", ""), ("small", question),
             ("small", correction)]

@@ -81,7 +81,7 @@ def drive_seed(seed: int) -> dict[str, Any]:
         "outcome": result.outcome, "error_mm": round(1000 * result.error_m, 1),
         "milestones": result.milestones["verified"], "wrong": result.milestones["false_accepts"],
         "collisions": result.collisions,
-        "path_m": round(result.path_length_m, 1), "robot_s": round(result.sim_time_s), "cycles": result.cycles}
+        "path_m": round(result.path_length_m, 1), "robot_s": round(result.sim_time_s), "cycles": result.decisions}
 
 
 def main() -> int:

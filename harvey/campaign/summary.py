@@ -90,8 +90,8 @@ def format_result(r: MissionResult, out: Path | None, story: Sequence[str] = ())
         *(f"  amiss         {text}" for text in r.amiss),
         *(f"  starved       {text}" for text in r.starved),
         f"  way           {r.path_length_m:.1f} m in {r.sim_time_s:.0f} s of the robot's time",
-        f"  took          {r.wall_time_s:.1f} s for {count(r.cycles, 'cycle')} and {count(r.frames, 'picture')}, with"
-        f" {count(r.waits, 'more cycle')} to ask for locale frames",
+        f"  took          {r.wall_time_s:.1f} s for {count(r.frames, 'picture')} and {count(r.decisions, 'cycle')},"
+        f" {r.waits} of them only to ask for locale frames",
     ]
     if out is not None:
         lines.append(f"  recording     {out / 'recording.rrd'}")
@@ -106,7 +106,7 @@ def format_results(results: Sequence[MissionResult]) -> str:
     """A table, one row a seed, with a summary row: counts are summed, ways averaged, of errors the worst is shown."""
     counts = [(r.milestones["verified"] or 0, r.milestones["refuted"] or 0, r.false_accepts, r.sketches, r.replans,
                r.relocalizations, r.collisions or 0) for r in results]
-    ways = [(r.path_length_m, r.sim_time_s, r.cycles, r.wall_time_s) for r in results]
+    ways = [(r.path_length_m, r.sim_time_s, r.decisions, r.wall_time_s) for r in results]
     reached = sum(r.outcome == "reached" for r in results)
     rows = [_row(str(r.seed), r.outcome, "", r.error_m, counted, way)
             for r, counted, way in zip(results, counts, ways, strict=True)]

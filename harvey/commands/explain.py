@@ -37,6 +37,7 @@ def _add_why_arguments(parser: ArgumentParser) -> None:
 
 
 def _run_why(args: Namespace) -> int:
+    from logs.explain.in_short import tell_end
     from logs.explain.questions_in_words import is_question
     from logs.explain.story import opening
     from logs.explain.web import cycle_lines, explain
@@ -55,6 +56,10 @@ def _run_why(args: Namespace) -> int:
         return _print_check(history, args.json)
     if args.not_ is not None:
         return _print_not(run, history, args)
+    if of_the_end and history.cut_off is None and args.depth is None and not args.json:
+        print("\n\n".join(["\n".join(opening(run, history, is_short=True)), "\n".join(lines_of(tell_end(run, history))),
+                           LEGEND]))
+        return 0
     stories = list(_stories(run, history, args))
     if of_the_end and history.cut_off is not None:
         print(_describe_unfinished(run, history.cut_off), file=sys.stderr if args.json else sys.stdout)
@@ -123,7 +128,7 @@ def _print_not(run: RunDirectory, history: Timeline, args: Namespace) -> int:
 WHY = CliCommand(
     "why", "why Harvey did what it did, in sentences; and why not something else",
     (
-        ("harvey why runs/lab-to-allens-office-0", "what happened on the way, how the mission ended, and why"),
+        ("harvey why runs/lab-to-allens-office-0", "how the mission ended, and what decided it"),
         ("harvey why runs/lab-to-allens-office-0 MotorCommand-12", "why it turned there"),
         ("harvey why runs/lab-to-allens-office-0 allens-office/desk", "who expected it, from which frame and line"),
         ("harvey why runs/lab-to-allens-office-0 --at 88", "what cycle 88 did, and why"),
@@ -135,6 +140,8 @@ WHY = CliCommand(
         ("harvey why runs/hallway-kidnap-0 'how far off was it?' --at 350", "belief against truth, from the recording"),
         ("harvey why runs/box-in-the-way-0 'what is in the way?'", "each thing that the model lacks, down to pixels"),
         ("harvey why runs/box-in-the-way-0 'why did you stop?' --at 120", "the last stop up to cycle 120"),
+        ("harvey why runs/box-in-the-way-0 'why not round it?'", "how much room there was, and how much it needs"),
+        ("harvey why runs/hallway-kidnap-0 'how sure was it?' --at 380", "by its own reckoning, and in truth"),
         ("harvey why runs/box-in-the-way-0 'why that detour?'", "the plan before and after, and what lay between"),
         ("harvey why runs/door-found-shut-0 'is the door shut?'", "what pictures show in its opening"),
         ("harvey why runs/lab-to-allens-office-0 --check", "whether every decision rests on something"),
@@ -142,7 +149,7 @@ WHY = CliCommand(
     ),
     _add_why_arguments, _run_why,
     "Follows the main reasons from an entry down to goal, model and pixels. With --check, exit code 1 where a\n"
-    "decision rests on nothing. Without NAME a legend is printed too: what places, pixels and names in brackets are.",
+    "decision rests on nothing. Without NAME the answer is short; with --depth all is told that the end rests on.",
 )
 
 

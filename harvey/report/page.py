@@ -109,8 +109,11 @@ def read_part(name: str) -> str:
 
 
 def _opening(story: RunStory) -> str:
+    """The first lines, which wrap on a narrow screen: what stands indented is a list."""
     first, *rest = story.opening
-    return f"<p><strong>{escape(first)}</strong></p>\n<pre tabindex=\"0\">{escape(chr(10).join(rest))}</pre>"
+    items = "".join(f"<li>{escape(' '.join(line.split()))}</li>" for line in rest if line.startswith(" "))
+    plain = "".join(f"<p>{escape(line)}</p>" for line in rest if line.strip() and not line.startswith(" "))
+    return f"<p><strong>{escape(first)}</strong></p>\n{plain}<ul>{items}</ul>"
 
 
 def _sections(story: RunStory) -> Iterator[str]:

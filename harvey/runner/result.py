@@ -88,11 +88,6 @@ class MissionResult:
     starved: Sequence[str] = ()
 
     @property
-    def cycles(self) -> int:
-        """The decisions in which something was done besides asking for locale frames."""
-        return self.decisions - self.waits
-
-    @property
     def error_m(self) -> float:
         """The final error; NaN where nobody knows the truth."""
         return math.nan if self.final_error_m is None else self.final_error_m

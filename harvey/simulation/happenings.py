@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from sim.body.collision import Obstacles
 from sim.body.simulated_body import SimulatedBody
 from sim.ground_truth.things import MovedThing
 from sim.truth import Truth
@@ -18,10 +19,11 @@ LEAF = "true-leaf"
 
 @dataclass(frozen=True, slots=True)
 class TrueContact:
-    """Where the robot truly was, and how fast it moved, when it touched something."""
+    """Where the robot truly was, how fast it moved, and what was nearest to it, when it touched something."""
 
     place: Place
     speed_m_per_s: float
+    thing: str
 
 
 class ContactWatch:
@@ -38,8 +40,9 @@ class ContactWatch:
         track = self._body.track
         found: list[TrueContact] = []
         for truth in (*track[self._followed:], self._body.truth):
-            contact = TrueContact(self._place(truth), truth.contact_m_per_s)
-            found += [contact] * (truth.collisions - self._counted)
+            if truth.collisions > self._counted:
+                contact = TrueContact(self._place(truth), truth.contact_m_per_s, self._find_nearest(truth))
+                found += [contact] * (truth.collisions - self._counted)
             self._counted = truth.collisions
         self._followed = len(track)
         return tuple(found)
@@ -49,6 +52,15 @@ class ContactWatch:
         if not truth.locale:
             return Place("", pose.x_m, pose.y_m)
         return Place.of_world(self._world, truth.locale, pose.x_m, pose.y_m)
+
+
+    def _find_nearest(self, truth: Truth) -> str:
+        """The thing, wall or door whose faces are nearest to the robot; "" outside all locales."""
+        faces = [*self._world.faces_within(truth.locale), *self._body.building.added] if truth.locale else []
+        parts = {name: [face for face in faces if _names([face]) == {name}] for name in _names(faces)}
+        clearances_m = {name: Obstacles.of_faces(part, self._body.building.floor_m).clearance_m(truth.world_from_robot)
+                        for name, part in parts.items()}
+        return min(sorted(clearances_m), key=lambda name: clearances_m[name], default="")
 
 
 class HappeningWatch:
@@ -71,7 +83,8 @@ class HappeningWatch:
         added, gone = _names(building.added), _names(building.gone)
         was_added, was_gone, self._added, self._gone = self._added, self._gone, added, gone
         for name in sorted(added - was_added):
-            yield _describe(name, "is shut or ajar" if name.endswith(LEAF) else "is there, and the model lacks it")
+            stands = "is there, and the model lacks it"
+            yield _describe(name, "is not as open as the model has it" if name.endswith(LEAF) else stands)
         for name in sorted(was_added - added):
             yield _describe(name, "is open again" if name.endswith(LEAF) else "is taken away again")
         yield from (f"the thing {name} is not there, and the model has it" for name in sorted(gone - was_gone - added))

@@ -85,7 +85,8 @@ class Referee:
         self._happened += [Happening(cycle, what) for what in self._happening_watch.new_happenings()]
         for contact in self._contact_watch.new_contacts():
             place = contact.place
-            self._contacts.append(Collision(cycle, place.locale, place.x_m, place.y_m, contact.speed_m_per_s))
+            self._contacts.append(
+                Collision(cycle, place.locale, place.x_m, place.y_m, contact.speed_m_per_s, contact.thing))
 
     def _follow(self) -> None:
         """How far the robot truly strayed from the leg that it was driving since the last decision."""

@@ -128,11 +128,13 @@ class MilestoneJudge(RobotKnowledgeSource):
         wrong = view.latest(Difference, lambda d: d.p_misled > MAX_P_RIVAL)
         rival = find_alias(view, case.fix, case.belief, weighed)
         p, said = p_alias, _ = (0.0, "") if rival is None else (rival.p, rival.said)
+        of = "it is"
         if wrong is not None and wrong.value.p_misled > p:
             p, said = wrong.value.p_misled, f"{wrong.value.about} differs, {wrong.value.odds_in_words()}"
+            of = "that misleads"
         if p <= MAX_P_RIVAL:
             return verdict
-        reason = f"{verdict.reason}; but {said}: {tell_odds(p, MAX_P_RIVAL)}"
+        reason = f"{verdict.reason}; but {said}: {tell_odds(p, MAX_P_RIVAL, of)}"
         return Verdict("not testable", reason, p, MAX_P_RIVAL, p_alias=p_alias)
 
     def _hold_against_single_lies(self, case: Case, weighed: Weighed, verdict: Verdict) -> Verdict:

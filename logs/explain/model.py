@@ -20,6 +20,7 @@ from world_models.words import landmark, listed
 
 if TYPE_CHECKING:  # a world is loaded only for an answer that needs it, and so is what loads it
     from world_models.building.locale_frame import LocaleFrame
+    from world_models.building.world import World
     from world_models.frame_store import FrameStore
 
 FRAME = "LocaleFrame-"
@@ -118,6 +119,11 @@ class WorldFile:
     def missing(self) -> str:
         """Why it cannot be asked; "" where it can."""
         return self._store if isinstance(self._store, str) else ""
+
+    @property
+    def world(self) -> World | None:
+        """The world; None where it cannot be asked."""
+        return None if isinstance(self._store, str) else self._store.world
 
     def element(self, name: str) -> Element | None:
         """What a name means; None where the world has nothing of that name, or cannot be asked."""

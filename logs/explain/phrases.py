@@ -294,7 +294,8 @@ def verdict(certificate: Certificate, milestone: Milestone | None) -> str:
 
 def milestone_name(milestone: Milestone) -> str:
     """``milestone M1 of the route``, or the check that it is."""
-    return f"milestone {milestone.name()}" if milestone.sketch else f"the {milestone.name()}"
+    name = milestone.name()
+    return f"milestone {name}" if milestone.sketch else name if name.startswith("the ") else f"the {name}"
 
 
 def milestone_of(record: EntryRecord[Any]) -> str:

@@ -1,5 +1,5 @@
-"""Questions in words: of what was in the way, why it stopped or took a detour, whether a door is shut; and of the whole
-run: when was it lost, where did it touch anything, how far off was it in truth.
+"""Questions in words: of what was in the way, why it stopped or took a detour, whether a door is shut, what it thought
+and how surely; and of the whole run: when was it lost, where did it touch anything, how far off was it in truth.
 
 A question is known by a word of it. It asks for entries of some kinds, each explained down to the pixels, or for
 a part of the run's story.
@@ -14,6 +14,7 @@ from itertools import groupby
 from typing import Any, NamedTuple
 
 from logs.explain import phrases
+from logs.explain.in_short import tell_end, tell_round, tell_sureness, tell_thoughts
 from logs.explain.phrases import Sentence, Story, describe_decision, headline, plainly, said, sentence
 from logs.explain.story import ENDED, HAPPENED, LOST, TOUCHED, TROUBLE, tell_part
 from logs.explain.true_errors import read_errors
@@ -76,6 +77,7 @@ def answers(
     Raises BadInput where it is none of the questions that are known, or what it takes is not recorded.
     """
     asked = set(re.findall(r"[^\W_](?:[\w'/.-]*\w)?", question.lower()))
+    asked |= {"gap"} if "not" in asked and asked & ROUND else set()  # why not round it: there was no room
     meant = next((answer for words, answer in KNOWN.values() if words & asked), None)
     foreign = _find_foreign(history, asked)
     if meant is None or foreign:
@@ -226,14 +228,26 @@ def _is_stop(record: Record) -> bool:
 
 
 def _tell_stops(asked: Asked, records: list[Record]) -> Iterator[Story]:
-    """Each stop; with ``at`` the last."""
+    """With ``at`` the last stop and its reasons; else how the run ended, if not at its goal, and the last stops."""
     stops = sorted(records, key=lambda record: record.cycle)
-    for record in stops if asked.at is None else stops[-1:]:
-        how = {Leg: " it stopped to look at floor that it had not seen yet",
-               MotorCommand: " it crept, as it could not see the floor before it"}.get(record.kind, "")
-        text = " a leg was broken off" if record.field("status") == "halted" and is_a(record, Leg) else (
-            f"{how}: {sentence(record)}")
-        yield _story(asked, record, f"In cycle {record.cycle}{text}.", _tell_reasons(asked.history, record))
+    if asked.run is not None and asked.at is None and stops and stops[-1].kind is Outcome:
+        yield tell_end(asked.run, asked.history)
+        del stops[:-2], stops[-1]
+    elif len(stops) > 1 and asked.at is None:
+        yield Story(f"It stopped or crept {count(len(stops), 'time')}; of one more is told by --at CYCLE.", tuple(
+            Sentence(_say_stop(record), (record.ref,), record.cycle) for record in stops[-MOST_STORIES:]))
+        return
+    for record in stops[-1:]:
+        steps = () if asked.run is not None and asked.at is None else _tell_reasons(asked.history, record)
+        yield _story(asked, record, _say_stop(record), steps)
+
+
+def _say_stop(record: Record) -> str:
+    how = {Leg: " it stopped to look at floor that it had not seen yet",
+           MotorCommand: " it crept, as not all of the floor that it was to drive over was seen to be free"}
+    if record.field("status") == "halted" and is_a(record, Leg):
+        return f"In cycle {record.cycle} a leg was broken off."
+    return f"In cycle {record.cycle}{how.get(record.kind, '')}: {sentence(record)}."
 
 
 def _tell_reasons(history: Timeline, record: Record) -> Iterator[Sentence]:
@@ -313,8 +327,9 @@ def _tell_door(record: EntryRecord[DoorState]) -> Sentence:
     state = record.value
     left, top, right, bottom = state.last.box_px
     box = f"pixels ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f})"
-    text = (f"In cycle {record.cycle} {state.last.frame}, {box}, showed {state.last.shows}: {state.state}, certainty"
-            f" {state.certainty:.3f} by {count(state.pictures, 'picture')}.")
+    is_shut = f"{state.certainty:.1%} sure that it is {'shut' if state.log_odds > 0.0 else 'open'}"
+    text = (f"In cycle {record.cycle} {state.last.frame}, {box}, showed {state.last.shows}: {is_shut}, by"
+            f" {count(state.pictures, 'picture')}.")
     return Sentence(text, (record.ref, *record.because), label="evidence")
 
 
@@ -322,6 +337,7 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
+ROUND, ROUND_GAP = _words("round around past by through between"), _words("gap fit squeeze")
 KNOWN: Mapping[str, tuple[frozenset[str], Answer]] = {
     "what went wrong?": (_words("wrong trouble happened"), _part(TROUBLE, "Up to then nothing had gone wrong.")),
     "what was done to it?": (_words("done simulator bumped carried"),
@@ -336,6 +352,7 @@ KNOWN: Mapping[str, tuple[frozenset[str], Answer]] = {
     "does a sense lie?": (
         _words("sense senses lie lies differs differ difference differences rival rivals odds"),
         _entries(_tell_differences, "Nothing was found to differ from model, belief or senses.", Difference)),
+    "why not round it?": (ROUND_GAP, lambda asked: tell_round(asked.run, asked.history, asked.at)),
     "why that detour?": (
         _words("detour detours round around another other else withdrawn replan replanned instead"),
         _entries(_tell_detours, "It took no detour: no plan was withdrawn for anything in the way.", PlanSketch,
@@ -350,17 +367,22 @@ KNOWN: Mapping[str, tuple[frozenset[str], Answer]] = {
     "what is in the way?": (
         _words("way obstacle obstacles there"),
         _entries(_tell_things, "Nothing that the model lacks was found in the way.", Obstacle)),
+    "how sure was it?": (
+        _words("sure surely certain confident sigma"), lambda asked: tell_sureness(asked.run, asked.history, asked.at)),
+    "what did it think?": (
+        _words("think thought believe believed know known"),
+        lambda asked: tell_thoughts(asked.run, asked.history, asked.at)),
 }
 """A question as somebody may ask it: one of which words in a question means it, and what answers. Of several that are
 meant, the first."""
 QUESTIONS = tuple(KNOWN)
 FILLERS = _words(
-    "a all along always and any anything anywhere are at be been before believe believed by can cannot cycle did "
+    "a all along always and any anything anywhere are at be been before by can cannot cycle did "
     "do does drive driven drove ever find first for found from get go goes going gone got had halt halted has "
-    "have held her his how i in into is it its keep kept know known last leave left let long many me mission "
+    "have held her his how i in into is it its keep kept last leave left let long many me mission "
     "model much my never new no not now of often old on once one only or out over plan planned plans position "
     "pose really robot room run say see seen so some somebody something stand standing still such take taken tell "
-    "than that the their them then thing things think thought they this time times to took true turn turned twice "
+    "than that the their them then thing things they this time times to took true turn turned twice "
     "up us very was way we went were what when where whether which who why will with would you your"
 )
 """Words that decide nothing."""

@@ -53,9 +53,7 @@ WITHOUT: Mapping[str, str] = {
 """What it means that a level is off."""
 WHAT_CHANGES: tuple[type[Any], ...] = (DoorState, Obstacle, Contact, UserReport, Redirection)
 """What changes the knowledge of a locale."""
-MOST_PLACES = 4
-"""Most candidate places that are named, the newest."""
-COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "p wrong", "at most")
+COLUMNS = ("cycle", "s", "milestone", "verdict", "lines", "off mm", "off deg", "chance elsewhere", "bound")
 MOST_ROWS = 60
 """Of more rows only those are printed that were not verified, and the last ones."""
 MILESTONES = "Milestones"
@@ -100,7 +98,9 @@ class MilestoneRow:
             unknown if self.time_s is None else f"{self.time_s:.1f}", f"{self.matched} of {self.expected}",
             unknown if off_m is None else f"{1e3 * off_m:.1f}",
             unknown if off_rad is None else f"{math.degrees(abs(off_rad)):.1f}",
-            *(unknown if p is None else f"{p:.2g}" for p in (self.p_wrong, self.most_p_wrong)))
+            unknown if self.p_wrong is None else f"{self.p_wrong:.2g}",
+            unknown if self.most_p_wrong is None else (
+                f"{'from ' if self.verdict == 'refuted' else ''}{self.most_p_wrong:.2g}"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +142,8 @@ def levels_off(run: RunDirectory) -> Iterator[str]:
             yield f"The {level} level of servoing was off in this run: {WITHOUT.get(level, 'nobody closed it')}."
 
 
-def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
-    """Which run it is, how it ended, and what went wrong on the way: the first lines of a story.
+def opening(run: RunDirectory, history: Timeline, *, is_short: bool = False) -> Iterator[str]:
+    """Which run it is, how it ended, and, unless it is to be short, what went wrong on the way: a story's first lines.
 
     Raises BadInput where the journal has no decision, or ``result.json`` is malformed.
     """
@@ -154,6 +154,8 @@ def opening(run: RunDirectory, history: Timeline) -> Iterator[str]:
         end = "cut off" if outcome is None else outcome.value.kind
         yield f"{run_name(run)}: {end} in {phrases.moment(history, cycle)}."
         yield from levels_off(run)
+        if is_short:
+            return
         yield from turn_lines(history, run.read_result(), is_whole=outcome is not None)
 
 
@@ -276,9 +278,9 @@ def _tell_search(history: Timeline, lost: EntryRecord[Any], last: int) -> Iterat
     if not looks and not candidates:
         return
     text = f"To find out where it was it took {count(len(looks), 'picture')}"
+    candidates = [one for one in candidates if one.cycle == candidates[-1].cycle]  # what was weighed together last
     if candidates:
-        places = [f"{record.value.place()} ({record.value.weight:.0%})" for record in candidates]
-        text += f"; it may have stood at {listed(places, MOST_PLACES)}"
+        text += f"; in the end it may have stood at {phrases.perhaps(one.value for one in candidates)}"
     first = min((*looks, *candidates), key=lambda record: record.cycle)
     yield said(f"{text}.", first, *candidates)
 
@@ -294,7 +296,7 @@ def _tell_contacts(history: Timeline, result: Mapping[str, Any]) -> Iterator[Sen
     """What it felt; and, where the simulator says so, what it truly touched."""
     yield from _points(read_turning_points(history, main=True), "contact") or [Sentence("It felt no contact.")]
     truly = [point for point in read_truth(history, result) if point.kind == COLLISION]
-    yield from (Sentence(f"It truly touched something at {point.text}.", cycle=point.cycle) for point in truly)
+    yield from (Sentence(f"It truly touched {point.text}.", cycle=point.cycle) for point in truly)
     if result.get("collisions") is None:
         yield Sentence("What it touched without feeling it nobody recorded: there is no result of the simulator.")
     elif (missing := result["collisions"] - len(truly)) > 0:

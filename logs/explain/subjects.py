@@ -24,6 +24,7 @@ from world_models.entries import (
     Hypothesis,
     LineMatch,
     Milestone,
+    Obstacle,
     PlanSketch,
     PoseFix,
     Segments,
@@ -122,7 +123,10 @@ def stories_of(history: Timeline, what: str | int | None, world: WorldFile) -> I
     Raises BadInput where the run has none of that name; near ones are listed.
     """
     if isinstance(what, str) and history.find(what) is None and ENTRY.fullmatch(what) is None:
-        yield element_story(history, what, world)
+        found = [one for one in history.last_of_kind(Obstacle) if one.field("name") == what]
+        yield from tell_stories(history, [one.ref for one in found], world)
+        if not found:
+            yield element_story(history, what, world)
     else:
         yield from tell_stories(history, find_refs(history, what), None if what is None else world)
 

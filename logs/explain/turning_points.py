@@ -94,6 +94,7 @@ class Collision:
         cycle: the first that began after it.
         locale: where the robot was, "" outside all locales; x_m, y_m: in the frame of the locale, else of the world.
         speed_m_per_s: how fast it moved; None in the results of older versions.
+        thing: what it touched; "" where nobody knows.
     """
 
     cycle: int
@@ -101,12 +102,14 @@ class Collision:
     x_m: float
     y_m: float
     speed_m_per_s: float | None = None
+    thing: str = ""
 
     def turning_point(self) -> TurningPoint:
         """As a turning point, which the robot knows nothing of. Raises TypeError, ValueError for other values."""
         place = Place(self.locale, float(self.x_m), float(self.y_m)).words()
         speed = "" if self.speed_m_per_s is None else f" at {self.speed_m_per_s:.2f} m/s"
-        return TurningPoint(self.cycle, COLLISION, f"{place}{speed}, as only the simulator knows")
+        touched = f"{self.thing or 'something'}, at {place}{speed}, as only the simulator knows"
+        return TurningPoint(self.cycle, COLLISION, touched)
 
 
 @dataclass(frozen=True, slots=True)

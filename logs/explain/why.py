@@ -76,9 +76,7 @@ from world_models.entries import (
 MOST, MOST_PLAIN, MOST_MET = 24, 12, 200
 """Most entries that are named, of a run of another version, and most that are reached."""
 LEGEND = """\
-Places are in metres in each room's own frame, headings counter-clockwise from its x axis; pixels count right and
-down from the top left. Model lines are edges that the map of the building says can be seen. Names in brackets are
-entries of the journal: ask on with harvey why RUN NAME, and of a landmark, door or room by its name too."""
+Ask on by a name in brackets, of a thing, door or room: harvey why RUN NAME. All that it rests on: --depth 5."""
 
 
 def tell_stories(history: Timeline, refs: Iterable[str], world: WorldFile | None = None) -> Iterator[Story]:

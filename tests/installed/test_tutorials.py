@@ -42,7 +42,9 @@ def write_files(here: Path) -> Path:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the reader works, from page to page."""
-    return write_files(tmp_path_factory.mktemp("reader"))
+    here = write_files(tmp_path_factory.mktemp("reader"))
+    (here / "docs").symlink_to(ROOT / "docs")
+    return here
 
 
 def run_line(line: str, folder: Path) -> subprocess.CompletedProcess[str]:

@@ -155,13 +155,15 @@ class Verdict(NamedTuple):
     p_alias: float = 0.0
 
 
-def tell_odds(p_wrong: float, most_p_wrong: float) -> str:
-    """A probability of a wrong place and its bound, in words."""
-    return f"wrong with a probability of {say_percent(p_wrong)}; the limit is {say_percent(most_p_wrong)}"
+def tell_odds(p: float, bound: float, of: str = "this is another place", bounds: str = "allowed {}") -> str:
+    """A probability and its bound, in words: ``chance that this is another place: 2.1e-5, allowed 6.3e-3``."""
+    return f"chance that {of}: {say_chance(p)}, {bounds.format(say_chance(bound))}"
 
 
-def say_percent(p: float) -> str:
-    """A probability to two figures, or four where it is near to one."""
+def say_chance(p: float) -> str:
+    """A probability to two figures: in percent from one percent on, to four figures where it is near to one."""
+    if p < 0.01:
+        return f"{p:.1e}".replace("e-0", "e-").replace(".0e", "e")
     return f"{100.0 * p:.{2 if p < 0.99 else 4}g}%"
 
 
@@ -263,7 +265,7 @@ def judge_place(w: Weighed) -> Verdict:
         if not w.is_camera_known:  # a place where the camera's own error hides what agrees
             return Verdict("not testable", f"{found}: the camera is not known well enough to tell", *odds)
         kind: MilestoneVerdict = "not testable" if w.is_inexact else "refuted"
-        return Verdict(kind, f"{found}: by what was seen {tell_odds(*odds)}", *odds)
+        return Verdict(kind, f"{found}: {tell_odds(*odds, bounds='refuted from {} on')}", *odds)
     where = f"{found}, {w.shift_px:.1f} px from where expected"
     if w.camera_chi2 > MAX_CAMERA_CHI2:
         return Verdict("refuted", f"{where}: only with a camera that is mounted differently than it can be", *odds)

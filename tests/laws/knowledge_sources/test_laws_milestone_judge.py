@@ -152,10 +152,10 @@ def test_a_verdict_says_one_count_of_lines_and_the_bound_that_decided(
     said = judge_place(weigh(matched=matched, p_by_looks=p_by_looks, p_wrong=p_wrong, most_p_wrong=most,
                              shift_px=shift_px, is_inexact=is_inexact))
     assert re.findall(r"(\d+) of (\d+) lines", said.reason) == [(str(matched), "20")]
-    told = re.findall(r"wrong with a probability of ([^ ]+)%; the limit is ([^ ]+)%", said.reason)
+    told = re.findall(r"another place: ([^ ]+), (?:allowed|refuted from) (\S+)", said.reason)
     assert "e+" not in said.reason
-    assert not told or [float(percent) for percent in told[0]] == pytest.approx(
-        [100.0 * said.p_wrong, 100.0 * said.most_p_wrong], rel=0.05)
+    assert not told or [float(one.rstrip("%")) / (100.0 if "%" in one else 1.0) for one in told[0]] == pytest.approx(
+        [said.p_wrong, said.most_p_wrong], rel=0.05)
     is_by_odds = said.kind == "verified" or p_by_looks >= REFUTE or p_wrong > most
     assert bool(told) is is_by_odds
     if said.kind == "verified" or not is_by_odds:

@@ -123,7 +123,7 @@ def test_a_short_account_tells_them_with_the_collisions_that_the_simulator_knows
     assert told == [
         "On the way:",
         "  cycle 2  refuted    M2 of the route: 1 of 9 lines",
-        "  cycle 3  collision  kitchen (1.50, 2.00) m, as only the simulator knows",
+        "  cycle 3  collision  something, at kitchen (1.50, 2.00) m, as only the simulator knows",
         "  cycle 4  lost       kitchen (1.00, 2.00) m by its belief; M2 is refuted",
         "  cycle 5  found      kitchen (3.00, 1.00) m; it knows again where it is",
         "  cycle 6  fault      camera: camera unplugged",
@@ -246,12 +246,14 @@ def test_progress_says_that_it_is_lost_and_found() -> None:
 @pytest.mark.parametrize("locale", ["kitchen", ""])
 def test_a_contact_is_found_once_where_the_robot_truly_was(locale: str) -> None:
     moments = [Truth(Pose2(x, 1.0, 0.0), collisions=n, locale=locale) for x, n in ((1.0, 0), (2.0, 1), (3.0, 1))]
-    body = SimpleNamespace(truth=moments[0], track=tuple(moments[:1]))
+    building = SimpleNamespace(added=(), floor_m=0.0)
+    body = SimpleNamespace(truth=moments[0], track=tuple(moments[:1]), building=building)
     watch = ContactWatch(house(), cast(SimulatedBody, body))
     assert watch.new_contacts() == ()
     body.truth, body.track = moments[2], tuple(moments)
     (contact,) = watch.new_contacts()
     assert (contact.place.locale, contact.place.x_m, contact.speed_m_per_s) == (locale, 2.0, 0.0)
+    assert contact.thing == ("kitchen/south-wall" if locale else "")
     assert watch.new_contacts() == ()
     body.truth = replace(moments[2], collisions=2, contact_m_per_s=0.3)
     assert [(contact.place.x_m, contact.speed_m_per_s) for contact in watch.new_contacts()] == [(3.0, 0.3)]

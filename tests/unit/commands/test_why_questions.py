@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from blackboard import plain
 from harvey.errors import BadInput
+from logs.explain.in_short import measure_gaps
 from logs.explain.questions_in_words import QUESTIONS, answers, is_question
 from logs.records import DecisionRecord, EntryRecord
 from memory_timeline import MemoryTimeline
@@ -78,6 +81,20 @@ def test_a_stop_is_told_with_the_door_that_it_is_for() -> None:
     (story,) = answers(RUN, "why did you stop there?")
     assert "blocked" in story.headline
     assert [step.label for step in story.steps] == ["door"]
+
+
+@pytest.mark.parametrize(("here", "gaps"), [((-2.0, 0.25), (1.25, 0.5)), ((0.25, 3.0), (0.5, 3.0))])
+def test_the_room_beside_a_thing_is_measured_to_the_next_thing_or_wall(here: Any, gaps: Any) -> None:
+    room, cupboard, bin_ = (np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]) for x0, y0, x1, y1 in (
+        (-3.0, -1.0, 1.0, 4.0), (0.2, 1.75, 0.4, 2.0), (-0.5, -1.0, 1.0, -0.5)))
+    world: Any = SimpleNamespace(outline=lambda _: room, obstacles=lambda _: [cupboard])
+    assert measure_gaps(world, THERE, [bin_], np.array(here)) == pytest.approx(gaps)
+
+
+@pytest.mark.parametrize(("question", "told"), [
+    ("what did it think?", "hallway/obstacle-1"), ("why not round it?", "0.5 m wide"), ("how sure was it?", "belief")])
+def test_what_it_thought_and_how_surely_is_told_also_where_it_had_no_belief(question: str, told: str) -> None:
+    assert any(told in str(story) for story in answers(RUN, question))
 
 
 def test_only_a_move_that_creeps_is_a_stop() -> None:

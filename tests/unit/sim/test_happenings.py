@@ -52,7 +52,7 @@ def test_how_the_building_differs_is_told_when_it_does() -> None:
                                       "the thing hallway/extra-0-box is there, and the model lacks it")
     body.building = SimpleNamespace(added=faces("a-door/true-leaf"), gone=faces("office/chair"))
     assert watch.new_happenings() == (
-        "the door a-door is shut or ajar", "the thing hallway/extra-0-box is taken away again",
+        "the door a-door is not as open as the model has it", "the thing hallway/extra-0-box is taken away again",
         "the thing office/chair is not there, and the model has it")
     body.building = SimpleNamespace(added=(), gone=())
     assert watch.new_happenings() == ("the door a-door is open again", "the thing office/chair is there again")
