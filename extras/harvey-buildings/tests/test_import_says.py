@@ -32,16 +32,19 @@ def write_rooms(path: Path, count: int) -> None:
     path.write_text(text, encoding="utf-8")
 
 
+@pytest.mark.parametrize("floor_m", [0.0, 3.6, -2.9])
 @pytest.mark.parametrize(("sill_m", "height_m", "panes", "words"), [
     (0.9, 1.2, 1, ""), (2.6, 0.8, 0, "from 2.60 to 3.40 m"), (2.49, 0.5, 0, "from 2.49 to 2.99 m"),
     (-1.5, 1.0, 0, "from -1.50 to -0.50 m"), (1.0, 2.0, 1, "ends at 2.40 m"),
 ])
 def test_a_window_above_the_ceiling_is_clipped_or_left_out_and_the_world_has_no_faults(
-        sill_m: float, height_m: float, panes: int, words: str) -> None:
+        sill_m: float, height_m: float, panes: int, words: str, floor_m: float) -> None:
+    """On whichever storey: all heights are the floor's and as much more."""
     square = np.array([[0.0, 0.0], [5.0, 0.0], [5.0, 4.0], [0.0, 4.0]])
-    plan = BuildingPlan("hut", "hut.ifc", [Storey("ground", 0.0)], [
-        Space("den", "room", "den", "ground", square, 0.0, 2.5)])
-    plan.windows.append(Window("w", "ground", np.array([2.5, 0.0]), np.array([1.0, 0.0]), 1.2, sill_m, height_m))
+    plan = BuildingPlan("hut", "hut.ifc", [Storey("ground", floor_m)], [
+        Space("den", "room", "den", "ground", square, floor_m, 2.5)])
+    plan.windows.append(Window("w", "ground", np.array([2.5, 0.0]), np.array([1.0, 0.0]), 1.2,
+                               floor_m + sill_m, height_m))
     layout = lay_out(plan)
     assert len(layout.panes) == panes and words in str(plan.report)
     assert ("window w" in str(plan.report)) == bool(words)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, rule
 from ros2_bench import TICK_S, Bench, deliver
 from ros2_values import plain
 
@@ -32,6 +33,7 @@ from harvey_ros2.ros2_base import SAY_S
 from sim.emulators.emulator import IdealGround
 from world_models.camera import Camera, CameraMount
 from world_models.entries import MotorCommand
+from world_models.frames import Pose2
 
 TYPES = message_types("jazzy")
 
@@ -409,3 +411,40 @@ def test_the_emulators_own_definitions_are_those_of_ros_2() -> None:
     theirs = {name.split("/")[-1]: describe(build_idl_class(TYPES, name)) for name in TYPES.store.fielddefs
               if "/msg/" in name and name.split("/")[-1] in ours}
     assert ours == theirs and ours["Twist"] != ours["Clock"]
+
+
+class OdometryMachine(RuleBasedStateMachine):
+    """Processes of a robot, one after the other, each of which begins to count anywhere: what is read goes on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reader, self.time_s, self.sender = OdometryReader(TYPES), 100.0, 0
+        self.counted = Pose2(2.0, -1.0, 0.7)
+        self.expected = self.counted
+        self.read()
+
+    @rule(turn_rad=st.floats(-0.1, 0.1), move_m=st.floats(0.0, 0.2))
+    def drive(self, turn_rad: float, move_m: float) -> None:
+        step = Pose2(move_m, 0.0, turn_rad)
+        self.counted, self.expected, self.time_s = self.counted @ step, self.expected @ step, self.time_s + 0.1
+        self.read()
+
+    @rule(begin=st.builds(Pose2, st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-3.0, 3.0)))
+    def begin_again(self, begin: Pose2) -> None:
+        self.reader.forget()
+        self.counted, self.sender, self.time_s = begin, self.sender + 1, self.time_s + 3.0
+        self.read()
+
+    def read(self) -> None:
+        spin = {"z": math.sin(self.counted.heading_rad / 2.0), "w": math.cos(self.counted.heading_rad / 2.0)}
+        message = TYPES.build("nav_msgs/msg/Odometry", header={"stamp": stamp(self.time_s)}, pose={
+            "pose": {"position": {"x": self.counted.x_m, "y": self.counted.y_m}, "orientation": spin}})
+        found = self.reader.read(Heard(TYPES.encode(message), f"process {self.sender}", self.time_s))
+        assert found is not None
+        here = Pose2(found.odometry.x_m, found.odometry.y_m, found.odometry.heading_rad)
+        assert here.distance_to(self.expected) < 1e-6
+        assert math.remainder(here.heading_rad - self.expected.heading_rad, math.tau) == pytest.approx(0.0, abs=1e-6)
+
+
+TestOdometry = OdometryMachine.TestCase
+TestOdometry.settings = settings(max_examples=30, stateful_step_count=8, deadline=None)

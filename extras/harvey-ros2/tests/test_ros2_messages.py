@@ -6,9 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, rule
 from ros2_values import USED, plain, random_message
 
+from blackboard import Level
+from harvey.testing import house, plain_robot
 from harvey_ros2.messages import MessageError, MessageTypes, dds_name, message_types, seconds, stamp
+from harvey_ros2.run_messages import RunMessages
+from knowledge_sources.reads.place_believed import MAX_P_RIVAL
+from world_models.entries import Certificate, Difference, Discrepancy, MilestoneVerdict, Rival
+from world_models.entries.discrepancy import DiscrepancyStatus
+from world_models.frames import Pose2
 
 TYPES = message_types("jazzy")
 VALUES = 1000
@@ -78,3 +86,46 @@ def test_a_message_cut_short_is_refused(name: str, seed: int, data: st.DataObjec
     except MessageError:
         return
     assert plain(read) == plain(TYPES.decode(whole, name))  # only padding was cut
+
+
+class CertaintyMachine(RuleBasedStateMachine):
+    """A place is told as certain where nothing spoke against it since a picture vouched for it, and no sense lies."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        robot = plain_robot()
+        self.messages = RunMessages(TYPES, house(), robot.lens, robot.mount)
+        self.is_certified = self.is_lost = self.is_misled = False
+
+    @rule(verdict=st.sampled_from(("verified", "refuted", "not testable")), p_wrong=st.sampled_from((0.1, 0.49, 0.51)))
+    def judge(self, verdict: MilestoneVerdict, p_wrong: float) -> None:
+        said = Certificate("Milestone-1", "", verdict, "so", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0, 0.1, p_wrong, 0.5)
+        is_kept = self.is_certified and verdict == "not testable" and p_wrong < 0.5
+        self.is_certified = (is_kept or verdict == "verified") and not (self.is_lost or self.is_misled)
+        self.agree(said)
+
+    @rule(level=st.sampled_from((Level.PLAN, Level.GOAL)), status=st.sampled_from(("open", "corrected")))
+    def doubt(self, level: Level, status: DiscrepancyStatus) -> None:
+        if level is Level.GOAL:
+            self.is_lost = status == "open"
+            self.is_certified = self.is_certified and not self.is_lost
+        self.agree(Discrepancy(level, "it is elsewhere", None, (5.0, 30.0), "px", status))
+
+    @rule(p=st.sampled_from((0.0, 0.001, 0.5, 1.0)))
+    def weigh_sense(self, p: float) -> None:
+        self.is_misled = p > MAX_P_RIVAL
+        self.is_certified = self.is_certified and not self.is_misled
+        rivals = Rival("lens", "another lens", 1.0, p), Rival("chance", "chance", 0.0, 1.0 - p)
+        self.agree(Difference("camera", rivals, (), 0.0))
+
+    def agree(self, value: Certificate | Discrepancy | Difference) -> None:
+        told = [item for item in self.messages.take(value) if item.topic == "/diagnostics"]
+        assert (self.messages.is_certified, bool(self.messages.lost)) == (self.is_certified, self.is_lost)
+        pose = self.messages.pose(Pose2(0.0, 0.0, 0.0), np.eye(3) * 1e-4).message.pose
+        assert (pose.covariance[0] < 1.0) == self.is_certified
+        level = 2 if self.is_lost else 1 - self.is_certified
+        assert [item.message.status[0].level for item in told] in ([], [level])
+
+
+TestCertainty = CertaintyMachine.TestCase
+TestCertainty.settings = settings(max_examples=60, stateful_step_count=10, deadline=None)

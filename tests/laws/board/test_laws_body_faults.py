@@ -26,6 +26,7 @@ from world_models.entries import (
     STOP_KEY,
     BodyFault,
     CameraPicture,
+    Contact,
     Discrepancy,
     MotionReport,
     MotorCommand,
@@ -42,19 +43,31 @@ MOST_CYCLES = 2000
 class ScriptedBody:
     """Answers as a script says, "" for well and else what is wrong; when that is at its end, as it says ever after."""
 
-    def __init__(self, script: list[str], ever_after: str) -> None:
-        self._script, self._ever_after = iter(script), ever_after
-        self.now_s = 0.0
+    def __init__(self, script: list[str], ever_after: str, touches: Iterable[bool] = ()) -> None:
+        """``touches``: whether it touches something in each motion, and each time that it is asked for what it did."""
+        self._script, self._ever_after, self._touches = iter(script), ever_after, iter(touches)
+        self.now_s, self.motions, self._contact = 0.0, 0, None
+        self.touched: list[int] = []
         self.waits: list[float] = []
 
     def execute(self, command: MotorCommand) -> MotionReport | BodyFault:
+        self.motions += 1
+        self._touch()
         return self._fault("base") or MotionReport(command.turn_rad, command.move_m, 1.0, self.now_s)
 
     def claim(self) -> MotionReport | BodyFault:
+        self._touch()
         return self._fault("base") or MotionReport(0.0, 0.1, 1.0, self.now_s)
 
-    def take_contact(self) -> None:
-        return None
+    def take_contact(self) -> Contact | None:
+        contact, self._contact = self._contact, None
+        return contact
+
+    def _touch(self) -> None:
+        """Something, in the motion under way."""
+        if self._contact is None and next(self._touches, False):
+            self._contact = Contact("bumper", 0.0, 0.2, self.now_s)
+            self.touched.append(self.motions)
 
     def ranges(self) -> None:
         return None
@@ -161,3 +174,16 @@ def test_a_base_that_breaks_off_every_motion_is_given_up(whole: int) -> None:
     assert outcome is not None and f"{MAX_BROKEN_MOTIONS} motions in a row" in outcome.value.reason
     moves = [e for e in told if isinstance(e.value, MotorCommand)]
     assert len(moves) == (2 * MAX_BROKEN_MOTIONS if whole else MAX_BROKEN_MOTIONS)
+
+
+@given(st.integers(1, 4), st.lists(st.sampled_from(["", "link lost", "stalled"]), max_size=12), st.lists(st.booleans()))
+def test_what_is_touched_is_told_once_and_with_the_motion_in_which_it_was(
+    moves: int, script: list[str], touches: list[bool]
+) -> None:
+    """Also where that was broken off, and whatever is touched until it has recovered."""
+    body = ScriptedBody(script, "", touches)
+    scheduler, told = drive(["move"] * moves, body)
+    commands = [e.ref for e in told if isinstance(e.value, MotorCommand)]
+    contacts = [commands.index(e.because[0]) + 1 for e in told if isinstance(e.value, Contact)]
+    if scheduler.view.latest(Outcome) is None:
+        assert contacts == body.touched

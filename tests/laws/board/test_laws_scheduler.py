@@ -361,3 +361,15 @@ def test_a_source_is_asked_only_where_all_that_it_needs_is_so() -> None:
         elif met:
             assert tally.of(scheduler.view).value == Tally(9)
             run(scheduler)
+
+
+@given(st.lists(st.integers(0, 2), max_size=8))
+def test_what_comes_from_outside_is_of_the_cycle_that_is_over_and_is_seen_in_the_next(posts: list[int]) -> None:
+    scheduler = Scheduler([Scripted()])
+    for count in posts:
+        posted = [scheduler.post([Post(Note("so it is"))], "user")[0] for _ in range(count)]
+        assert {change.entry.cycle for change in posted} <= {scheduler.cycle}
+        decision = scheduler.step()
+        if decision is not None and posted:
+            assert list(decision.observed) == posted
+            assert {change.entry.cycle for change in posted} == {decision.cycle - 1}

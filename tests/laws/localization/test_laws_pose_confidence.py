@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
 from experiments.generated.floors import generated_floor
@@ -31,7 +31,7 @@ from knowledge_sources.methods.verification import (
     predict_milestone,
 )
 from knowledge_sources.methods.verification.color_check import NOT_TESTED, ColorCheck
-from knowledge_sources.methods.verification.pose_confidence import compute_motion_tolerance_px
+from knowledge_sources.methods.verification.pose_confidence import P_REPAINTED, compute_motion_tolerance_px
 from sim.render.renderer import Renderer
 from sim.scenario import CameraSettings
 from world_models.actuator import ActuatorModel
@@ -215,3 +215,14 @@ def test_a_thing_that_is_not_there_is_one_line_that_is_missed_where_the_model_is
     assert np.count_nonzero(gone) >= 3 and by_line.visible == len(lines)
     assert by_line.visible - by_thing.visible == np.count_nonzero(gone) - 1
     assert not np.isnan(count(fixed, names).coverage[fixed]).any()
+
+
+@given(EVIDENCE)
+def test_colours_speak_against_a_pose_by_no_more_than_that_it_may_be_painted(evidence: PoseEvidence) -> None:
+    """What the lines say with paint that is another, or lines and colours together: what speaks less against it."""
+    by_lines, by_both = (float(weights.p_false(evidence.values[None])[0])
+                         for weights in (POSE_CONFIDENCE.lines_only, POSE_CONFIDENCE.lines_and_colors))
+    odds = by_lines / (1.0 - by_lines) / P_REPAINTED
+    painted, found = odds / (1.0 + odds), POSE_CONFIDENCE.p_false(evidence)
+    event("painted" if painted < by_both else "as in the model")
+    assert found == pytest.approx(min(painted, by_both)) and found <= painted + 1e-12 and found <= by_both + 1e-12

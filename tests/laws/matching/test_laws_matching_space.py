@@ -135,3 +135,14 @@ def test_what_is_verified_is_right_and_another_picture_is_not_verified(seed: int
 def test_an_empty_picture_gives_no_pose() -> None:
     image = np.full((512, 512), 90, np.uint8)
     assert locate(image, Pose.identity(), np.random.default_rng(0)) is None
+
+
+@given(seed=seeds)
+@few
+def test_the_tighter_the_prior_the_nearer_to_it(seed: int) -> None:
+    """It pulls the pose towards itself: so tight it is the prior, and never further away than by a looser one."""
+    data, _, prior, _ = scene(seed)
+    found = [match_in_space(build_hall(), data, CAMERA, prior, SPREAD * part).camera_from_world
+             for part in (1.0, 1e-3, 1e-7)]
+    away = [measure_distance(pose, prior) for pose in found]
+    assert away[0] > away[1] > away[2] and away[2] < 1e-2

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from world_models.building.locales import Locale
+from world_models.building.locales import MAX_FLUSH_M, ROBOT_TOP_M, STEP_M, Locale, Thing
 from world_models.building.world import World, build_frames
 from world_models.files.packed import compile_world
 from world_models.files.world_files import WORLDS, compile_file, load_world
@@ -103,3 +103,14 @@ def test_an_unknown_locale_is_refused(shipped: tuple[World, World]) -> None:
         with pytest.raises(ValueError, match=r"expected a locale of .*, got 'attic'"):
             world.frame("attic")
         assert "attic" not in world.frames
+
+
+@pytest.mark.parametrize(("low_m", "high_m", "protrusion_m", "is_in_the_way"), [
+    (0.0, STEP_M, None, False), (0.0, STEP_M + 1e-6, None, True), (ROBOT_TOP_M, 2.0, None, False),
+    (ROBOT_TOP_M - 1e-6, 2.0, None, True), (0.5, 1.0, MAX_FLUSH_M, False), (0.5, 1.0, MAX_FLUSH_M + 1e-6, True)])
+def test_a_thing_is_in_the_way_where_the_robot_could_hit_it(
+    low_m: float, high_m: float, protrusion_m: float | None, is_in_the_way: bool
+) -> None:
+    """Not what it rolls over, what hangs over it, or what lies flush in a wall: both sides of each bound."""
+    thing = Thing("rug-1", "hall", "rug", np.zeros((4, 2)), low_m, high_m, protrusion_m, "by a law")
+    assert thing.is_obstacle == is_in_the_way

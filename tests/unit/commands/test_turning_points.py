@@ -38,6 +38,7 @@ from world_models.entries import (
     BodyFault,
     Contact,
     Difference,
+    Discrepancy,
     DoorPicture,
     DoorState,
     Evidence,
@@ -257,3 +258,15 @@ def test_a_contact_is_found_once_where_the_robot_truly_was(locale: str) -> None:
     assert watch.new_contacts() == ()
     body.truth = replace(moments[2], collisions=2, contact_m_per_s=0.3)
     assert [(contact.place.x_m, contact.speed_m_per_s) for contact in watch.new_contacts()] == [(3.0, 0.3)]
+
+
+def test_it_is_lost_at_the_place_that_it_believes_by_the_same_decision() -> None:
+    board, finder = Blackboard(), TurningPointFinder()
+    doubt = Discrepancy(Level.PLAN, "M2 is refuted", 99.0, (9.0, 30.0), "px")
+    first = board.apply([Post(HELD), Post(doubt)], author="source", cycle=1)
+    finder.find(Decision(1, (), (), Level.ACTION, (), (), None, None, 0, first, ""))
+    there = replace(HELD, locale_from_robot=Pose2(5.0, 4.0, 0.0))
+    made = board.apply([Revise(board.view["Hypothesis-1"], there), Revise(
+        board.view["Discrepancy-1"], replace(doubt, status="escalated"))], author="source", cycle=2)
+    (lost,) = finder.find(Decision(2, (), (), Level.ACTION, (), (), None, None, 0, made, ""))
+    assert (lost.kind, lost.text.partition(" m")[0]) == ("lost", "kitchen (5.00, 4.00)")
