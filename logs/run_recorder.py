@@ -43,6 +43,7 @@ class RunRecorder:
     def __init__(
         self, run: RunDirectory | None, head: RunHead, world: World, robot: RobotModel, *,
         live: bool = False, whole: Extent | None = None, drawing: Path | None = None, sync: bool = False,
+        recording: bool = True,
     ) -> None:
         """Begin the files of a run.
 
@@ -52,6 +53,7 @@ class RunRecorder:
             whole: go on with the files of a run, of which so much is whole.
             drawing: of a run that is only replayed: where its recording is drawn.
             sync: force what a port acts on, and each picture, onto the disk, so that it outlives a power cut too.
+            recording: draw one into the run's directory.
 
         Raises:
             OSError: a file cannot be written, or another process is writing it.
@@ -61,7 +63,7 @@ class RunRecorder:
         self._journal: JournalFile | None = None
         self._camera: MjpegFile | None = None
         self._drawing: RecordingWriter | None = None
-        drawing = run.recording if run is not None else drawing
+        drawing = run.recording if run is not None and recording else drawing
         with ExitStack() as opened:
             if run is not None:
                 run.path.mkdir(parents=True, exist_ok=True)

@@ -47,6 +47,7 @@ class Task:
         body: how the simulated body is reached.
         go_on: keep what is in ``out`` of this mission already, and go on where it was cut off.
         sync: force what is written onto the disk before it is acted on.
+        recording: draw one into ``out``.
     """
 
     scenario: str
@@ -56,6 +57,7 @@ class Task:
     body: str = "simulated"
     go_on: bool = False
     sync: bool = False
+    recording: bool = True
 
     @property
     def agent_settings(self) -> Pairs:
@@ -129,9 +131,11 @@ def run_task(
             if (found := find_finished(task, stage)) is not None:
                 return found
             run = RunDirectory(task.out)
-            return resume_mission(run, find_remains(run), sinks=sinks, live=live, stage=stage, sync=task.sync)
+            return resume_mission(run, find_remains(run), sinks=sinks, live=live, stage=stage, sync=task.sync,
+                                  recording=task.recording)
         out = None if task.out is None else make_room(task.out, stage.scenario.name, task.seed)
-        return run_mission(stage, task.seed, out=out, sinks=sinks, live=live, head=task.head(stage), sync=task.sync)
+        return run_mission(stage, task.seed, out=out, sinks=sinks, live=live, head=task.head(stage), sync=task.sync,
+                           recording=task.recording)
 
 
 def find_finished(task: Task, stage: Stage) -> MissionResult | None:

@@ -94,7 +94,8 @@ def format_result(r: MissionResult, out: Path | None, story: Sequence[str] = ())
         f" {r.waits} of them only to ask for locale frames",
     ]
     if out is not None:
-        lines.append(f"  recording     {out / 'recording.rrd'}")
+        drawn = out / "recording.rrd"
+        lines.append(f"  recording     {drawn if drawn.exists() else f'none; harvey repair {out} draws it'}")
     lines += ["", *story] if story else []
     if out is not None:
         lines += ["", f"open it with    harvey view {out}", f"have it told    harvey story {out}",

@@ -61,6 +61,7 @@ def run_mission(
     around: Around = unchanged,
     tell: Tell = tell_nothing,
     sync: bool = False,
+    recording: bool = True,
 ) -> MissionResult:
     """Run a scenario's mission to its outcome.
 
@@ -75,25 +76,27 @@ def run_mission(
         tell: called before each cycle, to put on the board what somebody says meanwhile.
         sync: force what is written onto the disk before it is acted on, as over a serial line in any case. A mission in
             the process that a power cut takes can be driven again.
+        recording: draw one into ``out``; without, a mission takes a tenth less time, and half the room.
     """
     head = head or build_head(stage, seed, body)
     files = None if out is None else RunDirectory(out)
     agent = build_agent(head, sources)
-    recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, sync=sync or head.body != IN_PROCESS)
+    recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, sync=sync or head.body != IN_PROCESS,
+                           recording=recording)
     with SimulatedRun(stage, head, agent, recorder, sinks, around, tell) as run:
         return run.drive(files)
 
 
 def resume_mission(
     files: RunDirectory, remains: Remains, *, sinks: Sequence[Sink] = (), live: bool = False,
-    around: Around = unchanged, stage: Stage | None = None, sync: bool = False,
+    around: Around = unchanged, stage: Stage | None = None, sync: bool = False, recording: bool = True,
 ) -> MissionResult:
     """Go on with a run to its outcome; its recording is drawn again from the start.
 
     Args:
         remains: what is whole of it; the rest of its files is dropped.
         stage: the building of its scenario, where it is at hand.
-        sinks, live, around, sync: as for :func:`run_mission`.
+        sinks, live, around, sync, recording: as for :func:`run_mission`.
 
     Raises:
         BadInput: it is no run of the simulator, or cannot be replayed as it was.
@@ -102,7 +105,7 @@ def resume_mission(
     stage = stage or rebuild_stage(head)
     agent = build_agent(head)
     recorder = RunRecorder(files, head, agent.world, agent.robot, live=live, whole=remains.extent,
-                           sync=sync or head.body != IN_PROCESS)
+                           sync=sync or head.body != IN_PROCESS, recording=recording)
     with SimulatedRun(stage, head, agent, recorder, sinks, around) as run:
         return run.drive(files, lambda: continue_run(files, run, run.body_replay))
 

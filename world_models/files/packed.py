@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import sqlite3
 import types
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -69,7 +70,7 @@ def unpack_frame(packed: bytes) -> LocaleFrame:
     """
     data = _decompress(packed)
     end = 4 + int.from_bytes(data[:4], "little")
-    frame: LocaleFrame = _unpack(LocaleFrame, json.loads(data[4:end]), _Numbers(data, end))
+    frame: LocaleFrame = _unpacker_of(LocaleFrame)(json.loads(data[4:end]), _Numbers(data, end))
     return frame
 
 
@@ -89,33 +90,34 @@ class _Numbers:
         self._data, self._at = data, at
 
     def take(self, shape: Sequence[int]) -> Any:
-        count, at = int(np.prod(shape)), self._at
+        count, at = math.prod(shape), self._at
         self._at += 8 * count
         return frozen(np.frombuffer(self._data, "<f8", count, at).reshape(shape))
 
 
-def _unpack(kind: Any, value: Any, numbers: _Numbers) -> Any:
-    """The value of a type from what :func:`_pack` made of it."""
+@cache
+def _unpacker_of(kind: Any) -> Callable[[Any, _Numbers], Any]:
+    """Makes values of a type from what :func:`_pack` made of them; found once, as a building has thousands."""
     origin, of = get_origin(kind), get_args(kind)
     if origin is np.ndarray:
-        return numbers.take(value)
+        return lambda value, numbers: numbers.take(value)
     if origin in (Union, types.UnionType):
-        return None if value is None else _unpack(of[0], value, numbers)
+        one = _unpacker_of(of[0])
+        return lambda value, numbers: None if value is None else one(value, numbers)
+    if origin is tuple and of[1:] == (...,):
+        each = _unpacker_of(of[0])
+        return lambda value, numbers: tuple([each(item, numbers) for item in value])
     if origin is tuple:
-        kinds = of[:1] * len(value) if of[1:] == (...,) else of
-        return tuple(_unpack(each, item, numbers) for each, item in zip(kinds, value, strict=True))
+        parts = [_unpacker_of(part) for part in of]
+        return lambda value, numbers: tuple([
+            unpack(item, numbers) for unpack, item in zip(parts, value, strict=True)])
     if not is_dataclass(kind):
-        return value
+        return lambda value, numbers: value
     build: Any = kind
-    known = zip(_fields_of(build), value, strict=True)
-    return build(**{name: _unpack(each, item, numbers) for (name, each), item in known})
-
-
-@cache
-def _fields_of(kind: Any) -> list[tuple[str, Any]]:
-    """Names and types of the fields that are packed."""
     hints = get_type_hints(kind)
-    return [(field.name, hints[field.name]) for field in fields(kind) if field.name not in NOT_PACKED]
+    known = {field.name: _unpacker_of(hints[field.name]) for field in fields(kind) if field.name not in NOT_PACKED}
+    return lambda value, numbers: build(**{
+        name: unpack(item, numbers) for (name, unpack), item in zip(known.items(), value, strict=True)})
 
 
 def compile_world(world: World, out: Path) -> None:

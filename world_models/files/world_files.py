@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from os import PathLike
 from pathlib import Path
 
 from world_models.building.world import World
 from world_models.files.construction.builder import build_world
 from world_models.files.construction.specs import WorldSpec
-from world_models.files.packed import SUFFIXES, PackedFrames, compile_world, open_world
+from world_models.files.packed import FORMAT, SUFFIXES, PackedFrames, compile_world, open_world
 from world_models.files.toml.other_files import compute_digest
 from world_models.files.toml.settings_reader import suggest_keys
 from world_models.files.toml.source import WORLDS, Source, WorldError
 from world_models.files.toml.world_reader import WorldReader
 
 __all__ = ["SUFFIXES", "WORLDS", "WorldError", "compile_file", "fingerprint", "load_world", "read_world"]
+
+WORTH_KEEPING_FACES = 1000
+"""A building with fewer is built as fast as it is read."""
+MOST_KEPT = 32
+"""Buildings that are kept; the oldest goes."""
 
 
 def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[str]] = (),
@@ -54,8 +62,38 @@ def load_world(path: str | PathLike[str], *, details: Sequence[str | PathLike[st
 
 @lru_cache(maxsize=2)  # the true one and the believed one
 def _read_once(files: tuple[Path, ...], digests: tuple[str, ...], opened: tuple[str, ...]) -> World:
-    """The world of files with these digests."""
-    return _read_files(files, opened)
+    """The world of files with these digests: built once, then kept compiled where a user's caches are."""
+    said = repr((FORMAT, _digest_code(), [str(file) for file in files], digests, opened))
+    kept = _find_cache() / f"{hashlib.sha256(said.encode()).hexdigest()}.world"
+    with suppress(WorldError):
+        world = open_world(kept)
+        return World(dict(world.frames), world.building_faults)
+    world = _read_files(files, opened)
+    if len(world.faces) >= WORTH_KEEPING_FACES and kept.is_absolute():  # where somebody has no home it is not
+        _keep(world, kept)
+    return world
+
+
+def _find_cache() -> Path:
+    return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / "harvey" / "worlds"
+
+
+@cache
+def _digest_code() -> str:
+    """SHA-256 of the code that builds a world: what another version built is built again."""
+    root = Path(__file__).parents[1]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(root.rglob("*.py")))).hexdigest()
+
+
+def _keep(world: World, kept: Path) -> None:
+    """Write a world under its name, at once and whole; where that cannot be, it is built again next time."""
+    own = kept.with_suffix(f".{os.getpid()}")
+    with suppress(OSError, WorldError, TypeError):
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        compile_world(world, own)
+        os.replace(own, kept)
+        for old in sorted(kept.parent.glob("*.world"), key=os.path.getmtime)[:-MOST_KEPT]:
+            old.unlink(missing_ok=True)
 
 
 def _read_files(files: Sequence[Path], opened: Collection[str],

@@ -66,6 +66,18 @@ def test_a_run_leaves_its_files(run: Path) -> None:
     assert head["scenario"]["limits"] == {"max_cycles": 40}
 
 
+def test_without_a_recording_it_decides_the_same_and_is_drawn_later(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert main(["run", "lab-to-allens-office", *SHORT, "--no-recording", "--out", str(out)]) == 1
+    assert f"recording     none; harvey repair {out} draws it" in capsys.readouterr().out
+    assert not (out / "recording.rrd").exists()
+    assert (out / "journal.jsonl").read_bytes() == (run / "journal.jsonl").read_bytes()
+    assert main(["repair", str(out)]) == 0
+    assert read_decisions(out / "recording.rrd") == read_decisions(run / "recording.rrd")
+
+
 def test_why_goes_down_to_the_command(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["why", str(run), "motorcommand-1", "--depth", "99"]) == 0
     out = capsys.readouterr().out

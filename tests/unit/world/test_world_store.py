@@ -7,6 +7,9 @@ import pytest
 
 from world_models.building.checks import check_world
 from world_models.building.world import World
+from world_models.files import world_files
+from world_models.files.construction.builder import build_world
+from world_models.files.packed import pack_frame
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, WorldError, load_world, read_world
 
@@ -191,3 +194,22 @@ def test_a_world_is_read_once_as_long_as_none_of_its_files_changes(tmp_path: Pat
     world.write_text("name = ")
     with pytest.raises(WorldError, match="expected TOML"):
         load_world(world)
+
+
+def test_a_building_is_built_once_in_a_users_life(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is kept is the same to the bit; broken, it is built again; with nowhere to keep it, each time."""
+    built: list[object] = []
+    monkeypatch.setattr(world_files, "build_world", lambda spec: built.append(spec) or build_world(spec))
+
+    def load_anew(cache: Path) -> list[bytes]:
+        monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
+        world_files._read_once.cache_clear()
+        return [pack_frame(frame) for frame in load_world(WORLDS / "research_center.toml").frames.values()]
+
+    first = load_anew(tmp_path)
+    assert load_anew(tmp_path) == first and len(built) == 1
+    [kept] = (tmp_path / "harvey" / "worlds").iterdir()
+    kept.write_bytes(kept.read_bytes()[:9000])
+    assert load_anew(tmp_path) == first and len(built) == 2
+    assert load_anew(kept) == first and load_anew(Path("nowhere")) == first and len(built) == 4
+    assert not Path("nowhere").exists()
