@@ -34,20 +34,8 @@ from scripted_mission import house
 from scripted_turns import HELD, decisions
 from sim.body.simulated_body import SimulatedBody
 from sim.truth import Truth
-from world_models.entries import (
-    BodyFault,
-    Contact,
-    Difference,
-    DoorPicture,
-    DoorState,
-    Evidence,
-    Obstacle,
-    Outcome,
-    PlanSketch,
-    Recovery,
-    Rival,
-)
-from world_models.entries.difference import SURE
+from world_models.entries import BodyFault, Contact, DoorPicture, DoorState, Obstacle, Outcome, PlanSketch, Recovery
+from world_models.entries.difference import SURE, Difference, Evidence, Rival
 from world_models.frames import Pose2
 
 
