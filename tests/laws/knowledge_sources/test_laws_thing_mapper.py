@@ -24,14 +24,7 @@ from knowledge_sources.methods.floor.weigh_sight import (
 from knowledge_sources.model.thing_mapper import ThingMapper
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall, carton, known_by_sight
-from world_models.entries import (
-    CameraPicture,
-    Discrepancy,
-    Evidence,
-    FreeFloor,
-    Obstacle,
-    ObstacleStatus,
-)
+from world_models.entries import CameraPicture, Discrepancy, Evidence, FreeFloor, Obstacle, ObstacleStatus
 from world_models.entries.floor import FloorSense
 
 SOURCE, S = ThingMapper(), DEFAULT.action
@@ -209,3 +202,15 @@ def test_another_part_of_a_thing_in_the_same_sight_is_not_another_thing(part: fl
     aside_m = 0.4 * (1.0 - part)
     _, effects = ask(hall, hall.look(carton(), carton(by_m=aside_m), seen_s=9.0))
     assert len(effects or ()) == count
+
+
+@given(st.floats(0.7, 1.0))
+@settings(max_examples=5, deadline=None)
+def test_dirt_explains_what_was_seen_at_its_pixels_before_and_nothing_beside_them(by_m: float) -> None:
+    hall, at = Hall(), carton(0.7)
+    there = carton(0.7, by_m=-by_m)  # beside it, at other pixels
+    hall.see(at, there, seen_s=1.0)
+    ahead = tuple((x + 0.7, y) for x, y in at.footprint)
+    hall.see(replace(at, footprint=ahead), there, seen_s=2.0, ahead_m=0.7)
+    assert [thing.status == "gone" for thing in hall.obstacles] == [True, False, True]
+    assert "dirt on the lens" in hall.obstacles[0].evidence
