@@ -86,8 +86,8 @@ class ObstructionFinder(RobotKnowledgeSource):
                       if build_polygon(thing.footprint).intersects(polygon)]
             if sights and all(is_behind(box, found.value) for _, box in sights):
                 last, known = sights[-1][0].value, find_difference(view, entry.value.name)
-                dirt = Evidence(entry.value.name, shows, explain_seen_in_patch(), last.x_m, last.y_m, 0.0, MIN_MOVED_M,
-                                math.tau, last.seen_s)
+                dirt = Evidence(entry.value.name, shows, explain_seen_in_patch(MAX_FIXED_LOOKS), last.x_m, last.y_m,
+                                0.0, MIN_MOVED_M, math.tau, last.seen_s)
                 because = (found, entry, *dict.fromkeys(look for look, _ in sights))
                 yield Post(dirt, because)
                 yield Revise(entry, judge_by(dirt, entry.value, known, self._settings.action), because)

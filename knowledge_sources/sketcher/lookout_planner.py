@@ -10,12 +10,14 @@ import numpy as np
 import shapely
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import MIN_SIDE_M, build_polygon, list_corners
 from knowledge_sources.methods.motion import SubgoalPlanner
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
     HELD,
     Belief,
+    find_building,
     find_frames,
     find_obstacles,
     find_robot,
@@ -51,7 +53,8 @@ class LookoutPlanner(RobotKnowledgeSource):
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         impasse, belief = trigger.entry, HELD.of(view)
-        goal, looked = view.get(impasse.value.goal), _count_looks(view, impasse.value.goal)
+        goal, lookouts = view.get(impasse.value.goal), _list_lookouts(view, impasse.value.goal)
+        looked = len(lookouts)
         if goal is None or looked >= self._settings.plan.max_lookouts:
             return None
         planner = list_planners(view, self._settings.plan)[0]
@@ -60,7 +63,7 @@ class LookoutPlanner(RobotKnowledgeSource):
             if subgoal is not None:
                 return Case(impasse, goal, door, subgoal)
         for obstacle in self._list_in_order(view, impasse.value, goal.value, belief, looked):
-            subgoal = planner.plan_look(belief.value, obstacle.value)
+            subgoal = planner.plan_look(belief.value, obstacle.value, lookouts)
             if subgoal is not None:
                 return Case(impasse, goal, obstacle, subgoal)
         return None
@@ -68,7 +71,9 @@ class LookoutPlanner(RobotKnowledgeSource):
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         (impasse, goal, about, subgoal), belief = case, HELD.of(view).entry
         yield from supersede(view, impasse)
-        looked = Revise(impasse, replace(impasse.value, is_open=False), (impasse, about, belief))
+        there = subgoal.destination.in_world(find_building(view))
+        closed = replace(impasse.value, is_open=False, lookout=(there.x_m, there.y_m))
+        looked = Revise(impasse, closed, (impasse, about, belief))
         yield looked
         frames = find_frames(view, {belief.value.locale})
         yield Post(PlanSketch(goal.id, (), "", (subgoal,), is_look=True), (goal, belief, about, looked, *frames))
@@ -101,6 +106,7 @@ def _plan_door_look(view: View, planner: SubgoalPlanner, belief: Hypothesis, doo
     return None if doorway is None else planner.plan_door_look(belief, doorway, seen_from)
 
 
-def _count_looks(view: View, goal: str) -> int:
-    """How often the robot went to look again at what left no way to a goal."""
-    return len(view.where(Impasse, lambda impasse: impasse.goal == goal and not impasse.is_open))
+def _list_lookouts(view: View, goal: str) -> Floats:
+    """Where the robot went to look again at what left no way to a goal, each time: (n, 2) [m, world]."""
+    closed = view.where(Impasse, lambda impasse: impasse.goal == goal and not impasse.is_open)
+    return np.array([entry.value.lookout for entry in closed]).reshape(-1, 2)

@@ -359,6 +359,7 @@ class Impasse:
         goal: id of the goal to which no way leads; "" where it is no matter of a way.
         behind: ids of the obstacles that leave none.
         is_open: whether nobody has seen a way on.
+        lookout: where the robot goes to look again at what leaves no way [m, world]; (): nowhere.
     """
 
     kind: str
@@ -366,6 +367,7 @@ class Impasse:
     goal: str = ""
     behind: tuple[str, ...] = ()
     is_open: bool = True
+    lookout: tuple[float, ...] = ()
 
     def sentence(self) -> str:
         return f"no way on: {self.reason}" if self.is_open else f"something else is tried, as {self.reason}"

@@ -137,9 +137,9 @@ def explain_seen_elsewhere(known: Difference) -> tuple[Explanation, ...]:
     return (Explanation("elsewhere", "a thing that stands elsewhere", ratio),)
 
 
-def explain_seen_in_patch() -> tuple[Explanation, ...]:
-    """What each rival makes of a thing that was seen nowhere but in a patch on the lens."""
-    still = 2.0 * STOOD_STILL
+def explain_seen_in_patch(looks: int) -> tuple[Explanation, ...]:
+    """What each rival makes of a thing that was seen nowhere but where so many looks before showed the same pixels."""
+    still = STOOD_STILL * looks
     return Explanation("thing", "a thing", -still), Explanation("dirt", "dirt on the lens", still)
 
 
@@ -269,6 +269,12 @@ def enclose(boxes: Sequence[Box], known: Obstruction | None) -> Obstruction:
     corners = [(u, v) for left, top, right, bottom in boxes for u in (left, right) for v in (top, bottom)]
     whole = build_polygon([*corners, *(() if known is None else known.outline_px)])
     return Obstruction(tuple((float(u), float(v)) for u, v in shapely.get_coordinates(whole)[:-1]))
+
+
+def is_within(box: Box, patch: Box) -> bool:
+    """Whether a box of the picture lies within another."""
+    left, top, right, bottom = (inner - outer for inner, outer in zip(box, patch, strict=True))
+    return min(left, top) >= -FIXED_PX and max(right, bottom) <= FIXED_PX
 
 
 def is_behind(box: Box, obstruction: Obstruction) -> bool:

@@ -32,12 +32,15 @@ from knowledge_sources.methods.floor.found_things import (
 )
 from knowledge_sources.methods.floor.rivals_on_floor import (
     MIN_MOVED_M,
+    Box,
     ShownSight,
     explain_free,
+    explain_seen_in_patch,
     explain_sight,
     find_fixed,
     find_jamb_beside,
     find_leaf,
+    is_within,
     judge_thing,
 )
 from knowledge_sources.methods.floor.see_floor import FLOOR_VIEW_DISTANCE_M, MAX_P_SEEN_ONCE
@@ -154,6 +157,7 @@ def weigh_sight(
         confirmed = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m,
                                 np.minimum(f.confirmed_m, np.subtract(f.far_m, f.sigma_m)).tolist())
     drafts: dict[str, Sighted] = {}
+    patches: list[Box] = []
     fresh = 0
     for thing in f.things:
         if not is_telling(thing):
@@ -174,6 +178,7 @@ def weigh_sight(
             again = see_again(sight, known[id], thing, new, shown, free, s)
             if again is not None:
                 drafts[id] = again._replace(known=id)
+                patches += _list_patches(sight, thing, shown, again)
             continue
         joined = [build_polygon(draft.obstacle.footprint) for draft in drafts.values()]
         if any(shapely.intersection(polygon, shape).area > 0.5 * shape.area for polygon in joined):
@@ -184,6 +189,11 @@ def weigh_sight(
         if found is not None:
             fresh += 1
             drafts[f"new {fresh}"] = found
+            patches += _list_patches(sight, thing, shown, found)
+    for id, obstacle in known.items():
+        lost = lose_to_patch(sight, obstacle, patches, s) if id not in drafts and may_be_there(obstacle) else None
+        if lost is not None:
+            drafts[id] = lost._replace(known=id)
     yield from drafts.values()
     seen = shapely.union_all([build_polygon(thing.footprint).buffer(2.0 * thing.sigma_m) for thing in f.things])
     for id, obstacle in known.items():
@@ -193,6 +203,27 @@ def weigh_sight(
             gone = miss(sight, obstacle, confirmed if obstacle.is_camouflaged else free, confirmed, s)
             if gone is not None:
                 yield gone._replace(known=id)
+
+
+def _list_patches(sight: Sight, thing: FloorThing, shown: ShownSight, found: Sighted) -> list[Box]:
+    """The pixels of what stood still in the picture, where that is dirt by what is known with this sight."""
+    is_dirt = shown.still and found.told is not None and sight.weigh(found.told).leader.kind == "dirt"
+    return [thing.box_px] if is_dirt else []
+
+
+def lose_to_patch(sight: Sight, known: Obstacle, patches: Sequence[Box], settings: ActionSettings) -> Sighted | None:
+    """A known obstacle that was seen nowhere but at pixels that dirt turns out to take: it explains those sights, too.
+    """
+    polygon = build_polygon(known.footprint)
+    boxes = [one.box_px for things in sight.before for one in things
+             if build_polygon(one.footprint).intersects(polygon)]
+    if known.by != "camera" or known.touched_s is not None or not boxes or not all(
+            any(is_within(box, patch) for patch in patches) for box in boxes):
+        return None
+    told = sight.tell(known.name, "its pixels stay while the robot moves", explain_seen_in_patch(1), MIN_MOVED_M)
+    difference = sight.weigh(told)
+    evidence = f"{sight.seen_by}: {told.shows}: {difference.odds_in_words()}"
+    return Sighted(None, replace(judge_thing(known, difference, settings), evidence=evidence), told)
 
 
 def _show(sight: Sight, thing: FloorThing, shape: ThingShape) -> ShownSight:

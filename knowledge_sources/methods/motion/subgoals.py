@@ -47,6 +47,7 @@ LOOKOUT_SAME_SIDE_M = 3.0  # so much farther another side of it may be than the 
 DOOR_LOOK_DISTANCES_M = (1.2, 1.6, 2.0, 2.6)  # distances from which a door is looked at from the front
 DOOR_LOOK_APART_M = 0.7  # so far from where it was seen before: then it is another view
 MIN_DOOR_LOOK_SINE = 0.7  # least sine of the angle at which it is seen there, 1 from the front
+MAX_VISITS = 2  # so often one lookout is gone to: looks from one place count once
 MIN_LOOKOUT_CHANGE_M = 0.4  # a place nearer than this to where the robot stands shows nothing new
 WAY_TOLERANCE_M = 0.15  # tolerance at the end of a leg on the way
 MAX_OVERLAP_M = 0.05  # so much nearer than touching a way may begin, where no other does: its place is not known better
@@ -284,10 +285,11 @@ class SubgoalPlanner:
                       for obstacle in self._obstacles if obstacle.locale == b.locale), default=math.inf)
         return min(most_m, max(room_m - LEFT_ROOM_M, MIN_TOLERANCE_M))
 
-    def plan_look(self, belief: Hypothesis, obstacle: Obstacle) -> Subgoal | None:
+    def plan_look(self, belief: Hypothesis, obstacle: Obstacle, lookouts: Floats) -> Subgoal | None:
         """A place in the robot's room to look at an obstacle again, from elsewhere; None where none is left.
 
-        It is so far away that the floor before the obstacle is in the picture; near, but rather on another side.
+        It is so far away that the floor before the obstacle is in the picture; near, but rather on another side. No
+        place is led to a third time: ``lookouts`` (n, 2) [world] are those that were.
         """
         locale, here = belief.locale, belief.world_from_robot(self._building)
         poses = list_lookouts(
@@ -299,7 +301,9 @@ class SubgoalPlanner:
         side_rad = math.atan2(*(middle - here.position)[::-1])
         same_side = np.maximum(0.0, np.cos(poses[:, 2] - side_rad))
         order = np.argsort(away + LOOKOUT_SAME_SIDE_M * same_side, kind="stable")
-        return self._lead_to_first(locale, here, poses[order[away[order] >= MIN_LOOKOUT_CHANGE_M]])
+        visits = np.linalg.norm(poses[:, None, :2] - lookouts, axis=2) < MIN_LOOKOUT_CHANGE_M
+        is_new = (away >= MIN_LOOKOUT_CHANGE_M) & (visits.sum(axis=1) < MAX_VISITS)
+        return self._lead_to_first(locale, here, poses[order[is_new[order]]])
 
     def plan_door_look(self, belief: Hypothesis, doorway: Doorway, seen_from: Sequence[Floats]) -> Subgoal | None:
         """The nearest place in the robot's room from which a doorway is seen from the front; None where none is left.

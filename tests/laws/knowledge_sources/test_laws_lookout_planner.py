@@ -10,7 +10,7 @@ import pytest
 from blackboard import Entry
 from generated_boards import LENGTH_M, WIDTH_M, Bench, effect_on, made, reasons, to_world
 from harvey.testing import HALL, STUDY, check_source, plain_robot
-from knowledge_sources.methods.motion.subgoals import DOOR_LOOK_APART_M, MIN_DOOR_LOOK_SINE
+from knowledge_sources.methods.motion.subgoals import DOOR_LOOK_APART_M, MIN_DOOR_LOOK_SINE, MIN_LOOKOUT_CHANGE_M
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.sketcher.lookout_planner import LookoutPlanner
 from world_models.building.locale_frame import FRAME_OF
@@ -30,8 +30,8 @@ def stuck(*, looked: int = 0) -> tuple[Bench, Entry[Impasse]]:
                     for dx, dy in ((-0.1, -1.9), (0.1, -1.9), (0.1, 1.9), (-0.1, 1.9)))
     middle = to_world(Pose2(5.0, 2.0, 0.0))
     thing = bench.put(Obstacle("hall/obstacle-1", HALL, corners, 0.02, middle.x_m, middle.y_m, 3.8))
-    for _ in range(looked):
-        bench.put(Impasse("blocked", "before", goal.id, (thing.id,), is_open=False))
+    for number in range(looked):
+        bench.put(Impasse("blocked", "before", goal.id, (thing.id,), is_open=False, lookout=(-9.0 * number, 0.0)))
     return bench, bench.put(Impasse("blocked", "no way", goal.id, (thing.id,)))
 
 
@@ -80,6 +80,19 @@ def test_first_what_alone_leaves_a_way_the_nearest_first_and_another_each_time(s
         bench.apply(*effects or ())
         bench.revise(bench.view.latest(PlanSketch), status="done")  # type: ignore[arg-type]
     assert looked_at == [(near.id, far.id)[k % 2] for k in range(MOST)]
+
+
+def test_no_lookout_is_gone_to_a_third_time() -> None:
+    bench, impasse = stuck()
+    places = list[tuple[float, ...]]()
+    while (effects := bench.ask(SOURCE, impasse)) is not None:
+        places.append(effect_on(effects, Impasse).value.lookout)
+        bench.apply(*effects)
+        bench.revise(bench.view.latest(PlanSketch), status="done")  # type: ignore[arg-type]
+        impasse = bench.put(replace(impasse.value, is_open=True))
+    assert len(places) >= 3  # it looks from others
+    assert all(sum(math.dist(one, other) < MIN_LOOKOUT_CHANGE_M for other in places[:k]) < 2
+               for k, one in enumerate(places))
 
 
 @pytest.mark.parametrize("stale", ["goal", "belief", "gone"])

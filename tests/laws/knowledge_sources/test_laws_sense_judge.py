@@ -10,19 +10,8 @@ from blackboard import Level, Posted
 from generated_boards import Bench, made, reasons, wakes
 from harvey.testing import check_source
 from knowledge_sources.senses.sense_judge import WRONG, sense_judge
-from world_models.entries import (
-    MISLEADING,
-    RISK,
-    SENSES,
-    Difference,
-    Discrepancy,
-    Evidence,
-    Explanation,
-    Impasse,
-    Rival,
-    RivalKind,
-)
-from world_models.entries.difference import SURE
+from world_models.entries import MISLEADING, RISK, SENSES, Discrepancy, Impasse
+from world_models.entries.difference import SURE, Difference, Evidence, Explanation, Rival, RivalKind
 
 
 def differ(kind: RivalKind, p: float) -> Difference:

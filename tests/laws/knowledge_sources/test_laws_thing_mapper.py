@@ -24,14 +24,7 @@ from knowledge_sources.methods.floor.weigh_sight import (
 from knowledge_sources.model.thing_mapper import ThingMapper
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall, carton, known_by_sight
-from world_models.entries import (
-    CameraPicture,
-    Discrepancy,
-    Evidence,
-    FreeFloor,
-    Obstacle,
-    ObstacleStatus,
-)
+from world_models.entries import CameraPicture, Discrepancy, Evidence, FreeFloor, Obstacle, ObstacleStatus
 from world_models.entries.floor import FloorSense
 
 SOURCE, S = ThingMapper(), DEFAULT.action
@@ -208,3 +201,15 @@ def test_another_part_of_a_thing_in_the_same_sight_is_not_another_thing(part: fl
 def test_it_keeps_the_laws_of_all_sources() -> None:
     hall = Hall(())
     check_source(SOURCE, hall.bench, Posted(hall.put(hall.look(carton(0.9), seen_s=9.0))))
+
+
+@given(st.floats(0.7, 1.0))
+@settings(max_examples=5, deadline=None)
+def test_dirt_explains_what_was_seen_at_its_pixels_before_and_nothing_beside_them(by_m: float) -> None:
+    hall, at = Hall(), carton(0.7)
+    there = carton(0.7, by_m=-by_m)  # beside it, at other pixels
+    hall.see(at, there, seen_s=1.0)
+    ahead = tuple((x + 0.7, y) for x, y in at.footprint)
+    hall.see(replace(at, footprint=ahead), there, seen_s=2.0, ahead_m=0.7)
+    assert [thing.status == "gone" for thing in hall.obstacles] == [True, False, True]
+    assert "dirt on the lens" in hall.obstacles[0].evidence

@@ -186,7 +186,7 @@ def test_it_looks_again_from_where_that_is_best_by_way_and_by_side(
     bench = Bench(plain_robot())
     belief = bench.believe(Pose2(x, y, 0.0)).value
     thing = bench.stand(at_x, at_y, 0.1, 0.1).value
-    found = plan(bench).plan_look(belief, thing)
+    found = plan(bench).plan_look(belief, thing, np.zeros((0, 2)))
     r = plain_robot().radius_m + CLEARANCES_M[0]
     floor = shapely.box(0.0, 0.0, LENGTH_M, WIDTH_M)
     free = floor.buffer(-r, join_style="mitre").difference(shapely.box(
