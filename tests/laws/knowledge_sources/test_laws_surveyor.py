@@ -12,7 +12,7 @@ from generated_boards import HALL, Bench, effect_on, made, mirrored, plain_robot
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.model.surveyor import Surveyor
-from world_models.entries import Certificate, Evidence, LineMatch, Milestone, PoseFix, Protection, Segments, diagonal
+from world_models.entries import Certificate, Evidence, LineMatch, Milestone, PoseFix, Segments, diagonal
 from world_models.frames import Pose2
 
 SOURCE, ROBOT, HERE, THERE = Surveyor(), plain_robot(), Pose2(2.0, 1.8, 0.05), Pose2(3.5, 2.2, -0.1)
@@ -21,7 +21,7 @@ Look = tuple[Bench, Entry[Certificate]]
 
 
 def look(wider_m: float, door_m: float = 0.0, pose: Pose2 = HERE, *, order: int = 1, seed: int = 0,
-         place_m: float = 0.05, verdict: str = "verified") -> Look:
+         verdict: str = "verified") -> Look:
     """A picture of a hall that is so much wider, and its door so far beside."""
     bench, rng, there = Bench(ROBOT), np.random.default_rng(seed), to_world(pose)
     bench.believe(pose, diagonal(0.02, 0.01))
@@ -31,12 +31,12 @@ def look(wider_m: float, door_m: float = 0.0, pose: Pose2 = HERE, *, order: int 
     lines = m.errors.restate(1.0).displace(np.array(m.expected), np.array(
         [off_m.get(mode, 0.0) for mode in m.displacement_modes]))
     shown, _ = ROBOT.camera.project_segments(lines, ROBOT.camera_from_world(there))
-    shown = (shown + rng.normal(0.0, 0.2, shown.shape))[np.isfinite(shown).all(axis=(1, 2))][::order]
+    at = np.flatnonzero(np.isfinite(shown).all(axis=(1, 2)))[::order]
+    shown = (shown + rng.normal(0.0, 0.2, shown.shape))[at]
     segments = bench.put(Segments("CameraPicture-1", expected.id, shown, np.full(len(shown), 0.3), 40.0))
-    match = bench.put(LineMatch(expected.id, segments.id, np.zeros((0, 2), np.int64), lines[:0], shown[:0], 0.0,
-                                np.ones(len(lines))), expected)
-    fix = bench.put(PoseFix(match.id, there, np.diag([1.6e-5, 1.6e-5, 1e-6]), np.ones(0, bool), np.zeros(0), (),
-                            protection=Protection(place_m, 0.01, "")), match)
+    match = bench.put(LineMatch(expected.id, segments.id, np.column_stack([at, np.arange(len(at))]),
+                                np.array(m.expected)[at], shown, 0.0, np.ones(len(lines))), expected)
+    fix = bench.put(PoseFix(match.id, there, np.diag([1.6e-5, 1.6e-5, 1e-6]), np.ones(0, bool), np.zeros(0), ()), match)
     return bench, bench.put(Certificate(expected.id, fix.id, verdict, "", 9, 9, 9, 0.9, 1.0, 0.0, 0.0, 3.0, 30.0,  # type: ignore[arg-type]
                                         1e-3, 1e-3, 0.006), fix)
 
@@ -70,7 +70,7 @@ def test_of_a_building_as_it_was_measured_nothing_is_told(pose: Pose2, seed: int
 
 def test_a_door_is_told_by_a_sure_place_alone_and_all_by_none_that_is_refuted() -> None:
     assert not wakes(SOURCE, Posted(look(0.1, verdict="refuted")[1]))
-    assert not tell(DOOR, look(0.0, 0.1, place_m=0.2), look(0.0, 0.1, verdict="not testable"))
-    bench, last = look(0.1, place_m=0.2)
+    assert not tell(DOOR, look(0.0, 0.1, verdict="not testable"))
+    bench, last = look(0.1, verdict="not testable")
     (effect,) = bench.ask(SOURCE, last) or ()
     assert reasons(effect) == {"PoseFix-1", "Milestone-1", "Segments-1"}
