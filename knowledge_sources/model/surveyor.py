@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
@@ -12,8 +12,9 @@ import numpy as np
 from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.belief import hedge
-from knowledge_sources.methods.calibration import MIN_MOVE_M, MIN_TURN_RAD
-from knowledge_sources.methods.pose import find_beside, find_width, weigh_places
+from knowledge_sources.methods.calibration import MIN_MOVE_M, MIN_TURN_RAD, loosen
+from knowledge_sources.methods.features import SIGMA_ACROSS_PX
+from knowledge_sources.methods.pose import PlanarEstimate, find_beside, find_width, planar_from_lines, weigh_places
 from knowledge_sources.methods.pose.standing_beside import FoundBeside
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, find_difference, list_filed_doors
@@ -27,20 +28,24 @@ from world_models.entries import (
     Certificate,
     Evidence,
     Explanation,
+    LineMatch,
     Milestone,
     PoseFix,
     Segments,
 )
 from world_models.frames import Pose, Pose2
 
+MAX_SIGMA_M = 0.03
+"""A place that is known less well along a door's wall tells nothing of it: a board is no wider than three of these."""
 Sight = tuple[Floats, Floats, float, Floats, Camera, Pose, Pose2]
 """What :func:`find_beside` goes by, but for how well the pose is known."""
 
 
 class Surveyed(NamedTuple):
-    """A picture with its place, and whether that is verified and protected."""
+    """A picture with its place, and whether that is verified."""
 
     fix: Entry[PoseFix]
+    match: Entry[LineMatch]
     milestone: Entry[Milestone]
     segments: Entry[Segments]
     is_sure: bool
@@ -49,9 +54,9 @@ class Surveyed(NamedTuple):
 class Surveyor(RobotKnowledgeSource):
     """Says where along its wall a door's edges are found in a picture, and how far apart two walls are.
 
-    Only a place that is verified and protected tells of doors, and no surer than it is known, with what all pictures
-    share. Walls that face each other tell how far they are apart wherever the robot is between them. Nothing is said
-    of what stands in its place until something else was.
+    Only a verified place tells of doors, by what it rests on besides: by doors that stand beside it may be off by as
+    much. They are told no surer than it is known, with what all pictures share. Walls that face each other tell how far
+    they are apart wherever the robot is between them. Nothing is said of what stands in its place until it was doubted.
     """
 
     level, priority = Level.PLAN, Priority.ENTER
@@ -64,10 +69,9 @@ class Surveyor(RobotKnowledgeSource):
         fix, milestone = view.get(certificate.fix), view.get(certificate.milestone)
         match = None if fix is None else view.get(fix.value.match)
         segments = None if match is None else view.get(match.value.segments)
-        if fix is None or milestone is None or segments is None:
+        if fix is None or match is None or milestone is None or segments is None:
             return None
-        is_sure = certificate.verdict == "verified" and fix.value.protection.is_available
-        return Surveyed(fix, milestone, segments, is_sure)
+        return Surveyed(fix, match, milestone, segments, certificate.verdict == "verified")
 
     def act(self, view: View, case: Surveyed) -> Iterable[Effect]:
         told = [*self._survey_doors(view, case), *self._survey_widths(view, case)]
@@ -75,13 +79,28 @@ class Surveyor(RobotKnowledgeSource):
             yield Post(evidence, (case.fix, case.milestone, case.segments))
 
     def _survey_doors(self, view: View, case: Surveyed) -> Iterator[Evidence]:
-        m, filed, covariance = case.milestone.value, list_filed_doors(view), case.fix.value.covariance
-        for door in (filed[name] for name in m.landmarks if name in filed and case.is_sure):
+        m, filed = case.milestone.value, list_filed_doors(view)
+        doors = [filed[name] for name in m.landmarks if name in filed and case.is_sure]
+        if not doors:
+            return
+        place = self._solve_without(view, case, filed)
+        for door in doors:
             along = np.array([*find_along(door), 0.0])
-            sigma_m = math.sqrt(float(along[:2] @ covariance[:2, :2] @ along[:2]) + SHARED_SIGMA_M**2)
+            sigma_m = math.sqrt(float(along[:2] @ place.covariance[:2, :2] @ along[:2]) + SHARED_SIGMA_M**2)
             of_door = np.array([m.landmarks[i] == door.name for i in m.landmark_of])
-            found = find_beside(*self._see(view, case, of_door, along, door.name), sigma_m)
+            sight = self._see(view, case, place.world_from_robot, of_door, along, door.name)
+            found = find_beside(*sight, sigma_m) if sigma_m <= MAX_SIGMA_M else None
             yield from _tell(view, case, door.name, found, "jamb")
+
+    def _solve_without(self, view: View, case: Surveyed, doors: Collection[str]) -> PlanarEstimate:
+        """The pose by the lines that are of no door, and by what was believed before."""
+        match, m, belief = case.match.value, case.milestone.value, HELD.of(view)
+        names = [m.landmarks[m.landmark_of[line]] for line in match.pairs[:, 0]]
+        rest = np.flatnonzero([name not in doors for name in names])
+        return planar_from_lines(
+            match.lines_world[rest], match.segments_px[rest], belief.robot.camera, belief.robot.mount.camera_from_robot,
+            belief.pose, prior_covariance=loosen(belief.covariance), landmark_ids=[names[i] for i in rest],
+            sigma_px=SIGMA_ACROSS_PX, errors=m.errors.take(match.pairs[rest, 0]))
 
     def _survey_widths(self, view: View, case: Surveyed) -> Iterator[Evidence]:
         m, building = case.milestone.value, HELD.of(view).world
@@ -90,21 +109,22 @@ class Surveyor(RobotKnowledgeSource):
         rooms = dict.fromkeys(room for name in m.landmarks if (room := name.rpartition("/")[0]))
         for about, sides in (pair for room in rooms for pair in list_facing(building, room).items()):
             if all(side.mode in moved for side in sides):
-                seen = [weigh_places(*self._see(view, case, moved[side.mode], side.outward, side.mode))
+                here = case.fix.value.world_from_robot
+                seen = [weigh_places(*self._see(view, case, here, moved[side.mode], side.outward, side.mode))
                         for side in sides]
                 if seen[0] is not None and seen[1] is not None:
                     found = find_width(seen[0], seen[1])
                     found = replace(found, sigma_m=math.hypot(found.sigma_m, SHARED_SIGMA_M))
                     yield from _tell(view, case, about, found, "wall")
 
-    def _see(self, view: View, case: Surveyed, of: Mask, along: Floats, name: str) -> Sight:
-        """What a search for some of the expected lines goes by."""
+    def _see(self, view: View, case: Surveyed, here: Pose2, of: Mask, along: Floats, name: str) -> Sight:
+        """What a search for some of the expected lines from a pose goes by."""
         robot = HELD.of(view).robot
         changes = (change for entry in view.all(LocaleFrame) for change in entry.value.changes)
         known_m = next((float(along[:2] @ change.by_m) for change in changes
                         if (change.what, change.name) == ("beside", name)), 0.0)
         return (np.asarray(case.milestone.value.expected)[of], along, known_m, case.segments.value.segments_px,
-                robot.camera, robot.mount.camera_from_robot, case.fix.value.world_from_robot)
+                robot.camera, robot.mount.camera_from_robot, here)
 
 
 def _tell(

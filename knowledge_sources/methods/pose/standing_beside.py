@@ -76,7 +76,7 @@ def find_width(one: tuple[Floats, int], other: tuple[Floats, int]) -> FoundBesid
     tops = one[0].max(), other[0].max()
     apart = np.convolve(np.exp(one[0] - tops[0]), np.exp(other[0] - tops[1]))
     places = np.linspace(2.0 * PLACES_M[0], 2.0 * PLACES_M[-1], len(apart))
-    return _conclude(places, np.log(apart + TINY) + sum(tops), math.sqrt(2.0), one[1] + other[1])
+    return _conclude(places, np.log(apart + TINY) + tops[0] + tops[1], math.sqrt(2.0), one[1] + other[1])
 
 
 def _conclude(places_m: Floats, log_likelihood: Floats, spread: float, edges: int) -> FoundBeside:

@@ -18,8 +18,8 @@ from knowledge_sources.reads import find_building
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall
 from world_models.building.locale_frame import FRAME_OF, FrameChange, LocaleFrame
-from world_models.building.model_errors import INEXACT_M, find_sigma_m
-from world_models.entries import DoorPicture, DoorState, Evidence, Explanation, Obstacle, UserReport
+from world_models.building.model_errors import INEXACT_M, find_sigma_m, list_facing
+from world_models.entries import Difference, DoorPicture, DoorState, Evidence, Explanation, Obstacle, Rival, UserReport
 from world_models.entries.difference import MODEL
 
 SOURCE = ModelReviser()
@@ -145,6 +145,22 @@ def test_a_model_that_is_surely_inexact_is_so_from_then_on_in_every_room(drawn: 
         world = find_building(hall.board.view)
         assert [c.what for c in changes(hall, world.root)] == ["inexact"] * is_inexact
         assert {find_sigma_m(world, room) for room in ("archive", HALL)} == {INEXACT_M if is_inexact else 0.0}
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_walls_that_are_farther_apart_explain_a_model_that_seems_inexact(order: int) -> None:
+    hall = Hall((SOURCE,))
+    world = find_building(hall.board.view)
+    about, sides = next(iter(list_facing(world, HALL).items()))
+    for name, off_m, sigma_m in ((about, 0.1, 0.01), (MODEL, 0.0, 0.05))[::order]:
+        hall.put(Difference(name, (Rival("wall", "", 5.0, 0.99, off_m, sigma_m),), (), 1.0))
+    drawn = {change.name: change for change in changes(hall, HALL)}
+    assert set(drawn) == {side.mode for side in sides} and not changes(hall, world.root)
+    assert sum(side.outward[:2] @ drawn[side.mode].by_m for side in sides) == pytest.approx(0.1, abs=0.003)
+    for side in sides:
+        assert all(drawn[side.mode] in changes(hall, room) for room in side.rooms)
+        assert find_sigma_m(find_building(hall.board.view), HALL, side.mode) == pytest.approx(INEXACT_M, abs=1e-3)
+    assert hall.board.view.latest(Difference, lambda d: d.about == MODEL) is None
 
 
 def test_what_the_model_has_not_is_answered_and_revises_nothing() -> None:

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.pose import build_line_set, displacements, fit_displacements, planar_from_lines
-from knowledge_sources.methods.pose.displacements import compute_displaced_jacobian, compute_sigmas_px
+from knowledge_sources.methods.pose import displacements, planar_from_lines
 from world_models.building.model_errors import LineErrors, exact
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
@@ -21,7 +20,6 @@ MOUNT = CameraMount(1.0, 0.1, 0.05).camera_from_robot
 SIGMA_PX = 0.3
 PRIOR = np.diag([0.2, 0.2, 0.05]) ** 2
 TRUTH = Pose2(0.0, 0.0, 0.0)
-STATE = np.zeros(3)
 seeds = st.integers(0, 2**32 - 1)
 quick = settings(max_examples=15, deadline=None)
 Array = NDArray[np.float64]
@@ -29,7 +27,6 @@ Array = NDArray[np.float64]
 
 @pytest.fixture(autouse=True)
 def alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every segment is of its line, and the prior is independent."""
     monkeypatch.setattr(displacements, "MARGINAL_SPREAD", 1.0)
     monkeypatch.setattr(displacements, "SHARED_PRIOR_FACTOR", 0.0)
 
@@ -85,23 +82,6 @@ def test_an_exact_model_is_solved_as_before_to_the_bit(seed: int) -> None:
     assert one.world_from_robot == other.world_from_robot and np.array_equal(one.covariance, other.covariance)
 
 
-@given(seed=seeds)
-@quick
-def test_derivatives_by_the_modes_are_those_of_displaced_lines(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    model, errors = build_hall()
-    segments, visible = observe(model, rng)
-    kept = errors.take(np.flatnonzero(visible))
-    amplitudes = rng.normal(size=len(kept.displacement_modes))
-    _, _, by_mode = compute_displaced_jacobian(
-        build_line_set(model[visible], segments[visible], CAMERA, 1.0), kept.displacements, STATE, MOUNT)
-    step = 1e-4
-    there, back = (compute_displaced_jacobian(
-        build_line_set(kept.displace(model[visible], sign * step * amplitudes), segments[visible], CAMERA, 1.0),
-        kept.displacements, STATE, MOUNT)[0] for sign in (1.0, -1.0))
-    np.testing.assert_allclose(by_mode @ amplitudes, (there - back) / (2.0 * step), rtol=1e-4, atol=1e-4)
-
-
 def test_ellipsoids_hold_as_often_as_they_say() -> None:
     held = []
     for seed in range(150):
@@ -112,9 +92,8 @@ def test_ellipsoids_hold_as_often_as_they_say() -> None:
 
 def test_what_lines_share_does_not_average_out() -> None:
     """Across the hall nothing is known better than by its two walls."""
-    _, covariance = solve(1)
-    assert np.sqrt(covariance[1, 1]) > 0.05 / np.sqrt(2.0) * 0.98
-    assert np.sqrt(solve(1, 0.02)[1][1, 1]) > 0.02 / np.sqrt(2.0) * 0.98
+    for sigma_m in (0.05, 0.02):
+        assert np.sqrt(solve(1, sigma_m)[1][1, 1]) > sigma_m / np.sqrt(2.0) * 0.98
 
 
 @given(seed=seeds, sigma_m=st.sampled_from([0.01, 0.03, 0.06]))
@@ -128,20 +107,3 @@ def test_a_worse_model_never_states_a_smaller_covariance(seed: int, sigma_m: flo
         model[at], segments[at], CAMERA, MOUNT, TRUTH, prior_covariance=PRIOR, sigma_px=SIGMA_PX, robust=False,
         errors=build_hall(size)[1].take(at)).covariance for size in (sigma_m, 2.0 * sigma_m)]
     assert np.linalg.eigvalsh(covariances[1] - covariances[0]).min() > -1e-9
-
-
-@given(seed=seeds)
-@quick
-def test_displacements_are_found_among_clutter(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    model, errors = build_hall(0.03)
-    amplitudes = np.clip(rng.normal(size=len(errors.displacement_modes)), -2.0, 2.0)
-    true = errors.displace(model, amplitudes)
-    segments, visible = observe(true, rng)
-    at = np.flatnonzero(visible)
-    clutter = rng.uniform(0.0, 500.0, (30, 1, 2)) + rng.normal(0.0, 20.0, (30, 2, 2))
-    found = fit_displacements(model[at], errors.take(at), np.concatenate([segments[at], clutter]), CAMERA, MOUNT, TRUTH)
-    on_own = [i for i, s in found.pairs.tolist() if i == s]
-    assert len(set(on_own)) >= 0.6 * len(at)
-    px = compute_sigmas_px(model[at], errors.take(at), CAMERA, MOUNT, TRUTH)
-    assert np.all(px >= 0.0) and px.max() > 1.0
