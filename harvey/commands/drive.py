@@ -195,3 +195,30 @@ It is told before the first move what is not ready, and what to do about it. The
 answers and the milestone before the move was verified. Any of space, enter, q, escape, Ctrl-C and SIGTERM stops it.
 docs/hardware.md goes from the parts to a first mission. Exit code 0: reached; 1: not; 2: something is not ready.""",
 )
+
+
+def _add_tell_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("run", metavar="RUN", help="the directory of a run that goes on, or its name under runs/")
+    parser.add_argument("text", metavar="TEXT", help='"Go to the library", "go on"; with harvey-words any task')
+
+
+def _run_tell(args: Namespace) -> int:
+    from harvey.runner.teller import TOLD_FILE
+    from logs.disk import is_being_written
+    from logs.run_directory import open_run
+
+    run = open_run(args.run)
+    if not is_being_written(run.journal):
+        raise BadInput(f"{run.path}: expected a run that goes on, got one that has ended")
+    with (run.path / TOLD_FILE).open("a", encoding="utf-8") as file:
+        file.write(" ".join(args.text.split()) + "\n")
+    print(f"told; harvey story {run.path} has its answer")
+    return 0
+
+
+TELL = CliCommand(
+    "tell", "say something to a robot on its way, simulated or not",
+    (("harvey tell runs/office-drive 'Fetch the book'", "a new task, with harvey-words"),
+     ("harvey tell runs/office-drive done", "what it waits for is done")),
+    _add_tell_arguments, _run_tell,
+)

@@ -26,6 +26,7 @@ from logs.timeline import Timeline
 from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import (
     CameraPicture,
+    Command,
     Contact,
     Difference,
     DoorState,
@@ -265,6 +266,19 @@ def _tell_reasons(history: Timeline, record: Record) -> Iterator[Sentence]:
             yield said(plainly(found), found, picture, label=label_of(found))
 
 
+def _tell_doors_or_what_for(asked: Asked, records: list[Record]) -> Iterator[Story]:
+    """Whether doors are shut; asked why a door is taken, first what for, then the plan that leads through it."""
+    plans = [one for one in asked.history.of_kind(PlanSketch, until=asked.at)
+             if not one.value.path and any(part.passage for part in one.value.subgoals[one.value.at:])]
+    if "why" not in asked.question or "shut" in asked.question or not plans:
+        yield from _tell_doors(asked, records)
+        return
+    last, ahead = plans[-1], plans[-1].value.subgoals[plans[-1].value.at:]
+    what_for: Record | None = asked.history.nearest(last, Redirection) or asked.history.nearest(last, Command)
+    text = f"So it is to go to {phrases.steps(ahead)}."
+    yield _story(asked, last, plainly(what_for or last), (said(text, last, what_for, label="plan"),))
+
+
 def _is_changed_plan(record: Record) -> bool:
     """Whether a plan was withdrawn because the building differs."""
     heads = tuple(f"{kind.__name__}-" for kind in CHANGED)
@@ -363,7 +377,7 @@ KNOWN: Mapping[str, tuple[frozenset[str], Answer]] = {
                  where=_is_stop)),
     "is the door shut?": (
         _words("door doors shut open closed ajar"),
-        _entries(_tell_doors, "No picture was judged to tell whether a door is shut.", DoorState)),
+        _entries(_tell_doors_or_what_for, "No picture was judged to tell whether a door is shut.", DoorState)),
     "what is in the way?": (
         _words("way obstacle obstacles there"),
         _entries(_tell_things, "Nothing that the model lacks was found in the way.", Obstacle)),

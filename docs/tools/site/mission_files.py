@@ -14,11 +14,13 @@ from sim.faults.fault_registry import BUILT_IN
 from sim.ground_truth.table import ExtraThing, TrueDoor, TrueThing, TrueWall
 from sim.ground_truth.things import MovedThing
 from sim.scenario import FORMAT as SIMULATED
+from sim.scenario import Attendant
 from world_models.files.toml.mission import TABLES, Telling
 from world_models.files.toml.settings_reader import spellings
 
 LISTED: Mapping[str, type[Any]] = {
-    "moved": MovedThing, "rides": Helper, "truth.doors": TrueDoor, "truth.things": TrueThing, "truth.walls": TrueWall,
+    "helper": Attendant, "moved": MovedThing, "rides": Helper,
+    "truth.doors": TrueDoor, "truth.things": TrueThing, "truth.walls": TrueWall,
     "truth.extra": ExtraThing,
 }
 """Tables of a scenario that may stand several times, as ``[[moved]]``."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from blackboard import Change, Effect, Entry, KnowledgeSource, Level, Post, Posted, Revise, Revised, View, Watch
 from harvey_words.task_entries import Step, ToldTask, active_task, find_time_s, leave_goal
@@ -13,15 +13,8 @@ from knowledge_sources.reads import NOT_ENDED, NOT_LOST
 from world_models.entries import Goal, Impasse, Milestone, MotionReport, Outcome, Recovery
 
 MOST_WAITED_S = 600.0  # so long it waits for somebody who is asked to help
-
-
-class Case(NamedTuple):
-    """A task, the number of its step that is under way and the step, and what happened."""
-
-    task: Entry[ToldTask]
-    number: int
-    step: Step
-    cause: Entry[Any]
+Case = tuple[Entry[ToldTask], int, Entry[Any]]
+"""A task, the number of its step that is under way, and what happened."""
 
 
 class StepCloser(KnowledgeSource):
@@ -45,21 +38,21 @@ class StepCloser(KnowledgeSource):
             return None
         step, goal = task.value.steps[number], view.get(getattr(cause.value, "goal", ""))
         is_ours = {MotionReport: step.place is not None and 0.0 < step.due_s < find_time_s(view),
-                   Impasse: goal is not None and goal.value.is_active,
-                   Recovery: getattr(cause.value, "fault", "") == task.id and step.place is None,
-                   }.get(type(cause.value), True)
-        return Case(task, number, step, cause) if is_ours else None
+                   Recovery: step.place is None and getattr(cause.value, "fault", "") == task.id,
+                   Impasse: goal is not None and goal.value.is_active}.get(type(cause.value), True)
+        return (task, number, cause) if is_ours else None
 
     def rate(self, case: Case) -> float:
         late = {Impasse: Priority.LOOK, Recovery: Priority.MOVE}  # after the lookout planner, and after what was said
-        return late.get(type(case.cause.value), Priority.ENTER)
+        return late.get(type(case[-1].value), Priority.ENTER)
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        cause, changes = case.cause, _find_changes(view, case)
+        task, number, cause = case
+        changes = _find_changes(task.value.steps[number], cause.value, find_time_s(view))
         if changes is None:
-            yield Revise(cause, replace(cause.value, status="asked"), (case.task, cause))
+            yield Revise(cause, replace(cause.value, status="asked"), (task, cause))
             return
-        ended = Revise(case.task, case.task.value.with_step(case.number, **changes), (case.task, cause))
+        ended = Revise(task, task.value.with_step(number, **changes), (task, cause))
         yield ended
         if isinstance(cause.value, Goal) and ended.value.is_active:
             yield Revise(cause, replace(cause.value, status="visited"), (ended, cause))
@@ -73,18 +66,16 @@ class StepCloser(KnowledgeSource):
             yield Post(Outcome("reached" if all(done) else "blocked", said), (ended,))
 
 
-def _find_changes(view: View, case: Case) -> dict[str, Any] | None:
+def _find_changes(step: Step, cause: Any, now_s: float) -> dict[str, Any] | None:
     """How the step ends, or that it begins again to another place; None where it waits on."""
-    step, cause = case.step, case.cause.value
     if isinstance(cause, Impasse) and step.instead is not None:
-        note = f"instead, as {cause.reason}"
-        return {"status": "to do", "place": step.instead, "instead": None, "note": note}
+        return {"status": "to do", "place": step.instead, "instead": None, "note": f"instead, as {cause.reason}"}
     if isinstance(cause, Impasse):
         return {"status": "failed", "note": cause.reason}
     is_over = isinstance(cause, Recovery) and (cause.status == "over" or 0.0 < step.wait_s <= cause.waited_s)
     if isinstance(cause, Goal) or is_over:
         return {"status": "done"}
-    is_late = 0.0 < step.due_s < find_time_s(view)
+    is_late = 0.0 < step.due_s < now_s
     if isinstance(cause, Recovery) and not is_late and (step.wait_s or cause.waited_s < MOST_WAITED_S):
         return None
-    return {"status": "failed", "note": f"not done after {find_time_s(view):.0f} s"}
+    return {"status": "failed", "note": f"not done after {now_s:.0f} s"}

@@ -47,11 +47,7 @@ class Step:
             "attend": (f"wait for {span}", f"(attend robot {span})", span)}[self.act]
 
 
-def is_over(task: ToldTask) -> bool:
-    return not task.is_active
-
-
-@inference(keep=2, when=is_over)
+@inference(keep=2, when=lambda task: not task.is_active)
 @dataclass(frozen=True, slots=True)
 class ToldTask:
     """What somebody wants of the robot.
@@ -95,7 +91,7 @@ def active_task(view: View) -> Entry[ToldTask] | None:
 def find_time_s(view: View) -> float:
     """The body's time, as far as the board was told [s]."""
     told = (view.latest(MotionReport), view.latest(CameraPicture))
-    waits = (wait.value.since_s + wait.value.waited_s for wait in view.all(Recovery))
+    waits = [wait.value.since_s + wait.value.waited_s for wait in view.all(Recovery)]
     return max((*(entry.value.sim_time_s for entry in told if entry is not None), *waits), default=0.0)
 
 

@@ -36,7 +36,7 @@ class TaskReader(KnowledgeSource):
 
     def act(self, view: View, case: Entry[Redirection]) -> Iterable[Effect]:
         said, task, belief = case.value, active_task(view), HELD.of(view)
-        wait = None if task is None or not _is_waiting(task.value) else view.latest(Recovery)
+        wait = view.latest(Recovery, lambda one: task is not None and one.fault == task.id and one.status != "over")
         if wait is not None and is_word_to_go_on(said.text):
             answer = Revise(case, replace(said, answer="and goes on with its task"), (case, wait))
             yield answer
@@ -56,10 +56,6 @@ class TaskReader(KnowledgeSource):
         if task is not None:
             yield Revise(task, replace(task.value, status="given up"), (answer, task))
         yield Post(new, (answer, belief.entry))
-
-
-def _is_waiting(task: ToldTask) -> bool:
-    return task.under_way is not None and task.steps[task.under_way].place is None
 
 
 def _is_first(view: View, said: Entry[Redirection]) -> bool:

@@ -11,8 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import harvey
+from harvey.runner.resume import find_remains
+from harvey.simulation.simulated_run import resume_mission
 from harvey_words.task_tour import order_stops
 from harvey_words.task_words import TaskWordsError, read_wanted
+from logs.run_directory import RunDirectory
+from sim.scenario import parse_scenario
+from tests.recorded_runs import cut_off
 
 TEXTS = tomllib.loads((Path(__file__).parent / "data/tasks.toml").read_text(encoding="utf-8"))
 
@@ -48,3 +54,14 @@ def test_a_tour_is_the_shortest(n: int, seed: int) -> None:
     order = order_stops(ways, ends)
     assert sorted(order) == list(range(n))
     assert n > 6 or measure(order) == pytest.approx(min(map(measure, permutations(range(n)))))
+
+
+def test_a_task_is_done_replayed_and_gone_on_with(tmp_path: Path) -> None:
+    said = "Wait for a word, then go to the north hall, then come back within 1 second"
+    mission = parse_scenario(f'world = "two_ways"\ngoal = "(ptrans (reception (15,12,0)) (archive (9,6,0)))"\n'
+                             f'task = "{said}"\nstart.put_down_sigma_m = 0.03\n[[helper]]\nroom = "reception"\n')
+    whole = harvey.run(mission, out=tmp_path / "whole")
+    assert whole.outcome == "blocked" and "2 of 3 steps were done" in whole.reason and whole.final_error_m is not None
+    assert harvey.open_run(tmp_path / "whole").replay() is None
+    cut = cut_off(RunDirectory(tmp_path / "whole"), tmp_path / "cut", 12)
+    assert resume_mission(cut, find_remains(cut)).reason == whole.reason
