@@ -32,11 +32,10 @@ from knowledge_sources.methods.pose import (
     planar_from_lines,
 )
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, find_camera, find_robot, tell_time_s
+from knowledge_sources.reads import HELD, find_camera, find_difference, find_robot, name_model, tell_time_s
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.model_errors import INEXACT_M, LineErrors
-from world_models.entries import CameraState, Difference, Evidence, LineMatch, Milestone, PoseFix
-from world_models.entries.difference import MODEL
+from world_models.entries import CameraState, Evidence, LineMatch, Milestone, PoseFix
 from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
 
@@ -113,13 +112,13 @@ class MedRAndT(RobotKnowledgeSource):
         """What is new of whether the model is inexact, where it is not known, and whether that is likelier than not."""
         if not errors.is_exact or match.value.is_camera_open or len(match.value.pairs) < MIN_CAMERA_LINES:
             return None, False
-        known = view.latest(Difference, lambda d: d.about == MODEL)
+        known = find_difference(view, name_model(view))
         evidence = find_model_evidence(
-            match.value.lines_world, match.value.segments_px, errors, camera, here, prior, tell_time_s(view))
-        if known is None and not is_strange(evidence):
+            match.value.lines_world, match.value.segments_px, errors, camera, here, prior, tell_time_s(view),
+            known.about)
+        if not known.counted and not is_strange(evidence):
             return None, False
-        counted = () if known is None else known.value.counted
-        return evidence, is_model_doubted((*counted, evidence))
+        return evidence, is_model_doubted((*known.counted, evidence))
 
     def _learn(
         self, robot: RobotModel, match: LineMatch, here: Pose2, prior: Floats, known: Floats, errors: LineErrors

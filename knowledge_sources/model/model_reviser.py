@@ -7,7 +7,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
-from blackboard import Change, Effect, Entry, Level, Posted, Retract, Revise, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Posted, Revise, Revised, View, Watch
+from knowledge_sources.methods.calibration import compute_scale_sigma
 from knowledge_sources.methods.floor import (
     is_width,
     place_walls,
@@ -19,11 +20,11 @@ from knowledge_sources.methods.floor import (
     revise_by_thing,
 )
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_building, find_frames, list_filed_doors
+from knowledge_sources.reads import find_building, find_frames, list_filed_doors, name_model
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locale_frame import LocaleFrame
-from world_models.building.model_errors import find_facing
-from world_models.entries import Difference, DoorState, Obstacle, UserReport
+from world_models.building.model_errors import BETWEEN, find_facing, measure_between
+from world_models.entries import CameraState, Difference, DoorState, Obstacle, UserReport
 from world_models.entries.difference import MODEL
 
 
@@ -33,7 +34,6 @@ class Statement(NamedTuple):
     Attributes:
         locales: whose frames it concerns.
         revise: a frame as it is known by it; raises ValueError where the frame has nothing that could be so.
-        is_wall: whether it says where a wall stands.
         is_from_user: whether a user reported it, who is answered.
         error: why it concerns none, in words.
     """
@@ -41,17 +41,15 @@ class Statement(NamedTuple):
     entry: Entry[Any]
     locales: tuple[str, ...]
     revise: Callable[[LocaleFrame], LocaleFrame]
-    is_wall: bool = False
     is_from_user: bool = False
     error: str = ""
 
 
 class Case(NamedTuple):
-    """Frames as they are known now, each with what says so; answers to reports, in words; and what is explained now."""
+    """Frames as they are known now, each with what says so; and answers to reports, in words."""
 
     frames: tuple[tuple[Entry[LocaleFrame], LocaleFrame, tuple[Entry[Any], ...]], ...]
     answers: tuple[tuple[Entry[UserReport], str], ...]
-    explained: tuple[Entry[Difference], ...]
 
 
 class ModelReviser(RobotKnowledgeSource):
@@ -59,8 +57,8 @@ class ModelReviser(RobotKnowledgeSource):
 
     Of two that say otherwise the newer counts. All that is new of a locale comes into its frame at once, so that who
     reads why it was revised finds all of it. A door is in the frames of both its rooms, a wall in those of all at it.
-    Walls are redrawn once it is sure that walls are elsewhere, and not the camera is otherwise; that is explained then,
-    and where no wall explains it the whole building is inexact. A frame is revised only where a plan may change by it.
+    Walls are redrawn once it is sure that they are elsewhere, and not the camera is otherwise; where no wall explains
+    that the model is inexact, the whole building is. A frame is revised only where a plan may change by it.
     What cannot be taken up, because the model has nothing of that name, is answered. It acts at once, before the next
     increment: the door may be just ahead.
     """
@@ -68,7 +66,7 @@ class ModelReviser(RobotKnowledgeSource):
     level, priority = Level.ACTION, Priority.ENTER
     on = (Watch(UserReport, (Posted,)), Watch(Obstacle), Watch(DoorState),
           Watch(Difference, (Posted, Revised), lambda d: bool({"jamb", "wall"} & {rival.kind for rival in d.rivals})))
-    writes = (LocaleFrame, UserReport, Difference)
+    writes = (LocaleFrame, UserReport)
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         """The frames that differ by what is new, and all reports that are not answered yet."""
@@ -94,17 +92,13 @@ class ModelReviser(RobotKnowledgeSource):
                 taken.update(entry.id for entry in reasons)
         from_user = [said.entry for said in statements if said.is_from_user]
         answers = tuple((entry, _answer(entry.id in taken, errors.get(entry.id))) for entry in from_user)
-        found = {said.entry for said in statements if said.is_wall and said.entry.id in taken}
-        explained = tuple(view.where(Difference, lambda d: d.about == MODEL)) if found else ()
-        return Case(tuple(frames), answers, explained) if frames or answers else None
+        return Case(tuple(frames), answers) if frames or answers else None
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         for report, answer in case.answers:
             yield Revise(report, replace(report.value, answer=answer), (report,))
         for frame, value, reasons in case.frames:
             yield Revise(frame, value, (*reasons, frame))
-        for difference in case.explained:
-            yield Retract(difference)
 
     def _list_statements(self, view: View) -> Iterator[Statement]:
         """What things on the floor and doors say, and reports that are not answered."""
@@ -127,20 +121,25 @@ class ModelReviser(RobotKnowledgeSource):
 
     def _list_differences(self, view: View) -> Iterator[Statement]:
         """What differences say of doors, of walls, and of all of the building where no wall explains it."""
-        doors, building = list_filed_doors(view), find_building(view)
+        doors, building, name = list_filed_doors(view), find_building(view), name_model(view)
         for found in view.where(Difference, lambda d: d.about in doors):
             door = doors[found.value.about]
             yield Statement(found, door.between, partial(redraw_door, door=door, found=found.value, by=found.author))
-        for model in view.where(Difference, lambda d: d.about == MODEL and d.is_sure and d.leader.kind == "wall"):
-            widths = view.where(Difference, is_width)
-            pairs = [(one.value, find_facing(building, one.value.about)) for one in widths]
-            placed = place_walls(pairs, model.author)
-            newest = max((model, *widths), key=lambda entry: entry.cycle)
-            for side, change in placed:
-                yield Statement(newest, side.rooms, partial(redraw, change=change), is_wall=True)
-            is_drawn = all(redraw(frame := building.frame(side.rooms[0]), change) is frame for side, change in placed)
+        models = view.where(Difference, lambda d: d.about == name and d.is_sure and d.leader.kind == "wall")
+        camera = view.latest(CameraState)
+        scale = 0.0 if models or name != MODEL or camera is None else compute_scale_sigma(camera.value)
+        widths = [(found, sides) for found in view.where(Difference, lambda d: BETWEEN in d.about)
+                  if is_width(found.value, scale * measure_between(sides := find_facing(building, found.value.about)))]
+        newest = max((*models, *(found for found, _ in widths)), key=lambda entry: entry.cycle, default=None)
+        if newest is None:
+            return
+        placed = place_walls([(found.value, sides) for found, sides in widths], newest.author)
+        for side, change in placed:
+            yield Statement(newest, side.rooms, partial(redraw, change=change))
+        is_drawn = all(redraw(frame := building.frame(side.rooms[0]), change) is frame for side, change in placed)
+        if models or not is_drawn:
             yield Statement(newest, (building.root,), partial(
-                revise_by_difference, found=model.value, by=model.author, is_explained=not is_drawn))
+                revise_by_difference, by=newest.author, is_explained=not is_drawn))
 
 
 def _answer(is_taken: bool, error: str | None) -> str:

@@ -32,7 +32,8 @@ from knowledge_sources.reads.questions import (
     ACTIVE_SKETCH, EMERGENCY_STOPS, OPEN_FAULT, active_goal, current_leg, deepest_sketch, find_belief, find_building,
     find_building_as_filed, find_camera, find_contact, find_difference, find_followed, find_frames, find_robot,
     find_robot_in, find_stop, is_in_doubt, is_over, is_standing, is_up_to_date, is_worth_telling, last_motion,
-    open_discrepancies, open_discrepancy, open_impasse, open_milestone, rests_on, rolling_course, unmeasured_doubt,
+    name_model, open_discrepancies, open_discrepancy, open_impasse, open_milestone, rests_on, rolling_course,
+    unmeasured_doubt,
 )
 from knowledge_sources.reads.sketches import (
     Way, find_first_level, find_obstacles, find_way, find_way_to_goal, has_missed, is_just_found, list_locales,
@@ -52,8 +53,8 @@ __all__ = [
     "find_swept_next", "find_tried", "find_way", "find_way_to_goal", "follow_reports", "has_missed", "has_only_turned",
     "is_dark", "is_in_doubt", "is_just_found", "is_over", "is_standing", "is_up_to_date", "is_worth_telling",
     "last_motion", "list_contacts", "list_doors_in_view", "list_filed_doors", "list_locales", "list_log_odds",
-    "list_planners", "list_views", "locate_contact", "name_obstacles", "open_discrepancies", "open_discrepancy",
-    "open_impasse", "open_milestone", "place_of", "post_or_revise", "rectify", "rests_on", "rolling_course",
-    "supersede", "take_new", "tell_missed", "tell_time_s", "tell_worst", "unmeasured_doubt", "with_anchors",
-    "with_door_open", "with_door_shut",
+    "list_planners", "list_views", "locate_contact", "name_model", "name_obstacles", "open_discrepancies",
+    "open_discrepancy", "open_impasse", "open_milestone", "place_of", "post_or_revise", "rectify", "rests_on",
+    "rolling_course", "supersede", "take_new", "tell_missed", "tell_time_s", "tell_worst", "unmeasured_doubt",
+    "with_anchors", "with_door_open", "with_door_shut",
 ]

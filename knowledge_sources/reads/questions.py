@@ -7,7 +7,9 @@ from functools import lru_cache
 from typing import Any
 
 from blackboard import Blackboard, Entry, Index, Level, View
+from world_models import words
 from world_models.building.locale_frame import CHANGED, FRAME_OF, LocaleFrame
+from world_models.building.model_errors import WALL
 from world_models.entries import (
     GO_ON,
     OPEN,
@@ -35,6 +37,7 @@ from world_models.entries import (
     Tracks,
     Wheels,
 )
+from world_models.entries.difference import MODEL
 from world_models.frame_building import FrameBuilding
 from world_models.robot import RobotModel
 
@@ -63,6 +66,13 @@ def find_difference(view: View, about: str) -> Difference:
     """What is known of a difference."""
     known = view.latest(Difference, lambda difference: difference.about == about)
     return Difference.unknown(about) if known is None else known.value
+
+
+def name_model(view: View) -> str:
+    """What the difference of the whole building is called: of a model whose walls are redrawn little is known yet."""
+    walls = {change.name for frame in view.having(CHANGED, True) for change in frame.value.changes
+             if change.what == "beside" and WALL in change.name}
+    return f"{MODEL} with {words.count(len(walls), 'wall')} redrawn" if walls else MODEL
 
 
 def rests_on(view: View, entry: Entry[Any], picture: str, steps: int = 4) -> bool:

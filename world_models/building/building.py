@@ -137,9 +137,13 @@ class Building(ABC):
         return self.frame(locale).things
 
     def outline(self, locale: str) -> NDArray[np.float64]:
-        """(k, 2) free extent of a locale on the floor, counter-clockwise [m, world]."""
+        """(k, 2) free extent of a locale on the floor, counter-clockwise, to the walls as they are drawn [m, world]."""
         own = self.locale(locale).outline
-        return frozen(self.world_from_locale(locale).apply(np.column_stack([own, np.zeros(len(own))]))[:, :2])
+        outline = self.world_from_locale(locale).apply(np.column_stack([own, np.zeros(len(own))]))[:, :2]
+        for change in self.frame(locale).changes:
+            if change.what == "beside" and change.shift.is_wall:
+                outline = change.shift.move(outline)
+        return frozen(outline)
 
     def obstacles(self, locale: str) -> tuple[NDArray[np.float64], ...]:
         """Footprints (k, 2) of the things in a locale that the robot could hit [m, world]."""

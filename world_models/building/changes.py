@@ -204,10 +204,12 @@ class Shift:
     Attributes:
         corners: (k, 2) of the area, which is convex, counter-clockwise [m, world].
         by_m: (2,) how far it is displaced [m, world].
+        is_wall: whether it is a wall: what stands at it moves with it.
     """
 
     corners: NDArray[np.float64]
     by_m: NDArray[np.float64]
+    is_wall: bool = False
 
     def move(self, points: Any, whole: bool | None = None) -> NDArray[np.float64]:
         """Points (..., 2) or (..., 3), displaced where they stand in the area; the same array where none does.
@@ -232,9 +234,9 @@ class Shift:
         return tuple(self._move_part(part, whole) for part in parts)
 
     def moves_thing(self, thing: Thing) -> bool:
-        """Whether the middle of a thing stands in the area."""
-        middle = thing.footprint_world.mean(axis=0)
-        return self.move(middle) is not middle
+        """Whether a thing is built to a wall that is displaced."""
+        is_at = self.move(thing.footprint_world) is not thing.footprint_world
+        return self.is_wall and thing.protrusion_m is not None and is_at
 
     def move_thing(self, thing: Thing) -> Thing:
         if not self.moves_thing(thing):

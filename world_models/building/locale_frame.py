@@ -18,6 +18,7 @@ from world_models import words
 from world_models.building.changes import Shift, add_extra, remove_element, remove_thing, shut_door
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.building.locales import EXTRA_KIND, ROBOT_TOP_M, Doorway, Link, Locale, LocaleExtent, Thing
+from world_models.building.model_errors import WALL
 from world_models.building.passages import PassageEdge
 from world_models.entries import OPEN
 from world_models.entries.location import Hypothesis
@@ -60,7 +61,7 @@ class FrameChange:
     @property
     def shift(self) -> Shift:
         """Of what stands beside: what of the geometry is displaced, and by how much."""
-        return Shift(frozen(self.footprint, (None, 2)), frozen(self.by_m, (2,)))
+        return Shift(frozen(self.footprint, (None, 2)), frozen(self.by_m, (2,)), WALL in self.name)
 
     def sentence(self) -> str:
         beside = f"stands {100.0 * math.hypot(*self.by_m):.1f} cm beside, to {100.0 * self.sigma_m:.1f} cm"

@@ -216,6 +216,12 @@ def find_facing(building: Building, between: str) -> tuple[Side, Side]:
     return list_facing(building, between.partition(BETWEEN)[0])[between]
 
 
+def measure_between(sides: tuple[Side, Side]) -> float:
+    """How far apart the middles of two walls are that face each other [m]."""
+    one, other = (np.mean(side.corners, axis=0) for side in sides)
+    return float(abs((other - one) @ sides[0].outward[:2]))
+
+
 def _build_side(building: Building, mode: str, into: Floats) -> Side:
     locale, _, number = mode.rpartition(WALL)
     start, inward, length_m = (one[int(number)] for one in _measure_walls(building.outline(locale)))

@@ -4,8 +4,8 @@ from knowledge_sources.methods.calibration.camera_rivals import Opened, SeenLine
 from knowledge_sources.methods.calibration.camera_state import (
     LEAST_SIGMA_CENTRE_PX, LEAST_SIGMA_FOCAL, LEAST_SIGMA_M, LEAST_SIGMA_RAD, MAX_COUNTED, MIN_MOVE_M, MIN_TURN_RAD,
     RIGID_DISTANCE_M, SIGMA_CENTRE_PX, SIGMA_FOCAL, SIGMA_HEIGHT_M, SIGMA_ROLL_RAD, SIGMA_TILT_RAD, SIGMA_YAW_RAD,
-    add_yaw, compute_camera_covariance, compute_knocked_covariance, has_counted, is_camera_known, learn, loosen,
-    to_tuples, widen,
+    add_yaw, compute_camera_covariance, compute_knocked_covariance, compute_scale_sigma, has_counted, is_camera_known,
+    learn, loosen, to_tuples, widen,
 )
 from knowledge_sources.methods.calibration.intrinsics import (
     BoardView, Calibration, PARAMETERS, Pattern, calibrate, draw_calibration, find_board,
@@ -17,7 +17,8 @@ __all__ = [
     "LEAST_SIGMA_CENTRE_PX", "LEAST_SIGMA_FOCAL", "LEAST_SIGMA_M", "LEAST_SIGMA_RAD", "MAX_COUNTED", "MIN_MOVE_M",
     "MIN_TURN_RAD", "PARAMETERS", "RIGID_DISTANCE_M", "SIGMA_CENTRE_PX", "SIGMA_FOCAL", "SIGMA_HEIGHT_M",
     "SIGMA_ROLL_RAD", "SIGMA_TILT_RAD", "SIGMA_YAW_RAD", "BoardView", "Calibration", "Mounting", "Opened", "Pattern",
-    "SeenLines", "add_yaw", "calibrate", "compute_camera_covariance", "compute_knocked_covariance", "draw_calibration",
-    "estimate_mounting", "explain", "find_board", "find_model_evidence", "has_counted", "is_camera_known",
-    "is_model_doubted", "is_strange", "learn", "loosen", "open_rivals", "to_tuples", "widen",
+    "SeenLines", "add_yaw", "calibrate", "compute_camera_covariance", "compute_knocked_covariance",
+    "compute_scale_sigma", "draw_calibration", "estimate_mounting", "explain", "find_board", "find_model_evidence",
+    "has_counted", "is_camera_known", "is_model_doubted", "is_strange", "learn", "loosen", "open_rivals", "to_tuples",
+    "widen",
 ]

@@ -10,11 +10,12 @@ import numpy as np
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import compute_chi2
 from knowledge_sources.methods.pose import CameraEstimate
-from world_models.camera import YAW, Camera
+from world_models.camera import CAMERA_UNKNOWNS, YAW, Camera
 from world_models.entries import CameraState
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
+HEIGHT, FOCAL = (CAMERA_UNKNOWNS.index(name) for name in ("height_m", "focal"))
 SIGMA_TILT_RAD = math.radians(1.5)
 """Standard deviation of the mounting's tilt (issue: mounted by hand, up to 3 degrees and 8 cm otherwise than
 believed, taken for two deviations)."""
@@ -88,6 +89,12 @@ def compute_camera_px(camera: Camera, covariance: Floats, distance_m: float) -> 
     tilt, roll, _, height, focal, _, _ = np.sqrt(np.diag(covariance))
     aside_px = 0.25 * math.hypot(camera.width, camera.height)
     return math.hypot(camera.fy * tilt, aside_px * roll, camera.fy * height / distance_m, aside_px * focal)
+
+
+def compute_scale_sigma(camera: CameraState) -> float:
+    """How well it is known how large what it sees is, as a part of that: by its focal length and its height."""
+    sigmas = np.sqrt(np.diag(compute_camera_covariance(camera)))
+    return math.hypot(float(sigmas[FOCAL]), float(sigmas[HEIGHT]) / camera.mount.height_m)
 
 
 def is_camera_known(robot: RobotModel, covariance: Floats) -> bool:

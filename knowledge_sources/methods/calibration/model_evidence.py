@@ -32,7 +32,7 @@ APART_M, APART_RAD = 1.0, float(np.radians(20.0))
 
 def find_model_evidence(
     lines_world: Floats, segments_px: Floats, errors: LineErrors, camera: CameraState, belief: Pose2,
-    covariance: Floats, seen_s: float,
+    covariance: Floats, seen_s: float, about: str = MODEL,
 ) -> Evidence:
     """What matched lines (n, 2, 3) [m] and segments (n, 2, 2) say for a wrong model, a wrong camera, or neither.
 
@@ -54,7 +54,7 @@ def find_model_evidence(
     told = tuple(_explain(kind, found, max(found.log_likelihood - best + MAX_LOG_RATIO, 0.0))
                  for kind, found in fits.items())
     shows = f"{int(fits['wall'].inliers.sum())} of {len(lines_world)} lines where they would be"
-    return Evidence(MODEL, shows, told, belief.x_m, belief.y_m, belief.heading_rad, APART_M, APART_RAD, seen_s)
+    return Evidence(about, shows, told, belief.x_m, belief.y_m, belief.heading_rad, APART_M, APART_RAD, seen_s)
 
 
 def is_strange(evidence: Evidence) -> bool:

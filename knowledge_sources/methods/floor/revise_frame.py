@@ -11,7 +11,7 @@ from knowledge_sources.methods.floor.footprints import measure_change_m
 from world_models.building.changes import find_along, outline_door
 from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
 from world_models.building.locales import Doorway
-from world_models.building.model_errors import BETWEEN, INEXACT_M, Side
+from world_models.building.model_errors import INEXACT_M, Side
 from world_models.entries import DOOR_STATES, Difference, DoorState, Obstacle, UserReport
 
 MIN_BESIDE_SIGMAS = 3.0
@@ -50,14 +50,12 @@ def revise_by_door(frame: LocaleFrame, door: DoorState, by: str) -> LocaleFrame:
     return frame.restored("shut", door.door) if door.state == "open" and is_shut else frame
 
 
-def revise_by_difference(frame: LocaleFrame, found: Difference, by: str, *, is_explained: bool) -> LocaleFrame:
-    """The building's frame, once its model is surely inexact; or as filed, where a wall that is redrawn explains it."""
+def revise_by_difference(frame: LocaleFrame, by: str, *, is_explained: bool) -> LocaleFrame:
+    """The building's frame, whose model is surely inexact; or as filed, where a wall that is redrawn explains it."""
     is_known = any(change.what == "inexact" for change in frame.changes)
     if is_explained:
         return frame.restored("inexact", frame.name) if is_known else frame
-    if is_known or not found.is_sure or found.leader.kind != "wall":
-        return frame
-    return frame.changed(FrameChange("inexact", frame.name, by))
+    return frame if is_known else frame.changed(FrameChange("inexact", frame.name, by))
 
 
 def redraw_door(frame: LocaleFrame, door: Doorway, found: Difference, by: str) -> LocaleFrame:
@@ -85,11 +83,15 @@ def redraw(frame: LocaleFrame, change: FrameChange) -> LocaleFrame:
     return frame if moved_m < MIN_BESIDE_CHANGE_M else frame.restored("beside", change.name).changed(change)
 
 
-def is_width(found: Difference) -> bool:
-    """Whether two walls that face each other are surely farther apart, or nearer, than in the file."""
+def is_width(found: Difference, camera_m: float) -> bool:
+    """Whether walls that face each other are surely farther apart, or nearer, than in the file.
+
+    Args:
+        camera_m: by how much the camera may make it seem so, a standard deviation.
+    """
     wall = found.leader
-    return BETWEEN in found.about and found.is_sure and wall.kind == "wall" and (
-        abs(wall.off) >= MIN_BESIDE_SIGMAS * wall.sigma)
+    least_m = MIN_BESIDE_SIGMAS * math.hypot(wall.sigma, camera_m)
+    return found.is_sure and wall.kind == "wall" and abs(wall.off) >= least_m
 
 
 def place_walls(found: Sequence[tuple[Difference, tuple[Side, Side]]], by: str) -> list[tuple[Side, FrameChange]]:
