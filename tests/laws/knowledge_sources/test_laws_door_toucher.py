@@ -7,17 +7,7 @@ from typing import Any
 import pytest
 
 from blackboard import Entry, Posted, Revised
-from generated_boards import (
-    HALL,
-    LENGTH_M,
-    STUDY,
-    WIDTH_M,
-    Bench,
-    effect_on,
-    plain_robot,
-    reasons,
-    wakes,
-)
+from generated_boards import HALL, LENGTH_M, STUDY, WIDTH_M, Bench, effect_on, plain_robot, reasons, wakes
 from knowledge_sources.methods.doors import MAX_LOG_ODDS, PRIOR_LOG_ODDS, SHUT_LOG_ODDS, touch_door, update_door
 from knowledge_sources.methods.doors.belief import MAX_TOUCH_M, TOUCH_LOG_RATIO
 from knowledge_sources.model.door_toucher import door_toucher

@@ -15,16 +15,7 @@ from knowledge_sources.model.model_reviser import ModelReviser
 from knowledge_sources.reads import find_frames
 from knowledge_sources.reads.sketches import GOAL_TOLERANCE_M
 from knowledge_sources.sketcher.goal_sketcher import GoalSketcher
-from world_models.entries import (
-    DoorPicture,
-    DoorState,
-    Goal,
-    Impasse,
-    Obstacle,
-    Place,
-    PlanSketch,
-    SketchStatus,
-)
+from world_models.entries import DoorPicture, DoorState, Goal, Impasse, Obstacle, Place, PlanSketch, SketchStatus
 from world_models.frames import Pose2
 
 SOURCE = GoalSketcher()

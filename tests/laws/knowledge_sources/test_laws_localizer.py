@@ -12,13 +12,7 @@ from hypothesis import strategies as st
 
 from blackboard import Entry, Level, Post, Posted, Retract
 from generated_boards import HALL, Bench, drive, go, made, motions, plain_robot, poses, reasons, to_world, wakes
-from knowledge_sources.methods.localization import (
-    LOST_AGAIN_ODDS,
-    MAX_FAR_PROBES,
-    P_STATED,
-    LocalizationStatus,
-    Search,
-)
+from knowledge_sources.methods.localization import LOST_AGAIN_ODDS, MAX_FAR_PROBES, P_STATED, LocalizationStatus, Search
 from knowledge_sources.methods.localization.global_localization import LocalizationResult, PlaceCandidate
 from knowledge_sources.methods.localization.next_view import SensingAction
 from knowledge_sources.methods.localization.none_of_these import MIN_P_PLACE

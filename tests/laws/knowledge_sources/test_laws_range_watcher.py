@@ -11,17 +11,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generated_boards import (
-    HALL,
-    WIDTH_M,
-    Bench,
-    all_reasons,
-    effect_on,
-    made,
-    mirrored,
-    plain_robot,
-    to_world,
-)
+from generated_boards import HALL, WIDTH_M, Bench, all_reasons, effect_on, made, mirrored, plain_robot, to_world
 from knowledge_sources.methods.floor import see_ranges
 from knowledge_sources.model.range_watcher import (
     MAX_BELIEF_SIGMA_M,
