@@ -27,15 +27,7 @@ from harvey.runner.replay import open_originals
 from harvey.testing import answer
 from harvey.wiring import KNOWLEDGE_SOURCES, build, load_kinds
 from knowledge_sources.settings import DEFAULT
-from logs.records import (
-    DecisionRecord,
-    EntryRecord,
-    Originals,
-    as_line,
-    cycle_of_writing,
-    effect_of,
-    ref_of,
-)
+from logs.records import DecisionRecord, EntryRecord, Originals, as_line, cycle_of_writing, effect_of, ref_of
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
 from logs.timeline import Timeline

@@ -19,6 +19,7 @@ from knowledge_sources.reads import (
     UP_TO_DATE,
     Belief,
     Watched,
+    find_before_door,
     find_door_state,
     find_frames,
     list_doors_in_view,
@@ -34,7 +35,8 @@ class DoorWatcher(RobotKnowledgeSource):
     It looks at pictures as long as the belief is trusted: at those that track landmarks, and at those by which a
     milestone was verified. An opening shows what the model has beyond, or a leaf. That adds to the log odds of the
     door; at stated odds, by pictures from two places at least, it is shut, and the goal sketcher draws another way. One
-    that is believed to be shut and shows what is beyond is open again. A dark picture tells nothing of doors.
+    that is believed to be shut and shows what is beyond is open again. A dark picture tells nothing of doors,
+    nor does one of what was found to stand before them.
     """
 
     level, priority = Level.ACTION, Priority.SEE
@@ -67,7 +69,8 @@ class DoorWatcher(RobotKnowledgeSource):
         door, belief, robot, pose = watched.doorway, held.entry, held.seeing, held.pose
         frames = find_frames(view, door.between)
         beyond = with_door_open(view, door.name, frames) if watched.is_shut else robot.world
-        opening = predict_opening(robot, pose, held.covariance, door, held.locale, beyond)
+        before = find_before_door(view, door, held.locale)
+        opening = predict_opening(robot, pose, held.covariance, door, held.locale, beyond, before)
         evidence = None if opening is None else measure_opening(robot, opening, image)
         if opening is None or evidence is None:
             return

@@ -32,6 +32,7 @@ from knowledge_sources.reads import (
     PLAN_DOUBT,
     UP_TO_DATE,
     Watched,
+    find_before_door,
     find_door_state,
     find_frames,
     list_doors_in_view,
@@ -106,7 +107,8 @@ class ShutDoorExplainer(RobotKnowledgeSource):
         pose = shut.pose
         if not is_near(before, pose, belief.value):
             return None
-        opening = predict_opening(robot, pose, shut.covariance, door, locale, robot.world)
+        before = find_before_door(view, door, locale)
+        opening = predict_opening(robot, pose, shut.covariance, door, locale, robot.world, before)
         evidence = None if opening is None else measure_opening(robot, opening, read_picture(frame.value.jpeg).half)
         if opening is None or evidence is None:
             return None

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import numpy as np
+import shapely
+
 from blackboard import Entry, View
-from knowledge_sources.methods.doors import is_in_view
+from knowledge_sources.methods.doors import MAX_TOUCH_M, is_in_view
+from knowledge_sources.methods.floor import build_polygon, may_be_there
 from knowledge_sources.reads.questions import find_frames, find_robot_in
 from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.building.locales import Doorway
-from world_models.entries import DoorState, Hypothesis
+from world_models.entries import DoorState, Hypothesis, Obstacle
 from world_models.frame_building import FrameBuilding
 
 MAX_SIGMA_M = 0.1  # largest standard deviation of the robot's place when it judges a door
@@ -40,6 +44,14 @@ def list_filed_doors(view: View) -> dict[str, Doorway]:
     """The doorways of the frames on the board, as the file has them, by name."""
     frames = (entry.value for entry in view.all(LocaleFrame))
     return {door.name: door for frame in frames for door in (frame.filed or frame).doorways}
+
+
+def find_before_door(view: View, doorway: Doorway, locale: str) -> shapely.Geometry:
+    """The floor of what may stand in a room before a doorway and hide it [m, world]; what is in it may be its leaf."""
+    opening = shapely.MultiPoint(np.concatenate(doorway.thresholds_world)).convex_hull
+    found = view.where(Obstacle, lambda thing: thing.locale == locale and may_be_there(thing))
+    polygons = [(build_polygon(entry.value.footprint), MAX_TOUCH_M + 2.0 * entry.value.sigma_m) for entry in found]
+    return shapely.union_all([polygon for polygon, least_m in polygons if polygon.distance(opening) > least_m])
 
 
 def find_door_state(view: View, door: str) -> Entry[DoorState] | None:

@@ -8,13 +8,13 @@ In reading order:
 """
 
 from knowledge_sources.methods.doors.belief import (
-    MAX_LOG_ODDS, MIN_FEW_LINES, MIN_LOG_RATIO, PRIOR_LOG_ODDS, SHUT_LOG_ODDS, explain_picture, is_explained,
-    is_in_opening, is_near, touch_door, update_door,
+    MAX_LOG_ODDS, MAX_TOUCH_M, MIN_FEW_LINES, MIN_LOG_RATIO, PRIOR_LOG_ODDS, SHUT_LOG_ODDS, explain_picture,
+    is_explained, is_in_opening, is_near, touch_door, update_door,
 )
 from knowledge_sources.methods.doors.leaf import describe, is_in_view, measure_opening, predict_opening, weigh_leaf
 
 __all__ = [
-    "MAX_LOG_ODDS", "MIN_FEW_LINES", "MIN_LOG_RATIO", "PRIOR_LOG_ODDS", "SHUT_LOG_ODDS", "describe",
-    "explain_picture", "is_explained", "is_in_opening", "is_in_view", "is_near", "measure_opening",
-    "predict_opening", "touch_door", "update_door", "weigh_leaf",
+    "MAX_LOG_ODDS", "MAX_TOUCH_M", "MIN_FEW_LINES", "MIN_LOG_RATIO", "PRIOR_LOG_ODDS", "SHUT_LOG_ODDS", "describe",
+    "explain_picture", "is_explained", "is_in_opening", "is_in_view", "is_near", "measure_opening", "predict_opening",
+    "touch_door", "update_door", "weigh_leaf",
 ]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import shapely
 
 from knowledge_sources.methods.arrays import Floats, Image, Mask
 from knowledge_sources.methods.doors.rival_views import ALIKE, Views, fit_views
@@ -35,6 +36,7 @@ JAMB_MARGIN_M = 0.05  # distance that samples keep from jambs, head and floor
 MARGIN_SIGMAS = 2.0  # standard deviations of the pose that are added to that distance
 MIN_SAMPLES = 40  # fewest samples by which an opening is judged
 
+NOTHING = shapely.Polygon()
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom [px]."""
 OWN_SURFACE_M = 0.1
@@ -87,6 +89,7 @@ def is_in_view(
 
 def predict_opening(
     robot: RobotModel, pose: Pose2, covariance: Floats, doorway: Doorway, locale: str, beyond: Building,
+    before: shapely.Geometry = NOTHING,
 ) -> SeenOpening | None:
     """What should be seen of a doorway from a pose in one of its rooms; None where too little of it is in view.
 
@@ -95,6 +98,8 @@ def predict_opening(
         covariance: (3, 3) of the pose; samples keep so far from the jambs that the pose may be wrong by it.
         locale: the room where the robot is.
         beyond: the building with this door open.
+        before: the floor of what was found to stand in the room [m, world]: what stands there may hide the opening up
+            to any height, as its top is seldom seen.
     """
     if not is_in_view(robot, pose, doorway, locale):
         return None
@@ -119,6 +124,10 @@ def predict_opening(
     through, beside, across, height_m, first_m = _pass_through(center, world, doorway, locale, floor_m, margin_m)
     mine = slice(None, None, RAYS)
     clear = depth[mine] > first_m[mine] - OWN_SURFACE_M
+    if not before.is_empty:
+        ends = center[:2] + first_m[mine, None] * world[mine, :2]
+        lines = shapely.linestrings(np.stack([np.broadcast_to(center[:2], ends.shape), ends], axis=1))
+        clear &= ~shapely.intersects(lines, before)
     if robot.camera.obstruction is not None:
         clear &= ~robot.camera.obstruction.covers(pixels[:, 0])
     free = through[mine] & clear

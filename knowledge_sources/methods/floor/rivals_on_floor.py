@@ -272,9 +272,9 @@ def enclose(boxes: Sequence[Box], known: Obstruction | None) -> Obstruction:
 
 
 def is_within(box: Box, patch: Box) -> bool:
-    """Whether a box of the picture lies within another."""
-    left, top, right, bottom = (inner - outer for inner, outer in zip(box, patch, strict=True))
-    return min(left, top) >= -FIXED_PX and max(right, bottom) <= FIXED_PX
+    """Whether a box of the picture lies within another, but for its upper side: there the floor ends."""
+    left, _, right, bottom = (inner - outer for inner, outer in zip(box, patch, strict=True))
+    return left >= -FIXED_PX and max(right, bottom) <= FIXED_PX
 
 
 def is_behind(box: Box, obstruction: Obstruction) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -84,6 +85,15 @@ def test_samples_keep_off_the_jambs_by_what_the_pose_leaves_open(
             assert off.min() > margin_m - 1e-6
         if k == 0:
             assert np.allclose(across / doorway.width_m, opening.across) and np.allclose(height, opening.height_m)
+
+
+@pytest.mark.parametrize(("aside_m", "is_hidden"), [(0.0, True), (3.0, False)])
+def test_what_stands_before_an_opening_is_no_leaf_of_it(aside_m: float, is_hidden: bool) -> None:
+    pose, plain = before_door(2.5, 0.0), predict_opening(ROBOT, before_door(2.5, 0.0), SURE, DOORWAY, HALL, WORLD)
+    middle = pose @ Pose2(1.2, aside_m, 0.0)
+    before = shapely.Point(middle.x_m, middle.y_m).buffer(0.5)
+    opening = predict_opening(ROBOT, pose, SURE, DOORWAY, HALL, WORLD, before)
+    assert opening is None if is_hidden else np.array_equal(opening.pixels, plain.pixels)  # type: ignore[union-attr]
 
 
 def test_a_wall_where_the_door_should_be_is_no_leaf() -> None:

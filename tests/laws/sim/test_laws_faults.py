@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import fields, replace
+from pathlib import Path
 
 import pytest
 
@@ -34,6 +36,12 @@ def body(*faults: Fault) -> SimulatedBody:
 def test_kinds_are_unique_and_found() -> None:
     assert len({fault_class.kind for fault_class in BUILT_IN}) == len(BUILT_IN)
     assert all(find_fault_class(fault_class.kind) is fault_class for fault_class in BUILT_IN)
+
+
+def test_of_every_kind_it_is_said_what_tells_it() -> None:
+    said = (Path(__file__).parents[3] / "docs" / "design" / "faults.md").read_text("utf-8")
+    kinds = set(re.findall(r"`(\w+)`", "".join(line.split("|")[1] for line in said.splitlines() if line[:3] == "| `")))
+    assert kinds == {fault_class.kind for fault_class in BUILT_IN}
 
 
 @pytest.mark.parametrize("fault_class", BUILT_IN)
