@@ -218,9 +218,10 @@ class _Reader:
               and (one.heads or one.names)]
         past = tuple(one for meaning, one in wheres if meaning in ("past", "before"))
         way = next((way for way in ways if way not in ("ahead", "behind")), "")
-        blocks = [thing for thing in things if "unit" in thing.heads]
-        number = next((thing.number for thing in things if thing.number and not blocks), 0)
         hall = next(iter((*halls, *onto)), None)
+        is_on = ("on", hall) in wheres  # "left on the brick two", not "the second left onto the brick"
+        blocks = [thing for thing in things if "unit" in thing.heads or (is_on and thing.count and not thing.heads)]
+        number = next((thing.number for thing in things if thing.number and not blocks), 0)
         if way == "" and hall is not None:
             way = next((one for one in (hall.side,) if one not in ("ahead", "")), "")
         last = self.acts[-1] if self.acts else Act("")
@@ -380,8 +381,9 @@ class _Reader:
             return  # it tells of the walk before
         elif wheres and self._is_walk_told(things, ways) and all(meaning == "past" for meaning, _ in wheres):
             self._note_before([one for _, one in wheres])
-        elif things and ways and "unit" in things[0].heads:
-            self._turn(things, ways, wheres)
+        elif (things and ways and "unit" in things[0].heads) or (set(ways) & {"left", "right"} and any(
+                meaning in ("at", "on") for meaning, _ in wheres)):
+            self._turn(things, ways, wheres)  # "left at the lamp", "right on the brick two"
         elif things and ways and things[0].number and not things[0].heads and not things[0].names:
             self.acts.append(Act("turn", ways[0], units=things[0].number))
         elif things and (things[0].is_door or (things[0].count and things[0].side and not things[0].is_stretch)):
@@ -452,13 +454,16 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     reader = _Reader()
     for clause in ordered:
         reader.read(clause)
+    last = reader.acts[-1] if reader.acts else Act("")
+    if last.sort == "turn" and last.along is not None and not last.way:
+        reader.acts.append(replace(last, sort="go"))  # "take the blue hall", and no more
     if not any(act.sort in ("find", "exit", "turn", "go") for act in reader.acts):  # a goal, and no way
         goal = next((index for index, act in enumerate(reader.acts) if act.sort == "see" and act.what
                      and act.what.names), None)
         if goal is not None:
             reader.acts[goal] = replace(reader.acts[goal], sort="find")
-    last = max((index for index, act in enumerate(reader.acts) if act.sort in ("go", "turn", "exit")), default=-1)
-    return [replace(act, sort="see") if act.sort == "find" and index < last and not act.enters and reader.acts[
+    done = max((index for index, act in enumerate(reader.acts) if act.sort in ("go", "turn", "exit")), default=-1)
+    return [replace(act, sort="see") if act.sort == "find" and index < done and not act.enters and reader.acts[
         index + 1].sort != "exit" else act for index, act in enumerate(reader.acts)]
 
 

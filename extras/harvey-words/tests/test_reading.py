@@ -203,7 +203,7 @@ def test_the_experiment_reads_routes_and_paragraphs() -> None:
     assert all(claim[1] for claim in report.claims) and report.rows[0][1] == 30 and report.rows[1][1] == 80
     name, texts, arrive, *_, elsewhere, _ = report.rows[2]
     assert name == "of development" and isinstance(arrive, int) and isinstance(elsewhere, int)
-    assert texts == 160 and arrive >= 0.9 * 160 and elsewhere <= 0.02 * 160
+    assert texts == 180 and arrive >= 0.9 * 180 and elsewhere <= 0.03 * 180
 
 
 # -- directions ------------------------------------------------------------------------------------------------------
