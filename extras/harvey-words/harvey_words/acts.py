@@ -12,6 +12,8 @@ from harvey_words.word_clauses import Clause, Part
 RELATIONS = ("past", "before", "across", "between", "next-to")
 MOST_PASSED = 6
 """Things that are passed in one act."""
+Wheres = list[tuple[str, ThingWords]]
+"""Prepositions with their things."""
 LENGTHS_M = {"metre": 1.0, "foot": 0.3048}
 SIDES = ("left", "right", "ahead", "behind", "north", "south", "east", "west")
 
@@ -90,26 +92,21 @@ class _Reader:
         self.side_before = bool(parts) and parts[-1].sort == "where" and bool(parts[-1].side) and clause.end == "and"
         if parts:
             text = " ".join(word.text for part in parts for word in part.words) or " ".join(verbs)
-            place = min(part.place for part in parts)
-            self.acts[begun:] = [replace(act, place=place, text=text) for act in self.acts[begun:]]
+            self.acts[begun:] = [replace(act, text=text) for act in self.acts[begun:]]
 
-    def _collect(self, parts: Sequence[Part], verbs: set[str]) -> tuple[
-            list[ThingWords], list[str], list[tuple[str, ThingWords]]]:
+    def _collect(self, parts: Sequence[Part], verbs: set[str]) -> tuple[list[ThingWords], list[str], Wheres]:
         """Things, ways, and prepositions with their things; sides belong to the thing before them."""
         things: list[ThingWords] = []
         ways: list[str] = []
-        wheres: list[tuple[str, ThingWords]] = []
+        wheres: Wheres = []
         target: list[ThingWords] | None = None
         located = False
         turning = bool(verbs & {"turn", "take"}) and not verbs & {"be"}
         for part in parts:
             side = part.side or (part.meaning if part.sort == "way" else "")
-            if part.sort == "thing" and not (describe(part.words).count and things and not things[-1].heads
-                                             and not things[-1].names):
+            if part.sort == "thing":
                 things.append(describe(part.words))
                 target = things
-            elif part.sort == "thing":
-                things[-1] = replace(describe(part.words), count=things[-1].count)
             elif part.sort == "where" and not part.side:
                 if part.meaning in RELATIONS and target is things and things and (verbs & {"be", "see"}) and things[
                         -1].is_door:
@@ -167,7 +164,7 @@ class _Reader:
 
     # -- the sorts of clauses ----------------------------------------------------------------------------------------
 
-    def _exit(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _exit(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         by = [one for meaning, one in wheres
               if one.is_door and "door" in one.heads and meaning in ("past", "along", "to")]
         own = [thing for thing in things if thing.is_door and not ({"door"} & thing.heads and not thing.names)]
@@ -187,7 +184,7 @@ class _Reader:
         return not turns and any(
             part.words and part.sort in ("where", "thing") for part in parts[back[0]:])
 
-    def _posture(self, things: list[ThingWords], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _posture(self, things: list[ThingWords], wheres: Wheres) -> None:
         towards = [one for meaning, one in wheres if meaning in ("to", "away", "at", "on", "next-to")]
         if towards or things:
             self.acts.append(Act("orient", what=replace((towards or things)[0], side="behind")))
@@ -195,7 +192,7 @@ class _Reader:
         if rest:
             self._go([], [], rest)
 
-    def _orient(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _orient(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         all_things = [*things, *(one for _, one in wheres)]
         side = next((one.side for one in all_things if one.side), ways[0] if ways else "ahead")
         side = "behind" if side == "back" else side
@@ -203,15 +200,13 @@ class _Reader:
         if what is not None:
             self.acts.append(Act("orient", what=replace(what, side=what.side or side)))
 
-    def _face(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _face(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         turns = [way for way in ways if way in ("left", "right", *COMPASS)]
         self.acts += [Act("turn", way) for way in turns]
-        away = any(meaning == "away" for meaning, _ in wheres)
-        what = [*things, *(one for _, one in wheres)]
-        if what and not turns:
-            self.acts.append(Act("orient", what=replace(what[0], side="behind" if away else "ahead")))
+        if not turns:
+            self._orient(things, ["behind" if any(meaning == "away" for meaning, _ in wheres) else "ahead"], wheres)
 
-    def _turn(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _turn(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         halls = [thing for thing in things if thing.is_stretch]
         onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch]
         at = [one for meaning, one in wheres if (meaning == "at" or (meaning == "on" and not one.is_stretch))
@@ -222,10 +217,10 @@ class _Reader:
         is_on = ("on", hall) in wheres  # "left on the brick two", not "the second left onto the brick"
         blocks = [thing for thing in things if "unit" in thing.heads or (is_on and thing.count and not thing.heads)]
         number = next((thing.number for thing in things if thing.number and not blocks), 0)
-        if way == "" and hall is not None:
-            way = next((one for one in (hall.side,) if one not in ("ahead", "")), "")
+        if way == "" and hall is not None and hall.side != "ahead":
+            way = hall.side
         last = self.acts[-1] if self.acts else Act("")
-        if last == Act("turn", last.way, place=last.place, text=last.text) and not way and hall is not None:
+        if last == Act("turn", last.way, text=last.text) and not way and hall is not None:
             way = last.way  # "right, through the brick hall"
             self.acts.pop()
         self.acts.append(Act("turn", way, along=hall, until=at[0] if at and way else None, past=past if way else (),
@@ -237,12 +232,9 @@ class _Reader:
         if rest or blocks:
             self._go(blocks, [], rest)
 
-    def _go(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]], *,
+    def _go(self, things: list[ThingWords], ways: list[str], wheres: Wheres, *,
             until: bool = False, passing: bool = False) -> None:
         self._turn_only(ways)
-        if len(wheres) > 1 and wheres[0][0] == "at" and not things and wheres[1][0] == "to":
-            self.acts.append(Act("go", until=wheres[0][1]))  # "at its end go to the corner"
-            wheres = wheres[1:]
         if things and things[0].text.startswith("all the way") and (len(things) > 1 or wheres):
             things = [replace(things[0], heads=frozenset(("hall",))), *things[1:]]  # "all the way down the hall to X"
         units, metres = 0, 0.0
@@ -267,8 +259,7 @@ class _Reader:
             elif meaning == "from":
                 self.acts.append(Act("see", what=one))
             elif meaning == "away":
-                if not one.is_door:
-                    self.acts.append(Act("orient", what=replace(one, side="behind")))
+                self.acts += [] if one.is_door else [Act("orient", what=replace(one, side="behind"))]
             elif one.heads or one.names or one.count:
                 ends.append(one)
         if not (ends or passed or along or units or metres or things or ways or wheres) and self.acts and self.acts[
@@ -288,27 +279,24 @@ class _Reader:
                              Act("go", until=more) if more in onward else Act("see", what=more))
 
     def _turn_only(self, ways: Sequence[str]) -> None:
-        turns = [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
-        self.acts += turns
-        self.last_stretch = None if turns else self.last_stretch
+        self.acts += [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
+        self.last_stretch = None if ways else self.last_stretch
 
-    def _enter(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _enter(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         what = [thing for thing in things if not thing.is_stretch]
         what += [one for meaning, one in wheres if meaning in ("to", "at", "in", "on") and one.is_door]
         halls = [one for one in (*things, *(one for _, one in wheres)) if one.is_stretch]
         if halls and not (what and what[0].is_door):
             self._turn(halls, ways, [(meaning, one) for meaning, one in wheres if one is not halls[0]])
-            return
-        if not what:
+        elif not what:
             self._terse(things, ways, wheres)
-            return
-        side = next((way for way in ways if way in SIDES), "")
-        goal = replace(what[0], side=what[0].side or side, relations=(
-            *what[0].relations, *((meaning, one) for meaning, one in wheres if meaning in RELATIONS)))
-        self.acts.append(Act("find", what=_at_end(goal, wheres), enters=True))
+        else:
+            side = next((way for way in ways if way in SIDES), "")
+            goal = replace(what[0], side=what[0].side or side, relations=(
+                *what[0].relations, *((meaning, one) for meaning, one in wheres if meaning in RELATIONS)))
+            self.acts.append(Act("find", what=_at_end(goal, wheres), enters=True))
 
-    def _state(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]],
-               verbs: set[str]) -> None:
+    def _state(self, things: list[ThingWords], ways: list[str], wheres: Wheres, verbs: set[str]) -> None:
         """A sentence that says what is where."""
         if len(things) > 1 and things[-1].names and not things[-1].heads and things[-1].is_stretch:
             *things, kind = things  # "the next hall is yellow"
@@ -333,8 +321,7 @@ class _Reader:
         if doors or not things:
             doors += [one for meaning, one in wheres if meaning in ("in", "at") and one.is_door]
         if doors:
-            goal = _merge(doors)
-            goal = _at_end(goal, wheres)
+            goal = _at_end(_merge(doors), wheres)
             goal = replace(goal, side=goal.side or (side if side in SIDES else ""),
                            relations=(*goal.relations, *related))
             self.acts.append(Act("find", what=goal))
@@ -352,25 +339,22 @@ class _Reader:
         if ended is not None and not doors:
             on_the_way = any(act.sort in ("exit", "turn", "go") for act in self.acts)
             self.acts.append(Act("go", until=ended) if on_the_way else Act("find", what=ended))
-        for thing in things:
-            if thing.heads & {"unit"}:
-                self.acts.append(Act("go", units=thing.number or 1))
         for thing in (*things, *(one for meaning, one in wheres if meaning == "at")):
             if thing.number and thing.heads & POINTS:
                 self.acts.append(Act("go", until=thing))  # "it is the next crossing", "the chair is at the next one"
         for thing in things:
-            if thing.number and thing.heads & POINTS:
-                continue
-            if "end" in thing.heads and thing not in doors:
+            if "unit" in thing.heads:
+                self.acts.append(Act("go", units=thing.number or 1))
+            elif "end" in thing.heads and thing not in doors:
                 self.acts.append(Act("go", until=thing))
-            elif thing not in doors and not thing.heads & {"unit"}:
+            elif thing not in doors and not (thing.number and thing.heads & POINTS):
                 self.acts.append(Act("see", what=replace(thing, side=thing.side or (side if side in SIDES else ""))))
         places = [one for meaning, one in wheres if meaning in ("at", "in", "on", "to") and (one.heads or one.names)]
         self.acts += [Act("see", what=one) for one in places
                       if not (doors and (one.is_stretch or one in doors)) and "end" not in one.heads
                       and not (one.number and one.heads & POINTS)]
 
-    def _terse(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _terse(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         """No verb: ``second door on the right``, ``left``, ``past the machine room``."""
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS and one.text)
         side = next((one.side for _, one in wheres if one.side), "")

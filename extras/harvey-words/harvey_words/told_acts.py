@@ -73,7 +73,7 @@ class Act:
         until: where a walk or a turn ends; past: what is passed before; along: the hall that is taken.
         units: crossings to go; metres: length to go.
         enters: whether a door is said to be gone in at.
-        place, end: numbers of its first word in the text and of the word after its last.
+        text: its clause.
     """
 
     sort: str
@@ -85,5 +85,4 @@ class Act:
     units: int = 0
     metres: float = 0.0
     enters: bool = False
-    place: int = 0
     text: str = ""

@@ -124,14 +124,13 @@ class WordDoors(WordSights):
 
     def _weigh_rank(self, what: ThingWords, rank: int, count: int, open_rank: int, open_count: int,
                     only_open: bool) -> float:
-        related = any(relation in ("past", "before", "across", "next-to", "between") for relation, _ in what.relations)
+        related = bool(what.relations)
         if what.count == "last":
             return 0.0 if rank == count else OPEN_ONLY if open_rank == open_count and open_rank else WRONG_RANK
         number = what.number
         if number and not (related and number == 1):
-            if only_open:
-                return 0.0 if open_rank == number else WRONG_RANK
-            return 0.0 if rank == number else OPEN_ONLY if open_rank == number else WRONG_RANK
+            exact = (open_rank if only_open else rank) == number
+            return 0.0 if exact else OPEN_ONLY if open_rank == number else WRONG_RANK
         return 0.0 if what.names or related else AGAIN * min(rank - 1, 3)
 
     def _weigh_between(self, state: State, sight: NamedSight, doors: Sequence[NamedSight], one: ThingWords,
