@@ -34,8 +34,8 @@ SOURCES_GROUP, GUESTS_GROUP = "harvey.knowledge_sources", "harvey.guest_sources"
 COMMANDS_GROUP, PAGES_GROUP, CAMERAS_GROUP = "harvey.commands", "harvey.pages", "harvey.cameras"
 WORKERS_GROUP, RENDERERS_GROUP, RUN_EXPORTERS_GROUP = "harvey.workers", "harvey.renderers", "harvey.run_exporters"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
-    COMMANDS_GROUP: {"follow": "harvey-ros2", "parse": "harvey-words", "serve": "harvey-serve",
-                     "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
+    COMMANDS_GROUP: {"follow": "harvey-ros2", "directions": "harvey-words", "parse": "harvey-words",
+                     "serve": "harvey-serve", "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
     "harvey.experiments": {
         "imported-building": "harvey-buildings", "instructions": "harvey-words",
         "other-worlds": "harvey-miniworld", "rosmaps": "harvey-buildings",

@@ -6,93 +6,16 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from harvey_words.lexicon import Word
+from harvey_words.told_acts import COMPASS, POINTS, Act, ThingWords, describe
 from harvey_words.word_clauses import Clause, Part
 
-SIDES = ("left", "right", "ahead", "behind", "north", "south", "east", "west")
-COMPASS = ("north", "south", "east", "west")
 RELATIONS = ("past", "before", "across", "between", "next-to")
-DOORS = frozenset(("door", "room"))
-ROOMS = frozenset(("office", "laboratory", "toilet", "kitchen", "closet", "stairs", "elevator", "conference", "mail",
-                   "emergency-exit"))
-STRETCHES = frozenset(("hall", "turning"))
-POINTS = frozenset(("end", "crossing", "corner"))
 MOST_PASSED = 6
 """Things that are passed in one act."""
+Wheres = list[tuple[str, ThingWords]]
+"""Prepositions with their things."""
 LENGTHS_M = {"metre": 1.0, "foot": 0.3048}
-
-
-@dataclass(frozen=True)
-class ThingWords:
-    """A thing, door, room, hall, crossing or end as a text describes it.
-
-    Attributes:
-        heads: ``door``, ``room``, ``hall``, ``crossing``, ``corner``, ``end``, ``wall``, ``unit``, ... that are named.
-        names: all other words, with what they mean.
-        count: ``1`` to ``9``, ``last``, ``only``, ``other``, ``same``, or nothing.
-        side: where it is said to be.
-        relations: by what it is told apart, as (``past``, another description).
-        text: its words as they stand.
-    """
-
-    heads: frozenset[str] = frozenset()
-    names: tuple[Word, ...] = ()
-    count: str = ""
-    side: str = ""
-    relations: tuple[tuple[str, ThingWords], ...] = ()
-    text: str = ""
-
-    @property
-    def is_door(self) -> bool:
-        """Whether it may be a door or what lies behind one."""
-        return bool(self.heads & DOORS) or any(word.meaning in ROOMS for word in self.names) or (
-            not self.heads and any(word.sort == "NAME" for word in self.names))
-
-    @property
-    def number(self) -> int:
-        """Its place in a row; 0 where it has none."""
-        return int(self.count) if self.count.isdigit() else 0
-
-    @property
-    def is_stretch(self) -> bool:
-        """Whether it is a hall, or known by its floor."""
-        return bool(self.heads & STRETCHES and not self.heads & POINTS) or (
-            not self.heads and bool(self.names) and all(word.sort == "MOD" for word in self.names))
-
-
-def describe(words: Sequence[Word], side: str = "") -> ThingWords:
-    """What a row of words describes."""
-    heads = frozenset(word.meaning for word in words if word.sort == "HEAD")
-    counts = [word.meaning for word in words if word.sort == "COUNT"]
-    names = tuple(word for word in words if word.sort not in ("HEAD", "COUNT") and word.meaning != "&")
-    return ThingWords(heads, names, counts[0] if counts else "", side, (), " ".join(word.text for word in words))
-
-
-@dataclass(frozen=True)
-class Act:
-    """One thing to do or to see.
-
-    Attributes:
-        sort: ``exit``, ``turn``, ``go``, ``find`` (the goal, or a door to go in at), ``see``, ``orient``,
-            ``note`` (that is passed somewhere on the walk), ``halt``.
-        way: left, right, back, or a point of the compass, of a turn.
-        what: that is found, seen, faced or left.
-        until: where a walk or a turn ends; past: what is passed before; along: the hall that is taken.
-        units: crossings to go; metres: length to go.
-        enters: whether a door is said to be gone in at.
-        place, end: numbers of its first word in the text and of the word after its last.
-    """
-
-    sort: str
-    way: str = ""
-    what: ThingWords | None = None
-    until: ThingWords | None = None
-    past: tuple[ThingWords, ...] = ()
-    along: ThingWords | None = None
-    units: int = 0
-    metres: float = 0.0
-    enters: bool = False
-    place: int = 0
-    text: str = ""
+SIDES = ("left", "right", "ahead", "behind", "north", "south", "east", "west")
 
 
 @dataclass
@@ -169,26 +92,21 @@ class _Reader:
         self.side_before = bool(parts) and parts[-1].sort == "where" and bool(parts[-1].side) and clause.end == "and"
         if parts:
             text = " ".join(word.text for part in parts for word in part.words) or " ".join(verbs)
-            place = min(part.place for part in parts)
-            self.acts[begun:] = [replace(act, place=place, text=text) for act in self.acts[begun:]]
+            self.acts[begun:] = [replace(act, text=text) for act in self.acts[begun:]]
 
-    def _collect(self, parts: Sequence[Part], verbs: set[str]) -> tuple[
-            list[ThingWords], list[str], list[tuple[str, ThingWords]]]:
+    def _collect(self, parts: Sequence[Part], verbs: set[str]) -> tuple[list[ThingWords], list[str], Wheres]:
         """Things, ways, and prepositions with their things; sides belong to the thing before them."""
         things: list[ThingWords] = []
         ways: list[str] = []
-        wheres: list[tuple[str, ThingWords]] = []
+        wheres: Wheres = []
         target: list[ThingWords] | None = None
         located = False
         turning = bool(verbs & {"turn", "take"}) and not verbs & {"be"}
         for part in parts:
             side = part.side or (part.meaning if part.sort == "way" else "")
-            if part.sort == "thing" and not (describe(part.words).count and things and not things[-1].heads
-                                             and not things[-1].names):
+            if part.sort == "thing":
                 things.append(describe(part.words))
                 target = things
-            elif part.sort == "thing":
-                things[-1] = replace(describe(part.words), count=things[-1].count)
             elif part.sort == "where" and not part.side:
                 if part.meaning in RELATIONS and target is things and things and (verbs & {"be", "see"}) and things[
                         -1].is_door:
@@ -246,7 +164,7 @@ class _Reader:
 
     # -- the sorts of clauses ----------------------------------------------------------------------------------------
 
-    def _exit(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _exit(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         by = [one for meaning, one in wheres
               if one.is_door and "door" in one.heads and meaning in ("past", "along", "to")]
         own = [thing for thing in things if thing.is_door and not ({"door"} & thing.heads and not thing.names)]
@@ -266,7 +184,7 @@ class _Reader:
         return not turns and any(
             part.words and part.sort in ("where", "thing") for part in parts[back[0]:])
 
-    def _posture(self, things: list[ThingWords], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _posture(self, things: list[ThingWords], wheres: Wheres) -> None:
         towards = [one for meaning, one in wheres if meaning in ("to", "away", "at", "on", "next-to")]
         if towards or things:
             self.acts.append(Act("orient", what=replace((towards or things)[0], side="behind")))
@@ -274,7 +192,7 @@ class _Reader:
         if rest:
             self._go([], [], rest)
 
-    def _orient(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _orient(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         all_things = [*things, *(one for _, one in wheres)]
         side = next((one.side for one in all_things if one.side), ways[0] if ways else "ahead")
         side = "behind" if side == "back" else side
@@ -282,28 +200,27 @@ class _Reader:
         if what is not None:
             self.acts.append(Act("orient", what=replace(what, side=what.side or side)))
 
-    def _face(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _face(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         turns = [way for way in ways if way in ("left", "right", *COMPASS)]
         self.acts += [Act("turn", way) for way in turns]
-        away = any(meaning == "away" for meaning, _ in wheres)
-        what = [*things, *(one for _, one in wheres)]
-        if what and not turns:
-            self.acts.append(Act("orient", what=replace(what[0], side="behind" if away else "ahead")))
+        if not turns:
+            self._orient(things, ["behind" if any(meaning == "away" for meaning, _ in wheres) else "ahead"], wheres)
 
-    def _turn(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _turn(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         halls = [thing for thing in things if thing.is_stretch]
         onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch]
         at = [one for meaning, one in wheres if (meaning == "at" or (meaning == "on" and not one.is_stretch))
               and (one.heads or one.names)]
         past = tuple(one for meaning, one in wheres if meaning in ("past", "before"))
         way = next((way for way in ways if way not in ("ahead", "behind")), "")
-        blocks = [thing for thing in things if "unit" in thing.heads]
-        number = next((thing.number for thing in things if thing.number and not blocks), 0)
         hall = next(iter((*halls, *onto)), None)
-        if way == "" and hall is not None:
-            way = next((one for one in (hall.side,) if one not in ("ahead", "")), "")
+        is_on = ("on", hall) in wheres  # "left on the brick two", not "the second left onto the brick"
+        blocks = [thing for thing in things if "unit" in thing.heads or (is_on and thing.count and not thing.heads)]
+        number = next((thing.number for thing in things if thing.number and not blocks), 0)
+        if way == "" and hall is not None and hall.side != "ahead":
+            way = hall.side
         last = self.acts[-1] if self.acts else Act("")
-        if last == Act("turn", last.way, place=last.place, text=last.text) and not way and hall is not None:
+        if last == Act("turn", last.way, text=last.text) and not way and hall is not None:
             way = last.way  # "right, through the brick hall"
             self.acts.pop()
         self.acts.append(Act("turn", way, along=hall, until=at[0] if at and way else None, past=past if way else (),
@@ -315,12 +232,9 @@ class _Reader:
         if rest or blocks:
             self._go(blocks, [], rest)
 
-    def _go(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]], *,
+    def _go(self, things: list[ThingWords], ways: list[str], wheres: Wheres, *,
             until: bool = False, passing: bool = False) -> None:
         self._turn_only(ways)
-        if len(wheres) > 1 and wheres[0][0] == "at" and not things and wheres[1][0] == "to":
-            self.acts.append(Act("go", until=wheres[0][1]))  # "at its end go to the corner"
-            wheres = wheres[1:]
         if things and things[0].text.startswith("all the way") and (len(things) > 1 or wheres):
             things = [replace(things[0], heads=frozenset(("hall",))), *things[1:]]  # "all the way down the hall to X"
         units, metres = 0, 0.0
@@ -345,8 +259,7 @@ class _Reader:
             elif meaning == "from":
                 self.acts.append(Act("see", what=one))
             elif meaning == "away":
-                if not one.is_door:
-                    self.acts.append(Act("orient", what=replace(one, side="behind")))
+                self.acts += [] if one.is_door else [Act("orient", what=replace(one, side="behind"))]
             elif one.heads or one.names or one.count:
                 ends.append(one)
         if not (ends or passed or along or units or metres or things or ways or wheres) and self.acts and self.acts[
@@ -366,27 +279,24 @@ class _Reader:
                              Act("go", until=more) if more in onward else Act("see", what=more))
 
     def _turn_only(self, ways: Sequence[str]) -> None:
-        turns = [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
-        self.acts += turns
-        self.last_stretch = None if turns else self.last_stretch
+        self.acts += [Act("turn", way) for way in ways if way in ("left", "right", "back", *COMPASS)]
+        self.last_stretch = None if ways else self.last_stretch
 
-    def _enter(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _enter(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         what = [thing for thing in things if not thing.is_stretch]
         what += [one for meaning, one in wheres if meaning in ("to", "at", "in", "on") and one.is_door]
         halls = [one for one in (*things, *(one for _, one in wheres)) if one.is_stretch]
         if halls and not (what and what[0].is_door):
             self._turn(halls, ways, [(meaning, one) for meaning, one in wheres if one is not halls[0]])
-            return
-        if not what:
+        elif not what:
             self._terse(things, ways, wheres)
-            return
-        side = next((way for way in ways if way in SIDES), "")
-        goal = replace(what[0], side=what[0].side or side, relations=(
-            *what[0].relations, *((meaning, one) for meaning, one in wheres if meaning in RELATIONS)))
-        self.acts.append(Act("find", what=_at_end(goal, wheres), enters=True))
+        else:
+            side = next((way for way in ways if way in SIDES), "")
+            goal = replace(what[0], side=what[0].side or side, relations=(
+                *what[0].relations, *((meaning, one) for meaning, one in wheres if meaning in RELATIONS)))
+            self.acts.append(Act("find", what=_at_end(goal, wheres), enters=True))
 
-    def _state(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]],
-               verbs: set[str]) -> None:
+    def _state(self, things: list[ThingWords], ways: list[str], wheres: Wheres, verbs: set[str]) -> None:
         """A sentence that says what is where."""
         if len(things) > 1 and things[-1].names and not things[-1].heads and things[-1].is_stretch:
             *things, kind = things  # "the next hall is yellow"
@@ -411,8 +321,7 @@ class _Reader:
         if doors or not things:
             doors += [one for meaning, one in wheres if meaning in ("in", "at") and one.is_door]
         if doors:
-            goal = _merge(doors)
-            goal = _at_end(goal, wheres)
+            goal = _at_end(_merge(doors), wheres)
             goal = replace(goal, side=goal.side or (side if side in SIDES else ""),
                            relations=(*goal.relations, *related))
             self.acts.append(Act("find", what=goal))
@@ -430,25 +339,22 @@ class _Reader:
         if ended is not None and not doors:
             on_the_way = any(act.sort in ("exit", "turn", "go") for act in self.acts)
             self.acts.append(Act("go", until=ended) if on_the_way else Act("find", what=ended))
-        for thing in things:
-            if thing.heads & {"unit"}:
-                self.acts.append(Act("go", units=thing.number or 1))
         for thing in (*things, *(one for meaning, one in wheres if meaning == "at")):
             if thing.number and thing.heads & POINTS:
                 self.acts.append(Act("go", until=thing))  # "it is the next crossing", "the chair is at the next one"
         for thing in things:
-            if thing.number and thing.heads & POINTS:
-                continue
-            if "end" in thing.heads and thing not in doors:
+            if "unit" in thing.heads:
+                self.acts.append(Act("go", units=thing.number or 1))
+            elif "end" in thing.heads and thing not in doors:
                 self.acts.append(Act("go", until=thing))
-            elif thing not in doors and not thing.heads & {"unit"}:
+            elif thing not in doors and not (thing.number and thing.heads & POINTS):
                 self.acts.append(Act("see", what=replace(thing, side=thing.side or (side if side in SIDES else ""))))
         places = [one for meaning, one in wheres if meaning in ("at", "in", "on", "to") and (one.heads or one.names)]
         self.acts += [Act("see", what=one) for one in places
                       if not (doors and (one.is_stretch or one in doors)) and "end" not in one.heads
                       and not (one.number and one.heads & POINTS)]
 
-    def _terse(self, things: list[ThingWords], ways: list[str], wheres: list[tuple[str, ThingWords]]) -> None:
+    def _terse(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         """No verb: ``second door on the right``, ``left``, ``past the machine room``."""
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS and one.text)
         side = next((one.side for _, one in wheres if one.side), "")
@@ -459,8 +365,9 @@ class _Reader:
             return  # it tells of the walk before
         elif wheres and self._is_walk_told(things, ways) and all(meaning == "past" for meaning, _ in wheres):
             self._note_before([one for _, one in wheres])
-        elif things and ways and "unit" in things[0].heads:
-            self._turn(things, ways, wheres)
+        elif (things and ways and "unit" in things[0].heads) or (set(ways) & {"left", "right"} and any(
+                meaning in ("at", "on") for meaning, _ in wheres)):
+            self._turn(things, ways, wheres)  # "left at the lamp", "right on the brick two"
         elif things and ways and things[0].number and not things[0].heads and not things[0].names:
             self.acts.append(Act("turn", ways[0], units=things[0].number))
         elif things and (things[0].is_door or (things[0].count and things[0].side and not things[0].is_stretch)):
@@ -531,13 +438,16 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     reader = _Reader()
     for clause in ordered:
         reader.read(clause)
+    last = reader.acts[-1] if reader.acts else Act("")
+    if last.sort == "turn" and last.along is not None and not last.way:
+        reader.acts.append(replace(last, sort="go"))  # "take the blue hall", and no more
     if not any(act.sort in ("find", "exit", "turn", "go") for act in reader.acts):  # a goal, and no way
         goal = next((index for index, act in enumerate(reader.acts) if act.sort == "see" and act.what
                      and act.what.names), None)
         if goal is not None:
             reader.acts[goal] = replace(reader.acts[goal], sort="find")
-    last = max((index for index, act in enumerate(reader.acts) if act.sort in ("go", "turn", "exit")), default=-1)
-    return [replace(act, sort="see") if act.sort == "find" and index < last and not act.enters and reader.acts[
+    done = max((index for index, act in enumerate(reader.acts) if act.sort in ("go", "turn", "exit")), default=-1)
+    return [replace(act, sort="see") if act.sort == "find" and index < done and not act.enters and reader.acts[
         index + 1].sort != "exit" else act for index, act in enumerate(reader.acts)]
 
 

@@ -13,8 +13,10 @@ from dataclasses import dataclass, replace
 from harvey_words.lexicon import lexicon_data
 from harvey_words.reading import SURE, Reading, RouteError, find_start, read_route
 from harvey_words.way_legs import Spot, WayLeg, find_legs, find_way
-from harvey_words.word_follower import HERE_M, NEAR_M, OPPOSITE_M, State, WordFollower
+from harvey_words.word_doors import OPPOSITE_M
+from harvey_words.word_follower import WordFollower
 from harvey_words.word_map import NamedFeature, NamedSight, WordMap, is_along, moved, offsets, turned
+from harvey_words.word_places import HERE_M, NEAR_M, State
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -128,34 +128,29 @@ def read_paragraphs(path: Path = PARAGRAPHS) -> Iterator[tuple[str, WordMap, str
 
 
 def run(quick: bool, seed: int) -> Report:
-    """Read routes and paragraphs."""
-    tallies: dict[str, Tally] = {}
-    routes, paragraphs = Tally(), Tally()
-    for kind, plan, told in draw_routes(QUICK_ROUTES if quick else ROUTES, seed):
+    """Read routes, paragraphs and directions."""
+    tallies = {what: Tally() for what in (*LEAST, "of development")}
+
+    def read(what: Sequence[str], text: str, plan: WordMap, start: str, heading: float | None, end: str) -> None:
         begin = time.perf_counter()
-        reading = read_route(told.text, plan, told.start)
+        reading = read_route(text, plan, start, heading)
         taken = time.perf_counter() - begin
-        for tally in (routes, tallies.setdefault(f"routes: {kind}", Tally())):
-            tally.add(reading, told.end, taken)
-    development = Tally()
-    for path, sums in ((PARAGRAPHS, paragraphs), (DEVELOPMENT, development)):
+        for name in what:
+            tallies.setdefault(name, Tally()).add(reading, end, taken)
+
+    count = QUICK_ROUTES if quick else ROUTES
+    for kind, plan, told in draw_routes(count, seed):
+        read(("routes", f"routes: {kind}"), told.text, plan, told.start, None, told.end)
+    for path in (PARAGRAPHS, DEVELOPMENT):
         for style, plan, start, heading, end, text in read_paragraphs(path) if path.exists() else ():
-            begin = time.perf_counter()
-            reading = read_route(text, plan, start, heading)
-            taken = time.perf_counter() - begin
-            for tally in (sums, *([tallies.setdefault(f"paragraphs: {style}", Tally())] if sums is paragraphs else [])):
-                tally.add(reading, end, taken)
-    directions = Tally()
-    for plan, told in draw_directions(QUICK_ROUTES if quick else ROUTES, seed):
-        begin = time.perf_counter()
-        reading = read_route(told.text, plan, told.start)
-        directions.add(reading, told.end, time.perf_counter() - begin)
-    rows = tuple(tally.row(what) for what, tally in (
-        ("routes", routes), ("paragraphs", paragraphs), ("of development", development), ("directions", directions),
-        *tallies.items()))
+            what = ("paragraphs", f"paragraphs: {style}") if path is PARAGRAPHS else ("of development",)
+            read(what, text, plan, start, heading, end)
+    for plan, told in draw_directions(count, seed):
+        read(("directions",), told.text, plan, told.start, None, told.end)
+    rows = tuple(tally.row(what) for what, tally in tallies.items())
     claims = tuple(
-        (f"{what}: at least {least:.0%} arrive, at most {silent:.0%} silently elsewhere", tally.reaches(least, silent))
-        for (what, (least, silent)), tally in zip(LEAST.items(), (routes, paragraphs, directions), strict=True))
+        (f"{what}: at least {least:.0%} arrive, at most {silent:.0%} silently elsewhere",
+         tallies[what].reaches(least, silent)) for what, (least, silent) in LEAST.items())
     return Report("Ways that are told in words", COLUMNS, rows, NOTES, claims)
 
 

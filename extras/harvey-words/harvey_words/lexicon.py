@@ -36,14 +36,12 @@ class Word:
         meaning: the lexicon's or the model's word for it.
         text: as it stands in the text.
         place: number of its first word in the text.
-        is_guess: whether it was misspelt.
     """
 
     sort: str
     meaning: str
     text: str
     place: int
-    is_guess: bool = False
 
 
 class Lexicon:
@@ -92,8 +90,7 @@ class Lexicon:
             if sort == "STRANGE" and (place == 0 or pieces[place - 1] not in ARTICLES):
                 sort = ""
             if sort:
-                guess = own != corrected[place:place + length]
-                found.append(Word(sort, meaning, " ".join(own), place, guess))
+                found.append(Word(sort, meaning, " ".join(own), place))
             place += length
         return found
 

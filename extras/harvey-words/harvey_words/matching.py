@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from harvey_words.acts import ThingWords
 from harvey_words.lexicon import Word
+from harvey_words.told_acts import ThingWords
 from harvey_words.word_map import COLOUR_REACH, Area, NamedFeature, WordMap
 
 NEUTRAL = frozenset(("long", "colored", "frame", "north", "south", "east", "west"))

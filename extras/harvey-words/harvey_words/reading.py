@@ -10,10 +10,12 @@ from typing import Any
 
 from lark import Tree
 
-from harvey_words.acts import Act, read_acts
+from harvey_words.acts import read_acts
+from harvey_words.told_acts import Act
 from harvey_words.word_clauses import read_clauses
-from harvey_words.word_follower import State, WordFollower
+from harvey_words.word_follower import WordFollower
 from harvey_words.word_map import Point, WordMap
+from harvey_words.word_places import State
 from world_models.building.world import World
 from world_models.files.world_files import load_world
 

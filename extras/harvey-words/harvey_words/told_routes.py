@@ -12,11 +12,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from harvey_words.directions import NUMBERS, ORDINALS
 from harvey_words.mazes import Hall, Node
 from harvey_words.word_map import NamedFeature, NamedSight, WordMap, moved, turned
 
-ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
-NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 SAID = {"notice-board": "bulletin board", "hose-cabinet": "fire hose", "fountain": "drinking fountain",
         "white-board": "whiteboard", "exit-sign": "exit sign", "picture": "painting", "pillar": "column",
         "elevator": "elevator", "sign": "sign", "hatrack": "coat rack", "stool": "bar stool"}
@@ -103,10 +102,8 @@ def _tell_goal(goals: Sequence[NamedSight], goal: NamedSight, ahead: Sequence[Na
 
 def _is_first(mark: NamedSight, ahead: Sequence[NamedSight]) -> bool:
     """Whether no other thing of its kind comes before it."""
-    assert mark.feature is not None
-    kind = mark.feature.own_kind
-    same = [sight for sight in ahead if sight.feature is not None and sight.feature.own_kind == kind]
-    return same[0] is mark
+    kinds = [sight.feature and sight.feature.own_kind for sight in ahead]
+    return ahead[kinds.index(mark.feature and mark.feature.own_kind)] is mark
 
 
 def draw_maze(rng: np.random.Generator) -> tuple[tuple[Hall, ...], dict[Node, str]]:
@@ -182,17 +179,12 @@ def _tell_leg(leg: Sequence[Node], ways: dict[Node, dict[Node, str]], things: di
 
 
 def _shortest(ways: dict[Node, dict[Node, str]], start: Node, end: Node) -> list[Node]:
-    came: dict[Node, Node] = {start: start}
-    todo = [start]
-    for here in todo:
-        for there in sorted(ways[here]):
-            if there not in came:
-                came[there] = here
-                todo.append(there)
-    path = [end]
-    while path[-1] != start:
-        path.append(came[path[-1]])
-    return path[::-1]
+    paths = [[start]]
+    for path in paths:
+        if path[-1] == end:
+            break
+        paths += [[*path, there] for there in sorted(ways[path[-1]]) if there not in path]
+    return path
 
 
 def _step(one: Node, other: Node) -> Node:

@@ -61,14 +61,12 @@ class Part:
         meaning: of the verb, way or preposition.
         words: those of the thing.
         side: what stands for a thing: left, right, ahead.
-        place: number of the first word in the text.
     """
 
     sort: str
     meaning: str = ""
     words: tuple[Word, ...] = ()
     side: str = ""
-    place: int = 0
 
 
 @dataclass
@@ -179,13 +177,13 @@ def _read_part(node: Any) -> Part:
         preps = [word for word in words if word.sort == "PREP"]
         inner = next((child for child in node.children if isinstance(child, Tree)), None)
         if inner is not None and inner.data == "side":
-            return Part("where", preps[-1].meaning, (), next(iter(_words_of(inner))).meaning, first.place)
+            return Part("where", preps[-1].meaning, (), next(iter(_words_of(inner))).meaning)
         things = tuple(_words_of(inner)) if inner is not None else ()
         strong = [prep.meaning for prep in preps if prep.meaning not in ("along", "at", "on", "in")]
-        return Part("where", (strong or [preps[-1].meaning])[0], things, "", first.place)
+        return Part("where", (strong or [preps[-1].meaning])[0], things)
     if node.data == "thing":
-        return Part("thing", "", words, "", first.place)
-    return Part(str(node.data), first.meaning, words, "", first.place)
+        return Part("thing", "", words)
+    return Part(str(node.data), first.meaning, words)
 
 
 def _words_of(node: Any) -> Iterator[Word]:

@@ -59,19 +59,6 @@ def test_a_way_from_the_laboratory(text: str, end: str) -> None:
     assert reading.is_understood and end_of(reading) == end
 
 
-@pytest.mark.parametrize(("start", "text", "end"), [
-    ("c-0-1", "Face the lamp and walk to it.", "c-1-1"),
-    ("c-0-0", "With your back to the wall go forward one block. Turn left and go to the brick hall.", "c-1-2"),
-    ("c-3-0", "go up the yellow hall to the corner and turn left, so that the wall is on your right. go to the seat",
-     "c-2-1"),
-    ("c-2-2", "head south on the gravel until you hit the blue, hang a left to the end", "c-3-1"),
-    ("c-0-1", "it is at the end of the wooden hall where the sofa is", "c-0-0"),
-])
-def test_a_way_in_a_maze(start: str, text: str, end: str) -> None:
-    reading = read_route(text, maze(), start)
-    assert reading.is_understood and end_of(reading) == end
-
-
 def test_a_text_that_two_places_fit_asks_and_names_both() -> None:
     reading = read_route("It is the first door on the right.", centre(), "hallway")
     assert not reading.is_understood and len([end for end in reading.ends if end.odds > 0.2]) == 2
@@ -201,9 +188,9 @@ def test_the_experiment_reads_routes_and_paragraphs() -> None:
     assert len(list(read_paragraphs())) == 80
     report = run(quick=True, seed=3)
     assert all(claim[1] for claim in report.claims) and report.rows[0][1] == 30 and report.rows[1][1] == 80
-    name, texts, arrive, *_, elsewhere, _ = report.rows[2]
+    name, texts, arrive, *_, elsewhere, _ = report.rows[3]
     assert name == "of development" and isinstance(arrive, int) and isinstance(elsewhere, int)
-    assert texts == 160 and arrive >= 0.9 * 160 and elsewhere <= 0.02 * 160
+    assert texts == 185 and arrive >= 0.9 * 185 and elsewhere <= 0.03 * 185
 
 
 # -- directions ------------------------------------------------------------------------------------------------------

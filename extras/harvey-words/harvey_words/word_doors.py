@@ -1,0 +1,192 @@
+"""The goal: at which door, crossing or thing a description may be meant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from harvey_words.matching import MISFIT, UNKNOWN_HEAD, WORST, Senses
+from harvey_words.told_acts import ThingWords
+from harvey_words.word_map import NamedSight, is_along, moved, offsets, turned
+from harvey_words.word_places import TURNS, UNSAID_EXIT, WRONG_RANK, WRONG_SIDE, State
+from harvey_words.word_sights import AGAIN, WordSights
+
+UNTOLD = -4.0
+"""A goal out of sight to which no way is told."""
+OPEN_ONLY = -1.8
+"""That only open doors were counted."""
+BEHIND = 1.5
+"""Off for a thing that lies behind when the walk begins, where a door after it is meant."""
+SHUT = -0.5
+"""A shut door without a name, as a goal: people are sent to rooms."""
+OPPOSITE_M = 0.3
+"""What is hardly further along than the door one comes out of lies opposite, and is not counted."""
+
+
+class WordDoors(WordSights):
+    """Finds the doors and places that a text may mean."""
+
+    def find(self, state: State, what: ThingWords) -> Iterator[State]:
+        """At each door, or thing, that may be meant."""
+        if what.heads & {"crossing", "corner", "end"} and not what.heads & {"door"}:
+            for facing in self.facings(state, None):
+                if not what.names:
+                    yield from self.reach(facing, what)
+                for node in self.nodes(facing) if what.names else ():
+                    yield from self._named_crossing(replace(self.stand(facing, node), moving=False), what)
+            yield from self._anywhere(state, what)
+            return
+        if not self.area(state).is_hall:
+            for out in self.leave(state, None):
+                yield from self.find(replace(out, odds=out.odds + UNSAID_EXIT), what)
+            return
+        at_door = bool(state.came) and state.begun is not None and math.dist(state.begun, state.at) < 0.1
+        if at_door and what.side in ("left", "right") and not any(
+                is_along(way, state.heading) for way in self.ways(state)):
+            # come out of a door, what lies to the left lies in that direction, on either side of the hall
+            there = replace(state, heading=turned(state.heading, TURNS[what.side]), odds=state.odds - 0.5)
+            yield from self._find_from([there], replace(what, side=""))
+        yield from self._find_from(self.facings(state, None), what)
+        yield from self._anywhere(state, what)
+        yield replace(state, odds=state.odds + WORST)
+
+    def _anywhere(self, state: State, what: ThingWords) -> Iterator[State]:
+        """What is named and out of sight, wherever it is: a goal without a way."""
+        if not what.names:
+            return
+        for area in self.plan.areas.values():
+            here = replace(state, locale=area.name, at=area.middle, odds=state.odds + UNTOLD, moving=False, door="")
+            here = replace(here, way=(*state.way, (area.name, round(area.middle[0], 2), round(area.middle[1], 2))))
+            if what.heads & {"crossing", "corner", "end"}:
+                if area.is_tile and (area.meanings & {"crossing", "corner"} or len(self.ways(here)) != 2):
+                    yield from self._named_crossing(here, what)
+                continue
+            for feature in area.features:
+                fit, senses = self.match.fit(what, feature, state.senses)
+                if fit > UNKNOWN_HEAD and feature.sort == "door" and area.is_hall:
+                    ahead = feature.outward if feature.outward is not None else 0.0
+                    before = replace(here, at=feature.at, heading=ahead)
+                    yield self._at_door(before, NamedSight(feature, 0.0, 0.0, "ahead", area.name),
+                                        here.odds + fit, senses)
+
+    def _named_crossing(self, state: State, what: ThingWords) -> Iterator[State]:
+        """A crossing or end of halls, each word of which is said of one that leaves here or of what stands here."""
+        ways = self.ways(state)
+        if (what.heads & {"end"} and len(ways) > 2) or (what.heads & {"corner"} and len(ways) != 2):
+            return
+        halls = [self.hall_ahead(replace(state, heading=way)) for way in ways]
+        fit, senses = self.fit_place(state, what, halls)
+        if fit > WORST:
+            yield replace(state, odds=state.odds + fit, senses=senses)
+
+    def _find_from(self, facings: Iterable[State], what: ThingWords) -> Iterator[State]:
+        """The doors that may be meant from where one stands, along the ways that one may face."""
+        for facing in facings:
+            doors = [sight for sight in self.sights(facing) if sight.feature is not None
+                     and sight.feature.sort == "door" and sight.side != "behind"
+                     and sight.ahead_m > (OPPOSITE_M if facing.came and facing.begun == facing.at else -0.2)
+                     and sight.feature.name != facing.came]
+            for sight in doors:
+                cost, senses = self._weigh_door(facing, sight, doors, what)
+                if cost > WORST:
+                    yield self._at_door(facing, sight, facing.odds + cost, senses)
+
+    def _weigh_door(self, state: State, sight: NamedSight, doors: Sequence[NamedSight],
+                    what: ThingWords) -> tuple[float, Senses]:
+        """Words, side, rank and relations of a door, together."""
+        assert sight.feature is not None
+        cost, senses = self.match.fit(what, sight.feature, state.senses)
+        if not what.names and not sight.feature.is_open:
+            cost += SHUT
+        side = self.side_of(state, what.side)
+        sided = side in ("left", "right") or what.side == "ahead"
+        if sided and sight.side != (side or "ahead"):
+            cost += WRONG_SIDE
+        row = [one for one in doors if not sided or one.side == (side or "ahead")]
+        if sight in row and (what.count or not what.names):
+            rank = row.index(sight) + 1
+            opened = [one for one in row if one.feature is not None and one.feature.is_open]
+            open_rank = opened.index(sight) + 1 if sight in opened else 0
+            only_open = any(word.meaning == "open" for word in what.names)
+            own = self._weigh_rank(what, rank, len(row), open_rank, len(opened), only_open)
+            if not sided and what.count:
+                same = [one for one in row if one.side == sight.side]  # "the next" may be that of its side
+                rank = same.index(sight) + 1
+                own = max(own, self._weigh_rank(what, rank, len(same), 0, 0, only_open) - 0.5)
+            cost += own
+        between = [other for relation, other in what.relations if relation == "between"]
+        if len(between) == 2:
+            cost += self._weigh_between(state, sight, doors, between[0], between[1])
+        for relation, other in what.relations if len(between) != 2 else ():
+            cost += self._weigh_relation(state, sight, doors, relation, other)
+        return cost, senses
+
+    def _weigh_rank(self, what: ThingWords, rank: int, count: int, open_rank: int, open_count: int,
+                    only_open: bool) -> float:
+        related = bool(what.relations)
+        if what.count == "last":
+            return 0.0 if rank == count else OPEN_ONLY if open_rank == open_count and open_rank else WRONG_RANK
+        number = what.number
+        if number and not (related and number == 1):
+            exact = (open_rank if only_open else rank) == number
+            return 0.0 if exact else OPEN_ONLY if open_rank == number else WRONG_RANK
+        return 0.0 if what.names or related else AGAIN * min(rank - 1, 3)
+
+    def _weigh_between(self, state: State, sight: NamedSight, doors: Sequence[NamedSight], one: ThingWords,
+                       other: ThingWords) -> float:
+        """How well a door lies between two things: on their side, with no other door there."""
+        best = WRONG_SIDE
+        marks = [mark for mark in self.sights(state) if mark.feature is not None and mark.feature.sort != "opening"]
+        fits = [[(mark, fit) for mark in marks if mark.feature and mark is not sight and (
+            fit := self.match.fit(what, mark.feature, state.senses)[0]) > MISFIT] for what in (one, other)]
+        for first, fit in fits[0]:
+            for second, more in fits[1]:
+                low, high = sorted((first.ahead_m, second.ahead_m))
+                if low < sight.ahead_m < high:
+                    rivals = sum(low < door.ahead_m < high and door.side == sight.side for door in doors) - 1
+                    sides = (first.side != sight.side) + (second.side != sight.side)
+                    best = max(best, fit + more + AGAIN * rivals + AGAIN * sides)
+        return best
+
+    def _weigh_relation(self, state: State, sight: NamedSight, doors: Sequence[NamedSight], relation: str,
+                        other: ThingWords) -> float:
+        """How well a door lies to other things as it is said."""
+        best = -2.0 if not any(word.meaning in self.plan.vocabulary for word in other.names) else -3.5
+        rank = 0
+        for mark in self.sights(state):
+            if mark.feature is None or mark.feature.sort == "opening" or mark is sight:
+                continue
+            fit, _ = self.match.fit(other, mark.feature, state.senses)
+            if fit <= MISFIT:
+                continue
+            gap = sight.ahead_m - mark.ahead_m
+            walked_m = offsets(state.begun or state.at, state.heading, mark.feature.at)[0]
+            if walked_m > 0.0 and fit > -1.0:
+                fit += 0.7 * AGAIN * rank  # the first of several columns is meant
+                rank += 1
+            between = [one for one in doors if one is not sight and one is not mark and one.side == sight.side
+                       and min(sight.ahead_m, mark.ahead_m) - 0.05 < one.ahead_m < max(sight.ahead_m, mark.ahead_m)]
+            if relation == "past":
+                fit += AGAIN * 1.5 * len(between) - BEHIND * (walked_m < -0.3) if gap > -0.3 else -3.0
+            elif relation == "before":
+                fit += AGAIN * 1.5 * len(between) if gap < 0.3 else -3.0
+            elif relation == "across":
+                fit += -abs(gap) / 2.0 - 2.0 * (mark.side == sight.side)
+            else:
+                fit += -max(abs(gap) - 1.5, 0.0) / 2.0
+            best = max(best, fit)
+        if relation == "across" and not other.names:
+            best = max(best, -2.0 * abs(sight.ahead_m))
+        return best
+
+    def _at_door(self, state: State, sight: NamedSight, odds: float, senses: Senses) -> State:
+        """At a door: in the room behind it where it is open, else before it."""
+        feature = sight.feature
+        assert feature is not None
+        front = self.stand(state, sight)
+        heading = state.heading if feature.outward is None else feature.outward
+        locale = feature.beyond if feature.is_open and feature.beyond else sight.locale
+        at = moved(feature.at, heading, 0.5) if feature.is_open else front.at
+        return replace(front, locale=locale, at=at, heading=heading, odds=odds, senses=senses, moving=False,
+                       door=feature.name, way=(*front.way, (locale, round(at[0], 2), round(at[1], 2))))
