@@ -196,7 +196,7 @@ RUN = CliCommand(
         ("harvey run lab-to-allens-office --check", "which milestones it will have, and how well each tells the place"),
         ("harvey run hallway-kidnap --seed 3 --trace", "print who acts in each cycle, and what comes of it"),
         ("harvey run shut-door", "told on the way that a door is shut ([[told]] in its file)"),
-        ("harvey run lab-to-allens-office --tell 'Fetch the book'", "to the shelves, a person loads it, and back"),
+        ("harvey run lab-to-allens-office --tell 'Visit the library and the mail room'", "with harvey-words: a task"),
         ("harvey run bump --set servo.action=off", "without correcting on the move"),
         ("harvey run bump --set plan.max_leg_m=2", "with another number of harvey settings"),
         ("harvey run lab-to-allens-office --body serial:p2os", "the body behind an emulated Pioneer's serial line"),

@@ -21,9 +21,7 @@ ALIKE = 0.8  # a word so like one of a room's name, and the only one, is taken t
 def find_place(building: FrameBuilding, step: Step, phrase: str, start: Place) -> Place:
     """The place that a phrase of a step means.
 
-    Raises:
-        TaskWordsError: none, or more than one, answers; names the phrase and the nearest rooms.
-        MissingEntryError: the building has to be asked first.
+    Raises TaskWordsError where not one room answers, naming the phrase and what is near; MissingEntryError.
     """
     if phrase == START:
         return start
