@@ -19,7 +19,8 @@ EVERY = 20
 
 def main(lock: Path) -> int:
     """Install what a lock names; pip's exit code, and all that it said where that is not 0."""
-    total, names, said = len(re.findall(r"^[\w.,\[\]-]+==", lock.read_text(encoding="utf-8"), re.MULTILINE)), set[str](), []
+    total = len(re.findall(r"^[\w.,\[\]-]+==", lock.read_text(encoding="utf-8"), re.MULTILINE))
+    names, said = set[str](), []
     with subprocess.Popen([*PIP, str(lock)], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as pip:
         for line in pip.stdout or ():
             said.append(line)
