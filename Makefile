@@ -70,7 +70,7 @@ $(BIN)/python:
 	@$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11))" \
 		|| { echo "harvey needs Python 3.11 or newer; '$(PYTHON)' is $$($(PYTHON) -V 2>&1)." \
 			"Give another: make run PYTHON=python3.13"; exit 1; }
-	@echo "== Preparing $(VENV) with $$($(PYTHON) -V); the first time takes a minute or two"
+	@echo "== Preparing $(VENV) with $$($(PYTHON) -V); the first time takes some minutes"
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
 # The pip that comes with Python may be years old; one version installs the rest, everywhere.
@@ -80,7 +80,7 @@ $(VENV)/.ready-to-install: requirements-pip.lock | $(BIN)/python
 
 $(VENV)/.ready-to-run: requirements.lock pyproject.toml $(VENV)/.ready-to-install
 	@echo "== Installing what harvey needs ($$(grep -c == requirements.lock) packages)"
-	@$(PIP) install --no-compile --require-hashes -r requirements.lock
+	@$(BIN)/python docs/tools/installing.py requirements.lock
 	@echo "== Installing harvey"
 	@$(PIP) install --no-deps --no-build-isolation -e .
 	@$(BIN)/python -m compileall -q $(ROOMS)
@@ -90,7 +90,7 @@ $(VENV)/.ready-to-run: requirements.lock pyproject.toml $(VENV)/.ready-to-instal
 
 $(VENV)/.ready-to-test: requirements-dev.lock $(VENV)/.ready-to-run
 	@echo "== Installing what the tests need ($$(grep -c == requirements-dev.lock) packages)"
-	@$(PIP) install --no-compile --require-hashes -r requirements-dev.lock
+	@$(BIN)/python docs/tools/installing.py requirements-dev.lock
 	@$(BIN)/python -m compileall -q -q -j 0 $(VENV)/lib || true
 	@touch $@
 

@@ -2,8 +2,9 @@
 
 The Python interface. Everything below is loaded when it is first used:
 
-- missions: :func:`run`, :func:`open_run`, :class:`RecordedRun`, :class:`MissionResult`, :func:`load_scenario`;
-  what a recorded run yields: :class:`DecisionRecord`, with :class:`EntryRecord` and :class:`Candidate`
+- missions: :func:`run`, :func:`open_run`, :func:`show`, :func:`load_scenario`, :class:`RecordedRun`,
+  :class:`MissionResult`; what a recorded run yields: :class:`DecisionRecord`, with :class:`EntryRecord` and
+  :class:`Candidate`
 - building models: :func:`load_world`, :func:`build_world`, :class:`World`
 - poses from matched lines: :func:`med_r_and_t`, :func:`r_and_t_ml`, :func:`planar_from_lines`
   (``knowledge_sources.methods.pose`` says which to use when), :class:`Camera`, :class:`Pose`, :class:`Pose2`
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from blackboard import KnowledgeSource
     from blackboard import Level
     from blackboard import Scheduler
-    from harvey.api import RecordedRun, RunPicture, TrackPoint, build_world, open_run, run
+    from harvey.api import RecordedRun, RunPicture, TrackPoint, build_world, open_run, run, show
     from harvey.errors import BadInput
     from harvey.runner.result import MissionResult
     from knowledge_sources.methods.pose import (
@@ -67,7 +68,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "blackboard.knowledge_source": ("KnowledgeSource",),
     "blackboard.ladder": ("Level",),
     "blackboard.scheduler": ("Scheduler",),
-    "harvey.api": ("RunPicture", "RecordedRun", "TrackPoint", "build_world", "open_run", "run"),
+    "harvey.api": ("RunPicture", "RecordedRun", "TrackPoint", "build_world", "open_run", "run", "show"),
     "harvey.errors": ("BadInput",),
     "harvey.runner.result": ("MissionResult",),
     "knowledge_sources.methods.pose": (
@@ -87,7 +88,7 @@ __all__ = [
     "MissionResult", "PlanarEstimate", "Pose", "Pose2", "PoseEstimate", "Post", "Posted", "RecordedRun", "Retract",
     "Retracted", "Revise", "Revised", "RunPicture", "Scheduler", "TrackPoint", "View", "Watch", "World",
     "build_world", "inference", "load_scenario", "load_world", "med_r_and_t", "observation", "open_run",
-    "planar_from_lines", "r_and_t_ml", "request", "run",
+    "planar_from_lines", "r_and_t_ml", "request", "run", "show",
 ]
 
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import Any, TypeVar, overload
 
@@ -110,6 +111,30 @@ def open_run(path: str | Path, *, knowledge_sources: Sequence[type[KnowledgeSour
         BadInput: there is none.
     """
     return RecordedRun(run_directory.open_run(str(path)), knowledge_sources)
+
+
+@dataclass(frozen=True, slots=True)
+class RunPage:
+    """The report of a run, which a notebook shows in a frame of its own.
+
+    Attributes:
+        page: HTML that needs no network; height_px: of the frame.
+    """
+
+    page: str
+    height_px: int
+
+    def _repr_html_(self) -> str:
+        return (f'<iframe srcdoc="{escape(self.page)}" title="report of a run" '
+                f'style="border: 0; width: 100%; height: {self.height_px}px"></iframe>')
+
+
+def show(run: RecordedRun, *, height_px: int = 800) -> RunPage:
+    """Show a run in a notebook, as ``harvey report`` does in a browser. Raises BadInput where it cannot be read."""
+    from harvey.report.page import build_page
+
+    files = RunDirectory(run.path)
+    return RunPage(build_page(files, Timeline(files.journal)), height_px)
 
 
 def with_sources(more: Sequence[type[KnowledgeSource]]) -> Sources:
@@ -275,5 +300,5 @@ class RecordedRun:
 
 
 __all__ = [
-    "RecordedRun", "RunPicture", "TrackPoint", "build_world", "load_scenario", "load_world", "open_run", "run",
+    "RecordedRun", "RunPicture", "TrackPoint", "build_world", "load_scenario", "load_world", "open_run", "run", "show",
 ]

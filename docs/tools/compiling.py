@@ -25,6 +25,8 @@ from tqdm import tqdm
 FILE = Path(__file__).with_name("signatures.json")
 ENTRY = "harvey.simulation.simulated_run", "logs.recording.writer"
 """What imports all that a mission imports: Python compiles that too, and keeps it where it may."""
+EVERY = 10
+"""Where the output is no terminal, a line for so many modules."""
 Described = Mapping[str, Any] | str
 
 
@@ -87,8 +89,10 @@ def main() -> None:
                 for module in sorted(listed, key=_measure_size, reverse=True)]
         todo += [pool.submit(compile_module, module, ()) for module in ENTRY]
         shown = tqdm(as_completed(todo), "   compiled", len(todo), disable=not sys.stderr.isatty(), leave=False)
-        for done in shown:
+        for number, done in enumerate(shown, 1):
             done.result()
+            if shown.disable and number % EVERY == 0:
+                print(f"   {number} of {len(todo)} modules", flush=True)
 
 
 def _measure_size(module: str) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -18,6 +19,8 @@ from logs.run_directory import RunDirectory, open_run
 
 LOOPBACK = ("--bind", "127.0.0.1")
 """The viewer listens on this machine only; by itself it listens on every interface."""
+ADDRESS = re.compile(r"http://\S+\?url=\S+")
+"""Of the page with this recording, in what the viewer says."""
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -77,8 +80,9 @@ def _whole(run: RunDirectory) -> Path:
 
 def _open(recording: Path, in_browser: bool) -> int:
     if in_browser:
-        how = "--web-viewer" if has_screen() else "--serve-web"  # the latter opens no browser, but says the address
-        return _wait_for([find_viewer(), str(recording), how, *LOOPBACK, "--port", "0", "--web-viewer-port", "0"])
+        how = "--web-viewer" if has_screen() else "--serve-web"  # the latter opens no browser
+        return _wait_for([find_viewer(), str(recording), how, *LOOPBACK, "--port", "0", "--web-viewer-port", "0"],
+                         subprocess.PIPE)
     if not has_screen():
         print(f"no screen here to open a window on; the recording is {recording.resolve()}\n"
               f"open it where there is one, with: rerun {recording}", file=sys.stderr)
@@ -86,10 +90,18 @@ def _open(recording: Path, in_browser: bool) -> int:
     return _wait_for([find_viewer(), str(recording), *LOOPBACK])
 
 
-def _wait_for(viewer: list[str]) -> int:
-    """Run the viewer until it ends, or harvey does: its launcher leaves the viewer itself behind when only it ends."""
-    with subprocess.Popen(viewer, process_group=0) as running:
+def _wait_for(viewer: list[str], out: int | None = None) -> int:
+    """Run the viewer until it ends, or harvey does: its launcher leaves the viewer itself behind when only it ends.
+
+    ``out``: where what it says goes; of a pipe the address and what went wrong are printed.
+    """
+    with subprocess.Popen(viewer, process_group=0, text=True, stdout=out, stderr=out and subprocess.STDOUT) as running:
         try:
+            for line in running.stdout or ():
+                if address := ADDRESS.search(line):
+                    print(f"{address[0]}\nis its address, for a browser on this machine; Ctrl-C ends it", flush=True)
+                elif " INFO" not in line:
+                    print(line, end="", file=sys.stderr, flush=True)
             return running.wait()
         finally:
             with suppress(ProcessLookupError):

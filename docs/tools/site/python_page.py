@@ -16,7 +16,7 @@ from docs.tools.site.markdown import describe_fields, prose, table
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "Missions and runs": (
-        "run", "open_run", "load_scenario", "RecordedRun", "DecisionRecord", "EntryRecord", "Candidate",
+        "run", "open_run", "show", "load_scenario", "RecordedRun", "DecisionRecord", "EntryRecord", "Candidate",
         "MissionResult", "TrackPoint", "RunPicture", "BadInput"),
     "Building models": ("load_world", "build_world", "World"),
     "Poses from matched lines": (

@@ -247,8 +247,7 @@ def test_progress_says_that_it_is_lost_and_found() -> None:
 @pytest.mark.parametrize("locale", ["kitchen", ""])
 def test_a_contact_is_found_once_where_the_robot_truly_was(locale: str) -> None:
     moments = [Truth(Pose2(x, 1.0, 0.0), collisions=n, locale=locale) for x, n in ((1.0, 0), (2.0, 1), (3.0, 1))]
-    building = SimpleNamespace(added=(), floor_m=0.0)
-    body = SimpleNamespace(truth=moments[0], track=tuple(moments[:1]), building=building)
+    body = SimpleNamespace(truth=moments[0], track=tuple(moments[:1]), building=SimpleNamespace(added=(), floor_m=0.0))
     watch = ContactWatch(house(), cast(SimulatedBody, body))
     assert watch.new_contacts() == ()
     body.truth, body.track = moments[2], tuple(moments)
