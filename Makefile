@@ -5,6 +5,7 @@ SCENARIO ?= lab-to-allens-office
 ROOM ?= pose
 SAMPLE ?= 60
 SEED ?= 0
+MINUTES ?= 10
 WHEELS ?= build/wheels
 PIP_VERSION := 26.3
 
@@ -26,12 +27,13 @@ export OMP_NUM_THREADS := 1
 # Two at once; each takes neighbours, so that what the tests of a file share is seldom made twice.
 TWO := -n 2 --dist worksteal
 
-.PHONY: help run test test-rest test-all mutants environment site course wheels lock clean
+.PHONY: help run test test-rest test-all search mutants environment site course wheels lock clean
 
 help:
 	@echo "make run          prepare everything, then drive: harvey run $(SCENARIO)"
 	@echo "make test         ruff, mypy, import contracts, pytest; says what was skipped and why"
 	@echo "make test-all     that, and the tests of every extra (extras/), of an installation and in a browser"
+	@echo "make search       other draws of every law than yesterday's, MINUTES=$(MINUTES); what failed is kept, and tried first"
 	@echo "make mutants      mutation testing of ROOM=$(ROOM), SAMPLE=$(SAMPLE); goes on where it stopped, and reports"
 	@echo "make site         build the documentation site, build/site/index.html, and the man page, build/man/harvey.1"
 	@echo "make course       execute the notebooks of the course: build/course"
@@ -57,6 +59,10 @@ test-rest: $(VENV)/.ready-to-test-all
 	@echo "== pytest of the extras, of an installation and in a browser" \
 		&& $(BIN)/pytest $(TWO) $(wildcard extras/*/tests) tests/installed tests/browser
 	@echo "== pytest of what drives for minutes" && $(BIN)/pytest $(TWO) -m slow tests
+
+# What fails is kept in .hypothesis, and tried first the next time. The files of laws come in another order each day.
+search: $(VENV)/.ready-to-test
+	@echo "== pytest of the laws, $(MINUTES) minutes" && $(BIN)/python tests/mutation/search_laws.py --minutes $(MINUTES)
 
 # Minutes to hours; not in CI. Rooms and equivalent mutants: tests/mutation/rooms.toml.
 mutants: $(VENV)/.ready-to-test

@@ -6,7 +6,7 @@ The hall is the same left to right, so that a board can be mirrored: :func:`mirr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, TypeVar
@@ -15,10 +15,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from blackboard import (
-    Change,
     Effect,
     Entry,
-    KnowledgeSource,
     Ref,
     Retract,
 )
@@ -31,7 +29,6 @@ from world_models.entries import (
     Leg,
     Milestone,
     Obstacle,
-    Outcome,
     Place,
     PlanSketch,
     Subgoal,
@@ -49,13 +46,6 @@ LENGTH_M, WIDTH_M = 8.0, 4.0
 
 class Bench(testing.Bench):
     """A bench on which a law puts also what stands in the house, and what is planned there."""
-
-    def lack(self, what: str) -> None:
-        """What a source may need is not so: one of ``LACKING``, or the entry of this id is withdrawn."""
-        if what in LACKING:
-            LACKING[what](self)
-        elif what != "nothing":
-            self.retract(self.view[what])
 
     def pursue(self, destination: Place | None = None) -> Entry[Goal]:
         """A goal that is pursued."""
@@ -105,16 +95,6 @@ class Bench(testing.Bench):
 INEXACT: Mapping[str, Any] = {"expected": (((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),), "displacement_modes": ("wall",),
                               "displacements": ((0.0, 0.0, 0.05, 0.0, 0.0),)}
 """Fields of a milestone whose one line may be displaced by 5 cm."""
-
-LACKING: Mapping[str, Callable[[Bench], object]] = {
-    "belief": lambda bench: bench.revise(bench.view["Hypothesis-1"], status="candidate"),
-    "doubt": lambda bench: bench.revise(bench.view["Discrepancy-1"], status="corrected"),
-    "rest": Bench.move,
-    "place": Bench.doubt,
-    "course of things": lambda bench: bench.put(Outcome("failed", "")),
-    "goal": lambda bench: bench.revise(bench.view["Goal-1"], status="abandoned"),
-}
-"""How the first belief, doubt and goal come to be none, and the robot to move, to be lost and to be at its end."""
 
 motions = st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(0.0, 0.8)), min_size=1, max_size=3)
 """Turns [rad], each with the way after it [m]."""
@@ -187,8 +167,3 @@ def near(*bounds: float) -> st.SearchStrategy[float]:
     by = (1.0 - 1e-4, 1.0 + 1e-4, 0.9, 1.1, 0.7, 1.4, 0.5, 2.0)
     return st.builds(lambda bound, part, side: bound * part * side, st.sampled_from(bounds), st.sampled_from(by),
                      st.sampled_from((-1.0, 1.0)))
-
-
-def wakes(source: KnowledgeSource, change: Change) -> bool:
-    """Whether a source watches for a change."""
-    return any(watch.sees(change) for watch in source.on)

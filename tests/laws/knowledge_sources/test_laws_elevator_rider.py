@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Level
 from generated_boards import Bench, all_reasons, effect_on
 from harvey.testing import check_source
 from knowledge_sources.action.elevator_rider import elevator_rider
@@ -58,18 +56,6 @@ def test_the_second_ride_is_from_where_the_first_one_ended() -> None:
     bench.put(Ride(sketch.id, 0, "lift", "car-1", "car-2"))
     ride = effect_on(bench.ask(elevator_rider, sketch), Ride).value
     assert (ride.index, ride.origin, ride.destination) == (1, "car-2", "car-3")
-
-
-@pytest.mark.parametrize("level", list(Level))
-def test_in_doubt_above_the_action_level_it_waits(level: Level) -> None:
-    bench = Bench()
-    bench.believe()
-    goal = bench.pursue(FAR)
-    sketch = bench.put(PlanSketch(goal.id, (), "", (UP,), 0, True), goal)
-    doubt = bench.doubt(level, 1.0)
-    assert (bench.ask(elevator_rider, sketch) is None) == (level > Level.ACTION)
-    bench.revise(doubt, status="corrected")
-    assert bench.ask(elevator_rider, sketch) is not None
 
 
 def test_it_keeps_the_laws_of_all_sources() -> None:

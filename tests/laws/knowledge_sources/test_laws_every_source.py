@@ -1,4 +1,4 @@
-"""Laws of every knowledge source on the boards of recorded runs, as ``check_source`` has them: of each one act a run.
+"""Laws of every knowledge source on the boards of recorded runs, as ``check_source`` has them: some acts of each.
 
 Its own file has them on a board of its own: also of those that act in none of these runs.
 """
@@ -21,18 +21,18 @@ from logs.timeline import Timeline
 from rebuilt_board import CHANGES, SOURCES, rebuild
 from recorded_runs import Recorded
 
-RUNS = ("office", "two doors")
-MANY = 20
-"""So many sources act there at least."""
+RUNS = ("office", "two doors", *(pytest.param(name, marks=pytest.mark.slow) for name in ("bump", "kidnap", "hallway")))
+ACTS_EACH, MANY = 3, 18
+"""So many acts of a source are asked again in each run, and so many sources act there at least."""
 
 
 def list_acts(run: RunDirectory) -> Iterator[tuple[str, Bench, Change]]:
-    """An act of each source from the midst of a run: who, the board as the act saw it, and what woke it."""
+    """Acts of each source from all parts of a run: who, the board as the act saw it, and what woke it."""
     by_source: dict[str, list[int]] = {}
     for decision in Timeline(run.journal).decisions():
         if decision.chosen is not None:
             by_source.setdefault(decision.chosen.source, []).append(decision.cycle)
-    asked = {cycles[len(cycles) // 2] for cycles in by_source.values()}
+    asked = {cycles[part * len(cycles) // ACTS_EACH] for cycles in by_source.values() for part in range(ACTS_EACH)}
     for rebuilt, decision in rebuild(run):
         if decision.chosen is not None and decision.cycle in asked:
             bench = Bench()

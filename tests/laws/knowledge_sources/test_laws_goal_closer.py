@@ -32,14 +32,6 @@ def test_it_closes_the_goal_of_the_sketch_once(status: GoalStatus) -> None:
         assert bench.ask(SOURCE, sketch) is None
 
 
-def test_a_goal_that_is_gone_cannot_be_reached() -> None:
-    bench = Bench()
-    goal = bench.pursue()
-    sketch = bench.revise(bench.sketch(goal=goal), status="done")
-    bench.retract(goal)
-    assert bench.ask(SOURCE, sketch) is None
-
-
 def test_it_keeps_the_laws_of_all_sources() -> None:
     bench = Bench()
     goal = bench.pursue()

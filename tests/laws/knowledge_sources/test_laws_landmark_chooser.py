@@ -125,13 +125,6 @@ def test_the_same_picture_twice_is_once() -> None:
         assert len(made(choose(LandmarkChooser(), off_rad=0.003, seen_in=picture).effects, Hypothesis)) == times
 
 
-@pytest.mark.parametrize(("level", "acts"), [
-    (None, True), (Level.ACTION, True), (Level.PLAN, False), (Level.GOAL, False)])
-@pytest.mark.usefixtures("no_edges")
-def test_in_doubt_or_lost_it_chooses_nothing(level: Level | None, acts: bool) -> None:
-    assert (choose(LandmarkChooser(), lost=level).effects is not None) == acts
-
-
 def test_it_keeps_the_laws_of_all_sources() -> None:
     bench = choose(LandmarkChooser()).bench
     check_source(LandmarkChooser, bench, bench.view["Hypothesis-1"])

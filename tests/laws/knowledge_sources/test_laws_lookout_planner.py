@@ -95,18 +95,6 @@ def test_no_lookout_is_gone_to_a_third_time() -> None:
                for k, one in enumerate(places))
 
 
-@pytest.mark.parametrize("stale", ["goal", "belief", "gone"])
-def test_there_is_nothing_to_look_at_or_nobody_to_look(stale: str) -> None:
-    bench, impasse = stuck()
-    if stale == "goal":
-        bench.retract(bench.view["Goal-1"])
-    elif stale == "belief":
-        bench.revise(bench.view["Hypothesis-1"], status="candidate")
-    else:
-        bench.revise(bench.view["Obstacle-1"], status="gone")
-    assert bench.ask(SOURCE, impasse) is None
-
-
 def see_door(bench: Bench, log_odds: float, state: DoorCondition, seen_from: tuple[float, float], *,
              has_views: bool = True) -> Entry[DoorState]:
     """What is believed of the study's door, by a picture from there; that of a refuted milestone is no view."""

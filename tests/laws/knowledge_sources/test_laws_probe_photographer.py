@@ -67,11 +67,5 @@ def test_it_waits_for_light_so_long(taken: int, asks: bool) -> None:
     assert (bench.ask(SOURCE, doubt) is not None) == asks
 
 
-def test_found_again_it_asks_for_none() -> None:
-    bench, doubt = lost()
-    bench.revise(doubt, status="corrected")
-    assert bench.ask(SOURCE, doubt) is None
-
-
 def test_it_keeps_the_laws_of_all_sources() -> None:
     check_source(SOURCE, *lost())

@@ -7,8 +7,8 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard import Post, Posted, Revise
-from generated_boards import Bench, all_reasons, wakes
+from blackboard import Post, Revise
+from generated_boards import Bench, all_reasons
 from harvey.testing import check_source
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.model.rival_weigher import rival_weigher
@@ -29,7 +29,6 @@ def test_each_difference_is_weighed_by_all_of_its_evidence_and_by_no_other(all_s
     for one in all_seen:
         known = said.setdefault(one.about, [])
         entry = bench.put(one)
-        assert wakes(rival_weigher, Posted(entry))
         effects = tuple(bench.ask(rival_weigher, entry) or ())
         assert len(effects) == (one not in known)
         if effects:

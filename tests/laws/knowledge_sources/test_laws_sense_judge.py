@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blackboard import Level, Posted
-from generated_boards import Bench, made, reasons, wakes
+from blackboard import Level
+from generated_boards import Bench, made, reasons
 from harvey.testing import check_source
 from knowledge_sources.senses.sense_judge import WRONG, sense_judge
 from world_models.entries import MISLEADING, RISK, SENSES, Discrepancy, Impasse
@@ -30,7 +29,6 @@ def test_it_doubts_once_and_ends_only_where_no_doubt_is_left(
         bench.doubt(open_at)
     found = bench.put(differ(kind, p))
     acts = p >= SURE and kind in MISLEADING
-    assert wakes(sense_judge, Posted(found)) == acts
     effects = bench.ask(sense_judge, found) if acts else ()
     ends, doubts = made(effects, Impasse), made(effects, Discrepancy)
     assert bool(ends) == (acts and p >= 1.0 - RISK)
@@ -41,13 +39,6 @@ def test_it_doubts_once_and_ends_only_where_no_doubt_is_left(
         assert end.kind == "failed" and end.reason.startswith(f"{WRONG[kind]}: it is so")
     for doubt in doubts:
         assert (doubt.level, doubt.magnitude) == (Level.PLAN, None)  # looked at again before anything moves
-
-
-@pytest.mark.parametrize("kind", sorted(MISLEADING))
-def test_after_the_end_nothing_more_is_said(kind: RivalKind) -> None:
-    bench = Bench()
-    bench.put(Impasse("blocked", "so"))
-    assert bench.ask(sense_judge, bench.put(differ(kind, 1.0))) is None
 
 
 def test_it_keeps_the_laws_of_all_sources() -> None:

@@ -31,11 +31,6 @@ def test_it_marks_the_newest_way_and_no_more(is_broken: bool, x_m: float, y_m: f
         assert all_reasons(effects) == {travel.id, doubt.id}
 
 
-def test_without_a_way_there_is_nothing_to_break() -> None:
-    bench = Bench()
-    assert bench.ask(travel_breaker, bench.doubt()) is None
-
-
 def test_it_keeps_the_laws_of_all_sources() -> None:
     bench = Bench()
     bench.put(begin_travel(Pose2(0.0, 0.0, 0.0), diagonal(0.1, 0.1), 0.0, 0.1))

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from blackboard import Entry, Posted, Revised
-from generated_boards import Bench, effect_on, reasons, to_world, wakes
+from blackboard import Entry
+from generated_boards import Bench, effect_on, reasons, to_world
 from harvey.testing import check_source, plain_robot
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.milestone_selector.view_updater import ViewUpdater
@@ -64,7 +64,6 @@ def test_only_a_milestone_whose_picture_is_taken_and_not_judged_is_predicted_aga
     bench.await_milestone(status=status, look_heading_rad=AHEAD)
     hidden = bench.put(outline(0.0, 100.0))
     assert (bench.ask(SOURCE, hidden) is not None) == (status == "expected" and has_belief)
-    assert wakes(SOURCE, Posted(hidden)) and wakes(SOURCE, Revised(hidden))
 
 
 def test_it_keeps_the_laws_of_all_sources() -> None:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import SeenFloor, see_ranges
+from knowledge_sources.methods.floor.ranges import RANGE_SIGMAS
 from sim.body.collision import Obstacles
 from sim.body.senses import RangeRing
 from world_models.actuator import ActuatorModel
@@ -55,9 +56,13 @@ def read(solid: Floats, pose: Pose2, seed: int, dropout: float) -> FreeFloor | N
 
 
 def free_area(floor: FreeFloor) -> shapely.Geometry:
-    """All of what it calls free: each bearing's interval, half a step to either side."""
+    """All of what it calls free: each bearing's interval, half a step to either side.
+
+    What begins at the rim ends where something is next to it: by one echo, so to its three deviations.
+    """
     half, parts = 0.5 * math.tau / (len(floor.bearings_rad) - 1), []
-    for bearing, near, far in zip(floor.bearings_rad, floor.near_m, floor.far_m, strict=True):
+    for bearing, near, heard in zip(floor.bearings_rad, floor.near_m, floor.far_m, strict=True):
+        far = heard - RANGE_SIGMAS * SIGMA_M if near == ROBOT.radius_m else heard
         if far > near:
             angles = bearing + np.linspace(-half, half, 5)
             rim = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
@@ -74,9 +79,10 @@ def test_nothing_solid_is_where_the_floor_is_ranged_free(
 ) -> None:
     _, pose = place(room, parts[0], parts[1], turn_rad)
     _, at = place(room, parts[2], parts[3])
-    solid = np.concatenate([SOLID.segments_world, box(at.x_m, at.y_m, side_m, turn_rad)])
-    if Obstacles(solid).clearance_m(pose) < 0.0:
-        return
+    stands = box(at.x_m, at.y_m, side_m, turn_rad)
+    solid = np.concatenate([SOLID.segments_world, stands])
+    if Obstacles(solid).clearance_m(pose) < 0.0 or shapely.Polygon(stands[:, 0]).contains(shapely.Point(pose.position)):
+        return  # no robot stands in a thing
     floor = read(solid, pose, seed, dropout)
     if floor is not None:
         free = shapely.buffer(free_area(floor), -1e-3)

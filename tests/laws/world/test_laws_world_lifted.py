@@ -41,7 +41,7 @@ def list_points(frame: LocaleFrame) -> list[Points]:
     upright = [np.column_stack([np.tile(thing.footprint_world, (2, 1)), np.repeat(
         [frame.extent.reach[2] + thing.low_m, frame.extent.reach[2] + thing.high_m], len(thing.footprint_world))])
         for thing in frame.things]
-    return [array.reshape(-1, 3) for array in (*shown, *upright)]
+    return [array.reshape(-1, 3) for array in (*shown, *upright) if array.size]
 
 
 @pytest.mark.parametrize("what", ["nothing", "extra", "shut"])

@@ -6,18 +6,13 @@ import ast
 import dataclasses
 import importlib
 import inspect
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from blackboard import Change, Effect, Entry, KnowledgeSource, Level, Post, Ref, Retract, Role, View, plain
-from harvey.simulation.simulated_run import run_mission
+from blackboard import KnowledgeSource, Level, Role
 from harvey.wiring import SUBJECTS, knowledge_sources, load_kinds, sources_of
 from knowledge_sources.priority import Priority
-from sim.scenario import load_scenario
-from sim.stage import build_stage
 from world_models.building.locale_frame import FrameRequest, LocaleFrame
 from world_models.entries import Outcome
 
@@ -151,53 +146,3 @@ def test_it_is_one_rule_in_a_short_file(stem: str) -> None:
 @each_source
 def test_its_priority_is_one_of_the_named_scale_or_rated_by_the_case(source: type[KnowledgeSource]) -> None:
     assert isinstance(source.priority, Priority) or source.rate is not KnowledgeSource.rate
-
-
-def effect_record(effect: Effect) -> list[Any]:
-    """An effect as plain data: two effects that ask for the same have equal records."""
-    refs = [r.ref if isinstance(r, Entry) else r for r in effect.because]
-    reasons = [str(r) if isinstance(r, Ref) else "an earlier effect" for r in refs]
-    touched = "" if isinstance(effect, Post) else str(effect.entry.ref)
-    return [type(effect).__name__, touched, None if isinstance(effect, Retract) else plain(effect.value), reasons]
-
-
-def state(view: View) -> list[Ref]:
-    return [entry.ref for entry in view._board._current.values()]
-
-
-def asked_twice(source: KnowledgeSource, impure: list[str]) -> KnowledgeSource:
-    """The same knowledge source, but every question is put to it twice, and a change of answer or board is noted."""
-    cls = type(source)
-
-    def bind(self: KnowledgeSource, view: View, trigger: Change) -> Any:
-        before = state(view)
-        case, again = cls.bind(self, view, trigger), cls.bind(self, view, trigger)
-        rated = [None if c is None else cls.rate(self, c) for c in (case, again)]
-        is_rating = rated[0] is None or 0.0 <= rated[0] <= 1.0
-        if not is_rating or rated[0] != rated[1] or state(view) != before:
-            impure.append(f"{cls.__name__}.bind on {trigger.entry.ref}")
-        return None if case is None else (case, again)
-
-    def rate(self: KnowledgeSource, case: Any) -> float:
-        return cls.rate(self, case[0])
-
-    def act(self: KnowledgeSource, view: View, case: Any) -> Any:
-        before = state(view)
-        first, second = (tuple(cls.act(self, view, one)) for one in case)
-        if [effect_record(e) for e in first] != [effect_record(e) for e in second] or state(view) != before:
-            impure.append(f"{cls.__name__}.act")
-        return first
-
-    questions = {"bind": bind, "rate": rate, "act": act}
-    source.__class__ = type(cls.__name__, (cls,), questions)
-    return source
-
-
-def test_ratings_and_acts_are_pure() -> None:
-    """At the beginning of a real mission: asked again, everyone gives the same answer and changes nothing."""
-    scenario = load_scenario("lab-to-allens-office")
-    stage = build_stage(replace(scenario, limits=replace(scenario.limits, max_cycles=90)))
-    impure: list[str] = []
-    result = run_mission(stage, 1, sources=lambda known: [asked_twice(s, impure) for s in knowledge_sources(known)])
-    assert "90 cycles" in result.reason and result.frames > 2
-    assert impure == []
