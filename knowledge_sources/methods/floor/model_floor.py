@@ -6,7 +6,7 @@ The grid is by the camera's known mounting (inverse perspective).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import cv2
@@ -108,7 +108,7 @@ class ModelFloor:
     ranges_m: NDArray[np.float32]
     standing_m: NDArray[np.float32]
 
-    @property
+    @cached_property
     def is_unknown(self) -> NDArray[np.bool_]:
         """(rows, columns) plain floor of a colour that is not known."""
         return np.asarray(self.is_plain & np.append(np.isnan(self.colours).any(axis=1), False)[self.kinds])

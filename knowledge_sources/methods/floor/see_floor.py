@@ -237,7 +237,7 @@ def find_unlike(
             fitted = _fit_most(appearance, here, guesses, may_be_tinted=last_light is None)
             if fitted is None:
                 continue
-            mean, covariance = fitted
+            mean, floor = fitted
             shift = mean - by_model
             light = (float(shift[0]), float(shift[1]), float(shift[2]))
             if np.abs(shift[1:]).max() <= MAX_CHROMA_ERROR:
@@ -246,7 +246,8 @@ def find_unlike(
             expected = by_model + shift
             mean, covariance = fit_appearance(appearance[here], expected, True) or (
                 expected, 4.0 * default_covariance())
-        unlike |= here & ~find_floor_in_shade(appearance, here, mean, covariance)
+            floor = find_floor_in_shade(appearance, here, mean, covariance)
+        unlike |= here & ~floor
         tells |= here
     return unlike, tells, light
 
@@ -254,29 +255,29 @@ def find_unlike(
 def _fit_most(
     appearance: Floats, here: NDArray[np.bool_], guesses: Sequence[tuple[Floats, bool]], *,
     may_be_tinted: bool
-) -> tuple[Floats, Floats] | None:
-    """Mean and covariance of the looks of the floor ``here``, by the first of the guesses (as ``expected`` and
-    ``is_learnt`` of :func:`fit_appearance`) that some of it agrees with; None where its looks are not known.
+) -> tuple[Floats, NDArray[np.bool_]] | None:
+    """Mean of the looks of the floor ``here`` and which pixels look like it, by the first of the guesses (as
+    ``expected`` and ``is_learnt`` of :func:`fit_appearance`) that some of it agrees with; None where none is known.
 
     Where hardly any of it agrees, the camera's white balance may differ from the model's: what most of it looks like
     then is the floor, if it has about the floor's hue. That is so only where no picture was taken shortly before: white
     balance follows the light little by little, and what fills the picture all at once is a thing.
     """
     seen, size = appearance[here], np.count_nonzero(here)
-    first: tuple[Floats, Floats] | None = None
+    first: tuple[Floats, NDArray[np.bool_]] | None = None
 
-    def agrees(fit: tuple[Floats, Floats], share: float) -> bool:
-        return bool(np.count_nonzero(find_floor_in_shade(appearance, here, *fit)) >= share * size)
+    def find_floor(fit: tuple[Floats, Floats] | None) -> tuple[Floats, NDArray[np.bool_]] | None:
+        return None if fit is None else (fit[0], find_floor_in_shade(appearance, here, *fit))
 
     for expected, is_learnt in guesses:
-        fit = fit_appearance(seen, expected, is_learnt)
-        if fit is not None and agrees(fit, MIN_FLOOR_SHARE):
-            return fit
-        first = first or fit
+        found = find_floor(fit_appearance(seen, expected, is_learnt))
+        if found is not None and np.count_nonzero(found[1]) >= MIN_FLOOR_SHARE * size:
+            return found
+        first = first or found
     for expected, _ in guesses if may_be_tinted else ():
-        fit = fit_appearance(seen, expected, False, MAX_TINT)
-        if fit is not None and agrees(fit, MIN_TINTED_SHARE):
-            return fit
+        found = find_floor(fit_appearance(seen, expected, False, MAX_TINT))
+        if found is not None and np.count_nonzero(found[1]) >= MIN_TINTED_SHARE * size:
+            return found
     return first
 
 
