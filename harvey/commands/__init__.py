@@ -19,7 +19,7 @@ MODULES: Mapping[str, str] = {
     "replay": "again",
     "diff": "explain", "report": "report", "export": "report", "resume": "again", "repair": "again",
     "world": "world_command", "settings": "listing", "experiment": "listing", "campaign": "run_command",
-    "drive": "drive", "tell": "drive", "calibrate": "calibrate", "emulate": "emulate", "completion": "listing",
+    "drive": "drive", "tell": "drive", "emulate": "emulate", "completion": "listing",
 }
 """The module of each command; there it stands under its name in capitals."""
 

@@ -1,4 +1,4 @@
-"""Camera calibration: intrinsics, lens distortion and mounting; and what is learnt of the camera on the way."""
+"""What is learnt of the camera on the way: its state, whether lens or model err."""
 
 from knowledge_sources.methods.calibration.camera_rivals import Opened, SeenLines, explain, open_rivals
 from knowledge_sources.methods.calibration.camera_state import (
@@ -7,18 +7,12 @@ from knowledge_sources.methods.calibration.camera_state import (
     add_yaw, compute_camera_covariance, compute_knocked_covariance, compute_scale_sigma, has_counted, is_camera_known,
     learn, loosen, to_tuples, widen,
 )
-from knowledge_sources.methods.calibration.intrinsics import (
-    BoardView, Calibration, PARAMETERS, Pattern, calibrate, draw_calibration, find_board,
-)
 from knowledge_sources.methods.calibration.model_evidence import find_model_evidence, is_model_doubted, is_strange
-from knowledge_sources.methods.calibration.mounting import Mounting, estimate_mounting
 
 __all__ = [
     "LEAST_SIGMA_CENTRE_PX", "LEAST_SIGMA_FOCAL", "LEAST_SIGMA_M", "LEAST_SIGMA_RAD", "MAX_COUNTED", "MIN_MOVE_M",
-    "MIN_TURN_RAD", "PARAMETERS", "RIGID_DISTANCE_M", "SIGMA_CENTRE_PX", "SIGMA_FOCAL", "SIGMA_HEIGHT_M",
-    "SIGMA_ROLL_RAD", "SIGMA_TILT_RAD", "SIGMA_YAW_RAD", "BoardView", "Calibration", "Mounting", "Opened", "Pattern",
-    "SeenLines", "add_yaw", "calibrate", "compute_camera_covariance", "compute_knocked_covariance",
-    "compute_scale_sigma", "draw_calibration", "estimate_mounting", "explain", "find_board", "find_model_evidence",
-    "has_counted", "is_camera_known", "is_model_doubted", "is_strange", "learn", "loosen", "open_rivals", "to_tuples",
-    "widen",
+    "MIN_TURN_RAD", "RIGID_DISTANCE_M", "SIGMA_CENTRE_PX", "SIGMA_FOCAL", "SIGMA_HEIGHT_M", "SIGMA_ROLL_RAD",
+    "SIGMA_TILT_RAD", "SIGMA_YAW_RAD", "Opened", "SeenLines", "add_yaw", "compute_camera_covariance",
+    "compute_knocked_covariance", "compute_scale_sigma", "explain", "find_model_evidence", "has_counted",
+    "is_camera_known", "is_model_doubted", "is_strange", "learn", "loosen", "open_rivals", "to_tuples", "widen",
 ]

@@ -8,8 +8,6 @@ from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 
-import cv2
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -81,7 +79,6 @@ def said(capsys: pytest.CaptureFixture[str], argv: list[str]) -> tuple[int, str]
     (["run", "bump", "--check", "--go-on"], "--check: expected it without --go-on"),
     (["run", "."], "scenario: expected a name or a TOML file, got the directory ."),
     (["emulate", "denning", "--scenario", "bump", "--camera-port", "99999"], "expected a port from 0 to 65535"),
-    (["calibrate", "--camera", "999999999999"], "expected a device's number from 0 to 255, got 999999999999"),
     (["view", "nowhere"], "does not exist"),
     (["why", "nowhere"], "does not exist"),
     (["replay", "nowhere"], "does not exist"),
@@ -105,12 +102,6 @@ def test_bad_input_is_named(argv: list[str], told: str, tmp_path: Path, capsys: 
 
 def test_a_scenario_that_is_not_there_is_named_before_anything_begins(capsys: pytest.CaptureFixture[str]) -> None:
     assert said(capsys, ["run", "nosuch"])[1].startswith("harvey: scenario: expected one of")
-
-
-def test_a_picture_of_one_pixel_shows_no_board(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    cv2.imwrite(str(tmp_path / "dot.png"), np.zeros((1, 1), np.uint8))
-    code, err = said(capsys, ["calibrate", str(tmp_path / "dot.png"), "--out", str(tmp_path / "camera.toml")])
-    assert code == 2 and "no board of 7 x 5 inner corners" in err and "Traceback" not in err
 
 
 def test_a_port_in_use_is_named_before_a_base_is_there(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from pathlib import Path
 from typing import Any
@@ -12,23 +11,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from experiments.generated.scenes import board_picture, board_renderer, board_view
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey.hardware.calibration import Boards, calibrate_camera, find_boards, picture_files, save_board
-from knowledge_sources.methods.calibration import (
-    BoardView,
-    Calibration,
-    Pattern,
-    calibrate,
-    estimate_mounting,
-    find_board,
-)
+from harvey_survey.board_pictures import Boards, calibrate_camera, find_boards, picture_files, save_board
+from harvey_survey.intrinsics import BoardView, Calibration, Pattern, calibrate, find_board
+from harvey_survey.mounting import estimate_mounting
+from harvey_survey.rendered_boards import board_picture, board_renderer, board_view
 from knowledge_sources.methods.features import read_picture
 from sim.render.optics import Optics
 from sim.render.sensor import SensorParameters
 from world_models.camera import Camera, CameraDeviation, CameraMount
-from world_models.files.toml.camera_file import CameraFileError, camera_text, load_camera
+from world_models.files.toml.camera_file import load_camera
 from world_models.frames import Pose
 
 PATTERN = Pattern(7, 5, 0.025)
@@ -168,51 +161,6 @@ def test_a_board_nowhere_near_the_floor_is_refused(calibration: Calibration) -> 
         estimate_mounting(calibration, view, PATTERN, standing_at_m=-1.0)
 
 
-def test_a_camera_file_holds_the_same_numbers(tmp_path: Path) -> None:
-    mount = CameraMount(0.2, 0.08, math.radians(5.0))
-    (tmp_path / "camera.toml").write_text(camera_text(CAMERA, mount, ("a note",)))
-    camera, read, _ = load_camera(tmp_path / "camera.toml")
-    assert (camera.fx, camera.fy, camera.cx, camera.cy) == (CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
-    np.testing.assert_array_equal(camera.distortion, CAMERA.distortion)
-    assert read is not None and read.height_m == 0.2 and read.tilt_rad == pytest.approx(mount.tilt_rad)
-    (tmp_path / "camera.toml").write_text(camera_text(Camera(1.0, 2.0, 3.0, 4.0, 50, 60), None))
-    assert load_camera(tmp_path / "camera.toml")[1] is None
-
-
-def test_a_camera_file_says_how_well_it_is_known(tmp_path: Path) -> None:
-    deviation = CameraDeviation(math.radians(0.2), 0.003, 0.0, 0.001)
-    text = camera_text(CAMERA, CameraMount(0.2), deviation=deviation)
-    (tmp_path / "camera.toml").write_text(text)
-    read = load_camera(tmp_path / "camera.toml").deviation
-    assert dataclasses.astuple(read) == pytest.approx(dataclasses.astuple(deviation))
-    assert "forward_m" not in text.partition("[deviation]")[2]
-    (tmp_path / "camera.toml").write_text(camera_text(CAMERA, CameraMount(0.2), deviation=CameraDeviation()))
-    assert "deviation" not in (tmp_path / "camera.toml").read_text()
-    assert load_camera(tmp_path / "camera.toml").deviation == CameraDeviation()
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("fx_px = 402.0", "fx_px = -1"), r"camera.toml:4: camera.fx_px: expected a number from 1 to 1e\+06, got -1"),
-        (("width_px = 512", "width_px = 51.5"), "expected a whole number of pixels"),
-        (("[camera]", "[kamera]"), "expected the key 'camera'"),
-        (("fx_px", "fz_px"), "expected the key 'fx_px'"),
-        (("distortion = [", "distortion = [0.0, 0.0, "), "expected an array of 4 or 5 numbers"),
-        (("height_m = 0.2", "height_m = 'tall'"), "height_m: expected a number"),
-        (("[mount]", "[deviation]\nheight_m = -1.0\n[mount]"), "deviation.height_m: expected a number from 0 to 1"),
-        (("[mount]", "[deviation]\nlean_deg = 1.0\n[mount]"), "lean_deg"),
-    ],
-)
-def test_a_camera_file_that_is_wrong_is_pointed_at(tmp_path: Path, change: tuple[str, str], message: str) -> None:
-    text = camera_text(CAMERA, CameraMount(0.2))
-    assert change[0] in text
-    path = tmp_path / "camera.toml"
-    path.write_text(text.replace(*change, 1))
-    with pytest.raises(CameraFileError, match=message):
-        load_camera(path)
-
-
 def test_the_command_writes_file_report_and_picture(
     tmp_path: Path, pictures: list[bytes], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -235,6 +183,7 @@ def test_the_command_writes_file_report_and_picture(
     [
         ([], "expected pictures or --camera SOURCE, got neither"),
         (["nowhere/*.jpg"], "got 'nowhere/*.jpg'"),
+        (["--camera", "999999999999"], "expected a device's number from 0 to 255, got 999999999999"),
         (["--camera", "none.avi"], "--camera none.avi: unplugged"),
         (["x.jpg", "--pattern", "2x2"], "expected at least 3 x 3 inner corners"),
         (["x.jpg", "--mount-board", "standing", "--mount-image", "y.jpg"], "--lowest-mm: expected it"),
@@ -248,3 +197,10 @@ def test_wrong_options_are_named(
     monkeypatch.chdir(tmp_path)
     assert main(["calibrate", *words]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_picture_of_one_pixel_shows_no_board(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cv2.imwrite(str(tmp_path / "dot.png"), np.zeros((1, 1), np.uint8))
+    assert main(["calibrate", str(tmp_path / "dot.png"), "--out", str(tmp_path / "camera.toml")]) == 2
+    err = capsys.readouterr().err
+    assert "no board of 7 x 5 inner corners" in err and "Traceback" not in err

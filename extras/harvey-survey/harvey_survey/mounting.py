@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from harvey_survey.intrinsics import BoardView, Calibration, Pattern
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.calibration.intrinsics import BoardView, Calibration, Pattern
 
 MAX_TILT_RAD = 1.55  # largest tilt of a camera before the view of its mounting board is refused
 MAX_ROLL_RAD = 0.8  # largest roll of a camera before the view of its mounting board is refused

@@ -13,8 +13,8 @@ from harvey.commands.command import CliCommand, whole
 from harvey.errors import BadInput
 
 if TYPE_CHECKING:
-    from harvey.hardware.calibration import Boards, Grey, Mounted
-    from knowledge_sources.methods.calibration import Calibration, Pattern
+    from harvey_survey.board_pictures import Boards, Grey, Mounted
+    from harvey_survey.intrinsics import Calibration, Pattern
 
 PATTERN = re.compile(r"(\d{1,3})x(\d{1,3})", re.ASCII)
 
@@ -61,7 +61,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _run(args: Namespace) -> int:
-    from harvey.hardware.calibration import (
+    from harvey_survey.board_pictures import (
         calibrate_camera,
         find_deviation,
         find_mounting,
@@ -69,7 +69,7 @@ def _run(args: Namespace) -> int:
         report,
         save_board,
     )
-    from knowledge_sources.methods.calibration import Pattern, draw_calibration
+    from harvey_survey.intrinsics import Pattern, draw_calibration
     from world_models.files.toml.camera_file import camera_text
 
     try:
@@ -98,7 +98,7 @@ def _run(args: Namespace) -> int:
 
 def _check_options(args: Namespace) -> Mounted | None:
     """The board of the mounting. Raises BadInput where options do not go together."""
-    from harvey.hardware.calibration import Mounted
+    from harvey_survey.board_pictures import Mounted
 
     if bool(args.images) == (args.camera is not None):
         raise BadInput("expected pictures or --camera SOURCE, got " + ("both" if args.images else "neither"))
@@ -117,7 +117,7 @@ def _check_options(args: Namespace) -> Mounted | None:
 
 
 def _find_boards(args: Namespace, pattern: Pattern) -> Boards:
-    from harvey.hardware.calibration import find_boards, grey_of, live_pictures, picture_files
+    from harvey_survey.board_pictures import find_boards, grey_of, live_pictures, picture_files
 
     if args.camera is None:
         pictures = ((str(path), grey_of(path)) for path in picture_files(args.images))
@@ -129,7 +129,7 @@ def _find_boards(args: Namespace, pattern: Pattern) -> Boards:
 
 def _take_place(args: Namespace) -> Grey:
     """The picture of the mounting, taken when the user says so."""
-    from harvey.hardware.calibration import live_pictures
+    from harvey_survey.board_pictures import live_pictures
 
     where = "flat on the floor" if args.mount_board == "floor" else "upright on the floor"
     try:
@@ -141,7 +141,7 @@ def _take_place(args: Namespace) -> Grey:
 
 
 def _notes(calibration: Calibration, args: Namespace) -> tuple[str, ...]:
-    from knowledge_sources.methods.calibration import PARAMETERS
+    from harvey_survey.intrinsics import PARAMETERS
 
     sure = ", ".join(f"{name} {sigma:.2g}" for name, sigma in zip(PARAMETERS, calibration.deviations, strict=False))
     lines = [f"Written by harvey calibrate: {len(calibration.views)} views, {calibration.rms_px:.3f} px RMS.",
@@ -167,7 +167,7 @@ def _print_status(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-CALIBRATE = CliCommand(
+COMMAND = CliCommand(
     "calibrate", "measure a camera: lens, distortion, mounting",
     (
         ("harvey calibrate --board board.pdf", "the board, to be printed"),

@@ -16,16 +16,8 @@ from PIL import Image
 from harvey.errors import BadInput
 from harvey.hardware.drivers.capture import CameraFault
 from harvey.hardware.drivers.video_camera import VideoCamera
-from knowledge_sources.methods.calibration import (
-    PARAMETERS,
-    BoardView,
-    Calibration,
-    Mounting,
-    Pattern,
-    calibrate,
-    estimate_mounting,
-    find_board,
-)
+from harvey_survey.intrinsics import PARAMETERS, BoardView, Calibration, Pattern, calibrate, find_board
+from harvey_survey.mounting import Mounting, estimate_mounting
 from knowledge_sources.methods.features import read_picture
 from world_models.camera import CameraDeviation, CameraMount
 from world_models.words import by_numbers, count

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from experiments.generated.scenes import board_picture, board_renderer, board_view
 from experiments.report import Cell, Report
-from knowledge_sources.methods.calibration import PARAMETERS, BoardView, Calibration, Pattern, calibrate, find_board
+from harvey_survey.intrinsics import PARAMETERS, BoardView, Calibration, Pattern, calibrate, find_board
+from harvey_survey.rendered_boards import board_picture, board_renderer, board_view
 from knowledge_sources.methods.features import read_picture
 from sim.render.optics import Optics
 from sim.render.renderer import Renderer
