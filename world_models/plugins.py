@@ -8,7 +8,7 @@
 ``harvey.emulators``          a ``sim.emulators.emulator.EmulatorKind``
 ``harvey.faults``             a class under ``sim.faults.fault.Fault``
 ``harvey.loggers``            a class under ``logs.recording.logger.Logger``
-``harvey.pages``              a ``harvey.runner.page_kind.PageKind``, named ``live``
+``harvey.pages``              a ``harvey.runner.teller.PageKind``, named ``live``
 ``harvey.workers``            a ``harvey.campaign.workers.ClusterWorkers``, named ``dask``
 ``harvey.commands``           a ``harvey.commands.command.CliCommand``; of a verb: ``world.import``
 ``harvey.renderers``          a ``sim.render.lights.LitRenderers``, named ``lit``

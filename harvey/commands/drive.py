@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from harvey.agent_settings import Pairs
     from harvey.hardware.hardware_mission import HardwareMission
     from harvey.hardware.preflight import Check, Preflight
-    from harvey.runner.page_kind import PageKind
     from harvey.runner.ports import Body
     from harvey.runner.result import MissionResult
+    from harvey.runner.teller import PageKind
     from world_models.robot import RobotModel
 
 PORT = 8750
@@ -62,7 +62,7 @@ def _run(args: Namespace) -> int:
     from harvey.hardware.hardware_mission import FORMAT
     from harvey.hardware.preflight import Preflight
     from harvey.replay.what_if import WhatIf
-    from harvey.runner.page_kind import find_page
+    from harvey.runner.teller import find_page
 
     page = None if args.serve is None else find_page("--serve")
     settings, numbers = split_settings(dict(parse_pairs(args.settings)), FORMAT.keys())

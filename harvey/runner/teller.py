@@ -1,14 +1,22 @@
-"""Teller: what somebody tells the robot on the way: ``[[told]]`` of a mission's file, or what a live page hears."""
+"""Teller: what somebody tells the robot on the way: ``[[told]]`` of a mission's file, or what a live page hears.
+
+A live page also shows the run, and lets people pause and stop it: an extra brings it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from typing import Any
 
 from blackboard import Post, Scheduler
+from harvey.errors import BadInput
 from world_models.entries import Redirection, UserReport
 from world_models.files.toml.mission import Telling
+from world_models.plugins import PAGES_GROUP, list_absent, load_plugins
 
 USER, PAGE, SOMEBODY = "user", "live page", "harvey tell"
 """Who tells: the mission's file, or somebody while the run goes on."""
@@ -82,3 +90,29 @@ class FileTeller:
 def _count_tellings(scheduler: Scheduler) -> int:
     """How much of a mission's file the board was told."""
     return len(scheduler.view.all(UserReport)) + len(scheduler.view.where(Redirection, lambda asked: asked.by == USER))
+
+
+LIVE = "live"
+"""Its name, as an entry point."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageKind:
+    """A kind of live page.
+
+    Attributes:
+        serve: ``serve(port, world, lens, title, *, host, token, part)`` serves the page of one run while the block
+            lasts. It gives an object with ``live`` (a sink of the run; ``live.end(text)`` tells how it ended),
+            ``teller.tell`` (what is said to the run), ``guard(body, tick)`` (the body behind its gate) and ``gate``
+            (``on_stop`` is called when somebody stops the run, ``state`` is how it stands).
+    """
+
+    serve: Callable[..., AbstractContextManager[Any]]
+
+
+def find_page(asked_by: str) -> PageKind:
+    """The page that is installed. Raises BadInput, which says what to install, where there is none."""
+    if needs := list_absent(PAGES_GROUP).get(LIVE):
+        raise BadInput(f"{asked_by} needs {needs}")
+    page: PageKind = load_plugins(PAGES_GROUP, PageKind, LIVE)[LIVE]
+    return page

@@ -9,9 +9,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from socket import socket
 
-from harvey.runner.page_kind import PageKind
 from harvey.runner.ports import Body
-from harvey.runner.teller import LiveTeller
+from harvey.runner.teller import LiveTeller, PageKind
 from harvey_serve.app import LOCAL_HOSTS, build_app, refuse_goal
 from harvey_serve.live_state import LiveState
 from harvey_serve.run_gate import Gate, GatedBody, do_nothing
@@ -90,7 +89,7 @@ def open_page(
 def serve_page(
     port: int, world: World, camera: Camera, title: str, *, host: str = "127.0.0.1", token: str = "", part: str = "",
 ) -> Iterator[LivePage]:
-    """Serve the page of a run that can be paused and stopped; see :class:`harvey.runner.page_kind.PageKind`."""
+    """Serve the page of a run that can be paused and stopped; see :class:`harvey.runner.teller.PageKind`."""
     with open_page(bind(host, port), world, camera, title, gate=Gate(), part=part, token=token) as page:
         yield page
 

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from experiments.report import Cell, Report
-from harvey.runner.page_kind import find_page
+from harvey.runner.teller import find_page
 from harvey.simulation.simulated_run import build_head, run_mission
 from harvey_serve import watcher_clients
 from sim.scenario import load_scenario

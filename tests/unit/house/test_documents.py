@@ -22,7 +22,7 @@ TESTED = {
     "python": ("README.md", "docs/start.md", "docs/course/", "docs/how-to/knowledge-source.md", "docs/locale-frames.md",
                "blackboard/README.md"),
     "toml": ("docs/hardware.md", "docs/how-to/README.md", "docs/missions.md", "docs/locale-frames.md",
-             "docs/how-to/ros2.md", "docs/how-to/own-simulator.md"),
+             "docs/how-to/ros2.md", "docs/how-to/own-simulator.md", "extras/harvey-words/README.md"),
     "console": ("docs/background/faq.md",),
     "{code-block}": ("docs/tutorials/",),
     "{toctree}": ("docs/index.md", "docs/course/index.md"),
