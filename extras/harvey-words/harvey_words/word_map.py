@@ -20,8 +20,8 @@ from world_models.building.world import World, words_about
 Point = tuple[float, float]
 HALL_WORDS = frozenset(("hall", "crossing", "corner", "end"))
 """Meanings in a locale's kind or name that make it a place to walk along."""
-LONG_RATIO, TILE_RATIO = 3.0, 1.1
-"""Length over width of what is a hall by its form; and of a hall that is no longer than a crossing."""
+LONG_RATIO, TILE_RATIO, SQUARE = 3.0, 1.6, 1.1
+"""Length over width of what is a hall by its form; and of a crossing, if all halls beside it are larger, and if not."""
 WALKED_M = 1.2
 """An opening ahead no further to the side than this is walked on through."""
 COLOUR_REACH = 0.3
@@ -144,8 +144,14 @@ class WordMap:
         is_hall = bool(kind & HALL_WORDS) or length > LONG_RATIO * width or (
             bool(doors) and all(self._is_plain(locale.name, door) for door in doors))
         floor = self._surfaces.get(f"{locale.name}/floor", [])
-        return Area(locale.name, is_hall, is_hall and length < TILE_RATIO * width, turned(axis, 0.0),
+        is_small = all(self._size(locale.name) < self._size(door.other(locale.name)) for door in doors)
+        is_short = length < (TILE_RATIO if is_small else SQUARE) * width or bool(
+            self.lexicon.meanings(locale.kind) & (HALL_WORDS - {"hall"}))
+        return Area(locale.name, is_hall, is_hall and is_short, turned(axis, 0.0),
                     (float(x), float(y)), (length, width), meanings | _textures(floor), _colours(floor))
+
+    def _size(self, locale: str) -> float:
+        return float(np.prod(np.ptp(np.asarray(self.world.outline(locale), float), axis=0)))
 
     def _is_plain(self, locale: str, door: Doorway) -> bool:
         """Whether a doorway is an opening without a frame."""
