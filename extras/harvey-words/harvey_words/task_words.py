@@ -15,7 +15,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from harvey_words.lexicon import edit_distance
 from harvey_words.task_entries import Step
 
 START, HOME = "start", "home of"  # for words of a place: where it was told, and where the model says a thing is kept
@@ -114,6 +113,8 @@ class _ClauseReader:
             return
         self.verb, rest = self._find_verb(clause)
         parts = _Parts(" ".join(token.text for token in rest)).read(rest)
+        if (parts.seconds and self.verb != "wait") or (parts.rounds and self.verb not in ("go", "patrol")):
+            raise TaskWordsError(f"expected a time with 'within' or 'wait', and times to go, got {parts.text!r}")
         if is_instead:
             places = parts.places or [START] * (self.verb == "return")
             if self.verb not in ("go", "return") or len(places) != 1:
@@ -132,8 +133,7 @@ class _ClauseReader:
         if first.sort == "VERB":
             return first.meaning, clause[1:]
         verbs = {phrase[0]: verb for phrase, (sort, verb) in _phrases().items() if sort == "VERB" and len(phrase) == 1}
-        near = [verb for verb in verbs if len(first.text) > 3 and edit_distance(first.text, verb, 1) <= 1]
-        if first.sort == "NAME" and near:
+        if first.sort == "NAME" and (near := get_close_matches(first.text, sorted(verbs), 1, 0.8)):
             return verbs[near[0]], clause[1:]
         if first.text and (self.verb == "go" or (not self.verb and first.meaning == "to")):
             return "go", clause
@@ -227,14 +227,14 @@ class _Parts:
                 self.rounds = int(token.meaning)
             elif token.meaning in ("me", "return"):
                 self.recipient = START
-                self.places += [START] * (token.meaning == "me")
+                self.places += [START] * (token.meaning == "me" and role != "for")
             self.is_it, self.in_order = self.is_it or token.meaning == "it", self.in_order or token.meaning == "order"
             role = role if token.meaning == "every" else token.meaning
         return self
 
     def _name(self, role: str, phrase: str) -> None:
-        {"from": self.origins, "via": self.via}.get(role, self.places).append(phrase)
-        if role == "to":
+        {"from": self.origins, "via": self.via, "for": []}.get(role, self.places).append(phrase)
+        if role in ("to", "for"):
             self.recipient = phrase
         elif role not in ("from", "via"):
             self.thing, self.recipient = phrase, self.recipient or self.thing
