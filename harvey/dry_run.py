@@ -268,7 +268,7 @@ def _repeat(robot: RobotModel, locale: str, pose: Pose2) -> Iterator[Pose2]:
 def format_previews(ahead: Sequence[MilestonePreview]) -> str:
     """The milestones to come, one a row."""
     columns = ("milestone", "in", "x m", "y m", "looking", "landmarks", "lines", "place mm", "heading deg",
-               "p wrong", "verdict")
+               "chance elsewhere", "verdict")
     return table(columns, [
         (p.what, p.locale, f"{p.x_m:.2f}", f"{p.y_m:.2f}", f"{math.degrees(p.look_heading_rad):.0f}",
          str(p.landmarks), str(p.lines), f"{p.sigma_m * 1000:.1f}", f"{math.degrees(p.sigma_rad):.2f}",

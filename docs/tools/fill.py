@@ -8,6 +8,7 @@ compares, so that no page tells of older code.
 from __future__ import annotations
 
 import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -44,12 +45,19 @@ def show_example(name: str) -> str:
     return f"```python\n{(ROOT / 'examples' / name).with_suffix('.py').read_text(encoding='utf-8')}```"
 
 
+def show_check() -> str:
+    """What the dry run of the flat's mission prints."""
+    command = [sys.executable, "-m", "harvey.cli", "run", "docs/flat/flat-sim.toml", "--check"]
+    printed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return f"```\n{printed.partition(chr(10) * 2)[0]}\n```"
+
+
 GENERATORS: Mapping[str, Callable[[], str]] = {
     "commands": describe_commands, "settings": describe_settings, "kinds": journal.describe_kinds,
     "shared-tables": describe_shared_tables, "hardware-tables": describe_hardware_tables,
     "scenario-tables": describe_scenario_tables, "faults": describe_faults, "world-keys": describe_world_keys,
     "frames": describe_frames, "python": describe_python, "knowledge-sources": describe_knowledge_sources,
-    "experiments": describe_experiments, "seeds": describe_seeds,
+    "check-flat": show_check, "experiments": describe_experiments, "seeds": describe_seeds,
     **{f"rows-{name}": partial(describe_rows, name)
        for name in ("table1", "figure12", "table2", "table3", "planning", "pose-speed")},
     "rows-fragments": partial(describe_rows, "table3", "60%"),
