@@ -75,13 +75,10 @@ def answer(source: KnowledgeSource, view: View, trigger: Change) -> tuple[Effect
 
 
 class Bench:
-    """A board on which a law puts what it needs, one cycle after the other.
+    """A board on which a law puts what it needs, one cycle after the other; ``revisions`` has all that ever was there.
 
     Args:
         robot: whose camera, wheels and footprint are put there, with all frames of its world; None for an empty board.
-
-    Attributes:
-        revisions: every revision that was ever on the board.
     """
 
     def __init__(self, robot: RobotModel | None = None) -> None:
@@ -188,13 +185,6 @@ def find_named(board: Blackboard, trigger: Change, effects: tuple[Effect, ...]) 
     return named
 
 
-def list_unnamed(board: Blackboard, used: Iterable[Ref], named: Collection[str], most: int) -> list[Entry[Any]]:
-    """The newest of each kind of what was used and is neither named nor traced; so many kinds."""
-    read = (board.current[ref.id] for ref in sorted(used) if ref.id not in named)
-    newest = {type(entry.value): entry for entry in sorted(read, key=lambda e: (e.cycle, e.id))}
-    return [entry for kind, entry in newest.items() if kind not in TRACED][:most]
-
-
 Break = Callable[[View], Iterable[Effect]]
 """Makes a condition false on a board on which it holds."""
 
@@ -269,7 +259,9 @@ def check_source(
     assert {type_of(e) for e in effects} <= set(one.writes), f"{who} writes what it does not declare"
     assert all(e.because for e in effects), f"{who} has an effect without a reason"
     copy_of(board).apply(effects, author=one.name, cycle=10**6)
-    for entry in list_unnamed(board, view.used, find_named(board, woken, effects), most_hidden):
+    read, named = (board.current[ref.id] for ref in sorted(view.used)), find_named(board, woken, effects)
+    newest = {type(e.value): e for e in sorted(read, key=lambda e: (e.cycle, e.id)) if e.id not in named}
+    for entry in [entry for kind, entry in newest.items() if kind not in TRACED][:most_hidden]:
         again = make_without(one, board, woken, entry.id)
         assert not again or set(made) <= set(again), f"{who} does not name {entry.ref}"
     for id in without:

@@ -41,24 +41,8 @@ def measure_coverage(tree: Path, home: Path, python: Path, files: Sequence[str],
         "OPENBLAS_NUM_THREADS": "1",
     }
     command = [
-        python,
-        "-m",
-        "pytest",
-        "-n",
-        "2",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "--durations=0",
-        "--durations-min=0",
-        "-rpfE",
-        "--tb=no",
-        "--cov",
-        f"--cov-config={settings}",
-        "--cov-context=test",
-        "--cov-report=",
-        *tests,
-    ]
+        python, "-m", "pytest", "-n", "2", "-q", "-p", "no:cacheprovider", "--durations=0", "--durations-min=0",
+        "-rpfE", "--tb=no", "--cov", f"--cov-config={settings}", "--cov-context=test", "--cov-report=", *tests]
     with (home / "tests.log").open("w") as log:
         subprocess.run([str(part) for part in command], cwd=tree, env=os.environ | own, stdout=log, check=False)
     told = (home / "tests.log").read_text("utf-8")

@@ -47,18 +47,8 @@ def _run(python: str, tests: list[str], tree: Path, cache: Path) -> int:
     """Run the tests until the first fails; with all that they started, they end after the time limit."""
     own = {"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [
-        python,
-        "-B",
-        "-m",
-        "pytest",
-        "-x",
-        "-q",
-        "--tb=line",
-        "-p",
-        "no:cacheprovider",
-        "--hypothesis-profile=mutants",
-        *tests,
-    ]
+        python, "-B", "-m", "pytest", "-x", "-q", "--tb=line", "-p", "no:cacheprovider",
+        "--hypothesis-profile=mutants", *tests]
     started = subprocess.Popen(command, env=os.environ | own, start_new_session=True)
     try:
         return started.wait(TIMEOUT_S)
