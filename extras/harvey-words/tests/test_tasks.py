@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from itertools import pairwise, permutations
 from pathlib import Path
@@ -54,6 +55,13 @@ def test_a_tour_is_the_shortest(n: int, seed: int) -> None:
     order = order_stops(ways, ends)
     assert sorted(order) == list(range(n))
     assert n > 6 or measure(order) == pytest.approx(min(map(measure, permutations(range(n)))))
+
+
+def test_the_scenario_of_the_readme_is_read() -> None:
+    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    block, = re.findall(r"^```toml\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)
+    read = parse_scenario(f'world = "two_ways"\ngoal = "(ptrans (reception (15,12,0)) (archive (9,6,0)))"\n{block}')
+    assert read.task == "Fetch the book" and [helper.room for helper in read.helper] == ["library"]
 
 
 def test_a_task_is_done_replayed_and_gone_on_with(tmp_path: Path) -> None:
