@@ -365,6 +365,8 @@ class _Reader:
             return  # it tells of the walk before
         elif wheres and self._is_walk_told(things, ways) and all(meaning == "past" for meaning, _ in wheres):
             self._note_before([one for _, one in wheres])
+        elif things and things[0].is_stretch and things[0].side in ("left", "right") and last and not things[0].count:
+            self._turn(things, [*ways, things[0].side], wheres)  # "then the flowers on the left"
         elif (things and ways and "unit" in things[0].heads) or (set(ways) & {"left", "right"} and any(
                 meaning in ("at", "on") for meaning, _ in wheres)):
             self._turn(things, ways, wheres)  # "left at the lamp", "right on the brick two"

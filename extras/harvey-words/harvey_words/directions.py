@@ -192,9 +192,6 @@ class _Teller:
             said += [f"Go on to the {word} hall." for word in self._words(
                 taken.meanings, [self.follower.hall_ahead(state).meanings])]
         said += [f"{one[:-1]}, past the {name}." for one in said[:2] for name in self._passed(state, length)]
-        at_end = State(*leg.end, state.heading)
-        said += [f"{one} There is a {word} hall on your {side} there." for one in said[:1]
-                 for side in ("left", "right") for word in self._sided(at_end, side)]
         metres = max(1, round(length))
         into_hall = [""] if state.came and onward is not None and length < OUT_M else []
         return [*into_hall, *said, *([""] if onward is not None and said else []),
@@ -225,13 +222,6 @@ class _Teller:
                      for name in self._marks_before(state, row, rank)]
         others = [sight.feature.meanings for sight in doors if sight.feature is not None and sight is not own]
         return said + [f"It is the {word} door{side}." for word in self._words(door.meanings, others)]
-
-    def _sided(self, state: State, side: str) -> list[str]:
-        """Words of the hall that leaves to a side."""
-        there = replace(state, heading=turned(state.heading, SIDES[side]))
-        if not any(is_along(way, there.heading) for way in self.follower.ways(there)):
-            return []
-        return self._words(self.follower.hall_ahead(there).meanings, [self.follower.hall_ahead(state).meanings])
 
     # -- what can be named -------------------------------------------------------------------------------------------
 

@@ -93,7 +93,15 @@ class WordFollower(WordDoors):
             elif act.way:
                 yield from self._turn_here_or_on(one, act)
             else:
-                yield from self.facings(replace(one, moving=False), act.along)
+                yield from self._take(one, act.along)
+
+    def _take(self, state: State, along: ThingWords | None) -> Iterator[State]:
+        """Facing a hall that is named, here or where it leaves further on."""
+        yield from self.facings(replace(state, moving=False), along)
+        for rank, sight in enumerate(self.nodes(state) if along is not None and along.names else ()):
+            cost = UNSAID_WALK * (not state.moving) + AGAIN * rank
+            there = self.stand(state, sight)
+            yield from self.facings(replace(there, moving=False, odds=there.odds + cost), along)
 
     def _turn_to(self, state: State, heading: float, act: Act, cost: float) -> Iterator[State]:
         """Turned to a heading, where the hall that is named begins if one is."""
