@@ -219,7 +219,7 @@ def test_a_line_that_was_cut_off_is_left_out(tmp_path: Path, capsys: pytest.Capt
 def test_an_empty_journal_is_no_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, err = said(capsys, ["why", journalled(tmp_path / "run")])
     assert code == 2
-    assert "journal.jsonl: expected at least one entry, got none" in err
+    assert "journal.jsonl: expected at least one decision, got none" in err
 
 
 def test_a_directory_of_runs_is_told_apart_from_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
