@@ -17,7 +17,7 @@ from harvey.campaign.workers import CaseAnswer, ClusterWorkers, Killed
 from harvey.commands.command import CliCommand, add_parser
 from harvey.errors import BadInput
 from sim.render.lighting import Lighting
-from sim.render.lights import LitRenderers, Room, hang_lamps
+from sim.render.lights import LitRenderers, Room
 from sim.render.renderer import Renderer
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
@@ -66,8 +66,7 @@ def check_lit_renderers(renderers: LitRenderers) -> None:
     def see(**light: Any) -> NDArray[np.float32]:
         lighting = Lighting(**{"lamps": 0.0, "bounces": 1, "rays": 16, **light})
         renderers.check(lighting)
-        lamps = hang_lamps([room], lighting) if lighting.lamps else ()
-        return renderers.build(box_room(), lighting, [room], lamps, 4).radiance(camera, pose)
+        return renderers.build(box_room(), lighting, [room], 4).radiance(camera, pose)
 
     dark, even, lit, brighter = see(), see(flat=1.0), see(lamps=0.4), see(lamps=0.8)
     for picture in (dark, even, lit, brighter):

@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from harvey_light.hung_lamps import Lamp, hang_lamps
 from harvey_light.irradiance import SKY_COLOUR, SUN_COLOUR, compute_irradiance
 from harvey_light.light_map import LightMap, lay_light_map
 from harvey_light.lit_renderer import BakedLight, LitRenderer
@@ -19,7 +20,7 @@ from harvey_light.lit_shading import NO_MIRROR
 from harvey_light.path_traced import PathTracedRenderer
 from harvey_light.sun_patches import SunPatch, find_sun_patches
 from sim.render.lighting import GAMMA, Lighting
-from sim.render.lights import Lamp, Room
+from sim.render.lights import Room
 from sim.render.mesh import FaceLike, Mesh, build_mesh, join_meshes, plane_of
 from sim.render.rasterizer import sample_offsets
 from sim.render.textures import build_noise_table
@@ -52,9 +53,11 @@ class BakedRenderers:
         if lighting.traced_paths and find_spec("mitsuba") is None:
             raise ValueError("with traced_paths it needs Mitsuba: pip install './extras/harvey-light[photo]'")
 
-    def build(self, faces: Sequence[FaceLike], lighting: Lighting, rooms: Sequence[Room], lamps: Sequence[Lamp],
-              samples: int = 8) -> LitRenderer:
+    def build(
+        self, faces: Sequence[FaceLike], lighting: Lighting, rooms: Sequence[Room], samples: int = 8
+    ) -> LitRenderer:
         """The renderer of these faces under this light. Raises ValueError for a bad region or number of samples."""
+        lamps = hang_lamps(rooms, lighting) if lighting.lamps > 0.0 else ()
         return _Bake(lighting, rooms, self.folder).renderer(faces, lamps, samples)
 
 

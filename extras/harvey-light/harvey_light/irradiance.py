@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from harvey_light.hung_lamps import Lamp
 from harvey_light.light_map import LightMap
 from harvey_light.rays import RayTree, build_ray_tree, direct_light, first_hits, gather_hits
 from sim.render.lighting import GAMMA, Lighting
-from sim.render.lights import Lamp
 from sim.render.mesh import Mesh
 from sim.render.renderer import illumination
 

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from harvey_light.hung_lamps import Lamp
 from harvey_light.irradiance import SKY_COLOUR
 from harvey_light.lit_renderer import LitRenderer
 from sim.render.lighting import GAMMA, Lighting
-from sim.render.lights import Lamp
 from sim.render.mesh import Mesh, Pinhole
 from sim.render.renderer import HAZE_PER_M
 from world_models.camera import Camera

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,13 +15,14 @@ from numpy.typing import NDArray
 from box_rooms import box_faces, box_room
 from experiments.generated.scenes import Patch, PatchFace
 from harvey_light.baked import BAKED, find_panes
+from harvey_light.hung_lamps import Lamp, hang_lamps
 from harvey_light.irradiance import SUN_COLOUR, compute_irradiance
 from harvey_light.light_map import lay_light_map
 from harvey_light.lit_renderer import mirror_camera
 from harvey_light.rays import build_ray_tree, first_hits
 from harvey_light.sun_patches import find_sun_patches
 from sim.render.lighting import GAMMA, Lighting
-from sim.render.lights import Lamp, Room, hang_lamps
+from sim.render.lights import Room
 from sim.render.mesh import Pinhole, build_mesh
 from sim.render.renderer import Renderer
 from world_models.camera import Camera, CameraMount
@@ -159,8 +161,23 @@ def test_sun_patches_are_the_places_that_see_the_sun_through_the_pane(
 def test_the_sun_through_a_pane_adds_its_light_where_it_falls() -> None:
     faces = [f for f in box_room() if not f.front[0].name.startswith(("desk", "cabinet"))] + [pane()]
     sunny, plain = (BAKED.build(faces, Lighting(flat=0.3, lamps=0.0, sun=sun, bounces=0, sun_azimuth_rad=math.pi,
-                                                sun_elevation_rad=0.5), (), ()) for sun in (0.5, 0.0))
+                                                sun_elevation_rad=0.5), ()) for sun in (0.5, 0.0))
     above = len(plain.baked.seen_light)
     added = sunny.baked.seen_light[above:].astype(float) ** GAMMA
     np.testing.assert_array_equal(sunny.baked.seen_light[:above], plain.baked.seen_light)
     assert len(added) and np.all(added.max(axis=0) <= 0.3 + 0.5 * SUN_COLOUR + 1e-3)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.floats(1.0, 9.0), st.floats(1.0, 9.0), st.floats(0.8, 4.0), st.integers(0, 9))
+def test_lamps_hang_in_their_rooms_and_give_the_irradiance_asked_for(
+    length: float, width: float, spacing: float, seed: int
+) -> None:
+    outline = np.array([(0, 0), (length, 0), (length, width), (0, width)]) + np.array([3.0, -2.0])
+    lighting = Lighting(lamps=0.8, lamp_spacing_m=spacing, seed=seed)
+    lamps = hang_lamps((Room(outline, 0.0, 2.5),), lighting)
+    for lamp in lamps:
+        assert shapely.Polygon(outline).contains(shapely.Polygon(lamp.polygon_world[:, :2]))
+        assert np.all(lamp.polygon_world[:, 2] < 2.5)
+    if lamps:
+        assert sum(lamp.radiosity[0] * 0.36 for lamp in lamps) == pytest.approx(0.8 * length * width)

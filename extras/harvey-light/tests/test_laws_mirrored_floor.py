@@ -17,7 +17,7 @@ from knowledge_sources.methods.floor.relief import TwoPictures, find_relief
 from knowledge_sources.methods.floor.see_floor import GREY, find_unlike
 from knowledge_sources.methods.floor.standing_regions import compute_parallax_odds, find_regions
 from sim.render.lighting import Lighting
-from sim.render.lights import Room, hang_lamps
+from sim.render.lights import Room
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 
@@ -35,7 +35,7 @@ def views(gloss: float, thing: bool) -> tuple[NDArray[np.float32], NDArray[np.fl
                            colour=(0.1, 0.1, 0.1))
     room = Room(np.array([(0.0, 0.0), (9.0, 0.0), (9.0, 4.0), (0.0, 4.0)]), 0.0, 2.6)
     lighting = Lighting(flat=0.6 if thing else 0.0, lamps=0.0 if thing else 0.8, floor_gloss=gloss, lamp_spacing_m=2.6)
-    renderer = BAKED.build(faces, lighting, [room], hang_lamps([room], lighting) if lighting.lamps else ())
+    renderer = BAKED.build(faces, lighting, [room])
     before, now = Pose2(0.5, 2.0, 0.0), Pose2(1.1, 2.0, 0.0)
     pictures = []
     for pose in (now, before):

@@ -13,7 +13,7 @@ import pytest
 from box_rooms import box_room
 from harvey_light.baked import BakedRenderers
 from sim.render.lighting import Lighting
-from sim.render.lights import Room, hang_lamps
+from sim.render.lights import Room
 from sim.scenario import ScenarioError, parse_scenario
 from sim.stage import build_stage
 from world_models.camera import Camera, CameraMount
@@ -38,7 +38,7 @@ def test_the_fast_renderer_is_as_bright_as_the_path_tracer(tmp_path: Path, gloss
     pictures = []
     for paths in (0, 24):
         lighting = Lighting(lamps=0.8, floor_gloss=gloss, bounces=6, rays=256, cell_m=0.2, traced_paths=paths)
-        renderer = BakedRenderers(tmp_path).build(box_room(), lighting, [ROOM], hang_lamps([ROOM], lighting))
+        renderer = BakedRenderers(tmp_path).build(box_room(), lighting, [ROOM])
         pictures.append(renderer.radiance(CAMERA, pose))
         assert np.array_equal(renderer.radiance(CAMERA, pose), pictures[-1]), "a picture that is kept is the same"
     fast, traced = (np.minimum(cv2.GaussianBlur(picture, (0, 0), 3.0), 1.0) for picture in pictures)

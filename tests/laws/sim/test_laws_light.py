@@ -1,4 +1,4 @@
-"""Laws of light that is even, of the lamps, and of a camera that adapts; of baked light: extras/harvey-light/tests."""
+"""Laws of light that is even, and of a camera that adapts; of baked light: extras/harvey-light/tests."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from box_rooms import box_room
 from sim.render.auto_exposure import MAX_GAIN, MIN_GAIN, TARGET, AutoExposure, vignette
 from sim.render.lighting import GAMMA, UNEVEN, Lighting
-from sim.render.lights import Lights, Room, hang_lamps
+from sim.render.lights import Lights, Room
 from sim.render.renderer import Renderer
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose, Pose2
@@ -88,18 +87,3 @@ def test_vignetting_darkens_towards_the_corners_only(height: int, width: int, st
     factor = vignette(height, width, strength)[..., 0]
     assert factor.max() <= 1.0 and factor[height // 2, width // 2] > (1.0 - strength * 0.04) ** (1.0 / GAMMA) - 1e-6
     assert factor[0, 0] == factor.min() >= (1.0 - strength) ** (1.0 / GAMMA) - 1e-6
-
-
-@settings(deadline=None, max_examples=40)
-@given(st.floats(1.0, 9.0), st.floats(1.0, 9.0), st.floats(0.8, 4.0), st.integers(0, 9))
-def test_lamps_hang_in_their_rooms_and_give_the_irradiance_asked_for(
-    length: float, width: float, spacing: float, seed: int
-) -> None:
-    outline = np.array([(0, 0), (length, 0), (length, width), (0, width)]) + np.array([3.0, -2.0])
-    lighting = Lighting(lamps=0.8, lamp_spacing_m=spacing, seed=seed)
-    lamps = hang_lamps((Room(outline, 0.0, 2.5),), lighting)
-    for lamp in lamps:
-        assert shapely.Polygon(outline).contains(shapely.Polygon(lamp.polygon_world[:, :2]))
-        assert np.all(lamp.polygon_world[:, 2] < 2.5)
-    if lamps:
-        assert sum(lamp.radiosity[0] * 0.36 for lamp in lamps) == pytest.approx(0.8 * length * width)
