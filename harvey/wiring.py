@@ -42,6 +42,8 @@ def sources_of(module: ModuleType) -> list[type[KnowledgeSource]]:
 
 KNOWLEDGE_SOURCES: tuple[type[KnowledgeSource], ...] = tuple(_find_sources())
 """Every knowledge source. The order does not matter: control comes from triggers, ratings and levels."""
+OWN_KINDS: Registry = registry_of(KNOWLEDGE_SOURCES, KINDS)
+"""The kinds of entries of the project: documents tell of these, whatever else is installed."""
 
 
 def knowledge_sources(settings: Settings = DEFAULT) -> tuple[KnowledgeSource, ...]:

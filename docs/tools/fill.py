@@ -28,7 +28,7 @@ from docs.tools.site.python_page import describe_python
 from docs.tools.site.setting_tables import describe_settings
 from docs.tools.site.world_files import describe_world_keys
 from docs.tools.status import describe_experiments, describe_rows, describe_seeds
-from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds
+from harvey.wiring import KNOWLEDGE_SOURCES, OWN_KINDS
 from world_models import frames
 
 ROOT = Path(__file__).parents[2]
@@ -86,7 +86,7 @@ def list_pages() -> Iterator[Path]:
 def main() -> int:
     """Write what differs, and say which."""
     made = {path: fill(path.read_text(encoding="utf-8")) for path in list_pages()}
-    made |= {journal.SCHEMA: journal.format_schema(), PICTURE: draw_architecture(KNOWLEDGE_SOURCES, load_kinds())}
+    made |= {journal.SCHEMA: journal.format_schema(), PICTURE: draw_architecture(KNOWLEDGE_SOURCES, OWN_KINDS)}
     for path, text in made.items():
         if path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")

@@ -127,11 +127,9 @@ class MilestoneJudge(RobotKnowledgeSource):
             return verdict
         wrong = view.latest(Difference, lambda d: d.p_misled > MAX_P_RIVAL)
         rival = find_alias(view, case.fix, case.belief, weighed)
-        p, said = p_alias, _ = (0.0, "") if rival is None else (rival.p, rival.said)
-        of = "it is"
-        if wrong is not None and wrong.value.p_misled > p:
-            p, said = wrong.value.p_misled, f"{wrong.value.about} differs, {wrong.value.odds_in_words()}"
-            of = "that misleads"
+        p, said, of = p_alias, *_ = (0.0, "", "") if rival is None else (rival.p, rival.said, "it is")
+        if wrong is not None and (misled := wrong.value).p_misled > p:
+            p, said, of = misled.p_misled, f"{misled.about} differs, {misled.odds_in_words()}", "that misleads"
         if p <= MAX_P_RIVAL:
             return verdict
         reason = f"{verdict.reason}; but {said}: {tell_odds(p, MAX_P_RIVAL, of)}"

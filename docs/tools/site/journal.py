@@ -20,7 +20,7 @@ import numpy as np
 
 from blackboard import NOT_FINITE, Level, Role, kind_of
 from docs.tools.site.markdown import describe_fields, escape, summary, table
-from harvey.wiring import load_kinds
+from harvey.wiring import OWN_KINDS
 from logs.run_directory import JOURNAL_VERSION
 
 SCHEMA = Path(__file__).parents[2] / "reference" / "journal.schema.json"
@@ -39,7 +39,7 @@ SIMPLE: Mapping[Any, Mapping[str, Any]] = {
 
 def describe_kinds() -> str:
     """Every kind of entry by its role: what it is, and its fields."""
-    kinds = load_kinds()
+    kinds = OWN_KINDS
     return "\n".join(line for role, title in ROLES.items() for line in (
         f"## {title}", "", *(line for kind in kinds.of_role(role) for line in _describe(kind))))
 
@@ -73,7 +73,7 @@ def _name(hint: Any) -> str:
 def build_schema() -> dict[str, Any]:
     """The JSON Schema of one line of ``journal.jsonl``. Kinds of entries of other packages are let through."""
     parts: dict[str, Any] = {}
-    kinds = load_kinds()
+    kinds = OWN_KINDS
     by_type = [{"if": {"properties": {"type": {"const": name}}},
                 "then": {"properties": {"value": _schema(kind, parts)}}} for name, kind in sorted(kinds.items())]
     texts = {name: {"type": "string"} for name in ("type", "author")}

@@ -9,7 +9,7 @@ import pytest
 
 from docs.tools.architecture_picture import PICTURE, draw_architecture, name_of
 from docs.tools.fill import GENERATORS, MARKED, fill, list_pages
-from harvey.wiring import KNOWLEDGE_SOURCES, load_kinds
+from harvey.wiring import KNOWLEDGE_SOURCES, OWN_KINDS, load_kinds
 from world_models.plugins import EXTRAS, list_absent
 
 ROOT = Path(__file__).parents[3]
@@ -112,6 +112,6 @@ def anchors_of(document: Path) -> set[str]:
 def test_the_picture_is_the_one_that_the_classes_give() -> None:
     """It names every knowledge source and every kind of entry."""
     picture = PICTURE.read_text(encoding="utf-8")
-    assert picture == draw_architecture(KNOWLEDGE_SOURCES, load_kinds())
+    assert picture == draw_architecture(KNOWLEDGE_SOURCES, OWN_KINDS)
     words = {name for text in re.findall(r"<text[^>]*>([^<]*)</text>", picture) for name in text.split(" · ")}
-    assert words >= {name_of(source) for source in KNOWLEDGE_SOURCES} | set(load_kinds())
+    assert words >= {name_of(source) for source in KNOWLEDGE_SOURCES} | set(OWN_KINDS)
