@@ -8,7 +8,7 @@ from typing import Any
 
 from blackboard import Blackboard, Entry, Index, Level, View
 from world_models import words
-from world_models.building.locale_frame import CHANGED, FRAME_OF, LocaleFrame
+from world_models.building.locale_frame import CHANGED, FRAME_OF, REDRAWN, LocaleFrame
 from world_models.building.model_errors import WALL
 from world_models.entries import (
     GO_ON,
@@ -70,7 +70,7 @@ def find_difference(view: View, about: str) -> Difference:
 
 def name_model(view: View) -> str:
     """What the difference of the whole building is called: of a model whose walls are redrawn little is known yet."""
-    walls = {change.name for frame in view.having(CHANGED, True) for change in frame.value.changes
+    walls = {change.name for frame in view.having(REDRAWN, True) for change in frame.value.changes
              if change.what == "beside" and WALL in change.name}
     return f"{MODEL} with {words.count(len(walls), 'wall')} redrawn" if walls else MODEL
 

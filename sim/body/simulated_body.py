@@ -137,6 +137,11 @@ class SimulatedBody:
         return self._wheels.curvature_per_m
 
     @property
+    def speed_m_per_s(self) -> float:
+        """Of every move that is not asked to be slower."""
+        return self._wheels.parameters.speed_m_per_s
+
+    @property
     def missed_faults(self) -> tuple[str, ...]:
         """Which faults did not happen, or not as they were asked for, in words. Not for knowledge sources."""
         return (*self._missed, *(f"{fault.kind}: its moment did not come" for fault in self._schedule.pending))

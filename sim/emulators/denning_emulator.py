@@ -59,7 +59,7 @@ class InstantMotion(BaseMotors):
     """A simulated body's: a command is over at once, in the time of the body."""
 
     def __init__(self, body: SimulatedBody) -> None:
-        self._body = body
+        self._body, self.speed = body, body.speed_m_per_s
 
     def begin(self, command: MotorCommand) -> None:
         self.claim = self._body.execute(command)

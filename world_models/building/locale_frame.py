@@ -234,6 +234,9 @@ FRAME_OF: Index[LocaleFrame] = Index(LocaleFrame, lambda frame: frame.name, "fra
 """Frames by the name of their locale."""
 ROOT: Index[LocaleFrame] = Index(LocaleFrame, lambda frame: frame.locale.parent is None or None, "root")
 CHANGED: Index[LocaleFrame] = Index(LocaleFrame, lambda frame: bool(frame.changes) or None, "changed")
+REDRAWN: Index[LocaleFrame] = Index(
+    LocaleFrame, lambda frame: any(change.what == "beside" for change in frame.changes) or None, "redrawn")
+"""Frames in which a door or a wall stands elsewhere."""
 
 
 def has_answer(frame_request: FrameRequest) -> bool:

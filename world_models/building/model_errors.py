@@ -142,7 +142,8 @@ def find_sigma_m(building: Building, locale: str, name: str = "") -> float:
 def _find_modes(building: Building, mark: Landmark, unstated_m: float) -> Mapping[str, Floats]:
     """For each mode of a landmark, by name, the displacement (lines, 3) of its lines [m, world]."""
     own_m, walls_m = (find_sigma_m(building, mark.locale, name) or unstated_m for name in (mark.name, ""))
-    if not own_m and not walls_m and not building.frame(mark.locale).changes:
+    is_redrawn = any(change.what == "beside" for change in building.frame(mark.locale).changes)
+    if not own_m and not walls_m and not is_redrawn:
         return {}
     return building.cached("model errors", MAX_MARKS, (mark.name, unstated_m),
                            lambda: _compute_modes(building, mark, own_m, walls_m, unstated_m))

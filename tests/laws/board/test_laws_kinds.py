@@ -131,9 +131,9 @@ def test_every_kind_says_what_it_is_in_one_sentence_of_its_own(kind: type[Any]) 
 
 def test_what_a_knowledge_source_writes_from_outside_is_an_observation_or_a_request() -> None:
     """Nobody on the board makes up what a port alone can know; it may close a fault, correct a frame, learn of the
-    camera, take up what was told.
+    camera and of the wheels, take up what was told.
     """
-    only_revised = {"BodyFault", "CameraState", "LocaleFrame", "UserReport", "Redirection"}
+    only_revised = {"BodyFault", "CameraState", "LocaleFrame", "UserReport", "Redirection", "Wheels"}
     sources = knowledge_sources()
     written = {kind for source in sources for kind in source.writes}
     posted_by_ports = {kind for kind in ALL if kind_of(kind).role is Role.OBSERVATION}

@@ -95,7 +95,7 @@ def test_without_an_expert_the_simulated_robot_goes_on_by_itself(
     assert printed.startswith(f"{out / 'ways.png'}: both ways on the plan")
     with Image.open(out / "ways.png") as picture:
         colours = set(map(tuple, np.asarray(picture.convert("RGB")).reshape(-1, 3).tolist()))
-    assert {(0x00, 0x63, 0xA0), (0xB3, 0x24, 0x0F)} <= colours
+    assert {(0x1F, 0x77, 0xB4), (0xFF, 0x7F, 0x0E)} <= colours
     assert "as recorded:              reached" in printed and "the simulated robot went on by itself" in printed
     records, others = (list(Timeline(d / "journal.jsonl").decisions()) for d in (run.path, out))
     assert not any(e.author == "correlator_tracker" for record in others for e in record.made)

@@ -55,7 +55,8 @@ def test_a_landmark_that_is_taken_away_is_a_revision_of_its_locales_frame(
     assert revision.because == (f"{frame}.0",) and answer.revised == (revision.ref,)
     assert revision.fields["locale"] == "allens-office"
     assert revision.fields["changes"] == [
-        {"what": "removed", "name": DESK, "by": "what if", "footprint": [], "height_m": 0.0}]
+        {"what": "removed", "name": DESK, "by": "what if", "footprint": [], "height_m": 0.0,
+         "by_m": [0.0, 0.0], "sigma_m": 0.0}]
     observed = next(r.observed for r in Timeline(other.journal).decisions() if revision in r.observed)
     assert f"{frame}.0" in [entry.ref for entry in observed]
     expects = [json.dumps(e.fields) for r in Timeline(other.journal).decisions() for e in r.made

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -157,10 +158,11 @@ def test_replay_names_a_camera_file_that_is_too_short(
     short = copied(run, tmp_path / "short", journal=(run / "journal.jsonl").read_text())
     pictures = (short / "camera.mjpeg").read_bytes()
     (short / "camera.mjpeg").write_bytes(pictures[:left])
-    told = f"camera.mjpeg: expected {len(pictures)} bytes of pictures that the journal tells of, got {left}"
+    told = rf"camera.mjpeg: expected (\d+) bytes of pictures that the journal tells of, got {left}"
     for more in ([], ["--without", "plan_adjuster", "--record-only"]):
         assert main(["replay", str(short), *more]) == 2
-        assert told in capsys.readouterr().err
+        found = re.search(told, capsys.readouterr().err)
+        assert found is not None and left < int(found[1]) <= len(pictures)  # the last may have come after the end
 
 
 def test_a_run_that_was_cut_off_says_so_first(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
