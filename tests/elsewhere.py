@@ -28,13 +28,20 @@ def drive_elsewhere(python: str | Path, out: Path) -> None:
 
 
 def install_elsewhere(folder: Path, *wheels: Path, with_needs: bool = True) -> Path:
-    """A fresh environment with wheels; returns its packages. What these need are the packages of this environment."""
+    """A fresh environment with wheels; returns its packages. What these need are the packages of this environment, but
+    for those of the project that are installed here.
+    """
     venv.create(folder, with_pip=False)
     subprocess.run([sys.executable, "-m", "pip", "--python", folder / "bin" / "python", "install", "--quiet",
                     "--no-deps", "--no-index", *wheels], check=True, capture_output=True, timeout=300)
     site = Path(sysconfig.get_path("purelib", vars={"base": str(folder), "platbase": str(folder)}))
     if with_needs:
-        (site / "needed.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+        needed = folder / "needed"
+        needed.mkdir()
+        for package in Path(sysconfig.get_path("purelib")).iterdir():
+            if not package.name.startswith(("harvey", "__editable__")):
+                (needed / package.name).symlink_to(package)
+        (site / "needed.pth").write_text(f"{needed}\n", encoding="utf-8")
     return site
 
 

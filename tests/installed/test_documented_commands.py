@@ -39,6 +39,7 @@ NOT_RUN = {
     r"^(make|cd|cp) ": "a shell; the targets of make are looked for",
     r"\.(ifc|gml)\b": "a building by others; the tests of harvey-buildings make some",
     r"harvey follow (BAG|ros2:|drive.mp4|pictures)": "a robot, or a recording; the tests of harvey-ros2 make some",
+    r"harvey tell runs/": "a run that goes on; the tests of what is told start one",
     r"traced_paths": "the path tracer",
     r"harvey serve runs/": "a run that another command is driving; the tests of harvey-serve drive one",
     r"--go-on": "a campaign that was cut off; the laws of campaigns cut many off",
