@@ -32,7 +32,7 @@ from knowledge_sources.reads import (
     find_robot_in,
     find_search_here,
     has_only_turned,
-    open_discrepancy,
+    open_discrepancies,
 )
 from knowledge_sources.reads.place_believed import MAX_P_RIVAL
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -89,11 +89,11 @@ class MilestoneJudge(RobotKnowledgeSource):
         return Case(trigger.entry, match, segments, frame, milestone, HELD.of(view).entry)
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        milestone = case.milestone
-        weighed = self.weigh(view, case)
+        milestone, weighed = case.milestone, self.weigh(view, case)
         verdict = self._hold_against_others(view, case, weighed, judge_place(weighed))
         verdict = self._hold_against_single_lies(case, weighed, verdict)
-        because = case.fix, milestone, *find_followed(view), *view.all(Travel), *view.all(Difference)
+        because = (case.fix, milestone, *find_followed(view), *view.all(Travel), *view.all(Difference),
+                   *open_discrepancies(view))
         certificate = Post(certify((milestone.id, case.fix.id), weighed, verdict, case.fix.value), because)
         yield certificate
         yield Revise(milestone, replace(milestone.value, status=verdict.kind), (certificate,))
@@ -111,12 +111,12 @@ class MilestoneJudge(RobotKnowledgeSource):
         """What the picture says, with the camera as it was solved for, and with what was believed before."""
         s, fix, belief, camera = self._settings, case.fix.value, case.belief.value, find_camera(view)
         robot = find_robot_in(view, belief.locale, camera.moved(fix.camera_step) if fix.camera_step else None)
-        known = compute_camera_covariance(camera)
-        covariance = belief.covariance_world(robot.world)
+        known, covariance = compute_camera_covariance(camera), belief.covariance_world(robot.world)
         if fix.camera_step:
             covariance = add_yaw(covariance, np.array(fix.camera_covariance), known)
         before = Before(
-            belief.world_from_robot(robot.world), covariance, open_discrepancy(view, Level.PLAN) is not None,
+            belief.world_from_robot(robot.world), covariance,
+            any(doubt.value.level is Level.PLAN for doubt in open_discrepancies(view)),
             bool(find_followed(view)), has_only_turned(view, belief), is_camera_known(robot, known))
         seen = PictureEvidence(case.frame.value.jpeg, case.segments.value, case.milestone.value, fix)
         return weigh_picture(robot, seen, before, s)

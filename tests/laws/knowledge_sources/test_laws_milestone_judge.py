@@ -63,7 +63,14 @@ from knowledge_sources.methods.verification.weigh import (
     _sum_log_odds,
 )
 from knowledge_sources.milestone.milestone_judge import Case, MilestoneJudge
-from knowledge_sources.reads import find_belief, find_camera, find_followed, find_p_not_alias, place_believed
+from knowledge_sources.reads import (
+    find_belief,
+    find_camera,
+    find_followed,
+    find_p_not_alias,
+    open_discrepancies,
+    place_believed,
+)
 from knowledge_sources.reads.place_believed import MAX_P_FALSE_CLEAR, MAX_P_FALSE_UNMISTAKABLE, MAX_P_RIVAL
 from knowledge_sources.reads.questions import HELD, MIN_FOLLOWED_LANDMARKS
 from knowledge_sources.settings import DEFAULT, Settings
@@ -349,7 +356,8 @@ def test_what_it_writes_follows_from_the_verdict(judged: list[Judged], in_doubt:
             board.apply([Post(Discrepancy(Level.PLAN, "by a law", 9.0, (0.0, 30.0), "px"))], author="test", cycle=10**6)
         case, weighed, effects = judge_on(Judged(board, one.trigger))
         said = effect_on(effects, Certificate)
-        followed = {entry.id for entry in (*find_followed(board.view), *board.view.all(Travel))}
+        followed = {entry.id for entry in (
+            *find_followed(board.view), *board.view.all(Travel), *open_discrepancies(board.view))}
         assert reasons(said) == {case.fix.id, case.milestone.id, *followed}
         assert (said.value.milestone, said.value.fix) == (case.milestone.id, case.fix.id)
         off = case.fix.value.world_from_robot.minus(case.belief.value.world_from_robot(weighed.robot.world))
