@@ -35,7 +35,7 @@ from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, find_camera, find_difference, find_robot, name_model, tell_time_s
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.model_errors import INEXACT_M, LineErrors
-from world_models.entries import CameraState, Evidence, LineMatch, Milestone, PoseFix
+from world_models.entries import CameraState, Difference, Evidence, LineMatch, Milestone, PoseFix
 from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
 
@@ -92,6 +92,7 @@ class MedRAndT(RobotKnowledgeSource):
             match.value.lines_world[near], match.value.segments_px[near],
             [m.landmarks[m.landmark_of[i]] for i in match.value.pairs[near, 0]], robot.camera, robot.mount,
             np.zeros(len(known)) if moved is None else moved.step, here, belief.covariance, prior, known)
+        because = match, milestone, belief.entry, *view.where(Difference, lambda d: d.about == name_model(view))
         yield Post(
             PoseFix(
                 match.id, found.world_from_robot, frozen(covariance), near, frozen(found.residuals_px),
@@ -101,10 +102,10 @@ class MedRAndT(RobotKnowledgeSource):
                 0.0 if moved is None else moved.prior_chi2,
                 compute_protection(found.world_from_robot, covariance, rests),
             ),
-            (match, milestone, belief.entry),
+            because,
         )
         if evidence is not None:
-            yield Post(evidence, (match, milestone, belief.entry))
+            yield Post(evidence, because)
 
     def _weigh_model(
         self, view: View, match: Entry[LineMatch], camera: CameraState, here: Pose2, prior: Floats, errors: LineErrors
