@@ -28,6 +28,8 @@ DISTANCES = st.lists(st.none() | st.floats(0.0, 60.0), min_size=1, max_size=24)
 class StubBody:
     """Stops half way of every move, and feels what it is told to."""
 
+    speed_m_per_s = 0.6
+
     def __init__(self, contact: Contact | None, ranges: Ranges | None) -> None:
         self._contact, self._ranges = contact, ranges
 
