@@ -75,6 +75,8 @@ def test_a_repeated_denning_command_moves_once(monkeypatch: pytest.MonkeyPatch) 
 
 def test_over_a_body_that_acts_at_once_the_denning_reports_are_the_bodys_own() -> None:
     class Body:
+        speed_m_per_s = 0.5
+
         def execute(self, command: MotorCommand) -> MotionReport:
             return MotionReport(command.turn_rad * (1 + 2**-50), command.move_m / 3.0, 0.1 + 0.2, 1e-17)
 
