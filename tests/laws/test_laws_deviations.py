@@ -15,7 +15,7 @@ import shapely
 
 from generated_boards import LENGTH_M, WIDTH_M, Bench
 from harvey.testing import HALL, STUDY, plain_robot
-from knowledge_sources.methods.floor.found_things import find_same
+from knowledge_sources.methods.floor.footprints import find_same
 from knowledge_sources.methods.pose.displacements import _find_candidates
 from knowledge_sources.model.door_toucher import door_toucher
 from world_models.actuator import ActuatorModel
