@@ -30,11 +30,6 @@ class WordDoors(WordSights):
     def find(self, state: State, what: ThingWords) -> Iterator[State]:
         """At each door, or thing, that may be meant."""
         if what.heads & {"crossing", "corner", "end"} and not what.heads & {"door"}:
-            for facing in self.facings(state, None):
-                if not what.names:
-                    yield from self.reach(facing, what)
-                for node in self.nodes(facing) if what.names else ():
-                    yield from self._named_crossing(replace(self.stand(facing, node), moving=False), what)
             yield from self._anywhere(state, what)
             return
         if not self.area(state).is_hall:
@@ -110,10 +105,6 @@ class WordDoors(WordSights):
             open_rank = opened.index(sight) + 1 if sight in opened else 0
             only_open = any(word.meaning == "open" for word in what.names)
             own = self._weigh_rank(what, rank, len(row), open_rank, len(opened), only_open)
-            if not sided and what.count:
-                same = [one for one in row if one.side == sight.side]  # "the next" may be that of its side
-                rank = same.index(sight) + 1
-                own = max(own, self._weigh_rank(what, rank, len(same), 0, 0, only_open) - 0.5)
             cost += own
         between = [other for relation, other in what.relations if relation == "between"]
         if len(between) == 2:

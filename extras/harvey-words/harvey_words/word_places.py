@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from harvey_words.matching import Senses, WordMatcher
-from harvey_words.told_acts import COMPASS, ThingWords
+from harvey_words.told_acts import ThingWords
 from harvey_words.word_map import (
     Area,
     NamedFeature,
@@ -201,10 +201,8 @@ class WordPlaces:
                 cost = -0.4
             if state.moving and abs(turn) > 2.3:
                 cost *= 2.0  # nobody turns back in the middle of a walk and says nothing of it
-            if along is not None and (along.names or along.side in COMPASS):
+            if along is not None and along.names:
                 fit, senses = self.match.fit_area(along, self.hall_ahead(new), state.senses)
-                if along.side in COMPASS:
-                    fit += 0.0 if is_along(POINTS[along.side], way) else WRONG_SIDE
                 new = replace(new, senses=senses)
                 cost = 0.5 * cost + fit
             if not is_along(way, state.heading):
