@@ -52,7 +52,7 @@ class WordDoors(WordSights):
             return
         for area in self.plan.areas.values():
             here = replace(state, locale=area.name, at=area.middle, odds=state.odds + UNTOLD, moving=False, door="")
-            here = replace(here, way=(*state.way, (area.name, round(area.middle[0], 2), round(area.middle[1], 2))))
+            here = replace(here, way=state.by(area.name, area.middle))
             if what.heads & {"crossing", "corner", "end"}:
                 if area.is_tile and (area.meanings & {"crossing", "corner"} or len(self.ways(here)) != 2):
                     yield from self._named_crossing(here, what)
@@ -180,4 +180,4 @@ class WordDoors(WordSights):
         locale = feature.beyond if feature.is_open and feature.beyond else sight.locale
         at = moved(feature.at, heading, 0.5) if feature.is_open else front.at
         return replace(front, locale=locale, at=at, heading=heading, odds=odds, senses=senses, moving=False,
-                       door=feature.name, way=(*front.way, (locale, round(at[0], 2), round(at[1], 2))))
+                       door=feature.name, way=front.by(locale, at, feature.name))
