@@ -393,10 +393,11 @@ class SimulatedBody:
         """Let the building change with time. What would be put where the robot stands waits until it has gone."""
         if self._building.at_time is None:
             return
-        now = self._building.at_time(self._truth.time_s)
         here = self._truth.world_from_robot
+        now = self._building.at_time(self._truth.time_s, here)
         if now is not self._building and not self._is_run_into(now.obstacles.clearance_m(here)):
             self._building = now
+            self._happened += now.news
 
     def _is_run_into(self, clearance_m: float) -> bool:
         return clearance_m < 0.0 and clearance_m < self._building.obstacles.clearance_m(self._truth.world_from_robot)
