@@ -127,13 +127,15 @@ class Pedestrian:
         if not towards.any():
             return (0.0, 0.0)
         force = drive(np.array(self.velocity), self.wanted_m_per_s, towards)
-        around = [(other.pose, other.velocity, 0.0) for other in others if other.floor_m == self.floor_m]
+        around = [(other.pose, np.array(other.velocity), 0.0) for other in others if other.floor_m == self.floor_m]
         if robot is not None and (self.makes_way or self.held_s > PATIENCE_S):
-            around.append((robot.pose, robot.velocity, ROBOT_RADIUS_M))  # the people of the model are points
+            # The people of the model are points, and one who stands still pushes nobody aside: the robot has a rim, and
+            # its step is that of the motion between the two.
+            around.append((robot.pose, np.array(robot.velocity) - self.velocity, ROBOT_RADIUS_M))
         for pose, theirs, wider_m in around:
             away = self.pose.position - pose.position
             away = away * max(0.1, 1.0 - wider_m / max(1e-9, float(np.hypot(*away))))
-            force = force + weigh_by_sight(repulse(away, np.array(theirs)), towards)
+            force = force + weigh_by_sight(repulse(away, theirs), towards)
         force = force + repulse_wall(nearest_wall(obstacles, self.pose))
         velocity = np.array(self.velocity) + duration_s * force
         speed = float(np.hypot(*velocity))
