@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -123,10 +123,11 @@ class Attendant(Bounded):
 @runtime_checkable
 class Company(Protocol):
     """A scenario's ``[[walkers]]``: an extra brings what reads them; what is read enters a building, for a run
-    with a seed. Both raise ValueError for what does not fit."""
+    with a seed. Both raise ValueError for what does not fit. An act of a knowledge source is charged so long [s]."""
 
     def read(self, node: Node) -> Company: ...
     def enter(self, building: SimulatedBuilding, world: World, seed: int) -> SimulatedBuilding: ...
+    def charge(self, who: str) -> float: ...
 
 
 FORMAT = MissionFormat(
@@ -187,26 +188,17 @@ def load_scenario(path_or_name: str | Path) -> Scenario:
                 raise ScenarioError(f"scenario: expected a name or a TOML file, got the directory {path_or_name}")
             near = suggest_keys(str(path_or_name), list_scenarios())
             raise ScenarioError(f"scenario: expected {near}, got {path_or_name!r}")
-    try:
-        return _scenario(Source.read(path), path.stem, path.parent)
-    except WorldError as error:
-        raise ScenarioError(str(error)) from None
+    return _scenario(lambda: Source.read(path), path.stem, path.parent)
 
 
 def parse_scenario(text: str, name: str = "scenario", folder: Path = SCENARIOS) -> Scenario:
     """Read a scenario from text; file names in it are relative to ``folder``. Raises ScenarioError."""
-    try:
-        return _scenario(Source.parse(text, name), name, folder)
-    except WorldError as error:
-        raise ScenarioError(str(error)) from None
+    return _scenario(lambda: Source.parse(text, name), name, folder)
 
 
 def scenario_from_tables(data: Mapping[str, Any], name: str, folder: Path) -> Scenario:
     """The scenario of tables as its source holds them. Raises ScenarioError."""
-    try:
-        return _scenario(Source(name, data), name, folder)
-    except WorldError as error:
-        raise ScenarioError(str(error)) from None
+    return _scenario(lambda: Source(name, data), name, folder)
 
 
 def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
@@ -215,28 +207,29 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     Raises:
         ScenarioError: a key is unknown (near ones are listed) or a value is of the wrong kind.
     """
+    return _scenario(lambda: FORMAT.with_settings(scenario.source, settings), scenario.name, scenario.folder)
+
+
+def _scenario(read: Callable[[], Source], name: str, folder: Path) -> Scenario:
     try:
-        return _scenario(FORMAT.with_settings(scenario.source, settings), scenario.name, scenario.folder)
+        source = read()
+        shared, node = FORMAT.read(source, name, folder), source.root
+        details = [item.text() for item in node["details"].items()] if "details" in node else []
+        if len(details) > MOST_DETAILS:
+            raise node["details"].fail(f"at most {MOST_DETAILS} files", str(len(details)))
+        return Scenario(
+            details=tuple(named_file(text, ROOT / "sim" / "buildings", folder) for text in details),
+            faults=tuple(read_fault(item) for item in node["faults"].items()) if "faults" in node else (),
+            helper=read_all(node, "helper", Attendant),
+            moved=read_all(node, "moved", MovedThing),
+            rides=read_all(node, "rides", Helper),
+            truth=read_settings(node["truth"], TruthTable) if "truth" in node else NO_DIFFERENCES,
+            light=read_settings(node["light"], Lighting) if "light" in node else None,
+            walkers=_read_walkers(node["walkers"]) if "walkers" in node else None,
+            **shared,
+        )
     except WorldError as error:
         raise ScenarioError(str(error)) from None
-
-
-def _scenario(source: Source, name: str, folder: Path) -> Scenario:
-    shared, node = FORMAT.read(source, name, folder), source.root
-    details = [item.text() for item in node["details"].items()] if "details" in node else []
-    if len(details) > MOST_DETAILS:
-        raise node["details"].fail(f"at most {MOST_DETAILS} files", str(len(details)))
-    return Scenario(
-        details=tuple(named_file(text, ROOT / "sim" / "buildings", folder) for text in details),
-        faults=tuple(read_fault(item) for item in node["faults"].items()) if "faults" in node else (),
-        helper=read_all(node, "helper", Attendant),
-        moved=read_all(node, "moved", MovedThing),
-        rides=read_all(node, "rides", Helper),
-        truth=read_settings(node["truth"], TruthTable) if "truth" in node else NO_DIFFERENCES,
-        light=read_settings(node["light"], Lighting) if "light" in node else None,
-        walkers=_read_walkers(node["walkers"]) if "walkers" in node else None,
-        **shared,
-    )
 
 
 def _read_walkers(node: Node) -> Company:

@@ -17,7 +17,6 @@
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
 ``harvey.run_exporters``      a ``logs.export.RunExporter``, named ``mcap``
 ``harvey.exporters``          a ``harvey_buildings.exporters.Exporter``
-``harvey.experiments``        a module as those of ``experiments``
 ============================  ==========================================================================
 
 An entry point's name is the one that Harvey knows. ``extras`` are added so too; one that is absent can be named.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harvey_people.charged import CHARGED_S, OTHERS_S
 from harvey_people.figure import Figure
 from harvey_people.peopled import people_building
 from harvey_people.walking import WIDTH_M, Pedestrian
@@ -83,6 +84,10 @@ class Walkers:
             raise ValueError("expected even light where people walk, got [light] that is not")
         people = tuple(self._enter(number, building, world, seed) for number in range(len(self.walkers)))
         return people_building(building, people, 0.0)
+
+    def charge(self, who: str) -> float:
+        """How long an act of a knowledge source takes [s]: people walk meanwhile."""
+        return CHARGED_S.get(who, OTHERS_S)
 
     def _enter(self, number: int, building: SimulatedBuilding, world: World, seed: int) -> Pedestrian:
         walker = self.walkers[number]

@@ -174,6 +174,9 @@ def test_who_walks_there_is_told_where_the_robot_is(monkeypatch: pytest.MonkeyPa
                 return replace(building, news=(f"seed {seed}",))
             return replace(building, at_time=follow)
 
+        def charge(self, _who: str) -> float:
+            return 0.0
+
     monkeypatch.setattr(scenario_file, "list_absent", lambda _group: {})
     monkeypatch.setattr(scenario_file, "load_plugins", lambda *_: {"walkers": Nobody()})
     body = build_stage(parse_scenario(text)).body(7)
