@@ -122,12 +122,13 @@ def _weigh_edge(places: Floats, segments: Floats) -> Floats | None:
     if abs(float((edge[-1] - edge[0]).mean(axis=0) @ across[middle])) < 2.0 * MIN_MOVE_PX:
         return None
     by = segments[:, 1] - segments[:, 0]
-    turned = np.abs(across @ (by / np.linalg.norm(by, axis=1)[:, None]).T)
-    beside = np.einsum("pc,psec->pse", across, segments[None] - edge[:, None, :1])
-    at = np.einsum("pc,psec->pse", along, segments[None] - edge[:, None, :1])
+    is_like = np.abs(across @ (by / np.linalg.norm(by, axis=1)[:, None]).T) <= math.sin(MAX_TURN_RAD)
+    some = is_like.any(axis=0)  # most lines of a picture are turned otherwise
+    off = segments[some][None] - edge[:, None, :1]
+    beside, at = (np.abs(np.einsum("pc,psec->pse", across, off)), np.einsum("pc,psec->pse", along, off))
     ends = np.clip(at, 0.0, lengths[:, None, None])
-    is_like = (turned <= math.sin(MAX_TURN_RAD)) & (np.ptp(ends, axis=2) >= MIN_COVERED * lengths[:, None])
-    away = np.where(is_like, np.abs(beside).max(axis=2), np.inf)
+    is_like = is_like[:, some] & (np.abs(ends[..., 1] - ends[..., 0]) >= MIN_COVERED * lengths[:, None])
+    away = np.where(is_like, np.maximum(beside[..., 0], beside[..., 1]), np.inf)
     chance = max(int(np.count_nonzero(away[middle] < NEAR_PX)), 1) / (2.0 * NEAR_PX)
     nearest = away.min(axis=1, initial=np.inf)
     found = np.exp(-0.5 * (nearest / EDGE_SIGMA_PX) ** 2) / (math.sqrt(math.tau) * EDGE_SIGMA_PX)
