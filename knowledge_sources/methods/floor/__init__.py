@@ -21,7 +21,7 @@ from knowledge_sources.methods.floor.see_floor import (
 )
 from knowledge_sources.methods.floor.rivals_on_floor import (
     MAX_FIXED_LOOKS, MIN_MOVED_M, MIN_OBSTACLE_CERTAINTY, enclose, explain_seen_elsewhere, explain_seen_in_patch,
-    explain_touch, find_fixed, is_behind, judge_by, judge_thing, take_as_jamb,
+    explain_touch, find_fixed, is_behind, judge_by, judge_thing,
 )
 from knowledge_sources.methods.floor.floor_map import CELL_M, FloorMap, P_CAMOUFLAGED, Sweep, find_blind, sample_sweep
 from knowledge_sources.methods.floor.looks_round import (
@@ -40,5 +40,5 @@ __all__ = [
     "find_fixed", "find_floor", "find_touched", "is_behind", "is_telling", "is_width", "judge_by", "judge_thing",
     "list_corners", "locate_touch", "may_be_there", "measure_approach_m", "measure_first_seen_m", "move_thing",
     "place_walls", "redraw", "redraw_door", "revise_by_difference", "revise_by_door", "revise_by_report",
-    "revise_by_thing", "sample_sweep", "see_free_floor", "see_ranges", "take_as_jamb", "touch_again", "touch_first",
+    "revise_by_thing", "sample_sweep", "see_free_floor", "see_ranges", "touch_again", "touch_first",
 ]
