@@ -181,7 +181,9 @@ class SimulatedRun(Run):
         self.simulated_body = body = stage.body(head.seed)
         self._drawn: tuple[tuple[Face, ...], tuple[Face, ...]] = (), ()
         self._line, self._contact_watch = ExitStack(), ContactWatch(agent.world, body)
-        self._happening_watch = HappeningWatch(body, stage.scenario.moved)
+        self._happening_watch, walkers = HappeningWatch(body, stage.scenario.moved), stage.scenario.walkers
+        if walkers is not None:  # people walk while it thinks
+            sinks = (lambda d: body.charge(walkers.charge(d.chosen.source.name) if d.chosen else 0.0), *sinks)
         reached = around(self._line.enter_context(open_body(body, head.body)), lambda: recorder.replaying)
         super().__init__(
             head, agent, reached, recorder, limits=stage.scenario.limits, clock=lambda: body.truth.time_s,

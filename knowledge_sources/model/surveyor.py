@@ -10,12 +10,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
-from knowledge_sources.methods.arrays import Floats, Mask
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import hedge
 from knowledge_sources.methods.calibration import MIN_MOVE_M, MIN_TURN_RAD, loosen
 from knowledge_sources.methods.features import SIGMA_ACROSS_PX
 from knowledge_sources.methods.pose import PlanarEstimate, find_beside, find_width, planar_from_lines, weigh_places
 from knowledge_sources.methods.pose.standing_beside import FoundBeside
+from knowledge_sources.methods.verification import list_names, predict_lines
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, find_difference, list_filed_doors
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
@@ -79,15 +80,16 @@ class Surveyor(RobotKnowledgeSource):
             yield Post(evidence, (case.fix, case.milestone, case.segments))
 
     def _survey_doors(self, view: View, case: Surveyed) -> Iterator[Evidence]:
-        m, filed = case.milestone.value, list_filed_doors(view)
-        doors = [filed[name] for name in m.landmarks if name in filed and case.is_sure]
-        if not doors:
+        filed = list_filed_doors(view)
+        if not case.is_sure:
             return
         place = self._solve_without(view, case, filed)
-        for door in doors:
+        lines = predict_lines(HELD.of(view).robot, place.world_from_robot)
+        names = np.array(list_names(lines))
+        for door in (filed[name] for name in dict.fromkeys(names.tolist()) if name in filed):
             along = np.array([*find_along(door), 0.0])
             sigma_m = math.sqrt(float(along[:2] @ place.covariance[:2, :2] @ along[:2]) + SHARED_SIGMA_M**2)
-            of_door = np.array([m.landmarks[i] == door.name for i in m.landmark_of])
+            of_door = lines.lines_world[names == door.name]
             sight = self._see(view, case, place.world_from_robot, of_door, along, door.name)
             found = find_beside(*sight, sigma_m) if sigma_m <= MAX_SIGMA_M else None
             yield from _tell(view, case, door.name, found, "jamb")
@@ -109,21 +111,21 @@ class Surveyor(RobotKnowledgeSource):
         rooms = dict.fromkeys(room for name in m.landmarks if (room := name.rpartition("/")[0]))
         for about, sides in (pair for room in rooms for pair in list_facing(building, room).items()):
             if all(side.mode in moved for side in sides):
-                here = case.fix.value.world_from_robot
-                seen = [weigh_places(*self._see(view, case, here, moved[side.mode], side.outward, side.mode))
+                here, expected = case.fix.value.world_from_robot, np.asarray(m.expected)
+                seen = [weigh_places(*self._see(view, case, here, expected[moved[side.mode]], side.outward, side.mode))
                         for side in sides]
                 if seen[0] is not None and seen[1] is not None:
                     found = find_width(seen[0], seen[1])
                     found = replace(found, sigma_m=math.hypot(found.sigma_m, SHARED_SIGMA_M))
                     yield from _tell(view, case, about, found, "wall")
 
-    def _see(self, view: View, case: Surveyed, here: Pose2, of: Mask, along: Floats, name: str) -> Sight:
-        """What a search for some of the expected lines from a pose goes by."""
+    def _see(self, view: View, case: Surveyed, here: Pose2, lines: Floats, along: Floats, name: str) -> Sight:
+        """What a search for lines (n, 2, 3) from a pose goes by."""
         robot = HELD.of(view).robot
         changes = (change for entry in view.all(LocaleFrame) for change in entry.value.changes)
         known_m = next((float(along[:2] @ change.by_m) for change in changes
                         if (change.what, change.name) == ("beside", name)), 0.0)
-        return (np.asarray(case.milestone.value.expected)[of], along, known_m, case.segments.value.segments_px,
+        return (lines, along, known_m, case.segments.value.segments_px,
                 robot.camera, robot.mount.camera_from_robot, here)
 
 

@@ -25,14 +25,12 @@ from knowledge_sources.methods.floor import (
     find_blind,
     find_floor,
     sample_sweep,
-    take_as_jamb,
 )
 from knowledge_sources.methods.motion import MAX_LOOK_ERROR_RAD, Clearance, choose_move, plan_turn
 from knowledge_sources.reads.conditions import Belief
 from knowledge_sources.reads.lost import locate_contact
 from knowledge_sources.reads.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings import ActionSettings, Settings
-from world_models.building.building import Building
 from world_models.building.locales import EXTRA_KIND
 from world_models.entries import (
     AROUND_SIGMA_RAD,
@@ -90,7 +88,7 @@ class FloorAhead:
         found = [shapely.Polygon(thing.footprint_world) for name in self._locales
                  for thing in self._robot.world.things_of(name) if thing.kind == EXTRA_KIND]
         self._tested = shapely.buffer(shapely.union_all([self._floor, *found]), -NEAR_MODEL_M)
-        self._suspected = _list_what_may_stand(view, self._robot.world)
+        self._suspected = _list_what_may_stand(view)
         self._touches = _list_touches(view, self._here)
         self._scans = _find_scans(view, belief, settings)
         self._discs = list_free_discs(view, self._robot, self._here, self._scans)
@@ -273,14 +271,12 @@ class FloorAhead:
         return tested.only(~free)
 
 
-def _list_what_may_stand(view: View, world: Building) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
+def _list_what_may_stand(view: View) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
     """What the robot does not creep into: all that what is suspected may take; of what is there what was seen of it,
-    as the goal sketcher passes through the rest only where nothing else is left. It does creep to what may be a jamb.
+    as the goal sketcher passes through the rest only where nothing else is left.
     """
     found = [(entry, entry.value) for entry in view.where(Obstacle, lambda o: o.status != "gone")]
-    taken = [(entry, o, take_as_jamb(world, o)) for entry, o in found]
-    return [(entry, build_polygon(jamb.core if jamb.core and (o.is_there or jamb is not o) else o.footprint))
-            for entry, o, jamb in taken]
+    return [(entry, build_polygon(o.core if o.core and o.is_there else o.footprint)) for entry, o in found]
 
 
 def _list_touches(view: View, here: Pose2) -> list[tuple[Entry[Contact], shapely.Point]]:

@@ -26,7 +26,6 @@ class _Reader:
     last_thing: ThingWords | None = None
     last_stretch: ThingWords | None = None
     wants_orient: bool = False
-    side_before: bool = False
     goes_on: bool = False
     notes_on: bool = False
 
@@ -42,9 +41,6 @@ class _Reader:
             last, more = self.acts[-1], things[0]
             self.acts[-1] = (replace(last, units=more.number or 1) if "unit" in more.heads
                              else replace(last, past=(*last.past, more)))
-            wheres = [pair for pair in wheres if pair[1].heads or pair[1].names]
-            if wheres:
-                self._go([], [], wheres)
         elif self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
             self._orient(things, ways, wheres)
         elif "exit" in verbs:
@@ -89,7 +85,6 @@ class _Reader:
         begun = len(self.acts) if begun and self.acts[-1] is before else begun
         self.notes_on = clause.end == "and" and bool(self.acts) and (self.notes_on or self.acts[-1].sort == "note")
         self.wants_orient = clause.end == "so"
-        self.side_before = bool(parts) and parts[-1].sort == "where" and bool(parts[-1].side) and clause.end == "and"
         if parts:
             text = " ".join(word.text for part in parts for word in part.words) or " ".join(verbs)
             self.acts[begun:] = [replace(act, text=text) for act in self.acts[begun:]]
@@ -123,10 +118,6 @@ class _Reader:
             elif side in SIDES and target and (part.sort == "where" or (target[-1].is_door and not turning)
                                                or "be" in verbs):
                 target[-1] = replace(target[-1], side=side)
-            elif part.sort == "where" and side in SIDES and (turning or verbs & {"go"}):
-                ways.append(side)
-            elif part.sort == "where" and side:
-                wheres.append(("on", ThingWords(side=side)))
             elif part.sort == "way":
                 ways.append(side)
             located = False
@@ -188,9 +179,6 @@ class _Reader:
         towards = [one for meaning, one in wheres if meaning in ("to", "away", "at", "on", "next-to")]
         if towards or things:
             self.acts.append(Act("orient", what=replace((towards or things)[0], side="behind")))
-        rest = [(meaning, one) for meaning, one in wheres if one not in towards]
-        if rest:
-            self._go([], [], rest)
 
     def _orient(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         all_things = [*things, *(one for _, one in wheres)]
@@ -235,8 +223,6 @@ class _Reader:
     def _go(self, things: list[ThingWords], ways: list[str], wheres: Wheres, *,
             until: bool = False, passing: bool = False) -> None:
         self._turn_only(ways)
-        if things and things[0].text.startswith("all the way") and (len(things) > 1 or wheres):
-            things = [replace(things[0], heads=frozenset(("hall",))), *things[1:]]  # "all the way down the hall to X"
         units, metres = 0, 0.0
         ends: list[ThingWords] = []
         passed: list[ThingWords] = []
@@ -298,10 +284,7 @@ class _Reader:
 
     def _state(self, things: list[ThingWords], ways: list[str], wheres: Wheres, verbs: set[str]) -> None:
         """A sentence that says what is where."""
-        if len(things) > 1 and things[-1].names and not things[-1].heads and things[-1].is_stretch:
-            *things, kind = things  # "the next hall is yellow"
-            things[-1] = replace(things[-1], names=things[-1].names + kind.names)
-        elif len(things) > 1 and things[-1].count and not things[-1].heads and not things[-1].names:
+        if len(things) > 1 and things[-1].count and not things[-1].heads and not things[-1].names:
             *things, rank = things  # "the pink carpet is the first on your left", "the easel is one ahead"
             if rank.side == "ahead" and rank.number:
                 self.acts.append(Act("go", units=rank.number))
@@ -313,9 +296,6 @@ class _Reader:
         if blocks and len(things) > 1:  # "an easel one block in front of you"
             side = side or blocks[0].side
             things = [thing for thing in things if "unit" not in thing.heads]
-        if any("unit" in one.heads for _, one in wheres) and things and self._is_walk_told([], []):
-            self._note_before(things)  # "the couch will be at the first block"
-            return
         doors = [thing for thing in things if thing.is_door or (
             thing.count and thing.side and not thing.heads and not thing.names)]
         if doors or not things:
@@ -328,8 +308,6 @@ class _Reader:
         elif "see" in verbs and things and not self.acts:
             self._orient(things, ways, wheres)
             return
-        elif not things and (related or side) and self.acts and self.acts[-1].sort == "find":
-            self._amend(related, side)
         elif not things and side and self.acts and self.acts[-1].sort == "go" and self.acts[-1].until:
             until = self.acts[-1].until  # "the pink hall, which will be on your right"
             self.acts[-1] = replace(self.acts[-1], until=replace(until, side=until.side or side))
@@ -361,8 +339,6 @@ class _Reader:
         last = self.acts[-1] if self.acts else None
         if not things and last is not None and last.sort in ("find", "see") and (related or side) and not ways:
             self._amend(related, side)
-        elif self.side_before and not things and last is not None:
-            return  # it tells of the walk before
         elif wheres and self._is_walk_told(things, ways) and all(meaning == "past" for meaning, _ in wheres):
             self._note_before([one for _, one in wheres])
         elif things and things[0].is_stretch and things[0].side in ("left", "right") and last and not things[0].count:
@@ -435,8 +411,6 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
         if behind is not None and clause.parts:
             ordered.append(Clause(behind.parts, ""))
             behind = None
-    if behind is not None:
-        ordered.append(behind)
     reader = _Reader()
     for clause in ordered:
         reader.read(clause)

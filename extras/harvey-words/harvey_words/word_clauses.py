@@ -93,10 +93,6 @@ def read_clauses(words: Sequence[Word]) -> tuple[Tree[Any], list[Clause]]:
                     one.sort in ("thing", "where", "way") or one.meaning == "exit" for one in clause.parts):
                 clauses.append(clause)
                 clause = Clause([part])
-            elif part.meaning in ("left", "right") and part.sort == "way" and clause.parts[-1:] and (
-                    clause.parts[-1].words and clause.parts[0].sort == "where"):
-                clauses.append(clause)
-                clause = Clause([part])  # "down the hall to the lamp left two blocks"
             else:
                 clause.parts.append(part)
         clauses.append(clause)
@@ -138,9 +134,6 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
             yield from (Word("SEP", "comma", "", word.place), word)  # "two blocks chair", "the hall all the way down"
         elif word.meaning == "with" and is_joint and before and before.sort in ("HEAD", "MOD"):
             yield Word("PREP", "of", word.text, word.place)
-        elif word.text == "where" and word.sort == "VERB" and (
-                before and before.meaning == "be" and after and after.sort in NOUNS):
-            yield Word("HEAD", "room", word.text, word.place)
         elif word.text == "where" and word.sort == "VERB" and (after is None or after.sort in ("VERB", "SEP") or (
                 before and (before.sort == "PREP" or before.meaning == "reach"))):
             continue

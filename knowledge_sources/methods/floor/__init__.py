@@ -22,7 +22,7 @@ from knowledge_sources.methods.floor.see_floor import (
 )
 from knowledge_sources.methods.floor.rivals_on_floor import (
     MAX_FIXED_LOOKS, MIN_MOVED_M, MIN_OBSTACLE_CERTAINTY, enclose, explain_seen_elsewhere, explain_seen_in_patch,
-    explain_touch, find_fixed, is_behind, judge_by, judge_thing, take_as_jamb,
+    explain_touch, find_fixed, is_behind, judge_by, judge_thing,
 )
 from knowledge_sources.methods.floor.seen_floor import (
     Costs, Lookout, SPACING_M, SeenFloor, Sweep, choose_look, find_blind, find_floor, measure_first_seen_m,
@@ -41,5 +41,5 @@ __all__ = [
     "find_floor", "find_touched", "is_behind", "is_telling", "is_width", "judge_by", "judge_thing", "list_corners",
     "locate_touch", "may_be_there", "measure_approach_m", "measure_first_seen_m", "move_thing", "place_walls", "redraw",
     "redraw_door", "revise_by_difference", "revise_by_door", "revise_by_report", "revise_by_thing", "sample_sweep",
-    "see_free_floor", "see_ranges", "take_as_jamb", "touch_again", "touch_first",
+    "see_free_floor", "see_ranges", "touch_again", "touch_first",
 ]

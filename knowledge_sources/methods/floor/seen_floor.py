@@ -81,7 +81,7 @@ class SeenFloor:
             scans[k] = (is_free | is_taken).any()
         rest = np.flatnonzero(open_)
         if len(rest) and len(self.discs):
-            covers = np.linalg.norm(points[rest, None] - self.discs[None, :, :2], axis=2) <= self.discs[:, 2]
+            covers = _are_in(points[rest], self.discs)
             free[rest] = covers.any(axis=1)
             discs[covers.argmax(axis=1)[covers.any(axis=1)]] = True
         for corners in self.taken:
@@ -92,8 +92,7 @@ class SeenFloor:
         """Which of the points (n, 2) are seen free by more than looks: an earlier picture would tell what stands there,
         if it has an edge or a pattern; or the robot was there.
         """
-        away = np.linalg.norm(points[:, None] - self.discs[None, :, :2], axis=2)
-        confirmed = np.asarray((away <= self.discs[:, 2]).any(axis=1))
+        confirmed = np.asarray(_are_in(points, self.discs).any(axis=1))
         for scan in reversed(self.scans):
             rest = np.flatnonzero(~confirmed)
             if not len(rest):
@@ -101,6 +100,12 @@ class SeenFloor:
             if scan.confirmed_m or scan.sense != "camera":
                 confirmed[rest] = _is_confirmed(_read_scan(scan), points[rest])
         return confirmed
+
+
+def _are_in(points: Floats, discs: Floats) -> Mask:
+    """(n, k) which of the points (n, 2) are in which of the discs (k, 3)."""
+    dx, dy = (points[:, None, axis] - discs[:, axis] for axis in (0, 1))
+    return np.asarray(np.sqrt(dx * dx + dy * dy) <= discs[:, 2])
 
 
 def _is_confirmed(scan: _Scan, points: Floats) -> Mask:
