@@ -349,6 +349,8 @@ class _Reader:
         last = self.acts[-1] if self.acts else None
         if not things and last is not None and last.sort in ("find", "see") and (related or side) and not ways:
             self._amend(related, side)
+        elif things and things[0].heads == {"side"} and not wheres:
+            return  # "same side"
         elif side and not things and not related and not ways:
             self.side = side  # "on your right, the last door"
         elif wheres and self._is_walk_told(things, ways) and all(meaning == "past" for meaning, _ in wheres):
@@ -452,8 +454,12 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
         if act.sort == "find" == after.sort and after.what and any(by == "past" for by, _ in after.what.relations):
             reader.acts[index] = replace(act, sort="see")  # "the library is on the left; it is the door after that"
     done = max((index for index, act in enumerate(reader.acts) if act.sort in ("go", "turn", "exit")), default=-1)
-    return [replace(act, sort="see") if act.sort == "find" and index < done and not act.enters and reader.acts[
+    ordered_acts = [replace(act, sort="see") if act.sort == "find" and index < done and not act.enters and reader.acts[
         index + 1].sort != "exit" else act for index, act in enumerate(reader.acts)]
+    doors = [act for act in reader.acts if act.sort == "find" and act.what and act.what.is_door]
+    if doors and not any(act.sort == "find" for act in ordered_acts):  # "the next door, left as you come out"
+        ordered_acts = [*(act for act in reader.acts if act is not doors[-1]), doors[-1]]
+    return ordered_acts
 
 
 def _join_exits(clauses: Sequence[Clause]) -> list[Clause]:

@@ -136,7 +136,9 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
             pair = 0
             yield Word("NAME", "&", word.text, word.place)
         elif word.meaning == "of" and word.sort == "PREP":
-            if is_joint:
+            if is_joint and before and before.meaning == "side":
+                yield Word("PREP", "in", word.text, word.place)  # "on the left side of the hall"
+            elif is_joint:
                 pair = index + MOST_BETWEEN if before and before.meaning == "crossing" else pair
                 yield word
         elif before and before.sort in NOUNS and (
