@@ -24,6 +24,8 @@ STANDS_M_PER_S = 0.05
 """One who is slower keeps looking where he did."""
 PATIENCE_S = 2.0
 """One who makes no way does so once he has stood before the robot so long."""
+ASIDE_M_PER_S = 0.4
+"""One whom the robot stops steps aside so fast."""
 TOUCH_M = 0.01
 """Nearer than this is a touch."""
 
@@ -150,13 +152,30 @@ class Pedestrian:
             return still
         if robot is None or math.dist((self.pose.x_m, self.pose.y_m), (robot.pose.x_m, robot.pose.y_m)) > 2.0:
             return self
-        gap_m = Obstacles(self.segments_world()).clearance_m(robot.pose)
-        if gap_m > TOUCH_M or gap_m > Obstacles(before.segments_world()).clearance_m(robot.pose):
+        gap_m, was_m = self._gap_m(robot), before._gap_m(robot)
+        if gap_m > TOUCH_M or gap_m > was_m:
             return self
         speed = math.hypot(*self.velocity)
         told = f"{self.name} walked into it at {speed:.2f} m/s" if before.held_s == 0.0 and speed > 0.0 else ""
-        stood = Obstacles(still.segments_world()).clearance_m(robot.pose) >= 0.0
-        return replace(still if stood else replace(before, news=""), held_s=before.held_s + duration_s, news=told)
+        aside = still._step_aside(duration_s, robot, obstacles)
+        free = (there for there in (aside, still) if there._gap_m(robot) >= min(was_m, TOUCH_M))
+        return replace(next(free, before), held_s=before.held_s + duration_s, news=told)
+
+    def _gap_m(self, robot: Robot) -> float:
+        """Between this person and the robot [m]."""
+        return Obstacles(self.segments_world()).clearance_m(robot.pose)
+
+    def _step_aside(self, duration_s: float, robot: Robot, obstacles: Obstacles) -> Pedestrian:
+        """Past the robot, legs together, on the side on which the way goes on; the same where a wall is there."""
+        away = self.pose.position - robot.pose.position
+        away = away / max(1e-9, float(np.hypot(*away)))
+        aside = np.array([-away[1], away[0]])
+        ahead = np.array(self.way[min(self.aim, len(self.way) - 1)]) - self.pose.position
+        step = ASIDE_M_PER_S * (aside if aside @ ahead >= 0.0 else -aside) + 0.5 * ASIDE_M_PER_S * away
+        there = Pose2(self.pose.x_m + duration_s * step[0], self.pose.y_m + duration_s * step[1], self.pose.heading_rad)
+        if obstacles.clearance_m(there, WIDTH_M / 2.0) < min(0.0, obstacles.clearance_m(self.pose, WIDTH_M / 2.0)):
+            return self
+        return replace(self, pose=there)
 
 
 def nearest_wall(obstacles: Obstacles, pose: Pose2) -> Floats:
