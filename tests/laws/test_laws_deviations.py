@@ -13,7 +13,7 @@ import shapely
 
 from generated_boards import LENGTH_M, WIDTH_M, Bench
 from harvey.testing import HALL, STUDY, plain_robot
-from knowledge_sources.methods.floor.found_things import find_same
+from knowledge_sources.methods.floor.footprints import find_same
 from knowledge_sources.model.door_toucher import door_toucher
 from world_models.actuator import ActuatorModel
 from world_models.entries import Contact, DoorPicture, DoorState, Drift, Obstacle, diagonal
