@@ -35,6 +35,7 @@ from world_models.building.world import World
 from world_models.entries import Recovery, Redirection
 from world_models.files.toml.mission import ROOT
 from world_models.files.world_files import load_world
+from world_models.plugins import SOURCES_GROUP, list_plugins
 from world_models.robot import RobotModel
 
 HELPER = "helper"
@@ -141,9 +142,10 @@ def redraw(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
 def build_head(stage: Stage, seed: int, body: str = IN_PROCESS, settings: Pairs = ()) -> RunHead:
     """How a run of a scenario begins; ``settings`` are those of the agent."""
     s = stage.scenario
-    robot = build_robot_model(s, load_known_world(s.world))
+    robot, guests = build_robot_model(s, load_known_world(s.world)), s.walkers.guests if s.walkers else {}
     return RunHead.of(SIMULATOR, s.name, seed, s.world, robot, s.servo, s.command, scenario=s.source.data,
-                      folder=portable(s.folder), body=body, constants=settings)
+                      folder=portable(s.folder), body=body, constants=settings,
+                      plugins={**list_plugins(SOURCES_GROUP), **guests})
 
 
 def rebuild_stage(head: RunHead) -> Stage:

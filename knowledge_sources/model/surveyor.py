@@ -15,7 +15,7 @@ from knowledge_sources.methods.belief import hedge
 from knowledge_sources.methods.calibration import MIN_MOVE_M, MIN_TURN_RAD, loosen
 from knowledge_sources.methods.features import SIGMA_ACROSS_PX
 from knowledge_sources.methods.pose import PlanarEstimate, find_beside, find_width, planar_from_lines, weigh_places
-from knowledge_sources.methods.pose.standing_beside import FoundBeside
+from knowledge_sources.methods.pose.standing_beside import BESIDE_M, FoundBeside
 from knowledge_sources.methods.verification import list_names, predict_lines
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, find_difference, list_filed_doors
@@ -34,6 +34,7 @@ from world_models.entries import (
     PoseFix,
     Segments,
 )
+from world_models.entries.difference import DOORS
 from world_models.frames import Pose, Pose2
 
 MAX_SIGMA_M = 0.03
@@ -56,8 +57,9 @@ class Surveyor(RobotKnowledgeSource):
     """Says where along its wall a door's edges are found in a picture, and how far apart two walls are.
 
     Only a verified place tells of doors, by what it rests on besides: by doors that stand beside it may be off by as
-    much. They are told no surer than it is known, with what all pictures share. Walls that face each other tell how far
-    they are apart wherever the robot is between them. Nothing is said of what stands in its place until it was doubted.
+    much. They are told no surer than it is known, with what all pictures share. Each tells once of the doors of the
+    building, too. Walls that face each other tell how far they are apart wherever the robot is between them. Nothing is
+    said of what stands in its place until it was doubted.
     """
 
     level, priority = Level.PLAN, Priority.ENTER
@@ -92,7 +94,8 @@ class Surveyor(RobotKnowledgeSource):
             of_door = lines.lines_world[names == door.name]
             sight = self._see(view, case, place.world_from_robot, of_door, along, door.name)
             found = find_beside(*sight, sigma_m) if sigma_m <= MAX_SIGMA_M else None
-            yield from _tell(view, case, door.name, found, "jamb")
+            yield from _tell(view, case, door.name, found, "jamb", case.fix.value.world_from_robot)
+            yield from _tell(view, case, DOORS, found, "jamb", door.pose_from(door.between[0]))
 
     def _solve_without(self, view: View, case: Surveyed, doors: Collection[str]) -> PlanarEstimate:
         """The pose by the lines that are of no door, and by what was believed before."""
@@ -117,7 +120,7 @@ class Surveyor(RobotKnowledgeSource):
                 if seen[0] is not None and seen[1] is not None:
                     found = find_width(seen[0], seen[1])
                     found = replace(found, sigma_m=math.hypot(found.sigma_m, SHARED_SIGMA_M))
-                    yield from _tell(view, case, about, found, "wall")
+                    yield from _tell(view, case, about, found, "wall", here)
 
     def _see(self, view: View, case: Surveyed, here: Pose2, lines: Floats, along: Floats, name: str) -> Sight:
         """What a search for lines (n, 2, 3) from a pose goes by."""
@@ -130,17 +133,16 @@ class Surveyor(RobotKnowledgeSource):
 
 
 def _tell(
-    view: View, case: Surveyed, about: str, found: FoundBeside | None, kind: Literal["jamb", "wall"]
+    view: View, case: Surveyed, about: str, found: FoundBeside | None, kind: Literal["jamb", "wall"], at: Pose2
 ) -> Iterator[Evidence]:
-    """What the picture says, where that was not expected."""
+    """What the picture says, where that was not expected; evidence ``at`` one place counts once."""
     if found is None or (found.log_ratio <= 0.0 and not find_difference(view, about).rivals):
         return
-    here, frame = case.fix.value.world_from_robot, view.get(case.segments.value.frame)
-    beside_cm = 100.0 * found.off_m
-    what = (f"{about} that stands {abs(beside_cm):.0f} cm beside" if kind == "jamb" else
-            f"{about} {abs(beside_cm):.0f} cm {'farther' if beside_cm > 0.0 else 'nearer'}")
+    frame, beside_cm = view.get(case.segments.value.frame), 100.0 * found.off_m
+    what = (f"{about} {abs(beside_cm):.0f} cm {'farther' if beside_cm > 0.0 else 'nearer'}" if kind == "wall" else
+            f"{about} beside" if about == DOORS else f"{about} that stands {abs(beside_cm):.0f} cm beside")
+    size = (0.0, BESIDE_M) if about == DOORS else (round(found.off_m, 4), round(found.sigma_m, 4))
     told = (Explanation("chance", f"{about} as in the file", 0.0),
-            Explanation(kind, what, hedge({kind: found.log_ratio})[kind], round(found.off_m, 4),
-                        round(found.sigma_m, 4)))
-    yield Evidence(about, f"{found.edges} of its edges from {case.fix.id}", told, here.x_m, here.y_m, here.heading_rad,
+            Explanation(kind, what, hedge({kind: found.log_ratio})[kind], *size))
+    yield Evidence(about, f"{found.edges} of its edges from {case.fix.id}", told, at.x_m, at.y_m, at.heading_rad,
                    MIN_MOVE_M, MIN_TURN_RAD, 0.0 if frame is None else frame.value.sim_time_s)

@@ -191,8 +191,7 @@ class SimulatedBody:
 
     @property
     def touching_rad(self) -> float | None:
-        """The true direction in which :meth:`roll` touches something, from the heading; None where nothing is touched.
-        """
+        """The true direction in which :meth:`roll` touches something, from the heading; None: nothing is touched."""
         return self._touching_rad
 
     def take_contact(self) -> Contact | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +19,12 @@ from world_models.entries import Place
 from world_models.files.toml.settings_reader import read_settings, suggest_keys
 from world_models.files.toml.source import Node
 from world_models.frames import Pose2
+from world_models.plugins import GUESTS_GROUP, list_plugins
 from world_models.units import Bounded, bounded
 
 MOST = 20
+SOURCES = ("mover_watcher", "mover_explainer", "people_waiter")
+"""The knowledge sources of the package."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +88,11 @@ class Walkers:
             raise ValueError("expected even light where people walk, got [light] that is not")
         people = tuple(self._enter(number, building, world, seed) for number in range(len(self.walkers)))
         return people_building(building, people, 0.0)
+
+    @property
+    def guests(self) -> Mapping[str, str]:
+        """The package's knowledge sources, which a robot among people has."""
+        return {name: package for name, package in list_plugins(GUESTS_GROUP).items() if name in SOURCES}
 
     def charge(self, who: str) -> float:
         """How long an act of a knowledge source takes [s]: people walk meanwhile."""

@@ -24,6 +24,12 @@ STANDS_M_PER_S = 0.05
 """One who is slower keeps looking where he did."""
 PATIENCE_S = 2.0
 """One who makes no way does so once he has stood before the robot so long."""
+SEES_ROUND_M = 3.0
+"""From so far away one who makes way walks to the side of a robot on his way."""
+PAST_M = ROBOT_RADIUS_M + 0.45
+"""How far beside the robot's axis one passes it."""
+ASIDE_M_PER_S = 0.4
+"""One whom the robot stops steps aside so fast."""
 TOUCH_M = 0.01
 """Nearer than this is a touch."""
 
@@ -95,7 +101,7 @@ class Pedestrian:
               obstacles: Obstacles) -> Pedestrian:
         """A short while later; ``robot`` is None on another floor."""
         me = self._take_aim(now_s)
-        towards = me._towards(now_s)
+        towards = me._towards(now_s, robot if me.makes_way or me.held_s > PATIENCE_S else None, obstacles)
         velocity = me._change_velocity(towards, duration_s, others, robot, obstacles)
         speed = math.hypot(*velocity)
         x, y = me.pose.x_m + velocity[0] * duration_s, me.pose.y_m + velocity[1] * duration_s
@@ -114,12 +120,19 @@ class Pedestrian:
             return replace(self, aim=self.aim + 1)
         return replace(self, way=self.way[::-1], aim=1, waits_until_s=now_s + self.stays_s)
 
-    def _towards(self, now_s: float) -> Floats:
-        """(2,) unit vector to the point that is walked to; zero for one who stands."""
+    def _towards(self, now_s: float, robot: Robot | None, obstacles: Obstacles) -> Floats:
+        """(2,) unit vector to where is walked, past the robot where it is in the way; zero for one who stands."""
         if self.aim >= len(self.way) or now_s < self.waits_until_s:
             return np.zeros(2)
-        ahead = np.array(self.way[self.aim]) - self.pose.position
-        return np.asarray(ahead / max(1e-9, float(np.hypot(*ahead))))
+        ahead = _unit(np.array(self.way[self.aim]) - self.pose.position)
+        if robot is None:
+            return ahead
+        aside, to_robot = np.array([-ahead[1], ahead[0]]), robot.pose.position - self.pose.position
+        if not 0.0 < to_robot @ ahead < SEES_ROUND_M or abs(to_robot @ aside) > PAST_M:
+            return ahead
+        sides = [robot.pose.position + side * PAST_M * aside for side in (-1.0, 1.0)]  # right where both are free
+        rooms = [min(PAST_M, obstacles.clearance_m(Pose2(float(x), float(y), 0.0), 0.0)) for x, y in sides]
+        return _unit(sides[int(rooms[1] > rooms[0])] - self.pose.position)
 
     def _change_velocity(self, towards: Floats, duration_s: float, others: Sequence[Pedestrian], robot: Robot | None,
                          obstacles: Obstacles) -> tuple[float, float]:
@@ -127,15 +140,15 @@ class Pedestrian:
         if not towards.any():
             return (0.0, 0.0)
         force = drive(np.array(self.velocity), self.wanted_m_per_s, towards)
-        around = [(other.pose, np.array(other.velocity), 0.0) for other in others if other.floor_m == self.floor_m]
+        for other in others:
+            if other.floor_m == self.floor_m:
+                push = repulse(self.pose.position - other.pose.position, np.array(other.velocity))
+                force = force + weigh_by_sight(push, towards)
         if robot is not None and (self.makes_way or self.held_s > PATIENCE_S):
-            # The people of the model are points, and one who stands still pushes nobody aside: the robot has a rim, and
-            # its step is that of the motion between the two.
-            around.append((robot.pose, np.array(robot.velocity) - self.velocity, ROBOT_RADIUS_M))
-        for pose, theirs, wider_m in around:
-            away = self.pose.position - pose.position
-            away = away * max(0.1, 1.0 - wider_m / max(1e-9, float(np.hypot(*away))))
-            force = force + weigh_by_sight(repulse(away, theirs), towards)
+            away = self.pose.position - robot.pose.position
+            rim = away * max(0.05, 1.0 - ROBOT_RADIUS_M / max(1e-9, float(np.hypot(*away))))
+            push = repulse_wall(rim)  # to people its rim is a border, which pushes aside: the way leads past it
+            force = force + push - min(0.0, float(push @ towards)) * towards
         force = force + repulse_wall(nearest_wall(obstacles, self.pose))
         velocity = np.array(self.velocity) + duration_s * force
         speed = float(np.hypot(*velocity))
@@ -150,13 +163,34 @@ class Pedestrian:
             return still
         if robot is None or math.dist((self.pose.x_m, self.pose.y_m), (robot.pose.x_m, robot.pose.y_m)) > 2.0:
             return self
-        gap_m = Obstacles(self.segments_world()).clearance_m(robot.pose)
-        if gap_m > TOUCH_M or gap_m > Obstacles(before.segments_world()).clearance_m(robot.pose):
+        gap_m, was_m = self._gap_m(robot), before._gap_m(robot)
+        if gap_m > TOUCH_M or gap_m > was_m:
             return self
         speed = math.hypot(*self.velocity)
         told = f"{self.name} walked into it at {speed:.2f} m/s" if before.held_s == 0.0 and speed > 0.0 else ""
-        stood = Obstacles(still.segments_world()).clearance_m(robot.pose) >= 0.0
-        return replace(still if stood else replace(before, news=""), held_s=before.held_s + duration_s, news=told)
+        aside = still._step_aside(duration_s, robot, obstacles)
+        free = (there for there in (aside, still) if there._gap_m(robot) >= min(was_m, TOUCH_M))
+        return replace(next(free, before), held_s=before.held_s + duration_s, news=told)
+
+    def _gap_m(self, robot: Robot) -> float:
+        """Between this person and the robot [m]."""
+        return Obstacles(self.segments_world()).clearance_m(robot.pose)
+
+    def _step_aside(self, duration_s: float, robot: Robot, obstacles: Obstacles) -> Pedestrian:
+        """Past the robot, legs together, on the side on which the way goes on; the same where a wall is there."""
+        away = self.pose.position - robot.pose.position
+        away = away / max(1e-9, float(np.hypot(*away)))
+        aside = np.array([-away[1], away[0]])
+        ahead = np.array(self.way[min(self.aim, len(self.way) - 1)]) - self.pose.position
+        step = ASIDE_M_PER_S * (aside if aside @ ahead >= 0.0 else -aside) + 0.5 * ASIDE_M_PER_S * away
+        there = Pose2(self.pose.x_m + duration_s * step[0], self.pose.y_m + duration_s * step[1], self.pose.heading_rad)
+        if obstacles.clearance_m(there, WIDTH_M / 2.0) < min(0.0, obstacles.clearance_m(self.pose, WIDTH_M / 2.0)):
+            return self
+        return replace(self, pose=there)
+
+
+def _unit(vector: Floats) -> Floats:
+    return np.asarray(vector / max(1e-9, float(np.hypot(*vector))))
 
 
 def nearest_wall(obstacles: Obstacles, pose: Pose2) -> Floats:

@@ -78,6 +78,12 @@ def tells_way(text: str) -> bool:
     return any((word.sort, word.meaning) in WAYS or (counts and word.meaning == "door") for word in words)
 
 
+def _is_passage(text: str) -> bool:
+    """Whether what is to be taken is a door or a hall."""
+    nouns = [word.meaning for word in _way_lexicon().read(text) if word.sort in ("HEAD", "THING", "STRANGE")]
+    return nouns[:1] in (["door"], ["hall"])
+
+
 @cache
 def _way_lexicon() -> Lexicon:
     return Lexicon(lexicon_data())
@@ -129,10 +135,11 @@ class _ClauseReader:
     def read(self, clause: Sequence[Token]) -> None:
         """Adds what is wanted with this clause too: a task, or a way, which goes on with what is said of going."""
         first, (begin, _), (_, end) = clause[0], clause[0].span, clause[-1].span
-        said, goes = self.text[begin:end], first.meaning == "go" or (first.sort != "VERB" and first.meaning != "if")
+        goes = first.meaning == "go" or first.text == "take" or (first.sort != "VERB" and first.meaning != "if")
+        said = self.text[begin:end]
         if goes and self.wanted and self.wanted[-1].is_told:
             self.wanted[-1] = replace(self.wanted[-1], phrase=self.text[self.way_from:end])
-        elif goes and tells_way(said):
+        elif (goes and tells_way(said)) or (first.text == "take" and _is_passage(said)):
             self.way_from = begin
             self.wanted.append(Step("ptrans", said, is_told=True))
         else:

@@ -52,6 +52,8 @@ class WordSights(WordPlaces):
             return (NOT_SEEN if any(is_along(way, turn) for way in ways) else 0.0), state.senses
         if what.heads & {"corner"} and not what.names:
             return (0.0 if len(ways) <= 2 else NOT_SEEN), state.senses
+        if what.heads & {"crossing", "corner"}:
+            return self.fit_place(state, what, [self.hall_ahead(replace(state, heading=way)) for way in ways])
         best: tuple[float, Senses] = (NOT_SEEN - 1.0, state.senses)
         side = self.side_of(state, what.side)
         for way in ways:
