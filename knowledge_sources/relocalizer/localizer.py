@@ -41,8 +41,6 @@ from world_models.frames import Pose2
 MAX_DOUBTED_PICTURES = 3  # the nominal camera is tried too, where so few pictures corrected it, when the robot is lost
 MAX_PROBES = 8  # so many looks are taken when lost and no place fits; then the robot says that it does not know
 
-Candidates = tuple[Entry[Hypothesis], ...]
-
 
 class Localizer(RobotKnowledgeSource):
     """Keeps every place of the floor that agrees with the panorama, and says which next look tells most.
@@ -126,7 +124,7 @@ class Localizer(RobotKnowledgeSource):
         return (find_building(view),) if bare is None else (find_building(view), bare)
 
 
-def _follow(view: View, candidates: Candidates, building: FrameBuilding) -> list[tuple[str, Pose2]]:
+def _follow(view: View, candidates: Iterable[Entry[Hypothesis]], building: FrameBuilding) -> list[tuple[str, Pose2]]:
     """Room and pose of the candidates of the last search, as the robot has moved since."""
     out, actuator = [], find_robot(view).actuator
     for entry in candidates:
