@@ -12,6 +12,7 @@
 ``harvey.workers``            a ``harvey.campaign.workers.ClusterWorkers``, named ``dask``
 ``harvey.commands``           a ``harvey.commands.command.CliCommand``; of a verb: ``world.import``
 ``harvey.movers``             a ``sim.scenario.Company``, named ``walkers``
+``harvey.scenarios``          a folder of scenario files, as a ``pathlib.Path``; an entry point may have any name
 ``harvey.renderers``          a ``sim.render.lights.LitRenderers``, named ``lit``
 ``harvey.experiments``        the ``run`` of an experiment, by its name
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
