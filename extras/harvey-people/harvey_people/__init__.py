@@ -1,0 +1,1 @@
+"""People: who walks in the simulated building."""
