@@ -39,7 +39,7 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
                      "directions": "harvey-words", "parse": "harvey-words", "serve": "harvey-serve",
                      "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
     "harvey.experiments": {
-        "calibrate": "harvey-survey",
+        "calibrate": "harvey-survey", "driven-ways": "harvey-words",
         "imported-building": "harvey-buildings", "instructions": "harvey-words",
         "other-worlds": "harvey-miniworld", "rosmaps": "harvey-buildings",
         "watchers": "harvey-serve"},
