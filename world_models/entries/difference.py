@@ -36,6 +36,8 @@ TOLD_BY: Mapping[RivalKind, str] = {
 
 MODEL = "the model of the building"
 """What differs where walls and doors stand elsewhere in general, or the camera makes it seem so."""
+DOORS = "the doors of the building"
+"""What differs where doors stand beside in general: each of them tells of the others."""
 SURE = 0.95
 """A rival that is so probable is what the difference is taken for."""
 
