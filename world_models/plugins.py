@@ -41,7 +41,7 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
     "harvey.experiments": {
         "calibrate": "harvey-survey", "driven-ways": "harvey-words",
         "imported-building": "harvey-buildings", "instructions": "harvey-words",
-        "other-worlds": "harvey-miniworld", "rosmaps": "harvey-buildings",
+        "other-worlds": "harvey-miniworld", "people": "harvey-people", "rosmaps": "harvey-buildings",
         "watchers": "harvey-serve"},
     SOURCES_GROUP: dict.fromkeys(("problem_solver", "step_closer", "task_reader"), "harvey-words"),
     PAGES_GROUP: {"live": "harvey-serve"}, WORKERS_GROUP: {"dask": "harvey-cluster"},
