@@ -59,7 +59,7 @@ class Look:
         marks: (m) the landmark of each line; numbers: (m,) its number in the landmark.
         pieces_world: (m, 2, 3) the visible pieces, where the file has them [m].
         found, hidden: (m,) masks: which were found; and which stand behind something that the run has found there.
-        pairs: (p,) index of the line. segments_px: (p, 2, 2).
+        pairs: (p,) index of the line. segments_px: (p, 2, 2). every_px: (s, 2, 2) all segments of the picture.
         brightness, contrast: of the picture, 0..255.
     """
 
@@ -78,6 +78,7 @@ class Look:
     hidden: NDArray[np.bool_]
     pairs: NDArray[np.int64]
     segments_px: Floats
+    every_px: Floats
     brightness: float
     contrast: float
 
@@ -161,7 +162,7 @@ class _Reader:
             tuple(marks), np.array(numbers, np.int64), pieces, np.asarray(match.coverage)[list(lines)] > FOUND,
             self._find_hidden(fix.world_from_robot, pieces),
             np.array([place[int(match.pairs[k, 0])] for k in pairs], np.int64), match.segments_px[pairs],
-            segments.brightness, segments.contrast)
+            segments.segments_px, segments.brightness, segments.contrast)
 
     def _find_line(self, milestone: Milestone, i: int) -> tuple[Landmark, int, Floats] | None:
         """Of which line an expected piece is one, and where it is by the file; None where that is not known."""

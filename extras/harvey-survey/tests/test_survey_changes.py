@@ -100,7 +100,8 @@ def test_displacement_is_found_in_any_order(world: World, looks: tuple[Look, ...
         signs = np.sign(measure_offsets(replace(look, segments_px=look.segments_px + across[:, None]), look.pose,
                                         np.zeros(7), look.pieces_world[look.pairs])
                         - measure_offsets(look, look.pose, np.zeros(7), look.pieces_world[look.pairs]))
-        displaced.append(replace(look, segments_px=look.segments_px - (signs * shift_px)[..., None] * across[:, None]))
+        there_px = look.segments_px - (signs * shift_px)[..., None] * across[:, None]
+        displaced.append(replace(look, segments_px=there_px, every_px=there_px))
     found = adjust(world, displaced, 0.05)
     by_way = dict(zip(found.ways, found.offs_m.tolist(), strict=True))
     assert all(by_way[way] == pytest.approx(off, abs=0.025) for way, off in wanted.items())
