@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import multivariate_normal
 
 from blackboard import Entry
 from generated_boards import Bench, made, reasons
 from harvey.testing import check_source, plain_robot
-from knowledge_sources.methods.belief import weigh_rivals
+from knowledge_sources.methods.belief import hedge, weigh_rivals
+from knowledge_sources.reads import add_reports
+from knowledge_sources.reads.motion_between import WHEELS_PART
+from knowledge_sources.senses import correction_monitor as own
 from knowledge_sources.senses.correction_monitor import CorrectionMonitor
 from world_models.actuator import ActuatorModel
-from world_models.entries import Certificate, Evidence, PoseFix, Rival
+from world_models.entries import SHARED_SIGMA_M, Certificate, Drift, Evidence, MotionReport, PoseFix, Rival
 from world_models.frames import Pose2
 
 SOURCE, WHEELS, HERE = CorrectionMonitor(), ActuatorModel(), Pose2(2.0, 1.5, 0.3)
@@ -68,6 +72,31 @@ def test_pictures_that_never_change_are_told_by_each_leg(turn_rad: float, way_m:
     for one, two in zip(seen[0].explanations, other[0].explanations, strict=True):
         assert two.log_ratio == pytest.approx(one.log_ratio, abs=1e-3)  # in a mirror it is the same
     assert 0.03 < weigh_rivals("motion", seen).p_misled < 0.1  # one leg may be misread
+
+
+@settings(max_examples=60, deadline=None)
+@given(turns, st.floats(0.25, 1.5), st.builds(Pose2, *[st.floats(-0.3, 0.3)] * 3))
+def test_rivals_are_gaussians_about_what_the_wheels_count(turn_rad: float, way_m: float, error: Pose2) -> None:
+    moved, picture = WHEELS.predict_motion(turn_rad, way_m), np.diag([1.6e-5, 1.6e-5, 1e-6])
+    step = moved @ error
+    bench, last = go(step, turn_rad, way_m)
+    rolled = add_reports(WHEELS, Drift.unknown(WHEELS, 0.0), [one.value for one in bench.view.all(MotionReport)][-1:])
+    arm = np.array([[1.0, 0.0, -step.y_m], [0.0, 1.0, step.x_m], [0.0, 0.0, 1.0]])
+    shared = np.diag([SHARED_SIGMA_M, SHARED_SIGMA_M, own.SHARED_SIGMA_RAD]) ** 2
+    spread = arm @ picture @ arm.T + picture + 2.0 * shared
+    usual = spread + np.diag([rolled.sigma_m, rolled.sigma_m, rolled.sigma_rad]) ** 2
+    along, turned = WHEELS_PART * np.array([*moved.position, 0.0]), abs(turn_rad)
+    aside_m = own.ASIDE_M_PER_RAD * turned + own.BEND_RAD_PER_M * way_m**2 / 2.0
+    bent = np.diag([aside_m, aside_m, WHEELS_PART * turned + own.BEND_RAD_PER_M * way_m]) ** 2
+    wider = {"chance": 0.0, "wheels": np.outer(along, along), "turns": bent, "elsewhere": np.eye(3)}
+    logs = {kind: multivariate_normal(np.zeros(3), usual + by).logpdf(step.minus(moved)) for kind, by in wider.items()}
+    for told in ({one.kind: one for one in seen.explanations} for seen in made(bench.ask(SOURCE, last), Evidence)):
+        hedged = hedge({kind: log - logs["chance"] for kind, log in logs.items()})  # type: ignore[misc]
+        if max(told, key=lambda kind: told[kind].log_ratio) in wider:
+            assert {kind: told[kind].log_ratio for kind in hedged} == pytest.approx(hedged, abs=1e-6)
+        ahead, gone_m = moved.position / math.hypot(*moved.position), math.hypot(*moved.position)
+        wheels = ahead @ step.position, math.sqrt(ahead @ usual[:2, :2] @ ahead)
+        assert (told["wheels"].off, told["wheels"].sigma) == pytest.approx(np.array(wheels) * WHEELS.reach / gone_m)
 
 
 @settings(max_examples=60, deadline=None)
