@@ -75,7 +75,7 @@ def test_pictures_that_never_change_are_told_by_each_leg(turn_rad: float, way_m:
 
 
 @settings(max_examples=60, deadline=None)
-@given(turns, st.floats(0.25, 1.5), st.builds(Pose2, *[st.floats(-0.3, 0.3)] * 3))
+@given(turns, st.floats(0.0, 1.5), st.builds(Pose2, *[st.floats(-0.3, 0.3)] * 3))
 def test_rivals_are_gaussians_about_what_the_wheels_count(turn_rad: float, way_m: float, error: Pose2) -> None:
     moved, picture = WHEELS.predict_motion(turn_rad, way_m), np.diag([1.6e-5, 1.6e-5, 1e-6])
     step = moved @ error
@@ -94,9 +94,10 @@ def test_rivals_are_gaussians_about_what_the_wheels_count(turn_rad: float, way_m
         hedged = hedge({kind: log - logs["chance"] for kind, log in logs.items()})  # type: ignore[misc]
         if max(told, key=lambda kind: told[kind].log_ratio) in wider:
             assert {kind: told[kind].log_ratio for kind in hedged} == pytest.approx(hedged, abs=1e-6)
-        ahead, gone_m = moved.position / math.hypot(*moved.position), math.hypot(*moved.position)
-        wheels = ahead @ step.position, math.sqrt(ahead @ usual[:2, :2] @ ahead)
-        assert (told["wheels"].off, told["wheels"].sigma) == pytest.approx(np.array(wheels) * WHEELS.reach / gone_m)
+        if (gone_m := math.hypot(*moved.position)) >= own.MIN_REACH_M:
+            ahead = moved.position / gone_m
+            wheels = np.array([ahead @ step.position, math.sqrt(ahead @ usual[:2, :2] @ ahead)])
+            assert (told["wheels"].off, told["wheels"].sigma) == pytest.approx(wheels * WHEELS.reach / gone_m)
 
 
 @settings(max_examples=60, deadline=None)
@@ -106,17 +107,6 @@ def test_wheels_that_count_wrongly_are_no_reason_to_mistrust_pictures(way_m: flo
     seen = say(go(Pose2((1.0 + part) * moved.x_m, 0.0, 0.0), 0.0, way_m, way_m))
     assert not seen or weigh_rivals("motion", seen * 4).p_misled < 0.01
     assert way_m < 0.5 or lead(seen).kind == "wheels"
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.floats(0.6, 1.5), st.sampled_from((0.75, 0.9, 1.15, 1.25)), st.sampled_from((-1.0, 1.0)))
-def test_turns_neither_accuse_nor_acquit_wheels_that_go_too_short(way_m: float, part: float, side: float) -> None:
-    moved = WHEELS.predict_motion(0.0, way_m)
-    short = say(go(Pose2(part * moved.x_m, 0.0, 0.0), 0.0, way_m))
-    (turned,) = say(go(Pose2(0.0, 0.0, 0.8 * side), 0.5 * side, 0.0))
-    before, after = (weigh_rivals("motion", told).odds_of("wheels") for told in (short * 2, [*short * 2, turned]))
-    assert after == pytest.approx(before, abs=0.1)
-    assert turned.explanations[0].kind == "chance" and weigh_rivals("motion", [turned] * 4).leader.kind == "turns"
 
 
 @settings(max_examples=60, deadline=None)
@@ -140,11 +130,8 @@ def test_only_pictures_that_tell_the_place_count(verdict: str, p_false: float) -
     assert bool(say(legs)) == tells
 
 
-def test_it_rests_on_all_that_was_counted_and_needs_all_of_it() -> None:
+def test_it_rests_on_all_that_was_counted_and_keeps_the_laws_of_all_sources() -> None:
     bench, last = go(Pose2(0.0, 0.0, math.radians(1.0)), 0.0, 1.0)
     (effect,) = bench.ask(SOURCE, last) or ()
     assert reasons(effect) == {last.id, "PoseFix-1", "PoseFix-2", "MotionReport-2"}
-
-
-def test_it_keeps_the_laws_of_all_sources() -> None:
-    check_source(SOURCE, *go(Pose2(0.0, 0.0, math.radians(1.0)), 0.0, 1.0), without=("PoseFix-1", "MotionReport-2"))
+    check_source(SOURCE, bench, last, without=("PoseFix-1", "MotionReport-2"))
