@@ -68,7 +68,7 @@ class Stage:
         s = self.scenario
         camera, mount = _true_camera(s)
         return SimulatedBody(
-            self.building, self.put_down_world, camera, mount,
+            _people(s, self.world, self.building, seed), self.put_down_world, camera, mount,
             seed=seed, actuator=s.actuator, sensor=s.sensor, bumper=s.bumper, ranges=s.ranges,
             faults=s.faults, lighting=s.light,
             put_down_sigma_m=s.start.put_down_sigma_m, put_down_sigma_rad=s.start.put_down_sigma_rad,
@@ -109,11 +109,20 @@ def build_stage(scenario: Scenario) -> Stage:
     on_floor = _storeys(world, around, changing, elevators)
     building = on_floor(world.floor_m(start.locale))
     check_room(scenario, world, down, building, on_floor)
+    _people(scenario, world, building)
     heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
     start_world = replace(start, heading_rad=scenario.start.heading_rad).in_world(world)
     goal_world = replace(goal, heading_rad=heading).in_world(world)
     return Stage(scenario, world, building, start_world, goal_world, down.in_world(world), world.floor_m(goal.locale),
                  around)
+
+
+def _people(scenario: Scenario, world: World, building: SimulatedBuilding, seed: int = 0) -> SimulatedBuilding:
+    """The building with who walks there. Raises ScenarioError where they do not fit it."""
+    try:
+        return scenario.walkers.enter(building, world, seed) if scenario.walkers else building
+    except ValueError as error:
+        raise scenario.refused(("walkers",), str(error)) from None
 
 
 def move_ends(stage: Stage, scenario: Scenario) -> Stage:
@@ -190,7 +199,7 @@ def _storeys(
     known: dict[tuple[float, State], SimulatedBuilding] = {}
     finders: dict[float, Callable[[Pose2], str]] = {}
 
-    def at_time(floor_m: float, time_s: float) -> SimulatedBuilding:
+    def at_time(floor_m: float, time_s: float, _robot: Pose2 | None = None) -> SimulatedBuilding:
         key = round(floor_m, 3), changing.state_at(time_s)
         if key not in known:
             storey, state = key

@@ -11,12 +11,13 @@
 ``harvey.pages``              a ``harvey.runner.teller.PageKind``, named ``live``
 ``harvey.workers``            a ``harvey.campaign.workers.ClusterWorkers``, named ``dask``
 ``harvey.commands``           a ``harvey.commands.command.CliCommand``; of a verb: ``world.import``
+``harvey.movers``             a ``sim.scenario.Company``, named ``walkers``
+``harvey.scenarios``          a folder of scenario files, as a ``pathlib.Path``; an entry point may have any name
 ``harvey.renderers``          a ``sim.render.lights.LitRenderers``, named ``lit``
 ``harvey.experiments``        the ``run`` of an experiment, by its name
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
 ``harvey.run_exporters``      a ``logs.export.RunExporter``, named ``mcap``
 ``harvey.exporters``          a ``harvey_buildings.exporters.Exporter``
-``harvey.experiments``        a module as those of ``experiments``
 ============================  ==========================================================================
 
 An entry point's name is the one that Harvey knows. ``extras`` are added so too; one that is absent can be named.
@@ -34,8 +35,8 @@ SOURCES_GROUP, GUESTS_GROUP = "harvey.knowledge_sources", "harvey.guest_sources"
 COMMANDS_GROUP, PAGES_GROUP, CAMERAS_GROUP = "harvey.commands", "harvey.pages", "harvey.cameras"
 WORKERS_GROUP, RENDERERS_GROUP, RUN_EXPORTERS_GROUP = "harvey.workers", "harvey.renderers", "harvey.run_exporters"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
-    COMMANDS_GROUP: {"calibrate": "harvey-survey", "follow": "harvey-ros2", "directions": "harvey-words",
-                     "parse": "harvey-words", "serve": "harvey-serve",
+    COMMANDS_GROUP: {**dict.fromkeys(("calibrate", "world.ledger"), "harvey-survey"), "follow": "harvey-ros2",
+                     "directions": "harvey-words", "parse": "harvey-words", "serve": "harvey-serve",
                      "world.export": "harvey-buildings", "world.import": "harvey-buildings"},
     "harvey.experiments": {
         "calibrate": "harvey-survey",
@@ -44,7 +45,7 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
         "watchers": "harvey-serve"},
     SOURCES_GROUP: dict.fromkeys(("problem_solver", "step_closer", "task_reader"), "harvey-words"),
     PAGES_GROUP: {"live": "harvey-serve"}, WORKERS_GROUP: {"dask": "harvey-cluster"},
-    RENDERERS_GROUP: {"lit": "harvey-light"},
+    RENDERERS_GROUP: {"lit": "harvey-light"}, "harvey.movers": {"walkers": "harvey-people"},
     **{group: {"p2os": "harvey-bases", "create2": "harvey-bases", "ros2": "harvey-ros2"}
        for group in ("harvey.bases", "harvey.emulators")},
     CAMERAS_GROUP: {"ros2": "harvey-ros2"}, RUN_EXPORTERS_GROUP: {"mcap": "harvey-ros2"},

@@ -32,7 +32,7 @@ LETTERS_M: Mapping[str, float] = {"title": 0.7, "name": 0.42, "note": 0.34, "doo
 
 def draw_plan(world: World, out: Path) -> None:
     """Write the plan as a PNG. Raises OSError."""
-    figure, _ = _draw(build_drawing(world))
+    figure, _ = draw_drawing(build_drawing(world))
     figure.savefig(out, format="png")
 
 
@@ -55,7 +55,7 @@ def draw_ways(runs: Mapping[str, RunDirectory], out: Path) -> None:
         return len([room for believed, _ in ways.values() for room, _, _ in believed if room in storey.rooms])
 
     storey = max(draw_storeys(world), key=count)
-    figure, axes = _draw(storey.drawing)
+    figure, axes = draw_drawing(storey.drawing)
     for number, (name, both) in enumerate(ways.items()):
         for kind, way, style in zip(("believed", "true"), both, ("-", "--"), strict=True):
             points = np.array([(x, y) for room, x, y in way if room in storey.rooms]).reshape(-1, 2) - storey.origin
@@ -87,7 +87,7 @@ def _read_ways(run: RunDirectory, head: RunHead, world: World) -> tuple[list[Pla
     return [(one["locale"], one["x"], one["y"]) for one in held], true
 
 
-def _draw(plan: Drawing) -> tuple[Any, Any]:
+def draw_drawing(plan: Drawing) -> tuple[Any, Any]:
     """A figure of matplotlib, and its axes [m]."""
     from matplotlib.figure import Figure
 

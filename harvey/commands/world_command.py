@@ -69,13 +69,13 @@ def load_file(file: str, details: list[str]) -> World:
     """A world file, or one that comes with the project. Raises BadInput, WorldError."""
     from world_models.files.world_files import load_world
 
-    path = _path(file)
+    path = find_file(file)
     if path.suffix == ".toml" and path.is_file() and path.stat().st_size > LARGE_BYTES:
         print(f"{file}: reading {path.stat().st_size / 1e6:.1f} MB", file=sys.stderr, flush=True)
     return load_world(path, details=details)
 
 
-def _path(file: str) -> Path:
+def find_file(file: str) -> Path:
     """A file, or one that comes with the project, by its bare name."""
     from world_models.files.world_files import SUFFIXES, WORLDS
 
@@ -91,7 +91,7 @@ def _path(file: str) -> Path:
 def _compile(file: str, details: list[str], out: str | None) -> int:
     from world_models.files.world_files import SUFFIXES, compile_file
 
-    path = _path(file)
+    path = find_file(file)
     if path.suffix != ".toml":
         raise BadInput(f"expected a .toml file to compile, got {file!r}")
     target = Path(out or path.with_suffix(".world").name)

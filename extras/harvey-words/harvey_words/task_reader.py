@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from blackboard import Change, Effect, Entry, KnowledgeSource, Level, Post, Posted, Revise, View, Watch
 from harvey_words.task_entries import Step, ToldTask, active_task, find_time_s
-from harvey_words.task_places import find_place
-from harvey_words.task_words import START, TaskWordsError, is_word_to_go_on, read_tokens, read_wanted
+from harvey_words.task_places import find_places
+from harvey_words.task_words import START, TaskWordsError, is_word_to_go_on, read_tokens, read_wanted, tells_way
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, NOT_ENDED, find_building, place_of
 from world_models.building.locale_frame import FrameRequest
@@ -43,7 +43,8 @@ class TaskReader(KnowledgeSource):
             yield Revise(wait, replace(wait.value, status="over"), (answer, wait))
             return
         try:
-            new = _read_task(view, said.text, place_of(belief.value))
+            new = _read_task(view, said.text, replace(
+                place_of(belief.value), heading_rad=belief.value.locale_from_robot.heading_rad))
         except ValueError as error:
             yield Revise(case, replace(said, answer=f"which cannot be: {error}"), (case,))
             if _is_first(view, case):
@@ -71,7 +72,7 @@ def _is_plain(text: str) -> bool:
         wanted = read_wanted(text)
     except TaskWordsError:
         return not any(token.sort == "VERB" for token in read_tokens(text)[:1])
-    return wanted == (Step("ptrans", wanted[0].phrase),) and wanted[0].phrase != START
+    return wanted == (Step("ptrans", wanted[0].phrase),) and wanted[0].phrase != START and not tells_way(text)
 
 
 def _read_task(view: View, text: str, start: Place) -> ToldTask:
@@ -84,7 +85,7 @@ def _read_task(view: View, text: str, start: Place) -> ToldTask:
             raise
         place = read_destination(text, building, building.find_rooms)
         return ToldTask(text, text, start, (Step("ptrans", text, place=place),))
-    steps = tuple(replace(step, place=find_place(building, step, step.phrase, start) if step.phrase else None,
-                          instead=find_place(building, step, step.other, start) if step.other else None,
-                          due_s=step.due_s and now_s + step.due_s) for step in wanted)
+    steps = tuple(replace(step, due_s=step.due_s and now_s + step.due_s)
+                  for step in find_places(building, wanted, start))
+    start = replace(start, heading_rad=None)
     return ToldTask(text, f"(do {' '.join(step.tell()[1] for step in wanted)})", start, steps)

@@ -30,11 +30,6 @@ class WordDoors(WordSights):
     def find(self, state: State, what: ThingWords) -> Iterator[State]:
         """At each door, or thing, that may be meant."""
         if what.heads & {"crossing", "corner", "end"} and not what.heads & {"door"}:
-            for facing in self.facings(state, None):
-                if not what.names:
-                    yield from self.reach(facing, what)
-                for node in self.nodes(facing) if what.names else ():
-                    yield from self._named_crossing(replace(self.stand(facing, node), moving=False), what)
             yield from self._anywhere(state, what)
             return
         if not self.area(state).is_hall:
@@ -57,7 +52,7 @@ class WordDoors(WordSights):
             return
         for area in self.plan.areas.values():
             here = replace(state, locale=area.name, at=area.middle, odds=state.odds + UNTOLD, moving=False, door="")
-            here = replace(here, way=(*state.way, (area.name, round(area.middle[0], 2), round(area.middle[1], 2))))
+            here = replace(here, way=state.by(area.name, area.middle))
             if what.heads & {"crossing", "corner", "end"}:
                 if area.is_tile and (area.meanings & {"crossing", "corner"} or len(self.ways(here)) != 2):
                     yield from self._named_crossing(here, what)
@@ -110,10 +105,6 @@ class WordDoors(WordSights):
             open_rank = opened.index(sight) + 1 if sight in opened else 0
             only_open = any(word.meaning == "open" for word in what.names)
             own = self._weigh_rank(what, rank, len(row), open_rank, len(opened), only_open)
-            if not sided and what.count:
-                same = [one for one in row if one.side == sight.side]  # "the next" may be that of its side
-                rank = same.index(sight) + 1
-                own = max(own, self._weigh_rank(what, rank, len(same), 0, 0, only_open) - 0.5)
             cost += own
         between = [other for relation, other in what.relations if relation == "between"]
         if len(between) == 2:
@@ -189,4 +180,4 @@ class WordDoors(WordSights):
         locale = feature.beyond if feature.is_open and feature.beyond else sight.locale
         at = moved(feature.at, heading, 0.5) if feature.is_open else front.at
         return replace(front, locale=locale, at=at, heading=heading, odds=odds, senses=senses, moving=False,
-                       door=feature.name, way=(*front.way, (locale, round(at[0], 2), round(at[1], 2))))
+                       door=feature.name, way=front.by(locale, at, feature.name))

@@ -75,8 +75,6 @@ class WordFollower(WordDoors):
 
     def _turn(self, state: State, act: Act) -> Iterator[State]:
         if not self.area(state).is_hall:
-            if act.way in TURNS:
-                yield replace(state, heading=turned(state.heading, TURNS[act.way]), odds=state.odds - 1.5)
             for out in self.leave(state, None):
                 yield from self._turn(replace(out, odds=out.odds + UNSAID_EXIT), act)
             return
@@ -139,8 +137,6 @@ class WordFollower(WordDoors):
                     yield from self._turn_to(there, state.heading + TURNS[act.way], act, 0.0)
         if not rank:
             yield from self.find(state, ThingWords(frozenset(("door",)), count=str(act.units), side=act.way))
-        elif rank < act.units:
-            yield replace(state, odds=state.odds + MISSED)
 
     def _go(self, state: State, act: Act) -> Iterator[State]:
         says_nothing = act.until is None and not act.past and not act.units and act.along is None

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -115,11 +115,7 @@ class WordMap:
     def areas(self) -> Mapping[str, Area]:
         """All locales with walls, by name."""
         plain = {name: self._build_area(self.world.locales[name]) for name in self.world.rooms}
-        areas: dict[str, Area] = {}
-        for name, area in plain.items():
-            areas[name] = Area(name, area.is_hall, area.is_tile, area.axis, area.middle, area.half, area.meanings,
-                               area.colours, tuple(self._features(name, plain)))
-        return areas
+        return {name: replace(area, features=tuple(self._features(name, plain))) for name, area in plain.items()}
 
     @cached_property
     def vocabulary(self) -> frozenset[str]:

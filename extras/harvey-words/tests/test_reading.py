@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from harvey.cli import main
 from harvey_words import Reading, RouteError, read_route, write_directions
-from harvey_words.instructions import draw_routes, read_paragraphs, run
+from harvey_words.experiments.instructions import draw_routes, read_paragraphs, run
+from harvey_words.experiments.mazes import HALLS, THINGS, write_maze
+from harvey_words.experiments.told_routes import tell_maze
 from harvey_words.lexicon import Lexicon, lexicon_data
-from harvey_words.mazes import HALLS, THINGS, write_maze
-from harvey_words.told_routes import tell_maze
 from harvey_words.word_map import WordMap
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world

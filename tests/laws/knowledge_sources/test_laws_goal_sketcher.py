@@ -80,20 +80,6 @@ def test_halts_on_the_way_to_another_goal_do_not_count() -> None:
     assert effect.value.halts == 0 and old.id not in reasons(effect)
 
 
-@pytest.mark.parametrize(("y_m", "half_m", "touched_s", "is_blocked"), [
-    (1.63, 0.13, None, False), (2.37, 0.13, None, False), (1.66, 0.16, None, True), (1.63, 0.13, 1.0, True),
-    (2.0, 0.13, None, True)])
-def test_a_sliver_at_a_jamb_blocks_no_way_until_it_is_touched(
-    y_m: float, half_m: float, touched_s: float | None, is_blocked: bool
-) -> None:
-    """The doorway is from 1.5 to 2.5 m, and the robot 0.7 m wide."""
-    bench = Bench(plain_robot())
-    bench.believe()
-    bench.stand(8.0, y_m, 0.05, half_m, touched_s=touched_s)
-    effects = bench.ask(SOURCE, bench.pursue(AIM))
-    assert (bool(made(effects, Impasse)), bool(made(effects, PlanSketch))) == (is_blocked, not is_blocked)
-
-
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_only_what_takes_the_goal_is_behind_it_and_named(side: float) -> None:
     bench = Bench(plain_robot())

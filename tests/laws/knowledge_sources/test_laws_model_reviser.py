@@ -20,7 +20,7 @@ from things_in_hall import CARTON, HALL, Hall
 from world_models.building.locale_frame import FRAME_OF, FrameChange, LocaleFrame
 from world_models.building.model_errors import INEXACT_M, find_sigma_m, list_facing
 from world_models.entries import Difference, DoorPicture, DoorState, Evidence, Explanation, Obstacle, Rival, UserReport
-from world_models.entries.difference import MODEL
+from world_models.entries.difference import DOORS, MODEL
 
 SOURCE = ModelReviser()
 DOOR, ROOMS = "archive-north-door", ("archive", HALL)
@@ -161,6 +161,21 @@ def test_walls_that_are_farther_apart_explain_a_model_that_seems_inexact(order: 
         assert all(drawn[side.mode] in changes(hall, room) for room in side.rooms)
         assert find_sigma_m(find_building(hall.board.view), HALL, side.mode) == pytest.approx(INEXACT_M, abs=1e-3)
     assert name_model(hall.board.view) == f"{MODEL} with 2 walls redrawn"  # of which nothing is known yet
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_one_sure_look_redraws_a_door_only_where_doors_surely_stand_beside(order: int) -> None:
+    hall, told = Hall((SOURCE,)), (Explanation("chance", "", 0.0), Explanation("jamb", "", 3.5, 0.1, 0.015))
+    looks = [Evidence(name, "", told, x_m, 0.0, 0.0, 0.3, 0.2, 1.0)
+             for name, x_m in ((DOOR, 0.0), (DOORS, 4.0), (DOORS, 8.0))]
+    first, last = (weigh_rivals(said[0].about, said) for said in (looks[:1], looks[1:])[::order])
+    one = hall.put(first)
+    assert not changes(hall, HALL) and not changes(hall, "archive")
+    both = {one.id, hall.put(last).id}
+    for room in ROOMS:
+        (drawn,), entry = changes(hall, room), hall.board.view.latest(LocaleFrame, lambda f, room=room: f.name == room)
+        assert (drawn.what, drawn.name, drawn.sigma_m) == ("beside", DOOR, 0.015)
+        assert entry is not None and {ref.id for ref in entry.because} >= both
 
 
 def test_what_the_model_has_not_is_answered_and_revises_nothing() -> None:

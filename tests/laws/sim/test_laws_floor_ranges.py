@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor import SeenFloor, see_ranges
+from knowledge_sources.methods.floor import FloorMap, see_ranges
 from knowledge_sources.methods.floor.ranges import RANGE_SIGMAS
 from sim.body.collision import Obstacles
 from sim.body.senses import RangeRing
@@ -145,8 +145,8 @@ def test_what_touches_the_robot_ends_the_floor_there() -> None:
     floor = see_ranges(ROBOT, name, pose, 0.01, 0.002, reading, ())
     ahead = int(np.argmin(np.abs(floor.bearings_rad)))
     assert floor.ends[ahead] == "thing" and floor.far_m[ahead] <= 0.36
-    assert not SeenFloor((floor,), np.array([[pose.x_m, pose.y_m, 0.5]])).ask(
-        np.array([[pose.x_m + 0.42, pose.y_m]]))[0].any()
+    told = FloorMap([floor], np.array([[pose.x_m, pose.y_m, 0.5]])).ask(np.array([[pose.x_m + 0.42, pose.y_m]]))
+    assert told.p[0] == 1.0
 
 
 def test_without_an_echo_nothing_is_free() -> None:

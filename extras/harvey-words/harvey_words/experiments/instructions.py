@@ -13,10 +13,10 @@ import numpy as np
 from experiments.generated.floors import generated_floor
 from experiments.report import Cell, Report
 from harvey_words.directions import write_directions
+from harvey_words.experiments.mazes import write_maze
+from harvey_words.experiments.told_routes import Told, draw_maze, tell_maze, tell_rooms
 from harvey_words.lexicon import split_text
-from harvey_words.mazes import write_maze
 from harvey_words.reading import Reading, RouteError, read_route
-from harvey_words.told_routes import Told, draw_maze, tell_maze, tell_rooms
 from harvey_words.word_map import WordMap
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world

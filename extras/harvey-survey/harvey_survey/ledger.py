@@ -1,0 +1,256 @@
+"""The ledger of a building: of each line, wall, door and thing, how often runs expected it, found it, and how far off.
+
+A pure function of the world and the journals. How far something is off is measured from the pose that the picture gave,
+by all of its lines that were found in that picture; the part that the pose has taken up is not seen here, but by
+:mod:`harvey_survey.adjustment`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harvey_survey.looks import Look, light_of, read_looks
+from harvey_survey.offsets import SIGMA_PX, measure_offsets, measure_slopes
+from logs.run_directory import RunDirectory
+from world_models.building.model_errors import WALL, LineErrors, find_line_errors
+from world_models.building.world import World
+from world_models.camera import CAMERA_UNKNOWNS
+
+Floats = NDArray[np.float64]
+
+WITHIN_M = 0.1
+"""Deviation of what may be off, where one picture says little of it [m]: it counts by what it adds to that."""
+NEAR_M, FAR_M = 3.0, 6.0
+"""What is nearer than the one is near, what is further than the other far [m]."""
+DISTANCES = ("near", "middling far", "far")
+STILL = np.zeros(len(CAMERA_UNKNOWNS))
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """How often something was expected, found, hidden by what was found on the floor, and missing."""
+
+    expected: int = 0
+    found: int = 0
+    hidden: int = 0
+
+    @property
+    def missing(self) -> int:
+        return self.expected - self.found - self.hidden
+
+    def plus(self, found: bool, hidden: bool) -> Counts:
+        return Counts(self.expected + 1, self.found + found, self.hidden + (hidden and not found))
+
+
+@dataclass(frozen=True, slots=True)
+class Offset:
+    """How far something is off in one direction.
+
+    Attributes:
+        way: what is displaced and how, the name of a mode of :mod:`world_models.building.model_errors`: a wall into its
+            room, a door or a thing along its wall, a thing on a wall up, one on the floor to x and y of the world.
+        direction: (3,) unit vector of that [world].
+        mean_m: by all pictures; positive along that direction.
+        sigma_m: standard deviation of the mean. spread_m: between pictures; 0 of one.
+        pictures: by how many.
+    """
+
+    way: str
+    direction: tuple[float, float, float]
+    mean_m: float
+    sigma_m: float
+    spread_m: float
+    pictures: int
+
+
+@dataclass(frozen=True, slots=True)
+class LineEntry:
+    """One line of a landmark: its number there, its counts, and how far off across itself, as it shows best.
+
+    Attributes:
+        off_m: mean; spread_m: standard deviation between pictures; 0 where it was never found.
+        direction: (3,) the direction in which that is measured [world].
+    """
+
+    number: int
+    counts: Counts
+    off_m: float
+    spread_m: float
+    direction: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """A wall (a face), a door or a thing.
+
+    Attributes:
+        name, room, kind, source: of its landmark.
+        counts: of its lines in all pictures.
+        pictures, unseen: in how many pictures lines of it were expected, and in how many of them none was found.
+        by_light, by_distance: counts by the picture's brightness, and by how far away its lines are.
+    """
+
+    name: str
+    room: str
+    kind: str
+    source: str
+    counts: Counts
+    pictures: int
+    unseen: int
+    by_light: dict[str, Counts]
+    by_distance: dict[str, Counts]
+    lines: tuple[LineEntry, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Ledger:
+    """What all runs say of a building: elements by name, offsets by name of the mode.
+
+    Attributes:
+        runs: digests of the journals.
+        looks: pictures of verified places that were counted.
+    """
+
+    world: str
+    runs: tuple[str, ...]
+    looks: int
+    elements: tuple[Element, ...]
+    offsets: tuple[Offset, ...]
+
+    def offsets_of(self, name: str) -> tuple[Offset, ...]:
+        """Those of a landmark's own ways, without that of its wall."""
+        return tuple(o for o in self.offsets if o.way.startswith(f"{name} ") and WALL not in o.way)
+
+
+def read_ledger(world: World, path: Path, runs: Sequence[RunDirectory]) -> Ledger:
+    """The ledger of a world by the journals of its runs; ``path`` is the world's file. Raises BadInput."""
+    return build_ledger(world, read_looks(world, path, runs))
+
+
+def build_ledger(world: World, looks: Sequence[Look]) -> Ledger:
+    """The ledger by looks."""
+    tallies: dict[str, _Tally] = {}
+    measured: dict[tuple[str, tuple[float, float, float]], list[tuple[float, float]]] = {}
+    for look in looks:
+        for name, rows in _group_by_mark(look).items():
+            tallies.setdefault(name, _Tally()).add(look, rows)
+        for way, direction, mean_m, variance in _measure_modes(world, look):
+            measured.setdefault((way, direction), []).append((mean_m, variance))
+        for (name, number), offset, slope in _list_offsets(look):
+            tallies[name].offsets.setdefault(number, []).append((offset, slope))
+    elements = [tallies[mark.name].build(mark.name, mark.locale, mark.kind, mark.source)
+                for mark in world.landmarks if mark.name in tallies]
+    combined = [_combine(*way, measured[way]) for way in sorted(measured)]
+    return Ledger(world.name, tuple(sorted({look.run for look in looks})), len(looks), tuple(elements),
+                  tuple(offset for offset in combined if offset is not None))
+
+
+def errors_of(world: World, look: Look, unstated_m: float) -> LineErrors:
+    """The modes of a look's lines; what nothing is stated of has this deviation [m]."""
+    return find_line_errors(world, look.marks, look.numbers.tolist(), unstated_m)
+
+
+def _group_by_mark(look: Look) -> dict[str, list[int]]:
+    groups: dict[str, list[int]] = {}
+    for i, mark in enumerate(look.marks):
+        groups.setdefault(mark.name, []).append(i)
+    return groups
+
+
+@dataclass
+class _Tally:
+    """What is counted of one landmark so far; offsets: of each line, of each segment its offset and slopes [px, px/m].
+    """
+
+    counts: Counts = Counts()
+    pictures: int = 0
+    unseen: int = 0
+    by_light: dict[str, Counts] = field(default_factory=dict)
+    by_distance: dict[str, Counts] = field(default_factory=dict)
+    by_line: dict[int, Counts] = field(default_factory=dict)
+    offsets: dict[int, list[tuple[Floats, Floats]]] = field(default_factory=dict)
+
+    def add(self, look: Look, rows: Sequence[int]) -> None:
+        self.pictures += 1
+        self.unseen += not any(look.found[i] for i in rows)
+        light, far = light_of(look), look.distances_m
+        for i in rows:
+            seen = bool(look.found[i]), bool(look.hidden[i])
+            distance = DISTANCES[int(far[i] > NEAR_M) + int(far[i] > FAR_M)]
+            self.counts = self.counts.plus(*seen)
+            for counts, key in ((self.by_light, light), (self.by_distance, distance)):
+                counts[key] = counts.get(key, Counts()).plus(*seen)
+            self.by_line[int(look.numbers[i])] = self.by_line.get(int(look.numbers[i]), Counts()).plus(*seen)
+
+    def build(self, name: str, room: str, kind: str, source: str) -> Element:
+        lines = tuple(_build_line(n, counts, self.offsets.get(n, [])) for n, counts in sorted(self.by_line.items()))
+        return Element(name, room, kind, source, self.counts, self.pictures, self.unseen, _in_order(self.by_light),
+                       _in_order(self.by_distance), lines)
+
+
+def _in_order(counts: dict[str, Counts]) -> dict[str, Counts]:
+    return {key: counts[key] for key in ("dark", "middling", "bright", *DISTANCES) if key in counts}
+
+
+def _build_line(number: int, counts: Counts, offsets: Sequence[tuple[Floats, Floats]]) -> LineEntry:
+    """The direction in which a line's offsets show best is that of the largest information."""
+    if not offsets:
+        return LineEntry(number, counts, 0.0, 0.0, (0.0, 0.0, 0.0))
+    information = sum((slope.T @ slope for _, slope in offsets), np.zeros((3, 3)))
+    direction = np.linalg.eigh(information)[1][:, -1]
+    direction = direction * (1.0 if direction[np.argmax(np.abs(direction))] > 0.0 else -1.0)
+    shown = [(off, slope @ direction) for off, slope in offsets]
+    weight, off_m = np.array([(s @ s, s @ -off / (s @ s)) for off, s in shown]).T
+    mean_m = float(weight @ off_m / weight.sum())
+    spread_m = float(np.sqrt(weight @ (off_m - mean_m) ** 2 / weight.sum()))
+    x, y, z = direction.tolist()
+    return LineEntry(number, counts, mean_m, spread_m, (x, y, z))
+
+
+def _list_offsets(look: Look) -> list[tuple[tuple[str, int], Floats, Floats]]:
+    """Of each pair: its line, the offsets (2,) of its segment and their slopes (2, 3) with the place of the line."""
+    pieces = look.pieces_world[look.pairs]
+    offsets = measure_offsets(look, look.pose, STILL, pieces)
+    _, slopes = measure_slopes(look, look.pose, STILL, pieces)
+    return [((look.marks[i].name, int(look.numbers[i])), offsets[k], slopes[k])
+            for k, i in enumerate(look.pairs.tolist())]
+
+
+def _measure_modes(world: World, look: Look) -> list[tuple[str, tuple[float, float, float], float, float]]:
+    """How far each mode is off by one picture, its pose as it was found: name, direction, mean [m] and variance."""
+    every = errors_of(world, look, WITHIN_M).restate(1.0)
+    errors = every.take(look.pairs)
+    pieces = look.pieces_world[look.pairs]
+    offsets = measure_offsets(look, look.pose, STILL, pieces)
+    _, by_place = measure_slopes(look, look.pose, STILL, pieces)
+    slopes = np.einsum("pei,kpi->pek", by_place, errors.displacements).reshape(2 * len(pieces), -1) / SIGMA_PX
+    prior = np.eye(slopes.shape[1]) / WITHIN_M**2
+    covariance = np.linalg.inv(slopes.T @ slopes + prior)
+    means = covariance @ (slopes.T @ -offsets.reshape(-1) / SIGMA_PX)
+    return [(way, direction_of(every, k), float(means[k]), float(covariance[k, k]))
+            for k, way in enumerate(errors.displacement_modes)]
+
+
+def direction_of(errors: LineErrors, k: int) -> tuple[float, float, float]:
+    """(3,) the unit vector along which a mode displaces lines; rounded, so that it is the same from all pictures."""
+    by_m = errors.displacements[k][np.argmax(np.linalg.norm(errors.displacements[k], axis=1))]
+    x, y, z = (np.round(by_m / np.linalg.norm(by_m), 9) + 0.0).tolist()
+    return x, y, z
+
+
+def _combine(way: str, direction: tuple[float, float, float], measured: Sequence[tuple[float, float]]) -> Offset | None:
+    """All pictures together, each by what it adds to not knowing; None where none adds anything."""
+    means, variances = np.array(measured).T
+    added = 1.0 / variances - 1.0 / WITHIN_M**2
+    if added.sum() < 1.0 / WITHIN_M**2:
+        return None
+    counted = added > 1e-9 / WITHIN_M**2
+    own, weight = (means / variances)[counted] / added[counted], added[counted]
+    mean_m = float(weight @ own / weight.sum())
+    spread_m = float(np.sqrt(weight @ (own - mean_m) ** 2 / weight.sum()))
+    return Offset(way, direction, mean_m, float(1.0 / np.sqrt(weight.sum())), spread_m, int(counted.sum()))
