@@ -136,7 +136,7 @@ def tell_sureness(run: RunDirectory | None, history: Timeline, at: int | None) -
         errors = [] if run is None else read_errors(run, history, held.cycle if at is None else at)
     except BadInput:
         errors = []
-    steps += [Sentence(f"As only the simulator knows, it stood {error.words()}.", label="truth") for error in errors[-1:]]
+    steps += [Sentence(f"As only the simulator knows, it stood {one.words()}.", label="truth") for one in errors[-1:]]
     when = "At the end" if at is None else f"In cycle {at}"
     yield Story(f"{when}: {phrases.believed(held.value)}", tuple(steps), held.ref)
 
