@@ -35,6 +35,14 @@ def take_some(scene: PoseScene, rng: np.random.Generator, count: int = 14) -> Po
     return scene.take(np.sort(rng.permutation(len(scene))[:count]))
 
 
+def begin(scene: PoseScene, seed: int) -> tuple[np.random.Generator, PoseScene, Any, Pose]:
+    """Some lines of a scene, their noisy segments, and a prior."""
+    rng = np.random.default_rng(seed)
+    scene = take_some(scene, rng)
+    segments = end_noise(scene.segments_px, SIGMA_PX, rng)
+    return rng, scene, segments, draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
+
+
 @by_solver(SOLVERS)
 @given(scene=scenes, seed=seeds)
 @quick
@@ -50,10 +58,7 @@ def test_exact_lines_give_the_truth(solver: Solver, scene: PoseScene, seed: int)
 @given(scene=scenes, seed=seeds)
 @quick
 def test_the_order_of_the_lines_does_not_matter(solver: Solver, scene: PoseScene, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    scene = take_some(scene, rng)
-    segments = end_noise(scene.segments_px, SIGMA_PX, rng)
-    prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    rng, scene, segments, prior = begin(scene, seed)
     order = rng.permutation(len(scene))
     first = solve(solver, scene, segments, prior)
     second = solve(solver, scene.take(order), segments[order], prior)
@@ -66,10 +71,7 @@ def test_the_order_of_the_lines_does_not_matter(solver: Solver, scene: PoseScene
 @quick
 def test_which_end_comes_first_does_not_matter(solver: Solver, scene: PoseScene, seed: int) -> None:
     """Swapping the ends changes the sign of a normal or of a direction; neither sign has a meaning."""
-    rng = np.random.default_rng(seed)
-    scene = take_some(scene, rng)
-    segments = end_noise(scene.segments_px, SIGMA_PX, rng)
-    prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    rng, scene, segments, prior = begin(scene, seed)
     first = solve(solver, scene, segments, prior)
     lines, flipped = scene.lines_world.copy(), segments.copy()
     a, b = rng.random(len(scene)) < 0.5, rng.random(len(scene)) < 0.5
@@ -83,10 +85,7 @@ def test_which_end_comes_first_does_not_matter(solver: Solver, scene: PoseScene,
 @given(scene=scenes, seed=seeds)
 @quick
 def test_moving_the_world_moves_the_pose_with_it(solver: Solver, scene: PoseScene, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    scene = take_some(scene, rng)
-    segments = end_noise(scene.segments_px, SIGMA_PX, rng)
-    prior = draw_prior(scene.camera_from_world, 0.3, 0.03, rng)
+    rng, scene, segments, prior = begin(scene, seed)
     moved_from_world = Pose.from_rotation_vector(rng.normal(0.0, 1.0, 3), rng.uniform(-30.0, 30.0, 3))
     lines = moved_from_world.apply(scene.lines_world)
     moved = PoseScene(lines, segments, scene.landmark_ids, scene.camera, scene.camera_from_world)
