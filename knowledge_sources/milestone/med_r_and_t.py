@@ -113,14 +113,14 @@ class MedRAndT(RobotKnowledgeSource):
     def _weigh_model(
         self, view: View, match: Entry[LineMatch], camera: CameraState, here: Pose2, prior: Floats, errors: LineErrors
     ) -> tuple[Evidence | None, bool]:
-        """What is new of whether the model is inexact, where it is not known, and whether that is likelier than not."""
-        if not errors.is_exact or match.value.is_camera_open or len(match.value.pairs) < MIN_CAMERA_LINES:
+        """What is new of whether the model is inexact, where it is not stated, and whether it likely is."""
+        is_found = HELD.of(view).world.root_frame().is_inexact  # then what acquits it is told, too
+        if match.value.is_camera_open or len(match.value.pairs) < MIN_CAMERA_LINES or not (is_found or errors.is_exact):
             return None, False
         known = find_difference(view, name_model(view))
-        evidence = find_model_evidence(
-            match.value.lines_world, match.value.segments_px, errors, camera, here, prior, tell_time_s(view),
-            known.about)
-        if not known.counted and not is_strange(evidence):
+        evidence = find_model_evidence(match.value.lines_world, match.value.segments_px, errors, camera, here, prior,
+                                       tell_time_s(view), known.about)
+        if not (is_found or known.counted or is_strange(evidence)):
             return None, False
         return evidence, is_model_doubted((*known.counted, evidence))
 

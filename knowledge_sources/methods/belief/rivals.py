@@ -25,7 +25,7 @@ PRIORS: Mapping[RivalKind, float] = {
     "mounting": -2.0, "wheels": -2.0, "turns": -2.0, "odometry": -4.0, "elsewhere": -3.0, "mover": -1.0,
 }
 """Log odds of a rival before any evidence, against what nobody has thought of: what is ordinary first."""
-PRIORS_BESIDE = {**PRIORS, "chance": -2.0}
+PRIORS_BESIDE: Mapping[RivalKind, float] = {**PRIORS, "chance": -2.0}
 """The same of a door where doors stand beside in general, by some 8 cm: of eight one is within a centimetre."""
 P_MISREAD = 0.02
 """Part of the looks that are misread as a whole: such a one looks as if its best rival were so (pictures of honest

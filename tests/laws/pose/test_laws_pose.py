@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,10 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
+from experiments.paper.pose_scenes import PoseScene, corridor, draw_prior, end_noise, wrong_landmarks
 from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
 from knowledge_sources.methods.pose import (
-    PoseEstimate,
     build_line_set,
     compute_image_jacobian,
     compute_weak_information,
@@ -21,29 +19,11 @@ from knowledge_sources.methods.pose import (
     med_r_and_t,
     r_and_t_ml,
 )
+from pose_laws import SIGMA_PX, SOLVERS, Solver, by_solver, measure_error, scenes, seeds, solve
 from world_models.camera import Camera
 from world_models.frames import Pose
 
-SOLVERS = [r_then_t, r_and_t, r_and_t_ml, med_r_and_t, trunc_r_and_t]
-SCENES = [campus(), corridor()]
-SIGMA_PX = 0.4
-
-seeds = st.integers(0, 2**32 - 1)
-scenes = st.sampled_from([0, 1]).map(SCENES.__getitem__)
 quick = settings(max_examples=8, deadline=None)
-by_solver = pytest.mark.parametrize("solver", SOLVERS, ids=lambda f: f.__name__)
-Solver = Callable[..., PoseEstimate]
-
-
-def solve(solver: Solver, scene: PoseScene, segments: Any, prior: Pose, **more: Any) -> PoseEstimate:
-    more.setdefault("landmark_ids", scene.landmark_ids)
-    return solver(scene.lines_world, segments, scene.camera, prior, sigma_px=SIGMA_PX, **more)
-
-
-def measure_error(found: Pose, truth: Pose) -> tuple[float, float]:
-    """Rotation [rad] and translation [m] between two poses."""
-    apart = found @ truth.inverse()
-    return float(np.linalg.norm(apart.rotation_vector)), float(np.linalg.norm(apart.translation))
 
 
 def is_same(found: Pose, other: Pose) -> bool:
@@ -55,7 +35,7 @@ def take_some(scene: PoseScene, rng: np.random.Generator, count: int = 14) -> Po
     return scene.take(np.sort(rng.permutation(len(scene))[:count]))
 
 
-@by_solver
+@by_solver(SOLVERS)
 @given(scene=scenes, seed=seeds)
 @quick
 def test_exact_lines_give_the_truth(solver: Solver, scene: PoseScene, seed: int) -> None:
@@ -66,7 +46,7 @@ def test_exact_lines_give_the_truth(solver: Solver, scene: PoseScene, seed: int)
     assert found.inliers.all() and np.abs(found.residuals_px).max() < 1e-3
 
 
-@by_solver
+@by_solver(SOLVERS)
 @given(scene=scenes, seed=seeds)
 @quick
 def test_the_order_of_the_lines_does_not_matter(solver: Solver, scene: PoseScene, seed: int) -> None:
@@ -81,7 +61,7 @@ def test_the_order_of_the_lines_does_not_matter(solver: Solver, scene: PoseScene
     assert np.array_equal(second.inliers, first.inliers[order])
 
 
-@by_solver
+@by_solver(SOLVERS)
 @given(scene=scenes, seed=seeds)
 @quick
 def test_which_end_comes_first_does_not_matter(solver: Solver, scene: PoseScene, seed: int) -> None:
@@ -99,7 +79,7 @@ def test_which_end_comes_first_does_not_matter(solver: Solver, scene: PoseScene,
     assert is_same(second.camera_from_world, first.camera_from_world)
 
 
-@by_solver
+@by_solver(SOLVERS)
 @given(scene=scenes, seed=seeds)
 @quick
 def test_moving_the_world_moves_the_pose_with_it(solver: Solver, scene: PoseScene, seed: int) -> None:
@@ -140,7 +120,7 @@ def test_gross_outliers_do_not_move_a_robust_pose(
     assert all(found.rejected[i] for i in np.flatnonzero(gross))
 
 
-@by_solver
+@by_solver(SOLVERS)
 @given(scene=scenes, seed=seeds)
 @quick
 def test_a_pose_behind_the_camera_is_never_returned(solver: Solver, scene: PoseScene, seed: int) -> None:
@@ -218,7 +198,7 @@ def test_derivatives_are_those_of_the_residuals(scene: PoseScene, seed: int) -> 
         np.testing.assert_allclose((far - near) / 2e-6, image[..., k], rtol=1e-4, atol=1e-3)
 
 
-@by_solver
+@by_solver(SOLVERS)
 @given(seed=seeds)
 @quick
 def test_lens_distortion_is_undone(solver: Solver, seed: int) -> None:
