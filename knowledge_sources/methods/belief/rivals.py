@@ -22,10 +22,10 @@ from world_models.frames import Pose2
 PRIORS: Mapping[RivalKind, float] = {
     "chance": 3.0, "thing": 0.0, "leaf": -1.0, "jamb": 0.0, "wall": 0.0, "dirt": -1.0,
     "still camera": -4.0, "late pictures": -4.5, "lens": -4.0, "focal length": -2.0,
-    "mounting": -2.0, "wheels": -2.0, "turns": -2.0, "elsewhere": -3.0, "mover": -1.0,
+    "mounting": -2.0, "wheels": -2.0, "turns": -2.0, "odometry": -4.0, "elsewhere": -3.0, "mover": -1.0,
 }
 """Log odds of a rival before any evidence, against what nobody has thought of: what is ordinary first."""
-PRIORS_BESIDE = {**PRIORS, "chance": -2.0}
+PRIORS_BESIDE: Mapping[RivalKind, float] = {**PRIORS, "chance": -2.0}
 """The same of a door where doors stand beside in general, by some 8 cm: of eight one is within a centimetre."""
 P_MISREAD = 0.02
 """Part of the looks that are misread as a whole: such a one looks as if its best rival were so (pictures of honest
