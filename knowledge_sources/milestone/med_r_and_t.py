@@ -40,6 +40,8 @@ from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
 
 Matched = tuple[Entry[LineMatch], Entry[Milestone]]
+PUT_DOWN = "command"
+"""Basis of a belief that nothing has moved since the robot was put down."""
 
 
 class MedRAndT(RobotKnowledgeSource):
@@ -91,7 +93,8 @@ class MedRAndT(RobotKnowledgeSource):
         rests = Rests(
             match.value.lines_world[near], match.value.segments_px[near],
             [m.landmarks[m.landmark_of[i]] for i in match.value.pairs[near, 0]], robot.camera, robot.mount,
-            np.zeros(len(known)) if moved is None else moved.step, here, belief.covariance, prior, known)
+            np.zeros(len(known)) if moved is None else moved.step, here, belief.covariance,
+            None if belief.value.basis == PUT_DOWN else prior, known)
         because = match, milestone, belief.entry, *view.where(Difference, lambda d: d.about == name_model(view))
         yield Post(
             PoseFix(
@@ -138,11 +141,7 @@ class MedRAndT(RobotKnowledgeSource):
     ) -> PlanarEstimate:
         """The pose with a camera that is taken as it is."""
         return planar_from_lines(
-            match.lines_world,
-            match.segments_px,
-            robot.camera,
-            robot.mount.camera_from_robot,
-            here,
+            match.lines_world, match.segments_px, robot.camera, robot.mount.camera_from_robot, here,
             prior_covariance=prior,
             landmark_ids=[milestone.landmark_of[i] for i in match.pairs[:, 0]],
             sigma_px=SIGMA_ACROSS_PX,
