@@ -20,7 +20,7 @@ from sim.render.lighting import Lighting
 from sim.render.optics import check_lens
 from sim.render.rasterizer import sample_offsets
 from sim.render.sensor import SensorParameters
-from sim.scenario_names import SCENARIOS, list_scenarios
+from sim.scenario_names import SCENARIOS, find_scenarios
 from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.mission import ROOT, TABLES, Limits, Mission, MissionFormat, named_file
@@ -185,12 +185,13 @@ def load_scenario(path_or_name: str | Path) -> Scenario:
     """
     path = Path(path_or_name)
     if path.suffix != ".toml":
-        path = SCENARIOS / f"{path_or_name}.toml"
-        if str(path_or_name) not in list_scenarios():
+        known = find_scenarios()
+        if str(path_or_name) not in known:
             if Path(path_or_name).is_dir():
                 raise ScenarioError(f"scenario: expected a name or a TOML file, got the directory {path_or_name}")
-            near = suggest_keys(str(path_or_name), list_scenarios())
+            near = suggest_keys(str(path_or_name), list(known))
             raise ScenarioError(f"scenario: expected {near}, got {path_or_name!r}")
+        path = known[str(path_or_name)]
     return _scenario(lambda: Source.read(path), path.stem, path.parent)
 
 
