@@ -120,10 +120,9 @@ def main() -> int:
     """Drive the seeds and the kidnap, and keep what came."""
     commit = find_commit()
     missions = {seed: drive_seed(seed) for seed in SEEDS}
-    found = {SEEDS_FILE: {"missions": missions}, LADDER_FILE: {"rows": drive_ladder()}}
     SEEDS_FILE.parent.mkdir(parents=True, exist_ok=True)
-    for file, what in found.items():
-        file.write_text(json.dumps({"commit": commit, **what}, indent=1) + "\n", encoding="utf-8")
+    for file, found in ((SEEDS_FILE, {"missions": missions}), (LADDER_FILE, {"rows": drive_ladder()})):
+        file.write_text(json.dumps({"commit": commit, **found}, indent=1) + "\n", encoding="utf-8")
     return 0
 
 

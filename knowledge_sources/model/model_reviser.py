@@ -59,7 +59,8 @@ class ModelReviser(RobotKnowledgeSource):
     Of two that say otherwise the newer counts. All that is new of a locale comes into its frame at once, so that who
     reads why it was revised finds all of it. A door is in the frames of both its rooms, a wall in those of all at it.
     Walls are redrawn once it is sure that they are elsewhere, and not the camera is otherwise; where no wall explains
-    that the model is inexact, the whole building is. A frame is revised only where a plan may change by it.
+    that the model is inexact, the whole building is, until looks acquit it. A frame is revised only where a plan may
+    change by it.
     What cannot be taken up, because the model has nothing of that name, is answered. It acts at once, before the next
     increment: the door may be just ahead.
     """
@@ -133,15 +134,12 @@ class ModelReviser(RobotKnowledgeSource):
         widths = [(found, sides) for found in view.where(Difference, lambda d: BETWEEN in d.about)
                   if is_width(found.value, scale * measure_between(sides := find_facing(building, found.value.about)))]
         newest = max((*models, *(found for found, _ in widths)), key=lambda entry: entry.cycle, default=None)
-        if newest is None:
-            return
-        placed = place_walls([(found.value, sides) for found, sides in widths], newest.author)
-        for side, change in placed:
-            yield Statement(newest, side.rooms, partial(redraw, change=change))
+        placed = place_walls([(found.value, sides) for found, sides in widths], newest.author) if newest else []
+        yield from (Statement(newest, side.rooms, partial(redraw, change=change)) for side, change in placed if newest)
         is_drawn = all(redraw(frame := building.frame(side.rooms[0]), change) is frame for side, change in placed)
-        if models or not is_drawn:
-            yield Statement(newest, (building.root,), partial(
-                revise_by_difference, by=newest.author, is_explained=not is_drawn))
+        for model in view.where(Difference, lambda d: d.about == name and is_drawn):
+            yield Statement(model, (building.root,), partial(
+                revise_by_difference, found=model.value, by=model.author))
 
 
 def _answer(is_taken: bool, error: str | None) -> str:

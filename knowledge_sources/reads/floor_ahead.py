@@ -119,8 +119,9 @@ class FloorAhead:
         places = shapely.points(swept.points)
         p = self._tell(swept)
         for polygon, certainty, wider_m in self._wider:
-            gaps = shapely.distance(places, polygon) + SEEN_MARGIN_M
-            p = np.maximum(p, certainty * np.ceil(np.clip(1.0 - gaps / wider_m, 0.0, 1.0) * WIDER_STEPS) / WIDER_STEPS)
+            near = 1.0 - (shapely.distance(places, polygon) + SEEN_MARGIN_M) / wider_m
+            steps = np.ceil(np.where(swept.at_m > 0.0, near.clip(0.0), 0.0) * WIDER_STEPS)  # else it is there already
+            p = np.maximum(p, certainty * steps / WIDER_STEPS)
         p[(swept.at_m > self._to_go_m) & (shapely.distance(places, self._floor) > SEEN_MARGIN_M)] = 1.0
         risks: dict[float, Floats] = {1.0: np.array([room_m] if room_m < way_m else [])}
         borne = (self._settings.creep_speed_m_per_s / self._robot.actuator.speed_m_per_s) ** 2

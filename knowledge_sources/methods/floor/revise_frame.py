@@ -14,6 +14,7 @@ from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
 from world_models.building.locales import Doorway
 from world_models.building.model_errors import INEXACT_M, Side
 from world_models.entries import DOOR_STATES, Difference, DoorState, Obstacle, UserReport
+from world_models.entries.difference import SURE
 
 MIN_BESIDE_SIGMAS = 3.0
 """What stands beside is drawn there from so many standard deviations on."""
@@ -51,12 +52,13 @@ def revise_by_door(frame: LocaleFrame, door: DoorState, by: str) -> LocaleFrame:
     return frame.restored("shut", door.door) if door.state == "open" and is_shut else frame
 
 
-def revise_by_difference(frame: LocaleFrame, by: str, *, is_explained: bool) -> LocaleFrame:
-    """The building's frame, whose model is surely inexact; or as filed, where a wall that is redrawn explains it."""
-    is_known = any(change.what == "inexact" for change in frame.changes)
-    if is_explained:
-        return frame.restored("inexact", frame.name) if is_known else frame
-    return frame if is_known else frame.changed(FrameChange("inexact", frame.name, by))
+def revise_by_difference(frame: LocaleFrame, found: Difference, by: str) -> LocaleFrame:
+    """The building's frame, whose model is surely inexact, or surely as it was measured; else the same frame."""
+    what = found.leader
+    if what.p < SURE or what.kind != ("chance" if frame.is_inexact else "wall"):
+        return frame
+    change = FrameChange("inexact", frame.name, by)
+    return frame.restored("inexact", frame.name) if frame.is_inexact else frame.changed(change)
 
 
 def redraw_door(frame: LocaleFrame, door: Doorway, found: Difference, by: str, *, are_beside: bool) -> LocaleFrame:

@@ -60,12 +60,12 @@ def test_where_a_search_has_just_found_it_the_first_milestone_holds(basis: str) 
     assert drawn.verified is (basis == "relocalization")
 
 
-@pytest.mark.parametrize(("status", "halts"), [("halted", 3), ("superseded", 0)])
+@pytest.mark.parametrize(("status", "halts"), [("halted", 4), ("superseded", 0)])
 def test_halts_are_counted_in_a_row(status: SketchStatus, halts: int) -> None:
     bench = Bench(plain_robot())
     bench.believe()
     goal = bench.pursue(AIM)
-    old = bench.revise(bench.sketch(goal=goal), status=status, halts=2)
+    old = bench.revise(bench.sketch(goal=goal), status=status, halts=3)
     effect = effect_on(bench.ask(SOURCE, old), PlanSketch)
     assert effect.value.halts == halts and old.id in reasons(effect)
 
