@@ -38,7 +38,7 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
                      "follow": "harvey-ros2", "directions": "harvey-words", "parse": "harvey-words",
                      "serve": "harvey-serve", **dict.fromkeys(("world.export", "world.import"), "harvey-buildings")},
     "harvey.experiments": {
-        "calibrate": "harvey-survey",
+        "calibrate": "harvey-survey", "survey": "harvey-survey",
         "imported-building": "harvey-buildings", "instructions": "harvey-words",
         "other-worlds": "harvey-miniworld", "rosmaps": "harvey-buildings",
         "watchers": "harvey-serve"},
