@@ -60,6 +60,11 @@ class EntryStore:
         """The entries with a key, in order of posting."""
         return sorted(self._filed(index).get(key, {}).values(), key=_number)
 
+    def newest(self, index: Index[Any], key: Hashable) -> Entry[Any] | None:
+        """The one of them that was posted last, or None."""
+        found = self._filed(index).get(key, {}).values()
+        return next(iter(found)) if len(found) == 1 else max(found, key=_number, default=None)
+
     def keys(self, index: Index[Any]) -> Collection[Hashable]:
         """The keys that some entry has."""
         return self._filed(index).keys()

@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from enum import Enum, IntEnum
+from functools import cache
 from math import inf, isfinite, nan
 from typing import Any, NamedTuple
 
@@ -27,18 +28,20 @@ def plain(value: Any) -> Any:
     Raises:
         ValueError: a value without a fixed order or form.
     """
-    if isinstance(value, Enum):
-        return value.name.lower()
-    if value is None or isinstance(value, bool | int | str):
-        return value
     if isinstance(value, float):
         return value if isfinite(value) else repr(value)
+    if type(value) is str or value is None:
+        return value
+    if isinstance(value, Enum):
+        return value.name.lower()
+    if isinstance(value, int | str):
+        return value
     if isinstance(value, bytes):
         return {"bytes": len(value), "sha256": hashlib.sha256(value).hexdigest()}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         if hasattr(value, "journal_form"):
             return plain(value.journal_form())
-        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+        return {name: plain(getattr(value, name)) for name in _fields_of(type(value))}
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, tuple | list):
@@ -48,6 +51,11 @@ def plain(value: Any) -> Any:
     if hasattr(value, "tolist"):
         return plain(value.tolist())
     raise ValueError(f"expected a value of plain data, got a {type(value).__name__}")
+
+
+@cache
+def _fields_of(kind: type[Any]) -> tuple[str, ...]:
+    return tuple(field.name for field in dataclasses.fields(kind))
 
 
 class Decision(NamedTuple):

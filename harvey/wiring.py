@@ -19,7 +19,7 @@ from knowledge_sources.settings import DEFAULT, Settings
 from world_models.entries import LADDER
 from world_models.entries.entry_kinds import KINDS
 from world_models.files.toml.mission import Servo
-from world_models.plugins import SOURCES_GROUP, PluginError, load_plugin_classes
+from world_models.plugins import GUESTS_GROUP, SOURCES_GROUP, PluginError, load_plugin_classes
 
 SUBJECTS = ("sketcher", "milestone_selector", "action", "milestone", "relocalizer", "goal", "model", "senses")
 """The folders of knowledge sources, in the order in which a mission meets them."""
@@ -73,7 +73,8 @@ def foreign_sources(group: str = SOURCES_GROUP) -> Mapping[str, type[KnowledgeSo
 @cache
 def load_kinds() -> Registry:
     """The kinds of entries that may be on a board: those of the project and of every knowledge source there is."""
-    return registry_of((*KNOWLEDGE_SOURCES, *foreign_sources().values()), KINDS)
+    foreign = (*foreign_sources().values(), *foreign_sources(GUESTS_GROUP).values())
+    return registry_of((*KNOWLEDGE_SOURCES, *foreign), KINDS)
 
 
 def servoing(servo: Servo) -> Ladder:

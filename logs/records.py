@@ -335,8 +335,7 @@ def _get(data: Any, key: str, kind: type | tuple[type, ...]) -> Any:
 
 
 class Originals(NamedTuple):
-    """What the journal names only by reference: JPEG bytes by number of the picture, and frames of the world's locales.
-    """
+    """What the journal names only by reference: JPEG bytes by a picture's number, and frames of the world's locales."""
 
     pictures: Mapping[int, bytes]
     frames: FrameStore

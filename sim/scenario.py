@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from sim.body.senses import Bumper, RangeRing
-from sim.body.simulated_building import Helper
+from sim.body.simulated_building import Helper, SimulatedBuilding
 from sim.body.wheel_errors import ActuatorParameters
 from sim.faults.fault import Fault
 from sim.faults.fault_registry import read_fault
@@ -20,11 +20,13 @@ from sim.render.lighting import Lighting
 from sim.render.optics import check_lens
 from sim.render.rasterizer import sample_offsets
 from sim.render.sensor import SensorParameters
-from sim.scenario_names import SCENARIOS, list_scenarios
+from sim.scenario_names import SCENARIOS, find_scenarios
+from world_models.building.world import World
 from world_models.camera import Camera, CameraMount
 from world_models.files.toml.mission import ROOT, TABLES, Limits, Mission, MissionFormat, named_file
 from world_models.files.toml.settings_reader import MAX_NUMBER, read_all, read_settings, suggest_keys
-from world_models.files.toml.source import Key, Source, WorldError
+from world_models.files.toml.source import Key, Node, Source, WorldError
+from world_models.plugins import list_absent, load_plugins
 from world_models.units import Bounded, bounded
 
 MOST_DETAILS = 100
@@ -118,10 +120,23 @@ class Attendant(Bounded):
     says: str = "done"
 
 
+@runtime_checkable
+class Company(Protocol):
+    """A scenario's ``[[walkers]]``: an extra brings what reads them; what is read enters a building, for a run
+    with a seed. Both raise ValueError for what does not fit. An act of a knowledge source is charged so long [s]. The
+    robot has the guest sources, by name with their package."""
+
+    @property
+    def guests(self) -> Mapping[str, str]: ...
+    def read(self, node: Node) -> Company: ...
+    def enter(self, building: SimulatedBuilding, world: World, seed: int) -> SimulatedBuilding: ...
+    def charge(self, who: str) -> float: ...
+
+
 FORMAT = MissionFormat(
     {**TABLES, "limits": ScenarioLimits, "camera": CameraSettings, "render": Render, "actuator": ActuatorParameters,
      "sensor": SensorParameters, "bumper": Bumper, "ranges": RangeRing},
-    ("details", "faults", "helper", "light", "moved", "rides", "truth"),
+    ("details", "faults", "helper", "light", "moved", "rides", "truth", "walkers"),
     {"truth.camera": TrueCamera, "truth.inexact": TrueInexact, "light": Lighting},
 )
 
@@ -138,6 +153,7 @@ class Scenario(Mission):
         rides: who presses the buttons of elevators.
         truth: what differs from the robot's model.
         light: lamps, daylight and how the camera adapts; None: light that is the same everywhere.
+        walkers: who walks there; None: nobody.
     """
 
     details: tuple[Path, ...]
@@ -154,6 +170,7 @@ class Scenario(Mission):
     rides: tuple[Helper, ...] = ()
     truth: TruthTable = NO_DIFFERENCES
     light: Lighting | None = None
+    walkers: Company | None = None
 
     def refused(self, key: Key, why: str) -> ScenarioError:
         """The error to raise where one of its values does not fit the building."""
@@ -168,32 +185,24 @@ def load_scenario(path_or_name: str | Path) -> Scenario:
     """
     path = Path(path_or_name)
     if path.suffix != ".toml":
-        path = SCENARIOS / f"{path_or_name}.toml"
-        if str(path_or_name) not in list_scenarios():
+        known = find_scenarios()
+        if str(path_or_name) not in known:
             if Path(path_or_name).is_dir():
                 raise ScenarioError(f"scenario: expected a name or a TOML file, got the directory {path_or_name}")
-            near = suggest_keys(str(path_or_name), list_scenarios())
+            near = suggest_keys(str(path_or_name), list(known))
             raise ScenarioError(f"scenario: expected {near}, got {path_or_name!r}")
-    try:
-        return _scenario(Source.read(path), path.stem, path.parent)
-    except WorldError as error:
-        raise ScenarioError(str(error)) from None
+        path = known[str(path_or_name)]
+    return _scenario(lambda: Source.read(path), path.stem, path.parent)
 
 
 def parse_scenario(text: str, name: str = "scenario", folder: Path = SCENARIOS) -> Scenario:
     """Read a scenario from text; file names in it are relative to ``folder``. Raises ScenarioError."""
-    try:
-        return _scenario(Source.parse(text, name), name, folder)
-    except WorldError as error:
-        raise ScenarioError(str(error)) from None
+    return _scenario(lambda: Source.parse(text, name), name, folder)
 
 
 def scenario_from_tables(data: Mapping[str, Any], name: str, folder: Path) -> Scenario:
     """The scenario of tables as its source holds them. Raises ScenarioError."""
-    try:
-        return _scenario(Source(name, data), name, folder)
-    except WorldError as error:
-        raise ScenarioError(str(error)) from None
+    return _scenario(lambda: Source(name, data), name, folder)
 
 
 def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
@@ -202,24 +211,33 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     Raises:
         ScenarioError: a key is unknown (near ones are listed) or a value is of the wrong kind.
     """
+    return _scenario(lambda: FORMAT.with_settings(scenario.source, settings), scenario.name, scenario.folder)
+
+
+def _scenario(read: Callable[[], Source], name: str, folder: Path) -> Scenario:
     try:
-        return _scenario(FORMAT.with_settings(scenario.source, settings), scenario.name, scenario.folder)
+        source = read()
+        shared, node = FORMAT.read(source, name, folder), source.root
+        details = [item.text() for item in node["details"].items()] if "details" in node else []
+        if len(details) > MOST_DETAILS:
+            raise node["details"].fail(f"at most {MOST_DETAILS} files", str(len(details)))
+        return Scenario(
+            details=tuple(named_file(text, ROOT / "sim" / "buildings", folder) for text in details),
+            faults=tuple(read_fault(item) for item in node["faults"].items()) if "faults" in node else (),
+            helper=read_all(node, "helper", Attendant),
+            moved=read_all(node, "moved", MovedThing),
+            rides=read_all(node, "rides", Helper),
+            truth=read_settings(node["truth"], TruthTable) if "truth" in node else NO_DIFFERENCES,
+            light=read_settings(node["light"], Lighting) if "light" in node else None,
+            walkers=_read_walkers(node["walkers"]) if "walkers" in node else None,
+            **shared,
+        )
     except WorldError as error:
         raise ScenarioError(str(error)) from None
 
 
-def _scenario(source: Source, name: str, folder: Path) -> Scenario:
-    shared, node = FORMAT.read(source, name, folder), source.root
-    details = [item.text() for item in node["details"].items()] if "details" in node else []
-    if len(details) > MOST_DETAILS:
-        raise node["details"].fail(f"at most {MOST_DETAILS} files", str(len(details)))
-    return Scenario(
-        details=tuple(named_file(text, ROOT / "sim" / "buildings", folder) for text in details),
-        faults=tuple(read_fault(item) for item in node["faults"].items()) if "faults" in node else (),
-        helper=read_all(node, "helper", Attendant),
-        moved=read_all(node, "moved", MovedThing),
-        rides=read_all(node, "rides", Helper),
-        truth=read_settings(node["truth"], TruthTable) if "truth" in node else NO_DIFFERENCES,
-        light=read_settings(node["light"], Lighting) if "light" in node else None,
-        **shared,
-    )
+def _read_walkers(node: Node) -> Company:
+    if needs := list_absent("harvey.movers").get("walkers"):
+        raise WorldError(f"{node.place}: it needs {needs}")
+    company: Company = load_plugins("harvey.movers", Company, "walkers")["walkers"].read(node)
+    return company

@@ -68,7 +68,7 @@ class Stage:
         s = self.scenario
         camera, mount = _true_camera(s)
         return SimulatedBody(
-            self.building, self.put_down_world, camera, mount,
+            _people(s, self.world, self.building, seed), self.put_down_world, camera, mount,
             seed=seed, actuator=s.actuator, sensor=s.sensor, bumper=s.bumper, ranges=s.ranges,
             faults=s.faults, lighting=s.light,
             put_down_sigma_m=s.start.put_down_sigma_m, put_down_sigma_rad=s.start.put_down_sigma_rad,
@@ -109,6 +109,7 @@ def build_stage(scenario: Scenario) -> Stage:
     on_floor = _storeys(world, around, changing, elevators)
     building = on_floor(world.floor_m(start.locale))
     check_room(scenario, world, down, building, on_floor)
+    _people(scenario, world, building)
     heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
     start_world = replace(start, heading_rad=scenario.start.heading_rad).in_world(world)
     goal_world = replace(goal, heading_rad=heading).in_world(world)
@@ -116,25 +117,12 @@ def build_stage(scenario: Scenario) -> Stage:
                  around)
 
 
-def move_ends(stage: Stage, scenario: Scenario) -> Stage:
-    """The stage of a scenario that differs in start and goal alone, with the building that is there already.
-
-    Who looks for a mission draws many. Whether the robot has room there is not checked, as ``build_stage`` does.
-
-    Raises:
-        ScenarioError: the world has no such place.
-        ValueError: another part of the world would have to be built.
-    """
-    before = _ends(stage.scenario, stage.world)
-    start, goal = _ends(scenario, stage.world)
-    parts = [_around(stage.world, [end.locale for end in ends]) for ends in (before, (start, goal))]
-    if parts[0] != parts[1]:
-        raise ValueError(f"expected a mission in {parts[0]}, got one in {parts[1]}")
-    heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
-    start_world = replace(start, heading_rad=scenario.start.heading_rad).in_world(stage.world)
-    goal_world = replace(goal, heading_rad=heading).in_world(stage.world)
-    return replace(stage, scenario=scenario, start_world=start_world, goal_world=goal_world,
-                   put_down_world=start_world, goal_floor_m=stage.world.floor_m(goal.locale))
+def _people(scenario: Scenario, world: World, building: SimulatedBuilding, seed: int = 0) -> SimulatedBuilding:
+    """The building with who walks there. Raises ScenarioError where they do not fit it."""
+    try:
+        return scenario.walkers.enter(building, world, seed) if scenario.walkers else building
+    except ValueError as error:
+        raise scenario.refused(("walkers",), str(error)) from None
 
 
 def _world(scenario: Scenario) -> World:
@@ -190,7 +178,7 @@ def _storeys(
     known: dict[tuple[float, State], SimulatedBuilding] = {}
     finders: dict[float, Callable[[Pose2], str]] = {}
 
-    def at_time(floor_m: float, time_s: float) -> SimulatedBuilding:
+    def at_time(floor_m: float, time_s: float, _robot: Pose2 | None = None) -> SimulatedBuilding:
         key = round(floor_m, 3), changing.state_at(time_s)
         if key not in known:
             storey, state = key

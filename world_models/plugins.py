@@ -11,12 +11,13 @@
 ``harvey.pages``              a ``harvey.runner.teller.PageKind``, named ``live``
 ``harvey.workers``            a ``harvey.campaign.workers.ClusterWorkers``, named ``dask``
 ``harvey.commands``           a ``harvey.commands.command.CliCommand``; of a verb: ``world.import``
+``harvey.movers``             a ``sim.scenario.Company``, named ``walkers``
+``harvey.scenarios``          a folder of scenario files, as a ``pathlib.Path``; an entry point may have any name
 ``harvey.renderers``          a ``sim.render.lights.LitRenderers``, named ``lit``
 ``harvey.experiments``        the ``run`` of an experiment, by its name
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
 ``harvey.run_exporters``      a ``logs.export.RunExporter``, named ``mcap``
 ``harvey.exporters``          a ``harvey_buildings.exporters.Exporter``
-``harvey.experiments``        a module as those of ``experiments``
 ============================  ==========================================================================
 
 An entry point's name is the one that Harvey knows. ``extras`` are added so too; one that is absent can be named.
@@ -38,13 +39,13 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
                      "follow": "harvey-ros2", "directions": "harvey-words", "parse": "harvey-words",
                      "serve": "harvey-serve", **dict.fromkeys(("world.export", "world.import"), "harvey-buildings")},
     "harvey.experiments": {
-        "calibrate": "harvey-survey", "survey": "harvey-survey",
+        **dict.fromkeys(("calibrate", "survey"), "harvey-survey"), "driven-ways": "harvey-words",
         "imported-building": "harvey-buildings", "instructions": "harvey-words",
-        "other-worlds": "harvey-miniworld", "rosmaps": "harvey-buildings",
+        "other-worlds": "harvey-miniworld", "people": "harvey-people", "rosmaps": "harvey-buildings",
         "watchers": "harvey-serve"},
     SOURCES_GROUP: dict.fromkeys(("problem_solver", "step_closer", "task_reader"), "harvey-words"),
     PAGES_GROUP: {"live": "harvey-serve"}, WORKERS_GROUP: {"dask": "harvey-cluster"},
-    RENDERERS_GROUP: {"lit": "harvey-light"},
+    RENDERERS_GROUP: {"lit": "harvey-light"}, "harvey.movers": {"walkers": "harvey-people"},
     **{group: {"p2os": "harvey-bases", "create2": "harvey-bases", "ros2": "harvey-ros2"}
        for group in ("harvey.bases", "harvey.emulators")},
     CAMERAS_GROUP: {"ros2": "harvey-ros2"}, RUN_EXPORTERS_GROUP: {"mcap": "harvey-ros2"},

@@ -27,7 +27,7 @@ from docs.tools.site.mission_files import (
 from docs.tools.site.python_page import describe_python
 from docs.tools.site.setting_tables import describe_settings
 from docs.tools.site.world_files import describe_world_keys
-from docs.tools.status import describe_experiments, describe_rows, describe_seeds
+from docs.tools.status import describe_experiments, describe_ladder, describe_moments, describe_rows, describe_seeds
 from harvey.wiring import KNOWLEDGE_SOURCES, OWN_KINDS
 from world_models import frames
 
@@ -58,8 +58,9 @@ GENERATORS: Mapping[str, Callable[[], str]] = {
     "scenario-tables": describe_scenario_tables, "faults": describe_faults, "world-keys": describe_world_keys,
     "frames": describe_frames, "python": describe_python, "knowledge-sources": describe_knowledge_sources,
     "check-flat": show_check, "experiments": describe_experiments, "seeds": describe_seeds,
+    "ladder": describe_ladder, "moments": describe_moments,
     **{f"rows-{name}": partial(describe_rows, name)
-       for name in ("table1", "figure12", "table2", "table3", "planning", "pose-speed")},
+       for name in ("table1", "figure12", "table2", "table3", "planning", "pose-speed", "levels")},
     "rows-fragments": partial(describe_rows, "table3", "60%"),
     **{f"example-{name}": partial(show_example, name)
        for name in ("hearsay", "sudoku", "recorded_model", "plugin/tests/test_timekeeper")},

@@ -1,7 +1,7 @@
-"""The tables of docs/status.md: what each experiment found last, and the missions of four seeds.
+"""Tables of what was driven: what each experiment found last, four seeds, the way out of a kidnap.
 
 ``harvey experiment NAME --out docs/results/NAME.json`` writes what an experiment found; ``python -m docs.tools.status``
-drives the seeds and writes ``docs/results/seeds/``. ``python -m docs.tools.fill`` makes the tables of both.
+drives the seeds and the kidnap, and writes ``docs/results/seeds/``. ``python -m docs.tools.fill`` makes the tables.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import harvey
@@ -24,6 +25,8 @@ ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "docs" / "results"
 SCENARIO, SEEDS = "lab-to-allens-office", range(4)
 SEEDS_FILE = RESULTS / "seeds" / f"{SCENARIO}.json"
+KIDNAP = "hallway-kidnap"
+LADDER_FILE = SEEDS_FILE.with_name(f"{KIDNAP}.json")
 FIGURES: Mapping[str, str] = {
     "outcome": "outcome", "error_mm": "error mm", "milestones": "milestones", "wrong": "accepted wrongly",
     "collisions": "collisions", "path_m": "path m", "robot_s": "robot s", "cycles": "cycles",
@@ -84,11 +87,42 @@ def drive_seed(seed: int) -> dict[str, Any]:
         "path_m": round(result.path_length_m, 1), "robot_s": round(result.sim_time_s), "cycles": result.decisions}
 
 
+def drive_ladder() -> list[list[str]]:
+    """Of each cycle from the kidnap to the plan that follows it: focus, who acted, woken by what, what was written."""
+    with TemporaryDirectory() as folder:
+        harvey.run(KIDNAP, seed=0, out=Path(folder) / "run")
+        decisions = list(harvey.open_run(Path(folder) / "run").decisions())
+    acts = [(d, d.chosen) for d in decisions if d.chosen and d.made]
+    raised = next(k for k, (_, act) in enumerate(acts) if act.source == "discrepancy_raiser")
+    first = max(k for k in range(raised) if acts[k][1].source == "motor")
+    last = next(k for k in range(raised, len(acts)) if acts[k][1].source == "goal_sketcher")
+    return [[str(d.cycle), d.focus, act.source, act.trigger, ", ".join(
+        e.ref if e.is_new else f"{e.ref} ({e.change.lower()})" for e in d.made)] for d, act in acts[first:last + 1]]
+
+
+def describe_ladder() -> str:
+    """The cycles of :func:`drive_ladder`."""
+    found = json.loads(LADDER_FILE.read_text(encoding="utf-8"))
+    return "\n".join([f"`harvey run {KIDNAP} --seed 0`, commit {found['commit']}:",
+                      *table(("cycle", "focus", "who acts", "woken by", "what is written"), found["rows"])])
+
+
+def describe_moments() -> str:
+    """The command that takes pictures of four moments of the kidnap: it drives, doubts, is lost, is found."""
+    rows = json.loads(LADDER_FILE.read_text(encoding="utf-8"))["rows"]
+    raised = [int(row[0]) for row in rows if row[2] == "discrepancy_raiser"]
+    found = next(row[0] for row in rows if row[2] == "pose_adopter")
+    return (f"```\npython -m docs.tools.look runs/{KIDNAP}-0/recording.rrd pictures"
+            f" {rows[0][0]} {raised[0]} {raised[1] - 1} {found}\n```")
+
+
 def main() -> int:
-    """Drive the seeds, and keep what came."""
-    found = {"commit": find_commit(), "missions": {seed: drive_seed(seed) for seed in SEEDS}}
+    """Drive the seeds and the kidnap, and keep what came."""
+    commit = find_commit()
+    missions = {seed: drive_seed(seed) for seed in SEEDS}
     SEEDS_FILE.parent.mkdir(parents=True, exist_ok=True)
-    SEEDS_FILE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    for file, found in ((SEEDS_FILE, {"missions": missions}), (LADDER_FILE, {"rows": drive_ladder()})):
+        file.write_text(json.dumps({"commit": commit, **found}, indent=1) + "\n", encoding="utf-8")
     return 0
 
 

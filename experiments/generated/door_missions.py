@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,10 +18,11 @@ from experiments.generated.missions import ROOM_M, ROOMS, draw_ends, draw_headin
 from sim.body.collision import Obstacles
 from sim.ground_truth.table import TrueDoor
 from sim.ground_truth.true_changes import build_leaf
-from sim.scenario import parse_scenario
-from sim.stage import Stage, build_stage, move_ends
+from sim.scenario import Scenario, parse_scenario
+from sim.stage import Stage, build_stage
 from world_models.building.locales import Doorway
 from world_models.building.world import World
+from world_models.commands import parse_command
 
 CASES = ("another way", "no way", "extra door", "stands open", "opens", "shuts", "ajar", "as filed")
 """What differs about the doors: shut, with another way or with none; a door that the model lacks; one that stands
@@ -75,7 +76,7 @@ def _write_on_floor(folder: Path, seed: int, floor_seed: int, case: str) -> Door
         text = format_mission(f"A generated floor; doors: {case}.", files, ends, draw_heading_deg(rng))
         try:
             scenario = parse_scenario(text, "doors", folder)
-            stage = build_stage(scenario) if stage is None else move_ends(stage, scenario)
+            stage = build_stage(scenario) if stage is None else _move_ends(stage, scenario)
             drawn = _draw_doors(stage, floor, case, rng)
             if drawn is None:
                 continue
@@ -86,6 +87,27 @@ def _write_on_floor(folder: Path, seed: int, floor_seed: int, case: str) -> Door
         path.write_text(text + drawn[1], "utf-8")
         return DoorMission(path, drawn[0])
     return None
+
+
+def _move_ends(stage: Stage, scenario: Scenario) -> Stage:
+    """The stage of a scenario that differs in start and goal alone, with the building that is there already.
+
+    Whether the robot has room there is not checked, as ``build_stage`` does.
+
+    Raises:
+        ValueError: another part of the world would have to be built.
+    """
+    world = stage.world
+    start, goal = parse_command(scenario.goal, world)
+    parts = [{world.locale(end.locale).parent for end in ends}
+             for ends in (parse_command(stage.scenario.goal, world), (start, goal))]
+    if parts[0] != parts[1]:
+        raise ValueError(f"expected a mission in {parts[0]}, got one in {parts[1]}")
+    heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
+    start_world = replace(start, heading_rad=scenario.start.heading_rad).in_world(world)
+    goal_world = replace(goal, heading_rad=heading).in_world(world)
+    return replace(stage, scenario=scenario, start_world=start_world, goal_world=goal_world,
+                   put_down_world=start_world, goal_floor_m=world.floor_m(goal.locale))
 
 
 def _draw_doors(stage: Stage, floor: Floor, case: str, rng: np.random.Generator) -> tuple[str, str] | None:

@@ -20,6 +20,7 @@ import numpy as np
 
 from blackboard import Change, Decision, Entry, Level, Retracted
 from experiments import drives
+from experiments.differences.obstacles import Lacking
 from experiments.generated.missions import FOCAL_PX, write_inexact_mission
 from experiments.report import OURS, PAPER, PEER, Cell, Claim, Report, chart, count_kinds
 from experiments.trials import RESULTS, at_most, campaign_folder, judge_rare, judge_share, run_trials
@@ -161,12 +162,12 @@ def protection_level(entry: Entry[Any]) -> float:
     return float(value.protection.place_m if isinstance(value, entries.PoseFix) else value.protection_m)
 
 
-def list_words(value: Any) -> Iterator[str]:
-    """The words by which an entry warns, or names what is wrong."""
+def list_words(value: Any, lacking: Lacking) -> Iterator[str]:
+    """The words by which an entry warns, or names what is wrong; a thing is false where the model lacks nothing."""
     match value:
         case entries.CameraState():
             yield from (f"camera {lesson.what}" for lesson in entries.find_camera_lessons(value.as_nominal(), value))
-        case entries.Difference() if value.is_sure:
+        case entries.Difference() if value.is_sure and value.leader.kind != "thing":
             yield value.leader.kind
         case entries.BodyFault():
             yield value.what
@@ -177,11 +178,9 @@ def list_words(value: Any) -> Iterator[str]:
         case entries.Impasse() if value.is_open:
             yield "no way on"
         case entries.Obstacle() if value.is_there:
-            yield "thing"
+            yield "false thing" if lacking.is_false(value.footprint) else "thing"
         case entries.Obstruction():
             yield "hidden"
-        case entries.Difference() if value.is_of_sense:
-            yield value.leader.kind
 
 
 @dataclass
@@ -190,11 +189,13 @@ class Witness:
 
     Attributes:
         is_from_start: whether the fault is there from the start; else it is as soon as the body says so.
+        lacking: what the model lacks.
         body: with the truth, once there is one.
         fixes, beliefs, alerts: as of :class:`Flight`.
     """
 
     is_from_start: bool
+    lacking: Lacking
     body: SimulatedBody | None = None
     fixes: list[Point] = field(default_factory=list)
     beliefs: list[Point] = field(default_factory=list)
@@ -215,7 +216,7 @@ class Witness:
     def _take(self, change: Change, cycle: int, body: SimulatedBody) -> None:
         entry, value, is_gone = change.entry, change.entry.value, isinstance(change, Retracted)
         if self._onset_s is not None and not is_gone:
-            for word in list_words(value):
+            for word in list_words(value, self.lacking):
                 self.alerts.setdefault(word, body.time_s - self._onset_s)
         if isinstance(value, Discrepancy) and value.level is Level.GOAL:
             (self._lost.add if value.is_open and not is_gone else self._lost.discard)(entry.id)
@@ -238,11 +239,13 @@ class Witness:
 
 def drive(trial: Trial) -> Flight:
     """Drive the mission of a trial."""
-    witness = Witness("[[faults]]" not in KINDS[trial.kind].text)
+    kind, settings = KINDS[trial.kind], tuple(PLACES[trial.place].settings.items())
     with TemporaryDirectory() as folder:
-        settings = tuple(PLACES[trial.place].settings.items())
-        end = drives.drive_beside(Task(str(trial.write(Path(folder))), settings, trial.seed), witness).result.outcome
-    return Flight(trial.kind, trial.place, trial.seed, trial.size, end, witness.fixes, witness.beliefs, witness.alerts)
+        task = Task(str(trial.write(Path(folder))), settings, trial.seed)
+        witness = Witness("[[faults]]" not in kind.text, Lacking.of_stage(task.stage()))
+        end = drives.drive_beside(task, witness).result.outcome
+    alerts = {word: s for word, s in witness.alerts.items() if word != "thing" or word in kind.named}  # it is there
+    return Flight(trial.kind, trial.place, trial.seed, trial.size, end, witness.fixes, witness.beliefs, alerts)
 
 
 EACH, QUICK_EACH, CALM, QUICK_CALM = 8, 2, 40, 8
@@ -274,7 +277,8 @@ def run(quick: bool, seed: int) -> Report:
             " nobody. available: fixes with PL <= AL.",
             "named: missions in which the board named the fault, of those where it is above twice its least size."
             " alert: time from the fault to its name or the first doubt of the place, median and worst; never: missions"
-            " without. named otherwise: what was named and is none. Without a fault all of these are false alerts.",
+            " without. named otherwise: what was named and is none. Without a fault all of these are false alerts."
+            " A thing that the model lacks and that stands where it is said is none.",
             f"Places: {', '.join(PLACES)}. The paper has no integrity, and {drives.NO_PEER}",
             *_tell_worst(flights, folder), f"Stanford plot: {picture}; one line per mission: {folder / RESULTS}",
         ),

@@ -26,11 +26,11 @@ def _add_list_arguments(_parser: ArgumentParser) -> None:
 
 def _run_list(_args: Namespace) -> int:
     import experiments
-    from sim.scenario_names import describe_scenario, list_scenarios
+    from sim.scenario_names import describe_scenario, find_scenarios
 
     print("scenarios (harvey run NAME):")
-    for name in list_scenarios():
-        print(_item(name, describe_scenario(name)))
+    for name, path in find_scenarios().items():
+        print(_item(name, describe_scenario(path)))
     for folder, group in experiments.EXPERIMENTS.items():
         print(f"\nexperiments: {folder} (harvey experiment NAME):")
         for name, summary in sorted(group.items()):
@@ -225,7 +225,7 @@ def _run_completion(args: Namespace) -> int:
 
     from experiments import list_names
     from harvey.cli import parser
-    from sim.scenario_names import list_scenarios
+    from sim.scenario_names import find_scenarios
 
     top = parser()
     for action in _list_actions(top):
@@ -233,7 +233,7 @@ def _run_completion(args: Namespace) -> int:
             action.complete = dict.fromkeys(SHELLS, NAMED[action.dest])  # type: ignore[attr-defined]
         elif action.choices is None and action.nargs != 0:
             action.complete = shtab.FILE  # type: ignore[attr-defined]
-    words: Mapping[str, Sequence[str]] = {"scenario": list_scenarios(), "experiment": list_names()}
+    words: Mapping[str, Sequence[str]] = {"scenario": list(find_scenarios()), "experiment": list_names()}
     functions = [FUNCTION[args.shell].format(name=name, words=" ".join(words[what])) for what, name in NAMED.items()]
     print(shtab.complete(top, args.shell, preamble="\n".join(functions)))
     return 0

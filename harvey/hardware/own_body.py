@@ -53,8 +53,7 @@ class OwnBody(ABC):
     @property
     @abstractmethod
     def time_s(self) -> float:
-        """The body's own time [s]: by it the mission is limited and everything dated. It may stand while Harvey thinks.
-        """
+        """The body's own time [s]: by it the mission is limited and all is dated. It may stand while Harvey thinks."""
 
     @abstractmethod
     def execute(self, command: MotorCommand, /) -> MotionReport | BodyFault:

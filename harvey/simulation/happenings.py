@@ -53,7 +53,6 @@ class ContactWatch:
             return Place("", pose.x_m, pose.y_m)
         return Place.of_world(self._world, truth.locale, pose.x_m, pose.y_m)
 
-
     def _find_nearest(self, truth: Truth) -> str:
         """The thing, wall or door whose faces are nearest to the robot; "" outside all locales."""
         faces = [*self._world.faces_within(truth.locale), *self._body.building.added] if truth.locale else []

@@ -35,6 +35,7 @@ from world_models.building.world import World
 from world_models.entries import Recovery, Redirection
 from world_models.files.toml.mission import ROOT
 from world_models.files.world_files import load_world
+from world_models.plugins import SOURCES_GROUP, list_plugins
 from world_models.robot import RobotModel
 
 HELPER = "helper"
@@ -141,9 +142,10 @@ def redraw(run: RunDirectory, sinks: Sequence[Sink] = ()) -> int:
 def build_head(stage: Stage, seed: int, body: str = IN_PROCESS, settings: Pairs = ()) -> RunHead:
     """How a run of a scenario begins; ``settings`` are those of the agent."""
     s = stage.scenario
-    robot = build_robot_model(s, load_known_world(s.world))
+    robot, guests = build_robot_model(s, load_known_world(s.world)), s.walkers.guests if s.walkers else {}
     return RunHead.of(SIMULATOR, s.name, seed, s.world, robot, s.servo, s.command, scenario=s.source.data,
-                      folder=portable(s.folder), body=body, constants=settings)
+                      folder=portable(s.folder), body=body, constants=settings,
+                      plugins={**list_plugins(SOURCES_GROUP), **guests})
 
 
 def rebuild_stage(head: RunHead) -> Stage:
@@ -181,7 +183,9 @@ class SimulatedRun(Run):
         self.simulated_body = body = stage.body(head.seed)
         self._drawn: tuple[tuple[Face, ...], tuple[Face, ...]] = (), ()
         self._line, self._contact_watch = ExitStack(), ContactWatch(agent.world, body)
-        self._happening_watch = HappeningWatch(body, stage.scenario.moved)
+        self._happening_watch, walkers = HappeningWatch(body, stage.scenario.moved), stage.scenario.walkers
+        if walkers is not None:  # people walk while it thinks
+            sinks = (lambda d: body.charge(walkers.charge(d.chosen.source.name) if d.chosen else 0.0), *sinks)
         reached = around(self._line.enter_context(open_body(body, head.body)), lambda: recorder.replaying)
         super().__init__(
             head, agent, reached, recorder, limits=stage.scenario.limits, clock=lambda: body.truth.time_s,

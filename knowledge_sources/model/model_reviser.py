@@ -25,7 +25,7 @@ from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locale_frame import LocaleFrame
 from world_models.building.model_errors import BETWEEN, find_facing, measure_between
 from world_models.entries import CameraState, Difference, DoorState, Obstacle, UserReport
-from world_models.entries.difference import MODEL
+from world_models.entries.difference import DOORS, MODEL
 
 
 class Statement(NamedTuple):
@@ -35,7 +35,7 @@ class Statement(NamedTuple):
         locales: whose frames it concerns.
         revise: a frame as it is known by it; raises ValueError where the frame has nothing that could be so.
         is_from_user: whether a user reported it, who is answered.
-        error: why it concerns none, in words.
+        error: why it concerns none, in words; besides: what else it rests on.
     """
 
     entry: Entry[Any]
@@ -43,6 +43,7 @@ class Statement(NamedTuple):
     revise: Callable[[LocaleFrame], LocaleFrame]
     is_from_user: bool = False
     error: str = ""
+    besides: tuple[Entry[Any], ...] = ()
 
 
 class Case(NamedTuple):
@@ -58,7 +59,8 @@ class ModelReviser(RobotKnowledgeSource):
     Of two that say otherwise the newer counts. All that is new of a locale comes into its frame at once, so that who
     reads why it was revised finds all of it. A door is in the frames of both its rooms, a wall in those of all at it.
     Walls are redrawn once it is sure that they are elsewhere, and not the camera is otherwise; where no wall explains
-    that the model is inexact, the whole building is. A frame is revised only where a plan may change by it.
+    that the model is inexact, the whole building is, until looks acquit it. A frame is revised only where a plan may
+    change by it.
     What cannot be taken up, because the model has nothing of that name, is answered. It acts at once, before the next
     increment: the door may be just ahead.
     """
@@ -86,7 +88,7 @@ class ModelReviser(RobotKnowledgeSource):
                     continue
                 if revised.changes != value.changes:
                     value = revised
-                    reasons.append(said.entry)
+                    reasons += (said.entry, *said.besides)
             if reasons:
                 frames.append((frame, value, tuple(reasons)))
                 taken.update(entry.id for entry in reasons)
@@ -118,28 +120,26 @@ class ModelReviser(RobotKnowledgeSource):
             else:
                 yield Statement(from_user, locales, by_report, is_from_user=True)
 
-
     def _list_differences(self, view: View) -> Iterator[Statement]:
         """What differences say of doors, of walls, and of all of the building where no wall explains it."""
         doors, building, name = list_filed_doors(view), find_building(view), name_model(view)
+        others = view.where(Difference, lambda d: d.about == DOORS and d.is_sure)
         for found in view.where(Difference, lambda d: d.about in doors):
-            door = doors[found.value.about]
-            yield Statement(found, door.between, partial(redraw_door, door=door, found=found.value, by=found.author))
+            door, (*older, newer) = doors[found.value.about], sorted((found, *others), key=lambda entry: entry.cycle)
+            revise = partial(redraw_door, door=door, found=found.value, by=found.author, are_beside=bool(others))
+            yield Statement(newer, door.between, revise, besides=tuple(older))
         models = view.where(Difference, lambda d: d.about == name and d.is_sure and d.leader.kind == "wall")
         camera = view.latest(CameraState)
         scale = 0.0 if models or name != MODEL or camera is None else compute_scale_sigma(camera.value)
         widths = [(found, sides) for found in view.where(Difference, lambda d: BETWEEN in d.about)
                   if is_width(found.value, scale * measure_between(sides := find_facing(building, found.value.about)))]
         newest = max((*models, *(found for found, _ in widths)), key=lambda entry: entry.cycle, default=None)
-        if newest is None:
-            return
-        placed = place_walls([(found.value, sides) for found, sides in widths], newest.author)
-        for side, change in placed:
-            yield Statement(newest, side.rooms, partial(redraw, change=change))
+        placed = place_walls([(found.value, sides) for found, sides in widths], newest.author) if newest else []
+        yield from (Statement(newest, side.rooms, partial(redraw, change=change)) for side, change in placed if newest)
         is_drawn = all(redraw(frame := building.frame(side.rooms[0]), change) is frame for side, change in placed)
-        if models or not is_drawn:
-            yield Statement(newest, (building.root,), partial(
-                revise_by_difference, by=newest.author, is_explained=not is_drawn))
+        for model in view.where(Difference, lambda d: d.about == name and is_drawn):
+            yield Statement(model, (building.root,), partial(
+                revise_by_difference, found=model.value, by=model.author))
 
 
 def _answer(is_taken: bool, error: str | None) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -15,9 +15,9 @@ import shapely
 from blackboard import Entry, View
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import (
-    Costs,
+    LOOK_PICTURE_S,
+    FloorMap,
     Lookout,
-    SeenFloor,
     Sweep,
     build_free_floor,
     build_polygon,
@@ -25,14 +25,12 @@ from knowledge_sources.methods.floor import (
     find_blind,
     find_floor,
     sample_sweep,
-    take_as_jamb,
 )
 from knowledge_sources.methods.motion import MAX_LOOK_ERROR_RAD, Clearance, choose_move, plan_turn
 from knowledge_sources.reads.conditions import Belief
 from knowledge_sources.reads.lost import locate_contact
 from knowledge_sources.reads.questions import active_goal, deepest_sketch, find_robot
 from knowledge_sources.settings import ActionSettings, Settings
-from world_models.building.building import Building
 from world_models.building.locales import EXTRA_KIND
 from world_models.entries import (
     AROUND_SIGMA_RAD,
@@ -59,7 +57,8 @@ STEP_M = 0.05  # of the way, along which distances to things are measured
 MIN_MOVE_M = 0.05  # where there is less room before what may stand there, the leg is halted
 MAX_BRAKING_M = 0.6  # so far ahead the way is asked after: more than the robot needs to stop
 UNSURE_GAP_M = 0.3  # what was seen of what is only suspected may be a part of it, which reaches so much further
-P_CAMOUFLAGED = 0.05  # that something stands on floor that looks free, and that no earlier picture would tell
+AT_M = 0.025  # of the way, to which it is told where a touch may happen
+WIDER_STEPS = 20  # in which the probability falls with the distance from what may be wider than is known
 TOUCHED_GAP_M = 0.02  # what was touched is not come so near to again
 TOUCHED_AWAY = 0.2  # nearer to it than that a move must lead away from it by this part of the way
 TOUCH_HOLDS_M = 0.5  # after so much of the way a touch that is no obstacle tells no more where not to go
@@ -68,8 +67,6 @@ AWAY_STEP_RAD = math.radians(15.0)  # of the directions that are tried for it
 MAX_DRIVEN_GAP_M = 0.8  # between two pictures that are no further apart the robot drove straight
 LOOK_AHEAD_M = 1.1  # so much of the way beyond a leg is looked at before it ends: what is too near to be seen then
 LOOK_FROM_M = 3.0  # distance from the end of a leg from which that begins
-LOOK_TURN_RAD_PER_S = math.radians(45.0)  # how fast the robot turns, as far as the time that a look takes is weighed
-LOOK_PICTURE_S = 0.2  # time that a picture with its command takes, weighed likewise
 
 Point = tuple[float, float]
 
@@ -90,16 +87,16 @@ class FloorAhead:
         found = [shapely.Polygon(thing.footprint_world) for name in self._locales
                  for thing in self._robot.world.things_of(name) if thing.kind == EXTRA_KIND]
         self._tested = shapely.buffer(shapely.union_all([self._floor, *found]), -NEAR_MODEL_M)
-        self._suspected = _list_what_may_stand(view, self._robot.world)
+        self._suspected = _list_what_may_stand(view)
         self._touches = _list_touches(view, self._here)
         self._scans = _find_scans(view, belief, settings)
         self._discs = list_free_discs(view, self._robot, self._here, self._scans)
         search = _find_last_search(view)  # what was seen before it was found does not count
         self._reasons: dict[str, Entry[Any]] = {} if search is None else {search.id: search}
-        self._seen = SeenFloor(
-            tuple(entry.value for entry in self._scans), np.array([disc.circle for disc in self._discs]),
-            tuple(thing.footprint_world for name in self._locales
-                  for thing in self._robot.world.things_of(name) if thing.is_obstacle))
+        self._map = FloorMap(
+            [entry.value for entry in self._scans], np.array([disc.circle for disc in self._discs]),
+            [thing.footprint_world for name in self._locales
+             for thing in self._robot.world.things_of(name) if thing.is_obstacle])
         self._wider = [(polygon, 1.0, whole.plan.overhang_m) for polygon in found]
         self._wider += [(polygon, entry.value.certainty, UNSURE_GAP_M) for entry, polygon in self._suspected
                         if not entry.value.is_there]
@@ -113,23 +110,28 @@ class FloorAhead:
     def measure_clearance(self, way_m: float) -> Clearance:
         """Where straight ahead a touch may happen on so much of the way, and how probably; beyond the leg's end too.
 
-        Something stands, as far as is known, on each floor that was not seen free. On floor that only looks free it
-        rarely does. What was found, or is suspected, may reach further than was seen of it, by any length up to the
+        Something stands, as far as is known, on each floor of which the map tells nothing, and elsewhere as probably as
+        the map says. What was found, or is suspected, may reach further than was seen of it, by any length up to the
         longest that is likely.
         """
         room_m = self._measure_room_m(way_m)
-        tested = self._ask(self._sweep_ahead(room_m))
-        unconfirmed = tested.only(~self._seen.ask_confirmed(tested.points))
-        stands = [find_blind(self._find_unseen(tested)), self._find_wall(room_m),
-                  np.array([room_m] if room_m < way_m else [])]
-        risks = [(at, np.ones(len(at))) for at in stands]
-        may_stand = find_blind(unconfirmed)
-        risks += [(may_stand, np.full(len(may_stand), P_CAMOUFLAGED)), *self._find_near(room_m)]
-        at_m, p = (np.concatenate(column) for column in zip(*risks, strict=True))
-        places, number = np.unique(np.round(at_m, 3), return_inverse=True)
-        worst = np.zeros(len(places))
-        np.maximum.at(worst, number, p)
-        return Clearance(places, worst, room_m)
+        swept = self._sweep_ahead(room_m)
+        places = shapely.points(swept.points)
+        p = self._tell(swept)
+        for polygon, certainty, wider_m in self._wider:
+            near = 1.0 - (shapely.distance(places, polygon) + SEEN_MARGIN_M) / wider_m
+            steps = np.ceil(np.where(swept.at_m > 0.0, near.clip(0.0), 0.0) * WIDER_STEPS)  # else it is there already
+            p = np.maximum(p, certainty * steps / WIDER_STEPS)
+        p[(swept.at_m > self._to_go_m) & (shapely.distance(places, self._floor) > SEEN_MARGIN_M)] = 1.0
+        risks: dict[float, Floats] = {1.0: np.array([room_m] if room_m < way_m else [])}
+        borne = (self._settings.creep_speed_m_per_s / self._robot.actuator.speed_m_per_s) ** 2
+        for level in sorted(set(np.round(p[p > borne], 3).tolist())):
+            risks[level] = np.append(risks.get(level, []), find_blind(swept.only(p > level - 1e-3)))
+        at_m = np.floor(np.concatenate([*risks.values()]) / AT_M + 1e-6) * AT_M
+        stops, number = np.unique(at_m, return_inverse=True)
+        worst = np.zeros(len(stops))
+        np.maximum.at(worst, number, np.repeat([*risks], [len(at) for at in risks.values()]))
+        return Clearance(stops, worst, room_m)
 
     def keep_to_seen(self, command: MotorCommand) -> tuple[Leg, MotorCommand | None]:
         """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
@@ -180,8 +182,8 @@ class FloorAhead:
     def _measure_to_things_m(self, way_m: float, *, touched: bool = False) -> float:
         """The same of what was touched, along which the robot does not go, but away from it; or of all else.
         """
-        along, points = self._list_places(way_m)
-        free_m = way_m
+        along, free_m = np.arange(0.0, way_m + STEP_M, STEP_M), way_m
+        points = shapely.points(self._find_ahead(along))
         stands = [(entry, polygon) for entry, polygon in self._suspected
                   if not touched or entry.value.touched_s is not None]
         for entry, polygon in [*stands, *(self._touches if touched else ())]:
@@ -193,30 +195,10 @@ class FloorAhead:
                 self._reasons[entry.id] = entry
         return free_m
 
-    def _find_near(self, way_m: float) -> Iterator[tuple[Floats, Floats]]:
-        """Where the robot passes what may be wider than is known of it, and how probably it is so wide."""
-        along, points = self._list_places(way_m)
-        for polygon, certainty, wider_m in self._wider:
-            gaps = shapely.distance(points, polygon) - self._robot.radius_m
-            near = (gaps[:-1] < wider_m) & (gaps[1:] <= gaps[:-1] + 1e-3)
-            yield along[:-1][near], certainty * np.clip(1.0 - gaps[:-1][near] / wider_m, 1e-3, 1.0)
-
-    def _find_wall(self, way_m: float) -> Floats:
-        """Where straight behind the leg's end the robot would come to a wall or a thing of the model."""
-        along, points = self._list_places(way_m)
-        gaps = shapely.distance(points, shapely.boundary(self._floor))
-        met = (along[1:] > self._to_go_m) & (gaps[1:] < self._robot.radius_m) & (gaps[1:] < gaps[:-1])
-        return np.asarray(along[:-1][met])
-
     def _find_ahead(self, along_m: Floats) -> Floats:
         """(n, 2) places so far straight ahead [m, world]."""
         ahead = np.array([math.cos(self._ahead_rad), math.sin(self._ahead_rad)])
         return np.asarray(self._here.position + along_m[:, None] * ahead)
-
-    def _list_places(self, way_m: float) -> tuple[Floats, Any]:
-        """How far along the way, and where, the robot's axis is on it."""
-        along = np.arange(0.0, way_m + STEP_M, STEP_M)
-        return along, shapely.points(self._find_ahead(along))
 
     def choose_look(self) -> Lookout | None:
         """A look from here at floor that is needed behind the end of this leg, where it is the best place for that."""
@@ -225,13 +207,12 @@ class FloorAhead:
         if to_go_m > LOOK_FROM_M or not self._beyond or len(self._leg.looked_at) >= s.max_looks:
             return None
         swept = sample_sweep([end, *self._beyond], self._robot.radius_m + SEEN_MARGIN_M, LOOK_AHEAD_M)
-        unseen = self._find_unseen(swept)
+        unseen = swept.only(self._tell(swept) >= 1.0)
         if len(unseen.points) == 0:
             return None
-        actuator = self._robot.actuator
-        costs = Costs(LOOK_TURN_RAD_PER_S, LOOK_PICTURE_S, actuator.turn_increment_rad,
-                      1.0 / s.creep_speed_m_per_s - 1.0 / actuator.speed_m_per_s)
-        look = choose_look(self._robot, self._floor, self._here, self._list_poses_ahead(to_go_m), unseen, costs)
+        slower_s_per_m = 1.0 / s.creep_speed_m_per_s - 1.0 / self._robot.actuator.speed_m_per_s
+        look = choose_look(
+            self._robot, self._floor, self._here, self._list_poses_ahead(to_go_m), unseen, slower_s_per_m)
         if look is None or self._was_tried(look.heading_rad):
             return None
         return look
@@ -254,33 +235,28 @@ class FloorAhead:
 
     def _sweep_ahead(self, most_m: float) -> Sweep:
         """What the robot sweeps straight ahead, but for what it stands on, which is free, and leaves behind."""
-        (here, there) = self._find_ahead(np.array([0.0, most_m]))
+        here, there = self._find_ahead(np.array([0.0, most_m]))
         sweep = sample_sweep([here, there], self._robot.radius_m + SEEN_MARGIN_M, most_m)
         off = sweep.points - here
         return sweep.only((np.linalg.norm(off, axis=1) > self._robot.radius_m) & (off @ (there - here) > 0.0))
 
-    def _ask(self, sweep: Sweep) -> Sweep:
-        """The part of a sweep that is not next to something that the model has."""
-        return sweep.only(shapely.contains_xy(self._tested, sweep.points[:, 0], sweep.points[:, 1]))
-
-    def _find_unseen(self, sweep: Sweep) -> Sweep:
-        """The part of a sweep that is not seen free, and not next to something that the model has."""
-        tested = self._ask(sweep)
-        free, scans, discs = self._seen.ask(tested.points)
-        reasons = [self._scans[k] for k in np.flatnonzero(scans)]
-        reasons += [entry for k in np.flatnonzero(discs) for entry in self._discs[k].because]
+    def _tell(self, swept: Sweep) -> Floats:
+        """How probably something stands on each cell of a sweep, but for those next to something that the model has."""
+        p, asked = np.zeros(len(swept.points)), shapely.contains_xy(self._tested, *swept.points.T)
+        told = self._map.ask(swept.points[asked])
+        p[asked] = told.p
+        reasons = [self._scans[k] for k in np.flatnonzero(told.sights)]
+        reasons += [entry for k in np.flatnonzero(told.discs) for entry in self._discs[k].because]
         self._reasons.update((entry.id, entry) for entry in reasons)
-        return tested.only(~free)
+        return p
 
 
-def _list_what_may_stand(view: View, world: Building) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
+def _list_what_may_stand(view: View) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
     """What the robot does not creep into: all that what is suspected may take; of what is there what was seen of it,
-    as the goal sketcher passes through the rest only where nothing else is left. It does creep to what may be a jamb.
+    as the goal sketcher passes through the rest only where nothing else is left.
     """
     found = [(entry, entry.value) for entry in view.where(Obstacle, lambda o: o.status != "gone")]
-    taken = [(entry, o, take_as_jamb(world, o)) for entry, o in found]
-    return [(entry, build_polygon(jamb.core if jamb.core and (o.is_there or jamb is not o) else o.footprint))
-            for entry, o, jamb in taken]
+    return [(entry, build_polygon(o.core if o.core and o.is_there else o.footprint)) for entry, o in found]
 
 
 def _list_touches(view: View, here: Pose2) -> list[tuple[Entry[Contact], shapely.Point]]:
@@ -347,15 +323,13 @@ def list_free_discs(
 def _find_put_down(view: View, robot: RobotModel, goal: Goal) -> FreeDisc:
     """Round where the robot was put down: by the first picture, if it is still on the board, else by what was said."""
     first = view.get(f"{FreeFloor.__name__}-1")
-    start = goal.origin.in_world(robot.world)
-    if first is None or not first.value.bearings_rad:
-        return FreeDisc((start.x_m, start.y_m, PUT_DOWN_FREE_M), () if first is None else (first,))
-    eye, ahead = first.value, first.value.bearings_rad[len(first.value.bearings_rad) // 2]
-    before_m = robot.mount.forward_m if eye.sense == "camera" else 0.0  # the robot's axis is that far behind its camera
-    x_m, y_m = eye.x_m - before_m * math.cos(ahead), eye.y_m - before_m * math.sin(ahead)
-    if math.dist((x_m, y_m), start.position) > MAX_DRIVEN_GAP_M:
-        return FreeDisc((start.x_m, start.y_m, PUT_DOWN_FREE_M), (first,))
-    return FreeDisc((x_m, y_m, PUT_DOWN_FREE_M), (first,))
+    at = start = goal.origin.in_world(robot.world).position
+    if first is not None and first.value.bearings_rad:
+        eye, ahead = first.value, first.value.bearings_rad[len(first.value.bearings_rad) // 2]
+        before_m = robot.mount.forward_m if eye.sense == "camera" else 0.0  # the robot's axis is behind its camera
+        axis = np.array([eye.x_m, eye.y_m]) - before_m * np.array([math.cos(ahead), math.sin(ahead)])
+        at = axis if math.dist(axis, start) <= MAX_DRIVEN_GAP_M else start
+    return FreeDisc((float(at[0]), float(at[1]), PUT_DOWN_FREE_M), () if first is None else (first,))
 
 
 def _find_scans(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> tuple[Entry[FreeFloor], ...]:

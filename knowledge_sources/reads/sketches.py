@@ -9,7 +9,7 @@ from dataclasses import replace
 import shapely
 
 from blackboard import Effect, Entry, Revise, View
-from knowledge_sources.methods.floor import build_polygon, take_as_jamb
+from knowledge_sources.methods.floor import build_polygon
 from knowledge_sources.methods.motion import SubgoalPlanner
 from knowledge_sources.reads.questions import find_building, find_robot
 from knowledge_sources.settings import PlanSettings
@@ -27,17 +27,14 @@ Way = tuple[Subgoal, ...]
 
 
 def list_planners(view: View, settings: PlanSettings) -> list[SubgoalPlanner]:
-    """Planners in the order in which they are asked: round all that obstacles may take, then what is seen of them, then
-    as if slivers in doorways were the jambs, which may be a little displaced: nothing so narrow blocks a way.
+    """Planners in the order in which they are asked: round all that obstacles may take, then what is seen of them.
 
     Where the feet of an obstacle were not seen, the floor round it may be free: the robot drives as if it were, and
     only into what it then sees to be free.
     """
     robot, obstacles = find_robot(view), [entry.value for entry in find_obstacles(view)]
     ways = [False, *([True] if any(obstacle.core for obstacle in obstacles) else [])]
-    planners = [SubgoalPlanner(robot, settings, obstacles, by_cores=by_cores) for by_cores in ways]
-    as_jambs = [take_as_jamb(robot.world, obstacle) for obstacle in obstacles]
-    return planners if as_jambs == obstacles else [*planners, SubgoalPlanner(robot, settings, as_jambs, by_cores=True)]
+    return [SubgoalPlanner(robot, settings, obstacles, by_cores=by_cores) for by_cores in ways]
 
 
 def find_way(planners: Iterable[SubgoalPlanner], ask: Callable[[SubgoalPlanner], Way | None]) -> Way | None:

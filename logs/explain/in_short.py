@@ -136,7 +136,7 @@ def tell_sureness(run: RunDirectory | None, history: Timeline, at: int | None) -
         errors = [] if run is None else read_errors(run, history, held.cycle if at is None else at)
     except BadInput:
         errors = []
-    steps += [Sentence(f"As only the simulator knows, it stood {errors[-1].words()}.", label="truth")] * bool(errors)
+    steps += [Sentence(f"As only the simulator knows, it stood {one.words()}.", label="truth") for one in errors[-1:]]
     when = "At the end" if at is None else f"In cycle {at}"
     yield Story(f"{when}: {phrases.believed(held.value)}", tuple(steps), held.ref)
 
@@ -163,9 +163,10 @@ def tell_gap(run: RunDirectory, history: Timeline, thing: Record) -> str:
     others = [one.value.footprint for one in _newest(history, Obstacle)
               if one.value.is_there and one.value.locale == thing.value.locale and one.id != thing.id]
     here = held.value.world_from_robot(world).position
-    left_m, right_m = measure_gaps(world, thing.value, others, np.asarray(here))
-    needs_m = 2.0 * (body.value.radius_m + CLEARANCES_M[-1])
-    return f" {metres(left_m)} free on its left, {metres(right_m)} on its right; the robot needs {metres(needs_m)}."
+    gaps_m = measure_gaps(world, thing.value, others, np.asarray(here))
+    left, right = (metres(gap_m) if gap_m > 0.0 else "" for gap_m in gaps_m)
+    room = f"{left + ' free' if left else 'No room'} on its left, {right or 'none'} on its right"
+    return f" {room}; the robot needs {metres(2.0 * (body.value.radius_m + CLEARANCES_M[-1]))}."
 
 
 def measure_gaps(

@@ -209,7 +209,7 @@ def _plan(history: Timeline, record: EntryRecord[Any]) -> str:
     if isinstance(sketch, Goal):
         return plainly(record) if record.is_new or not sketch.is_active else ""
     if record.is_new:
-        look = "to look from elsewhere, " if sketch.is_look else ""
+        look = f"to look from elsewhere {_doubted(history, record)}, " if sketch.is_look else ""
         parts = count(len(sketch.subgoals), "part")
         return f"Plan {look}{sketch.where()}, {parts}: to {phrases.steps(sketch.subgoals)}."
     if turning_points.is_adjusted(sketch, record.author):
@@ -220,6 +220,14 @@ def _plan(history: Timeline, record: EntryRecord[Any]) -> str:
     causes = listed([cause for ref in record.because if (cause := _cause(history, ref))]) or "it no longer held"
     part = f"in part {sketch.at + 1} of {len(sketch.subgoals)}"
     return f"The plan {sketch.where()} was withdrawn {part}, because of this: {causes}."
+
+
+def _doubted(history: Timeline, record: EntryRecord[PlanSketch]) -> str:
+    """What it hopes to see from there."""
+    below = [one for ref in record.because if (one := history.entry(ref)) is not None]
+    doors = [f"whether {one.value.door} is shut" for one in below if is_a(one, DoorState)]
+    things = [f"whether {one.value.name} is in the way" for one in below if is_a(one, Obstacle)]
+    return next(iter((*doors, *things)), "at what leaves no way")
 
 
 def _cause(history: Timeline, ref: str) -> str:

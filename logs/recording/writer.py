@@ -73,8 +73,7 @@ class RecordingWriter:
 
     def truth(self, world_from_robot: Pose2, sim_time_s: float, contacts: Sequence[Place] = (),
               happened: Sequence[str] = ()) -> None:
-        """Where the robot truly is, where it touched something, and what was done to it; drawn with the next decision.
-        """
+        """Where the robot truly is, what it touched, and what was done to it; drawn with the next decision."""
         self._truth = world_from_robot
         self._contacts += contacts
         self._happened += happened

@@ -25,8 +25,7 @@ class Bumper(Bounded):
     sectors: int = bounded(12, 0, 360)
 
     def feel(self, direction_rad: float, when_s: float) -> Contact:
-        """What is felt of a touch in this direction from the robot's heading; the touch may be anywhere in its sector.
-        """
+        """What is felt of a touch in this direction from the robot's heading; it may be anywhere in its sector."""
         if not self.sectors:
             return Contact.of_stall(when_s)
         width = math.tau / self.sectors

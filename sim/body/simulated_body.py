@@ -90,7 +90,7 @@ class SimulatedBody:
         self._touching_rad: float | None = None
         self._contact: Contact | None = None
         self._motion = ContinuousMotion()
-        self._frozen_until_s, self._lag_s, self._delivered = 0.0, 0.0, b""
+        self._frozen_until_s, self._lag_s, self._delivered, self._owed_s = 0.0, 0.0, b"", 0.0
         self._truth = Truth(start, locale=building.locale_at(start))
         there = self._draw_put_down(put_down_rng, put_down_sigma_m, put_down_sigma_rad)
         self._truth = Truth(there, locale=building.locale_at(there))
@@ -163,13 +163,18 @@ class SimulatedBody:
         self._advance_time(duration_s)
         return self._truth.time_s
 
+    def charge(self, duration_s: float) -> None:
+        """Thinking takes time, which passes with the next act; a robot on the move follows its course meanwhile."""
+        self._owed_s += duration_s
+
     def execute(self, command: MotorCommand) -> MotionReport:
         """TURN in place, then MOVE straight ahead, as well as the wheels can. Returns what the encoders report.
 
         A contact ends the motion, and so does a device fault that stops it; the report is of the part that was done.
         """
-        began_s = self._truth.time_s
-        self._advance_time(self._wheels.parameters.command_s)
+        owed_s, self._owed_s = self._owed_s, 0.0
+        began_s = self._truth.time_s + owed_s
+        self._advance_time(owed_s + self._wheels.parameters.command_s)
         self._turn(command.turn_rad)
         done = self._move(command.move_m, command.speed_m_per_s)
         turn, move = self._wheels.quantize(command.turn_rad, command.move_m * done)
@@ -186,8 +191,7 @@ class SimulatedBody:
 
     @property
     def touching_rad(self) -> float | None:
-        """The true direction in which :meth:`roll` touches something, from the heading; None where nothing is touched.
-        """
+        """The true direction in which :meth:`roll` touches something, from the heading; None: nothing is touched."""
         return self._touching_rad
 
     def take_contact(self) -> Contact | None:
@@ -239,7 +243,7 @@ class SimulatedBody:
         A contact ends the motion with a fault.
         """
         began_s, parameters = self._truth.time_s, self._wheels.parameters
-        each_s = 1.0 / self._camera.sensor.frames_per_s
+        each_s, self._owed_s = max(self._owed_s, 1.0 / self._camera.sensor.frames_per_s), 0.0
         self._motion = self._motion.steer(min(course.speed_m_per_s, parameters.speed_m_per_s), course.curvature_per_m)
         touched = self._follow_arc(each_s)
         while not course.is_rolling and self._motion.speed_m_per_s > 0.0 and not touched:
@@ -302,7 +306,8 @@ class SimulatedBody:
 
     def look(self, purpose: str = "") -> CameraPicture:
         """Take a picture, for the purpose of the request."""
-        self._advance_time(FRAME_S)
+        owed_s, self._owed_s = self._owed_s, 0.0
+        self._advance_time(owed_s + FRAME_S)
         return self._take_frame(purpose)
 
     def picture(self) -> bytes:
@@ -393,10 +398,11 @@ class SimulatedBody:
         """Let the building change with time. What would be put where the robot stands waits until it has gone."""
         if self._building.at_time is None:
             return
-        now = self._building.at_time(self._truth.time_s)
         here = self._truth.world_from_robot
+        now = self._building.at_time(self._truth.time_s, here)
         if now is not self._building and not self._is_run_into(now.obstacles.clearance_m(here)):
             self._building = now
+            self._happened += now.news
 
     def _is_run_into(self, clearance_m: float) -> bool:
         return clearance_m < 0.0 and clearance_m < self._building.obstacles.clearance_m(self._truth.world_from_robot)

@@ -119,8 +119,9 @@ class SimulatedBuilding:
         floor_m: height of the floor that the body stands on [m]; obstacles and locales are those of this floor.
         elevators: the rides to other floors.
         on_floor: the building for a body on the floor of this height [m].
-        at_time: the building on this floor at a time of the run [s]; None where nothing changes.
+        at_time: the building on this floor at a time of the run [s], with the robot there; None where nothing changes.
         added, gone: faces that are there, or not, otherwise than in the building's files.
+        news: what who walks in it has just done to the robot, in words.
     """
 
     renderer: Renderer
@@ -130,9 +131,10 @@ class SimulatedBuilding:
     floor_m: float = 0.0
     elevators: Elevators = NO_ELEVATORS
     on_floor: Callable[[float], SimulatedBuilding] | None = field(default=None, repr=False)
-    at_time: Callable[[float], SimulatedBuilding] | None = field(default=None, repr=False)
+    at_time: Callable[[float, Pose2], SimulatedBuilding] | None = field(default=None, repr=False)
     added: tuple[Face, ...] = ()
     gone: tuple[Face, ...] = ()
+    news: tuple[str, ...] = ()
 
     @staticmethod
     def of_faces(

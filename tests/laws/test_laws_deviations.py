@@ -5,28 +5,19 @@ One table; a method that takes a standard deviation has its row.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
 import pytest
 import shapely
 
 from generated_boards import LENGTH_M, WIDTH_M, Bench
 from harvey.testing import HALL, STUDY, plain_robot
-from knowledge_sources.methods.floor.found_things import find_same
-from knowledge_sources.methods.pose.displacements import _find_candidates
+from knowledge_sources.methods.floor.footprints import find_same
 from knowledge_sources.model.door_toucher import door_toucher
 from world_models.actuator import ActuatorModel
-from world_models.building.model_errors import LineErrors
-from world_models.camera import Camera, CameraMount
 from world_models.entries import Contact, DoorPicture, DoorState, Drift, Obstacle, diagonal
 from world_models.frames import Pose2
-
-CAMERA = Camera.from_field_of_view(math.radians(65.0))
-MOUNT = CameraMount(1.0, 0.1, 0.05).camera_from_robot
-POSTS = np.array([[(5.0, y, 0.5), (5.0, y, 1.5)] for y in (-1.0, 0.0, 1.0)])
 
 
 def refuse_touch(place_m: float, heading_rad: float, direction_rad: float) -> float:
@@ -47,15 +38,6 @@ def learn_drift(before_per_m: float, turned_rad: float, heading_rad: float) -> f
     return drift.update(ActuatorModel(), 0.2, heading_rad).sigma_per_m
 
 
-def count_candidates(place_m: float, heading_rad: float, model_m: float) -> float:
-    """How many segments may be of lines that stand elsewhere than the belief and the model say."""
-    shifted = POSTS + np.array([0.0, 0.1, 0.0])
-    segments = CAMERA.project((MOUNT @ Pose2(0.0, 0.0, 0.0).lifted().inverse()).apply(shifted))
-    errors = LineErrors(("walls",), np.tile([0.0, model_m, 0.0], (1, len(POSTS), 1)))
-    spread = np.diag([place_m, place_m, heading_rad]) ** 2
-    return len(_find_candidates(POSTS, errors, segments, CAMERA, MOUNT, np.zeros(3), spread)[0])
-
-
 def is_same_thing(known_m: float, seen_m: float) -> float:
     """Whether what is seen beside a thing is that thing."""
     known = Obstacle("hall/obstacle-1", HALL, ((0.0, 0.0), (0.3, 0.0), (0.3, 0.3), (0.0, 0.3)), known_m, 0.0, 0.0, 0.3)
@@ -65,7 +47,6 @@ def is_same_thing(known_m: float, seen_m: float) -> float:
 ROWS: Mapping[str, tuple[Callable[..., float], dict[str, Any]]] = {
     "a touch in a doorway": (refuse_touch, {"place_m": 0.005, "heading_rad": 0.005, "direction_rad": 0.05}),
     "the drift of the wheels": (learn_drift, {"before_per_m": 0.002, "turned_rad": 0.002, "heading_rad": 0.002}),
-    "lines that stand elsewhere": (count_candidates, {"place_m": 0.001, "heading_rad": 0.001, "model_m": 0.001}),
     "two sights of a thing": (is_same_thing, {"known_m": 0.005, "seen_m": 0.005}),
 }
 LARGE = 100.0

@@ -15,7 +15,7 @@ LAST_EVIDENCE = 64
 
 RivalKind = Literal[
     "chance", "thing", "jamb", "leaf", "wall", "dirt", "still camera", "late pictures", "lens", "focal length",
-    "mounting", "wheels", "turns", "elsewhere",
+    "mounting", "wheels", "turns", "elsewhere", "mover",
 ]
 SENSES: frozenset[RivalKind] = frozenset({
     "dirt", "still camera", "late pictures", "lens", "focal length", "mounting", "wheels", "turns"})
@@ -30,12 +30,14 @@ TOLD_BY: Mapping[RivalKind, str] = {
     "still camera": "a picture after a turn", "late pictures": "a picture after a turn, and one long after it",
     "lens": "edges near the rim of the picture", "focal length": "the same edges from nearer and from further away",
     "mounting": "looks at near floor and far walls", "wheels": "another way between two sure places",
-    "elsewhere": "what can be seen from here alone",
+    "elsewhere": "what can be seen from here alone", "mover": "the same look a second later",
 }
 """What would tell a rival from the others."""
 
 MODEL = "the model of the building"
 """What differs where walls and doors stand elsewhere in general, or the camera makes it seem so."""
+DOORS = "the doors of the building"
+"""What differs where doors stand beside in general: each of them tells of the others."""
 SURE = 0.95
 """A rival that is so probable is what the difference is taken for."""
 

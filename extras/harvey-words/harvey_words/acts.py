@@ -26,8 +26,9 @@ class _Reader:
     last_thing: ThingWords | None = None
     last_stretch: ThingWords | None = None
     wants_orient: bool = False
-    side_before: bool = False
     goes_on: bool = False
+    side: str = ""
+    goals: list[Act] = field(default_factory=list)
     notes_on: bool = False
 
     def read(self, clause: Clause) -> None:
@@ -42,16 +43,15 @@ class _Reader:
             last, more = self.acts[-1], things[0]
             self.acts[-1] = (replace(last, units=more.number or 1) if "unit" in more.heads
                              else replace(last, past=(*last.past, more)))
-            wheres = [pair for pair in wheres if pair[1].heads or pair[1].names]
-            if wheres:
-                self._go([], [], wheres)
         elif self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
             self._orient(things, ways, wheres)
+        elif "goal" in verbs and (things or wheres) and not self._has_way():
+            self.goals += [Act("see", what=one) for one in (*things, *(one for _, one in wheres)) if one.names]
         elif "exit" in verbs:
             self._exit(things, ways, wheres)
-        elif things and self.acts and self.acts[-1].sort == "go" and self.acts[-1].until and (
+        elif things and self._is_walk_told([], []) and (
                 (self.notes_on and not verbs) or verbs in ({"note"}, {"pass"})):
-            self._note_before(things)
+            self._note_before(things)  # "to the chair, over the crossing with the lamp"
         elif ("note" in verbs or (self.notes_on and not verbs)) and things:
             self.acts += [Act("note", what=thing) for thing in things]
         elif self._is_posture(parts, verbs):
@@ -89,7 +89,6 @@ class _Reader:
         begun = len(self.acts) if begun and self.acts[-1] is before else begun
         self.notes_on = clause.end == "and" and bool(self.acts) and (self.notes_on or self.acts[-1].sort == "note")
         self.wants_orient = clause.end == "so"
-        self.side_before = bool(parts) and parts[-1].sort == "where" and bool(parts[-1].side) and clause.end == "and"
         if parts:
             text = " ".join(word.text for part in parts for word in part.words) or " ".join(verbs)
             self.acts[begun:] = [replace(act, text=text) for act in self.acts[begun:]]
@@ -114,7 +113,7 @@ class _Reader:
                         *things[-1].relations, *self._relation(part.meaning, part.words)))
                 else:
                     if part.words or part.meaning != "at":
-                        wheres.append((part.meaning, describe(part.words) if part.words else self._it()))
+                        wheres.append((part.meaning, self._describe(part.meaning, part.words)))
                         target, located = None, True
                         continue
             elif part.sort == "where" and located and side in SIDES:
@@ -123,8 +122,6 @@ class _Reader:
             elif side in SIDES and target and (part.sort == "where" or (target[-1].is_door and not turning)
                                                or "be" in verbs):
                 target[-1] = replace(target[-1], side=side)
-            elif part.sort == "where" and side in SIDES and (turning or verbs & {"go"}):
-                ways.append(side)
             elif part.sort == "where" and side:
                 wheres.append(("on", ThingWords(side=side)))
             elif part.sort == "way":
@@ -160,7 +157,12 @@ class _Reader:
         cut = [index for index, word in enumerate(words) if word.meaning == "&"]
         if meaning == "between" and cut:
             return ((meaning, describe(words[:cut[0]])), (meaning, describe(words[cut[0] + 1:])))
-        return ((meaning, describe(words)),) if words else ()
+        return ((meaning, self._describe(meaning, words)),) if words else ()
+
+    def _describe(self, meaning: str, words: Sequence[Word]) -> ThingWords:
+        """What follows a preposition: ``past it`` is past what was named in a clause before."""
+        is_it = meaning in RELATIONS and all(word.meaning == "it" for word in words)
+        return describe(words) if words and not is_it else self._it()
 
     # -- the sorts of clauses ----------------------------------------------------------------------------------------
 
@@ -188,9 +190,6 @@ class _Reader:
         towards = [one for meaning, one in wheres if meaning in ("to", "away", "at", "on", "next-to")]
         if towards or things:
             self.acts.append(Act("orient", what=replace((towards or things)[0], side="behind")))
-        rest = [(meaning, one) for meaning, one in wheres if one not in towards]
-        if rest:
-            self._go([], [], rest)
 
     def _orient(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         all_things = [*things, *(one for _, one in wheres)]
@@ -219,10 +218,6 @@ class _Reader:
         number = next((thing.number for thing in things if thing.number and not blocks), 0)
         if way == "" and hall is not None and hall.side != "ahead":
             way = hall.side
-        last = self.acts[-1] if self.acts else Act("")
-        if last == Act("turn", last.way, text=last.text) and not way and hall is not None:
-            way = last.way  # "right, through the brick hall"
-            self.acts.pop()
         self.acts.append(Act("turn", way, along=hall, until=at[0] if at and way else None, past=past if way else (),
                              units=number if not halls else 0))
         rest = [(meaning, one) for meaning, one in wheres
@@ -235,8 +230,6 @@ class _Reader:
     def _go(self, things: list[ThingWords], ways: list[str], wheres: Wheres, *,
             until: bool = False, passing: bool = False) -> None:
         self._turn_only(ways)
-        if things and things[0].text.startswith("all the way") and (len(things) > 1 or wheres):
-            things = [replace(things[0], heads=frozenset(("hall",))), *things[1:]]  # "all the way down the hall to X"
         units, metres = 0, 0.0
         ends: list[ThingWords] = []
         passed: list[ThingWords] = []
@@ -244,7 +237,9 @@ class _Reader:
         for meaning, one in [*(("", thing) for thing in things), *wheres]:
             counts = "crossing" in one.heads and one.number and meaning == "" and any(by == "to" for by, _ in wheres)
             is_number = one.number and not one.heads and not one.names and not one.side
-            if one.heads & {"unit"} or counts or is_number:
+            if is_number and meaning == "to" and passed:
+                ends.append(replace(passed.pop(), count=one.count))  # "past the first crossing to the second one"
+            elif one.heads & {"unit"} or counts or is_number:
                 units = one.number or 1
                 if not counts and (one.names or one.heads - {"unit"}):
                     along = along or replace(one, heads=frozenset(("hall",)), count="")
@@ -298,10 +293,7 @@ class _Reader:
 
     def _state(self, things: list[ThingWords], ways: list[str], wheres: Wheres, verbs: set[str]) -> None:
         """A sentence that says what is where."""
-        if len(things) > 1 and things[-1].names and not things[-1].heads and things[-1].is_stretch:
-            *things, kind = things  # "the next hall is yellow"
-            things[-1] = replace(things[-1], names=things[-1].names + kind.names)
-        elif len(things) > 1 and things[-1].count and not things[-1].heads and not things[-1].names:
+        if len(things) > 1 and things[-1].count and not things[-1].heads and not things[-1].names:
             *things, rank = things  # "the pink carpet is the first on your left", "the easel is one ahead"
             if rank.side == "ahead" and rank.number:
                 self.acts.append(Act("go", units=rank.number))
@@ -313,9 +305,6 @@ class _Reader:
         if blocks and len(things) > 1:  # "an easel one block in front of you"
             side = side or blocks[0].side
             things = [thing for thing in things if "unit" not in thing.heads]
-        if any("unit" in one.heads for _, one in wheres) and things and self._is_walk_told([], []):
-            self._note_before(things)  # "the couch will be at the first block"
-            return
         doors = [thing for thing in things if thing.is_door or (
             thing.count and thing.side and not thing.heads and not thing.names)]
         if doors or not things:
@@ -328,17 +317,11 @@ class _Reader:
         elif "see" in verbs and things and not self.acts:
             self._orient(things, ways, wheres)
             return
-        elif not things and (related or side) and self.acts and self.acts[-1].sort == "find":
-            self._amend(related, side)
-        elif not things and side and self.acts and self.acts[-1].sort == "go" and self.acts[-1].until:
-            until = self.acts[-1].until  # "the pink hall, which will be on your right"
-            self.acts[-1] = replace(self.acts[-1], until=replace(until, side=until.side or side))
         elif not things and (related or side):
             self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), side=side, relations=related)))
         ended = next((one for meaning, one in wheres if meaning in ("at", "in") and "end" in one.heads), None)
         if ended is not None and not doors:
-            on_the_way = any(act.sort in ("exit", "turn", "go") for act in self.acts)
-            self.acts.append(Act("go", until=ended) if on_the_way else Act("find", what=ended))
+            self.acts.append(Act("go", until=ended) if self._has_way() else Act("find", what=ended))
         for thing in (*things, *(one for meaning, one in wheres if meaning == "at")):
             if thing.number and thing.heads & POINTS:
                 self.acts.append(Act("go", until=thing))  # "it is the next crossing", "the chair is at the next one"
@@ -361,24 +344,34 @@ class _Reader:
         last = self.acts[-1] if self.acts else None
         if not things and last is not None and last.sort in ("find", "see") and (related or side) and not ways:
             self._amend(related, side)
-        elif self.side_before and not things and last is not None:
-            return  # it tells of the walk before
+        elif things and things[0].heads == {"side"} and not wheres:
+            return  # "same side"
+        elif side and not things and not related and not ways:
+            self.side = side  # "on your right, the last door"
         elif wheres and self._is_walk_told(things, ways) and all(meaning == "past" for meaning, _ in wheres):
             self._note_before([one for _, one in wheres])
         elif things and things[0].is_stretch and things[0].side in ("left", "right") and last and not things[0].count:
             self._turn(things, [*ways, things[0].side], wheres)  # "then the flowers on the left"
+        elif things and "unit" in things[0].heads and things[0].side in ("left", "right"):
+            self._turn(things, [things[0].side], wheres)  # "one block to your right"
         elif (things and ways and "unit" in things[0].heads) or (set(ways) & {"left", "right"} and any(
                 meaning in ("at", "on") for meaning, _ in wheres)):
             self._turn(things, ways, wheres)  # "left at the lamp", "right on the brick two"
         elif things and ways and things[0].number and not things[0].heads and not things[0].names:
-            self.acts.append(Act("turn", ways[0], units=things[0].number))
+            act = Act("go") if ways[0] == "ahead" else Act("turn", ways[0])  # "one forward", "second left"
+            self.acts.append(replace(act, units=things[0].number))
         elif things and (things[0].is_door or (things[0].count and things[0].side and not things[0].is_stretch)):
             goal = _merge(things)
-            side = goal.side or next(iter(ways), "")
-            if last is not None and last.sort == "find" and last.what and last.what.names and not goal.names:
+            side, self.side = goal.side or next(iter(ways), self.side), ""
+            is_beyond = any(meaning == "past" for meaning, _ in related)
+            is_named = last is not None and last.sort == "find" and bool(last.what and last.what.names)
+            if is_named and not goal.names and not is_beyond:
                 self._amend(related, side)  # "the library is opposite, one door to the left"
             else:
                 self.acts.append(Act("find", what=replace(goal, side=side, relations=related)))
+        elif things and things[0].number and self.last_thing and self.last_thing.is_door and not (
+                things[0].heads or things[0].names):
+            self.acts.append(Act("find", what=replace(things[0], heads=frozenset(("door",)))))  # "the next one"
         elif things or any(one.heads or one.names or one.number for _, one in wheres):
             is_at = not things and not ways and all(meaning == "on" for meaning, _ in wheres)
             self._go(things, ways, [("at" if is_at else meaning, one) for meaning, one in wheres])
@@ -386,6 +379,10 @@ class _Reader:
             self._turn_only(ways)
             if "ahead" in ways:
                 self.acts.append(Act("go"))
+
+    def _has_way(self) -> bool:
+        """Whether anything was told to be done yet."""
+        return any(act.sort in ("go", "turn", "exit") for act in self.acts)
 
     def _is_walk_told(self, things: Sequence[ThingWords], ways: Sequence[str]) -> bool:
         """Whether the act before is a walk with an end, and nothing is named to go to."""
@@ -424,7 +421,7 @@ def _at_end(goal: ThingWords, wheres: Sequence[tuple[str, ThingWords]]) -> Thing
 
 def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     """The acts of a text in the order in which they are to be done."""
-    clauses = list(_leave_warnings(clauses))
+    clauses = _join_exits(list(_leave_warnings(clauses)))
     ordered: list[Clause] = []
     behind: Clause | None = None
     for clause in clauses:
@@ -435,22 +432,40 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
         if behind is not None and clause.parts:
             ordered.append(Clause(behind.parts, ""))
             behind = None
-    if behind is not None:
-        ordered.append(behind)
     reader = _Reader()
     for clause in ordered:
         reader.read(clause)
-    last = reader.acts[-1] if reader.acts else Act("")
-    if last.sort == "turn" and last.along is not None and not last.way:
-        reader.acts.append(replace(last, sort="go"))  # "take the blue hall", and no more
+    reader.acts += reader.goals
     if not any(act.sort in ("find", "exit", "turn", "go") for act in reader.acts):  # a goal, and no way
         goal = next((index for index, act in enumerate(reader.acts) if act.sort == "see" and act.what
                      and act.what.names), None)
         if goal is not None:
             reader.acts[goal] = replace(reader.acts[goal], sort="find")
+    for index, act in enumerate(reader.acts[:-1]):
+        after = reader.acts[index + 1]
+        if act.sort == "find" == after.sort and after.what and any(by == "past" for by, _ in after.what.relations):
+            reader.acts[index] = replace(act, sort="see")  # "the library is on the left; it is the door after that"
     done = max((index for index, act in enumerate(reader.acts) if act.sort in ("go", "turn", "exit")), default=-1)
-    return [replace(act, sort="see") if act.sort == "find" and index < done and not act.enters and reader.acts[
+    ordered_acts = [replace(act, sort="see") if act.sort == "find" and index < done and not act.enters and reader.acts[
         index + 1].sort != "exit" else act for index, act in enumerate(reader.acts)]
+    doors = [act for act in reader.acts if act.sort == "find" and act.what and act.what.is_door]
+    if doors and not any(act.sort == "find" for act in ordered_acts):  # "the next door, left as you come out"
+        ordered_acts = [*(act for act in reader.acts if act is not doors[-1]), doors[-1]]
+    return ordered_acts
+
+
+def _join_exits(clauses: Sequence[Clause]) -> list[Clause]:
+    """``Left out of the lab`` and ``turn left coming out`` are one clause: one is out before one turns."""
+    joined: list[Clause] = []
+    for clause in clauses:
+        before = joined[-1] if joined else Clause()
+        ways = [part for part in before.parts if part.meaning in ("left", "right")]
+        is_turn = ways and not before.end and all(part.sort in ("verb", "way") for part in before.parts)
+        if is_turn and any(part.meaning == "exit" for part in clause.parts):
+            joined[-1] = Clause([*ways, *clause.parts], clause.end)
+        else:
+            joined.append(clause)
+    return joined
 
 
 def _leave_warnings(clauses: Sequence[Clause]) -> Iterable[Clause]:

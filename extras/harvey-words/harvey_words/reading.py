@@ -41,7 +41,7 @@ class RouteEnd:
         locale: the room or hall; door: at or behind which, where the text names one.
         x_m, y_m, heading_rad: pose [world].
         odds: of this end, 0 to 1, against all others and against none of them.
-        way: the places on the way (locale, x, y).
+        way: the places on the way (locale, x, y), each with the name of what the words named there, or "".
     """
 
     locale: str
@@ -50,7 +50,7 @@ class RouteEnd:
     y_m: float
     heading_rad: float
     odds: float
-    way: tuple[tuple[str, float, float], ...]
+    way: tuple[tuple[str, float, float, str], ...]
 
     def is_at(self, place: str) -> bool:
         """Whether it is a locale, a door, or no further than ``NEAR_M`` from x,y."""

@@ -13,6 +13,7 @@ from knowledge_sources.reads import NOT_ENDED, NOT_LOST
 from world_models.entries import Goal, Impasse, Milestone, MotionReport, Outcome, Recovery
 
 MOST_WAITED_S = 600.0  # so long it waits for somebody who is asked to help
+SEEN = "was seen"
 Case = tuple[Entry[ToldTask], int, Entry[Any]]
 """A task, the number of its step that is under way, and what happened."""
 
@@ -20,12 +21,14 @@ Case = tuple[Entry[ToldTask], int, Entry[Any]]
 class StepCloser(KnowledgeSource):
     """Says how a step ended, and after the last how the task did, where that is not what the mission monitor says.
 
-    A goal that is reached was a visit on the way, where steps are left. Where there is no way, the step leads to the
-    other place that was named for this, or it failed, once nobody has another look to take; the rest is done.
+    Where a milestone shows what the words of a way name there, it says so too. A goal that is reached was a visit on
+    the way, where steps are left. Where there is no way, the step leads to the other place that was named for this, or
+    it failed, once nobody has another look to take; the rest is done.
     """
 
     level = Level.PLAN  # before the mission monitor, which is of the goal level
     on = (Watch(Goal, (Revised,), lambda goal: goal.status == "reached"), Watch(MotionReport, (Posted,)),
+          Watch(Milestone, (Revised,), lambda milestone: milestone.status == "verified"),
           Watch(Impasse, (Posted,), lambda impasse: impasse.is_open and impasse.kind == "blocked"),
           Watch(Recovery, (Revised,), lambda wait: wait.status != "asked" and not wait.request))
     needs = (NOT_ENDED, NOT_LOST)
@@ -39,6 +42,7 @@ class StepCloser(KnowledgeSource):
         step, goal = task.value.steps[number], view.get(getattr(cause.value, "goal", ""))
         is_ours = {MotionReport: step.place is not None and 0.0 < step.due_s < find_time_s(view),
                    Recovery: step.place is None and getattr(cause.value, "fault", "") == task.id,
+                   Milestone: step.mark in getattr(cause.value, "landmarks", ()) and SEEN not in step.note,
                    Impasse: goal is not None and goal.value.is_active}.get(type(cause.value), True)
         return (task, number, cause) if is_ours else None
 
@@ -48,6 +52,11 @@ class StepCloser(KnowledgeSource):
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
         task, number, cause = case
+        if isinstance(cause.value, Milestone):
+            step = task.value.steps[number]
+            note = f"{step.mark} {SEEN}" + f"; {step.note}" * bool(step.note)
+            yield Revise(task, task.value.with_step(number, note=note), (task, cause))
+            return
         changes = _find_changes(task.value.steps[number], cause.value, find_time_s(view))
         if changes is None:
             yield Revise(cause, replace(cause.value, status="asked"), (task, cause))

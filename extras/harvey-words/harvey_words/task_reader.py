@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import takewhile
 
 from blackboard import Change, Effect, Entry, KnowledgeSource, Level, Post, Posted, Revise, View, Watch
 from harvey_words.task_entries import Step, ToldTask, active_task, find_time_s
-from harvey_words.task_places import find_place
-from harvey_words.task_words import START, TaskWordsError, is_word_to_go_on, read_tokens, read_wanted
+from harvey_words.task_places import find_places
+from harvey_words.task_words import START, TaskWordsError, is_word_to_go_on, read_tokens, read_wanted, tells_way
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, NOT_ENDED, find_building, place_of
 from world_models.building.locale_frame import FrameRequest
@@ -30,12 +31,13 @@ class TaskReader(KnowledgeSource):
 
     def bind(self, view: View, trigger: Change) -> Entry[Redirection] | None:
         """What was said first and is not answered yet; one place, on the way, is left to the goal changer."""
-        said = next(iter(view.where(Redirection, lambda asked: not asked.answer)), None)
-        is_ours = said is not None and (active_task(view) or not _is_plain(said.value.text) or _is_first(view, said))
-        return said if is_ours else None
+        return next((said for said in _list_unanswered(view) if active_task(view) or not _is_plain(said.value.text)
+                     or _is_first(view, said)), None)
 
     def act(self, view: View, case: Entry[Redirection]) -> Iterable[Effect]:
         said, task, belief = case.value, active_task(view), HELD.of(view)
+        for earlier in takewhile(lambda one: one.id != case.id, _list_unanswered(view)):
+            yield Revise(earlier, replace(earlier.value, answer="but was asked again since"), (earlier, case))
         wait = view.latest(Recovery, lambda one: task is not None and one.fault == task.id and one.status != "over")
         if wait is not None and is_word_to_go_on(said.text):
             answer = Revise(case, replace(said, answer="and goes on with its task"), (case, wait))
@@ -43,7 +45,8 @@ class TaskReader(KnowledgeSource):
             yield Revise(wait, replace(wait.value, status="over"), (answer, wait))
             return
         try:
-            new = _read_task(view, said.text, place_of(belief.value))
+            new = _read_task(view, said.text, replace(
+                place_of(belief.value), heading_rad=belief.value.locale_from_robot.heading_rad))
         except ValueError as error:
             yield Revise(case, replace(said, answer=f"which cannot be: {error}"), (case,))
             if _is_first(view, case):
@@ -56,6 +59,10 @@ class TaskReader(KnowledgeSource):
         if task is not None:
             yield Revise(task, replace(task.value, status="given up"), (answer, task))
         yield Post(new, (answer, belief.entry))
+
+
+def _list_unanswered(view: View) -> Sequence[Entry[Redirection]]:
+    return view.where(Redirection, lambda asked: not asked.answer)
 
 
 def _is_first(view: View, said: Entry[Redirection]) -> bool:
@@ -71,7 +78,7 @@ def _is_plain(text: str) -> bool:
         wanted = read_wanted(text)
     except TaskWordsError:
         return not any(token.sort == "VERB" for token in read_tokens(text)[:1])
-    return wanted == (Step("ptrans", wanted[0].phrase),) and wanted[0].phrase != START
+    return wanted == (Step("ptrans", wanted[0].phrase),) and wanted[0].phrase != START and not tells_way(text)
 
 
 def _read_task(view: View, text: str, start: Place) -> ToldTask:
@@ -84,7 +91,7 @@ def _read_task(view: View, text: str, start: Place) -> ToldTask:
             raise
         place = read_destination(text, building, building.find_rooms)
         return ToldTask(text, text, start, (Step("ptrans", text, place=place),))
-    steps = tuple(replace(step, place=find_place(building, step, step.phrase, start) if step.phrase else None,
-                          instead=find_place(building, step, step.other, start) if step.other else None,
-                          due_s=step.due_s and now_s + step.due_s) for step in wanted)
+    steps = tuple(replace(step, due_s=step.due_s and now_s + step.due_s)
+                  for step in find_places(building, wanted, start))
+    start = replace(start, heading_rad=None)
     return ToldTask(text, f"(do {' '.join(step.tell()[1] for step in wanted)})", start, steps)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import networkx as nx
 import numpy as np
-from networkx.algorithms import approximation
 from numpy.typing import NDArray
 
 MOST_EXACT = 9
@@ -40,6 +38,9 @@ def _order_exactly(ways: NDArray[np.float64], ends: NDArray[np.float64]) -> tupl
 
 def _order_nearly(ways: NDArray[np.float64], ends: NDArray[np.float64]) -> tuple[int, ...]:
     """A greedy tour, of which then each nine stops in a row are put in their best order; to go back costs an end."""
+    import networkx as nx  # loaded when first used: hardly a task has so many stops
+    from networkx.algorithms import approximation
+
     closed = ways + 1e-9  # a weight of 0 would be no edge
     closed[1:, 0] = ends + 1e-9
     np.fill_diagonal(closed, 0.0)

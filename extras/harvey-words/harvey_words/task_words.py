@@ -15,12 +15,17 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from harvey_words.lexicon import Lexicon, lexicon_data
 from harvey_words.task_entries import Step
 
 START, HOME = "start", "home of"  # for words of a place: where it was told, and where the model says a thing is kept
 MOST_WORDS, MOST_STEPS, LONGEST = 200, 40, 6
 SORTS = ("VERB", "WORD", "TIMES", "NUMBER", "UNIT")
 PIECES = re.compile(r"\d+(?:\.\d+)?|[^\W\d_][\w'-]*|[.,;:!?\n]")
+WAYS = frozenset((
+    *(("VERB", verb) for verb in ("turn", "exit", "pass")),
+    *(("WAY", way) for way in ("left", "right", "ahead")),
+    *(("HEAD", head) for head in ("crossing", "corner", "end", "unit", "turning"))))
 STOPS = {";": ".", ":": ",", "!": ".", "?": ".", "\n": "."}
 
 
@@ -29,11 +34,12 @@ class TaskWordsError(ValueError):
 
 
 class Token(NamedTuple):
-    """A word or phrase: its class in the lexicon, ``NAME`` for a place's or a thing's, and its meaning."""
+    """A word or phrase: its class in the lexicon, ``NAME`` for a place's or a thing's, its meaning, where it stands."""
 
     sort: str
     meaning: str
     text: str
+    span: tuple[int, int] = (0, 0)
 
 
 @cache
@@ -50,7 +56,8 @@ def _phrases() -> Mapping[tuple[str, ...], tuple[str, str]]:
 
 def read_tokens(text: str) -> list[Token]:
     """The words of a text with their classes; chatter is left out. Raises TaskWordsError where it is too long."""
-    pieces = [STOPS.get(piece, piece) for piece in PIECES.findall(text.lower().replace("’", "'"))]
+    matches = list(PIECES.finditer(text.lower().replace("’", "'")))
+    pieces = [STOPS.get(match.group(), match.group()) for match in matches]
     if len(pieces) > MOST_WORDS:
         raise TaskWordsError(f"expected at most {MOST_WORDS} words, got {len(pieces)}")
     known, found, place = _phrases(), list[Token](), 0
@@ -58,9 +65,28 @@ def read_tokens(text: str) -> list[Token]:
         length = next((n for n in range(LONGEST, 0, -1) if tuple(pieces[place:place + n]) in known), 1)
         words = pieces[place:place + length]
         sort, meaning = known.get(tuple(words), ("NUMBER" if words[0][0].isdigit() else "NAME", words[0]))
-        found.append(Token(sort, meaning, " ".join(words)))
+        span = matches[place].start(), matches[place + len(words) - 1].end()
+        found.append(Token(sort, meaning, " ".join(words), span))
         place += length
     return [token for token in found if token.meaning != "skip"]
+
+
+def tells_way(text: str) -> bool:
+    """Whether some words tell a way: by a turn, a mark that is passed, a door that is counted."""
+    words = _way_lexicon().read(text)
+    counts = any(word.sort == "COUNT" for word in words)
+    return any((word.sort, word.meaning) in WAYS or (counts and word.meaning == "door") for word in words)
+
+
+def _is_passage(text: str) -> bool:
+    """Whether what is to be taken is a door or a hall."""
+    nouns = [word.meaning for word in _way_lexicon().read(text) if word.sort in ("HEAD", "THING", "STRANGE")]
+    return nouns[:1] in (["door"], ["hall"])
+
+
+@cache
+def _way_lexicon() -> Lexicon:
+    return Lexicon(lexicon_data())
 
 
 def is_word_to_go_on(text: str) -> bool:
@@ -70,9 +96,9 @@ def is_word_to_go_on(text: str) -> bool:
 
 def read_wanted(text: str) -> tuple[Step, ...]:
     """What a text asks for. Raises TaskWordsError, naming the words that were not understood."""
-    reader = _ClauseReader()
+    reader = _ClauseReader(text)
     for clause in _split(read_tokens(text)):
-        reader.add(clause)
+        reader.read(clause)
     if reader.is_awaited:
         raise TaskWordsError("expected where to go instead if the door is shut, got nothing")
     if not 0 < len(reader.wanted) <= MOST_STEPS:
@@ -98,11 +124,26 @@ def _split(tokens: Sequence[Token]) -> list[list[Token]]:
 class _ClauseReader:
     """Reads one clause after the other; knows what "it" is, and whether a condition waits for its "instead"."""
 
+    text: str
     wanted: list[Step] = field(default_factory=list)
     is_awaited: bool = False
     thing: str = "it"
     groups: int = 0
     verb: str = ""
+    way_from: int = 0
+
+    def read(self, clause: Sequence[Token]) -> None:
+        """Adds what is wanted with this clause too: a task, or a way, which goes on with what is said of going."""
+        first, (begin, _), (_, end) = clause[0], clause[0].span, clause[-1].span
+        goes = first.meaning == "go" or first.text == "take" or (first.sort != "VERB" and first.meaning != "if")
+        said = self.text[begin:end]
+        if goes and self.wanted and self.wanted[-1].is_told:
+            self.wanted[-1] = replace(self.wanted[-1], phrase=self.text[self.way_from:end])
+        elif (goes and tells_way(said)) or (first.text == "take" and _is_passage(said)):
+            self.way_from = begin
+            self.wanted.append(Step("ptrans", said, is_told=True))
+        else:
+            self.add(clause)
 
     def add(self, clause: Sequence[Token]) -> None:
         """Adds what is wanted with this clause too. Raises TaskWordsError."""

@@ -89,14 +89,15 @@ def read_clauses(words: Sequence[Word]) -> tuple[Tree[Any], list[Clause]]:
             part = _read_part(child)
             if part.sort == "sep":
                 clause.end = part.meaning
+            elif part.meaning == "be" and clause.parts[-1:] and clause.parts[-1].sort == "thing" and any(
+                    one.meaning == "exit" for one in clause.parts):
+                thing = clause.parts.pop()  # "when you come out of the lab the office is on the left"
+                clauses.append(clause)
+                clause = Clause([thing, part])
             elif part.meaning in STARTS and part.sort == "verb" and not _is_posture(clause, part) and any(
                     one.sort in ("thing", "where", "way") or one.meaning == "exit" for one in clause.parts):
                 clauses.append(clause)
                 clause = Clause([part])
-            elif part.meaning in ("left", "right") and part.sort == "way" and clause.parts[-1:] and (
-                    clause.parts[-1].words and clause.parts[0].sort == "where"):
-                clauses.append(clause)
-                clause = Clause([part])  # "down the hall to the lamp left two blocks"
             else:
                 clause.parts.append(part)
         clauses.append(clause)
@@ -121,6 +122,11 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
         is_joint = bool(before and after and before.sort in NOUNS and after.sort in NOUNS)
         if word.text == "its" and before and before.sort == "PREP":
             continue
+        if word.text == "after that" and before and before.sort in NOUNS and (after is None or after.meaning == "dot"):
+            yield from (Word("PREP", "past", "after", word.place), Word("HEAD", "it", "that", word.place))
+            continue
+        if word.text == "first" and before and before.sort in NOUNS and (after is None or after.sort == "SEP"):
+            continue  # "you go by the library first"
         if word.text == "once" and (after is None or after.sort == "SEP" or (
                 before and before.meaning in ("go", "ahead"))):
             yield Word("COUNT", "1", word.text, word.place)
@@ -130,7 +136,9 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
             pair = 0
             yield Word("NAME", "&", word.text, word.place)
         elif word.meaning == "of" and word.sort == "PREP":
-            if is_joint:
+            if is_joint and before and before.meaning == "side":
+                yield Word("PREP", "in", word.text, word.place)  # "on the left side of the hall"
+            elif is_joint:
                 pair = index + MOST_BETWEEN if before and before.meaning == "crossing" else pair
                 yield word
         elif before and before.sort in NOUNS and (
@@ -138,9 +146,6 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
             yield from (Word("SEP", "comma", "", word.place), word)  # "two blocks chair", "the hall all the way down"
         elif word.meaning == "with" and is_joint and before and before.sort in ("HEAD", "MOD"):
             yield Word("PREP", "of", word.text, word.place)
-        elif word.text == "where" and word.sort == "VERB" and (
-                before and before.meaning == "be" and after and after.sort in NOUNS):
-            yield Word("HEAD", "room", word.text, word.place)
         elif word.text == "where" and word.sort == "VERB" and (after is None or after.sort in ("VERB", "SEP") or (
                 before and (before.sort == "PREP" or before.meaning == "reach"))):
             continue

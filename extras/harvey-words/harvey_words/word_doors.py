@@ -18,8 +18,6 @@ OPEN_ONLY = -1.8
 """That only open doors were counted."""
 BEHIND = 1.5
 """Off for a thing that lies behind when the walk begins, where a door after it is meant."""
-SHUT = -0.5
-"""A shut door without a name, as a goal: people are sent to rooms."""
 OPPOSITE_M = 0.3
 """What is hardly further along than the door one comes out of lies opposite, and is not counted."""
 
@@ -30,11 +28,6 @@ class WordDoors(WordSights):
     def find(self, state: State, what: ThingWords) -> Iterator[State]:
         """At each door, or thing, that may be meant."""
         if what.heads & {"crossing", "corner", "end"} and not what.heads & {"door"}:
-            for facing in self.facings(state, None):
-                if not what.names:
-                    yield from self.reach(facing, what)
-                for node in self.nodes(facing) if what.names else ():
-                    yield from self._named_crossing(replace(self.stand(facing, node), moving=False), what)
             yield from self._anywhere(state, what)
             return
         if not self.area(state).is_hall:
@@ -57,7 +50,7 @@ class WordDoors(WordSights):
             return
         for area in self.plan.areas.values():
             here = replace(state, locale=area.name, at=area.middle, odds=state.odds + UNTOLD, moving=False, door="")
-            here = replace(here, way=(*state.way, (area.name, round(area.middle[0], 2), round(area.middle[1], 2))))
+            here = replace(here, way=state.by(area.name, area.middle))
             if what.heads & {"crossing", "corner", "end"}:
                 if area.is_tile and (area.meanings & {"crossing", "corner"} or len(self.ways(here)) != 2):
                     yield from self._named_crossing(here, what)
@@ -97,8 +90,6 @@ class WordDoors(WordSights):
         """Words, side, rank and relations of a door, together."""
         assert sight.feature is not None
         cost, senses = self.match.fit(what, sight.feature, state.senses)
-        if not what.names and not sight.feature.is_open:
-            cost += SHUT
         side = self.side_of(state, what.side)
         sided = side in ("left", "right") or what.side == "ahead"
         if sided and sight.side != (side or "ahead"):
@@ -110,10 +101,6 @@ class WordDoors(WordSights):
             open_rank = opened.index(sight) + 1 if sight in opened else 0
             only_open = any(word.meaning == "open" for word in what.names)
             own = self._weigh_rank(what, rank, len(row), open_rank, len(opened), only_open)
-            if not sided and what.count:
-                same = [one for one in row if one.side == sight.side]  # "the next" may be that of its side
-                rank = same.index(sight) + 1
-                own = max(own, self._weigh_rank(what, rank, len(same), 0, 0, only_open) - 0.5)
             cost += own
         between = [other for relation, other in what.relations if relation == "between"]
         if len(between) == 2:
@@ -158,8 +145,6 @@ class WordDoors(WordSights):
             if mark.feature is None or mark.feature.sort == "opening" or mark is sight:
                 continue
             fit, _ = self.match.fit(other, mark.feature, state.senses)
-            if fit <= MISFIT:
-                continue
             gap = sight.ahead_m - mark.ahead_m
             walked_m = offsets(state.begun or state.at, state.heading, mark.feature.at)[0]
             if walked_m > 0.0 and fit > -1.0:
@@ -189,4 +174,4 @@ class WordDoors(WordSights):
         locale = feature.beyond if feature.is_open and feature.beyond else sight.locale
         at = moved(feature.at, heading, 0.5) if feature.is_open else front.at
         return replace(front, locale=locale, at=at, heading=heading, odds=odds, senses=senses, moving=False,
-                       door=feature.name, way=(*front.way, (locale, round(at[0], 2), round(at[1], 2))))
+                       door=feature.name, way=front.by(locale, at, feature.name))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -115,11 +115,7 @@ class WordMap:
     def areas(self) -> Mapping[str, Area]:
         """All locales with walls, by name."""
         plain = {name: self._build_area(self.world.locales[name]) for name in self.world.rooms}
-        areas: dict[str, Area] = {}
-        for name, area in plain.items():
-            areas[name] = Area(name, area.is_hall, area.is_tile, area.axis, area.middle, area.half, area.meanings,
-                               area.colours, tuple(self._features(name, plain)))
-        return areas
+        return {name: replace(area, features=tuple(self._features(name, plain))) for name, area in plain.items()}
 
     @cached_property
     def vocabulary(self) -> frozenset[str]:
@@ -181,9 +177,8 @@ class WordMap:
             faces = self._surfaces.get(thing.name, [])
             short = thing.name.rpartition("/")[2]
             words = self.lexicon.meanings(f"{thing.kind} , {short} , {said.get(short, '')}") | _textures(faces)
-            yield NamedFeature(thing.name, "thing", name, (x, y), self._toward_wall(areas[name], (x, y),
-                                                                                    thing.protrusion_m),
-                          words, words, _colours(faces), own_kind=thing.kind)
+            yield NamedFeature(thing.name, "thing", name, (x, y), None, words, words, _colours(faces),
+                               own_kind=thing.kind)
 
     def _shut_door(self, locale: str, leaf: Face, said: Mapping[str, str]) -> NamedFeature:
         short = leaf.name.split("/")[1]
@@ -194,15 +189,6 @@ class WordMap:
         words = self.lexicon.meanings(f"{short} {said.get(short, '')}") | _textures(faces)
         return NamedFeature(short, "door", locale, (x, y), math.atan2(-normal[1], -normal[0]), words, words,
                        _colours(faces))
-
-    def _toward_wall(self, area: Area, at: Point, protrusion_m: float | None) -> float | None:
-        """The direction to the nearest wall of what hangs or stands at one."""
-        if protrusion_m is None:
-            return None
-        ahead, left = offsets(area.middle, area.axis, at)
-        gaps = {0.0: area.half[0] - ahead, math.pi: area.half[0] + ahead,
-                math.pi / 2: area.half[1] - left, -math.pi / 2: area.half[1] + left}
-        return turned(area.axis, min(gaps, key=lambda turn: gaps[turn]))
 
     # -- looking ---------------------------------------------------------------------------------------------------
 

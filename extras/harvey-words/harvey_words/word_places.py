@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from harvey_words.matching import Senses, WordMatcher
-from harvey_words.told_acts import COMPASS, ThingWords
+from harvey_words.told_acts import ThingWords
 from harvey_words.word_map import (
     Area,
     NamedFeature,
@@ -46,7 +46,7 @@ class State:
         door: the door that the text says it is.
         senses: what the writer's words mean.
         misfits: numbers of the acts that fitted badly.
-        way: the places on the way.
+        way: the places on the way (locale, x, y), each with the name of what the words named there, or "".
         begun: where the walk began about whose end nothing is said; came: the door by which one came out here.
     """
 
@@ -58,7 +58,7 @@ class State:
     door: str = ""
     senses: Senses = frozenset()
     misfits: tuple[int, ...] = ()
-    way: tuple[tuple[str, float, float], ...] = ()
+    way: tuple[tuple[str, float, float, str], ...] = ()
     begun: Point | None = None
     came: str = ""
 
@@ -66,6 +66,10 @@ class State:
     def key(self) -> tuple[object, ...]:
         """What makes two hypotheses one."""
         return (self.locale, round(self.at[0], 1), round(self.at[1], 1), round(self.heading, 2), self.moving, self.door)
+
+    def by(self, locale: str, at: Point, mark: str = "") -> tuple[tuple[str, float, float, str], ...]:
+        """Its way with one more place."""
+        return (*self.way, (locale, round(at[0], 2), round(at[1], 2), mark))
 
 
 def best_of(states: Iterable[State], count: int = FEW) -> list[State]:
@@ -130,7 +134,8 @@ class WordPlaces:
         name = area.name
         if name == state.locale and math.dist(at, state.at) < 0.01:
             return state
-        return replace(state, locale=name, at=at, way=(*state.way, (name, round(at[0], 2), round(at[1], 2))))
+        mark = sight.feature.name if sight.feature is not None else ""
+        return replace(state, locale=name, at=at, way=state.by(name, at, mark))
 
     def nodes(self, state: State, through: bool = False) -> list[NamedSight]:
         """The crossings, corners and the end ahead, nearest first; where one stands is none.
@@ -183,7 +188,7 @@ class WordPlaces:
                     at = moved(at, heading, 0.5)
                 yield replace(state, locale=area.name, at=at, heading=heading, odds=state.odds + fit, senses=senses,
                               moving=False, door="", begun=at, came=feature.name,
-                              way=(*state.way, (area.name, round(at[0], 2), round(at[1], 2))))
+                              way=state.by(area.name, at, feature.name))
 
     def facings(self, state: State, along: ThingWords | None) -> Iterator[State]:
         """The hypothesis out in the hall, facing the ways that it may go on, those that are not said at a price."""
@@ -201,10 +206,8 @@ class WordPlaces:
                 cost = -0.4
             if state.moving and abs(turn) > 2.3:
                 cost *= 2.0  # nobody turns back in the middle of a walk and says nothing of it
-            if along is not None and (along.names or along.side in COMPASS):
+            if along is not None and along.names:
                 fit, senses = self.match.fit_area(along, self.hall_ahead(new), state.senses)
-                if along.side in COMPASS:
-                    fit += 0.0 if is_along(POINTS[along.side], way) else WRONG_SIDE
                 new = replace(new, senses=senses)
                 cost = 0.5 * cost + fit
             if not is_along(way, state.heading):

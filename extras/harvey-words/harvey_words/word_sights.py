@@ -9,7 +9,7 @@ from dataclasses import replace
 from harvey_words.matching import MISFIT, UNKNOWN_HEAD, WORST, Senses
 from harvey_words.told_acts import ThingWords
 from harvey_words.word_map import Area, NamedSight, is_along, turned
-from harvey_words.word_places import HERE_M, NEAR_M, TURNS, UNSAID_WALK, WRONG_RANK, WRONG_SIDE, State, WordPlaces
+from harvey_words.word_places import HERE_M, NEAR_M, TURNS, UNSAID_WALK, WRONG_RANK, State, WordPlaces
 
 AGAIN = -1.0
 """Of each further place that would do as well as the first."""
@@ -52,20 +52,14 @@ class WordSights(WordPlaces):
             return (NOT_SEEN if any(is_along(way, turn) for way in ways) else 0.0), state.senses
         if what.heads & {"corner"} and not what.names:
             return (0.0 if len(ways) <= 2 else NOT_SEEN), state.senses
-        if what.heads & {"crossing"} and not what.names:
-            return (0.0 if len(ways) > 2 else -1.0), state.senses
+        if what.heads & {"crossing", "corner"}:
+            return self.fit_place(state, what, [self.hall_ahead(replace(state, heading=way)) for way in ways])
         best: tuple[float, Senses] = (NOT_SEEN - 1.0, state.senses)
         side = self.side_of(state, what.side)
         for way in ways:
             if side not in TURNS or is_along(way, state.heading + TURNS[side]):
                 fit = self.match.fit_area(what, self.hall_ahead(replace(state, heading=way)), state.senses)
                 best = max(best, fit, key=lambda pair: pair[0])
-        if what.is_stretch and what.heads:
-            looking = replace(state, heading=turned(state.heading, TURNS.get(side, 0.0)))
-            for node in self.nodes(looking) if what.names else ():
-                own, senses = self._fit_sight(looking, node, what)
-                best = max(best, (own - 0.7 - 0.02 * node.ahead_m, senses), key=lambda pair: pair[0])
-            return best
         far = side in ("ahead", "behind", "left", "right") or not self.area(state).is_hall
         looking = replace(state, heading=turned(state.heading, TURNS.get(side, 0.0))) if side in TURNS else state
         for sight in self.sights(looking):
@@ -134,8 +128,6 @@ class WordSights(WordPlaces):
                 yield there
             if not self.plan.areas[sight.locale].is_tile:
                 yield replace(state, odds=state.odds - 0.5, moving=True)  # what follows may be short of the end
-        if not nodes:
-            yield replace(state, odds=state.odds - 0.3, moving=False)  # it is here
 
     def candidates(self, state: State, what: ThingWords) -> Iterator[tuple[NamedSight, float, Senses]]:
         """What is seen ahead and fits, nearest first, each with its price."""
@@ -146,9 +138,6 @@ class WordSights(WordPlaces):
             fit, senses = self._fit_sight(state, sight, what)
             if fit <= MISFIT or (sight.ahead_m - taken < 0.3 and not sight.feature):
                 continue
-            if what.side in ("left", "right") and sight.side in ("left", "right") and sight.side != what.side and (
-                    not what.is_stretch):
-                fit += WRONG_SIDE
             if fit > -1.0:
                 rank += 1
                 taken = sight.ahead_m

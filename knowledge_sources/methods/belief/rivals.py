@@ -22,9 +22,11 @@ from world_models.frames import Pose2
 PRIORS: Mapping[RivalKind, float] = {
     "chance": 3.0, "thing": 0.0, "leaf": -1.0, "jamb": 0.0, "wall": 0.0, "dirt": -1.0,
     "still camera": -4.0, "late pictures": -4.5, "lens": -4.0, "focal length": -2.0,
-    "mounting": -2.0, "wheels": -2.0, "turns": -2.0, "elsewhere": -3.0,
+    "mounting": -2.0, "wheels": -2.0, "turns": -2.0, "elsewhere": -3.0, "mover": -1.0,
 }
 """Log odds of a rival before any evidence, against what nobody has thought of: what is ordinary first."""
+PRIORS_BESIDE = {**PRIORS, "chance": -2.0}
+"""The same of a door where doors stand beside in general, by some 8 cm: of eight one is within a centimetre."""
 P_MISREAD = 0.02
 """Part of the looks that are misread as a whole: such a one looks as if its best rival were so (pictures of honest
 missions, development seeds: 1 of 67 matched wrongly)."""
@@ -80,10 +82,13 @@ def _add(kind: RivalKind, prior: float, evidence: Sequence[Evidence]) -> float:
 
 def _tell(kind: RivalKind, evidence: Sequence[Evidence], log_odds: float, p: float) -> Rival:
     """A rival in the words of the evidence that is surest of its size, the strongest of these; its size by all of it.
+
+    What has no size, as a stretch that is too short to tell one, says nothing of it.
     """
     said = [(e, one) for one in evidence for e in one.explanations if e.kind == kind]
-    best = max(reversed(said), key=lambda told: (-told[0].sigma, told[0].log_ratio))[0]
-    return Rival(kind, best.what, log_odds, p, *_measure(said))
+    sized = [told for told in said if told[0].sigma]
+    best = max(reversed(sized or said), key=lambda told: (-told[0].sigma, told[0].log_ratio))[0]
+    return Rival(kind, best.what, log_odds, p, *_measure(sized))
 
 
 def _measure(said: Sequence[tuple[Explanation, Evidence]]) -> tuple[float, float]:
@@ -93,8 +98,8 @@ def _measure(said: Sequence[tuple[Explanation, Evidence]]) -> tuple[float, float
     """
     ordered = sorted(said, key=lambda told: (told[0].sigma, told[0].off, *_when(told[1])))
     looks, weights = list[Pose2](), list[float]()
-    if ordered[0][0].sigma <= 0.0:
-        return ordered[0][0].off, 0.0
+    if not ordered:
+        return 0.0, 0.0
     for told, one in ordered:
         alike, here = Alike(one.apart_m, one.apart_rad), Pose2(one.x_m, one.y_m, one.heading_rad)
         common = max((measure_common(here, other, alike) for other in looks), default=0.0) if one.apart_m else 0.0

@@ -1,20 +1,27 @@
-"""Footprints of things on the floor: joined from several sights of a thing, and taken back where the floor is free.
+"""Footprints of things on the floor that the model lacks: joined from several sights, taken back where it is free.
 
-All coordinates are on the floor, in one frame, in metres.
+From far away what hangs over the floor seems to stand on it further off, and things that stand behind one another seem
+to be one. So of two sights the one from clearly nearer tells the shape. All coordinates are on the floor, in one frame,
+in metres.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats
+from world_models.building.building import Building
+from world_models.building.locales import EXTRA_KIND, Doorway
+from world_models.entries import Obstacle, Place
+from world_models.frames import Pose2
 
 Corners = tuple[tuple[float, float], ...]
 
@@ -22,6 +29,16 @@ GRAIN_M = 1e-3
 """Corners are resolved to this."""
 MIN_SIDE_M = 0.02
 """A footprint is at least so wide and so deep."""
+VAGUE_SIGMA_M = 0.05  # an obstacle of which the place is less sure is not known well
+MAX_BEHIND_DOOR_M = 4.0  # a thing that is seen through a doorway stands at most so far behind it
+NEARER = 0.7
+"""A sight from less than this part of the distance of another is from clearly nearer."""
+MIN_COMMON_DIRECTIONS = 0.6
+"""A sight without feet tells nothing new where this part of its directions is that of what is known."""
+REACH_M = 10.0
+"""No thing is further off than this when it is seen."""
+CORE_PART = 0.9
+"""Where more of a thing than this part was seen, all of it counts as seen."""
 
 
 def build_polygon(footprint: Any) -> shapely.Polygon:
@@ -147,3 +164,145 @@ def measure_approach_m(
     while first < steps and distances[first] < reach_m and distances[first + 1] > distances[first] + 0.5 * step_m:
         first += 1
     return float(min(distances[first:]))
+
+
+def may_be_there(obstacle: Obstacle) -> bool:
+    """Whether it is there or suspected."""
+    return obstacle.status != "gone"
+
+
+class ThingShape(NamedTuple):
+    """What is known of the shape of a thing [m, world].
+
+    Attributes:
+        seen: what was seen of it; whole: with what it may take besides.
+        from_m: from how near it was seen; infinite where its feet were not.
+    """
+
+    seen: shapely.Geometry
+    whole: shapely.Geometry
+    from_m: float
+
+    @staticmethod
+    def of(obstacle: Obstacle) -> ThingShape:
+        seen, whole = (build_polygon(corners) for corners in (obstacle.core or obstacle.footprint, obstacle.footprint))
+        return ThingShape(seen, whole, obstacle.seen_from_m)
+
+    def list_corners(self) -> tuple[Corners, Corners]:
+        """Of the whole, and of what was seen; () for the latter where it is about all."""
+        footprint = list_corners(self.whole)
+        if not footprint:
+            return (), ()
+        whole = build_polygon(footprint)
+        core = shapely.intersection(whole, self.seen)
+        return footprint, list_corners(core) if 0.0 < core.area < CORE_PART * whole.area else ()
+
+
+def join_shapes(known: ThingShape, new: ThingShape, free: shapely.Geometry, eye: Floats) -> ThingShape:
+    """The shape of a thing by what is known and by a new sight from an ``eye`` (2,), which shows some floor ``free``.
+
+    A sight of which the feet are not seen tells only in which directions the thing is: it adds to what is known in
+    directions in which nothing was known.
+    """
+    if new.from_m < NEARER * known.from_m:
+        behind = _build_sector(new.seen, eye)
+        seen, whole = (take_free(shapely.difference(shape, behind), free) for shape in (known.seen, known.whole))
+        return ThingShape(_join(new.seen, seen), _join(new.whole, whole), new.from_m)
+    if not math.isfinite(new.from_m):
+        if measure_common_directions(known.seen, new.seen, eye) >= MIN_COMMON_DIRECTIONS:
+            return leave_free(known, free)
+    elif NEARER * new.from_m > known.from_m:
+        return known
+    seen = join_footprints(known.seen, new.seen, free)
+    return ThingShape(seen, _join(join_footprints(known.whole, new.whole, free), seen), min(known.from_m, new.from_m))
+
+
+def leave_free(known: ThingShape, free: shapely.Geometry) -> ThingShape:
+    """What is left of a shape without the floor that is seen to be free."""
+    return ThingShape(take_free(known.seen, free), take_free(known.whole, free), known.from_m)
+
+
+def _build_sector(shape: shapely.Geometry, eye: Floats) -> shapely.Geometry:
+    """All in the directions of a shape from an eye."""
+    to = shapely.get_coordinates(shape) - eye
+    rim = eye + REACH_M * to / np.maximum(np.linalg.norm(to, axis=1, keepdims=True), 1e-9)
+    return shapely.convex_hull(shapely.multipoints(np.vstack([eye, rim])))
+
+
+def _join(one: shapely.Geometry, other: shapely.Geometry) -> shapely.Geometry:
+    return shapely.convex_hull(shapely.union(one, other))
+
+
+def find_same(
+    known: Mapping[str, Obstacle], shape: shapely.Polygon, sigma_m: float, most_hull: float
+) -> str | None:
+    """Which obstacle a thing is another sight of: that of which it covers most, within the standard deviations.
+
+    What lies next to an obstacle, so that a hull round both would take much floor that neither takes, is another thing.
+    """
+    shared = dict[str, float]()
+    for name, obstacle in known.items():
+        polygon = build_polygon(obstacle.footprint)
+        reach_m = 2.0 * math.hypot(sigma_m, obstacle.sigma_m)
+        if measure_hull_part(polygon, shape) <= most_hull:
+            shared[name] = shapely.intersection(polygon.buffer(reach_m), shape).area
+    best = max(shared, key=shared.__getitem__, default=None)
+    return best if best is not None and shared[best] > 0.0 else None
+
+
+def find_before(
+    known: Mapping[str, Obstacle], seen: shapely.Geometry, eye: tuple[float, float], overhang_m: float
+) -> str | None:
+    """The obstacle that something without a visible foot belongs to: well known, nearer than the picture's border,
+    and in most of its directions, as its top may be wider than its foot.
+    """
+    parts = {name: cover_directions(build_polygon(obstacle.footprint).buffer(overhang_m), seen, eye)
+             for name, obstacle in known.items() if obstacle.is_there and obstacle.sigma_m <= VAGUE_SIGMA_M}
+    best = max(parts, key=parts.__getitem__, default=None)
+    return best if best is not None and parts[best] >= MIN_COMMON_DIRECTIONS else None
+
+
+def place(world: Building, obstacle: Obstacle, shape: shapely.Geometry) -> Obstacle:
+    """An obstacle with the place and the width that follow from its footprint."""
+    middle = shape.centroid
+    at = Place.of_world(world, obstacle.locale, float(middle.x), float(middle.y))
+    return replace(obstacle, x_m=round(at.x_m, 3), y_m=round(at.y_m, 3),
+                   width_m=round(measure_width_m(obstacle.footprint), 3))
+
+
+def move_thing(world: Building, thing: Obstacle, by: Pose2, off_m: float, evidence: str) -> Obstacle:
+    """A thing that is moved on the floor: ``by``, in the world; it was seen by a belief that was ``off_m`` wrong.
+
+    How much of that the belief was wrong already when it was seen, is not known: half of it is added to its deviation.
+    """
+    def move(corners: Corners) -> Corners:
+        return tuple((round(float(x), 3), round(float(y), 3)) for x, y in by.apply(corners)) if corners else ()
+
+    moved = replace(thing, footprint=move(thing.footprint), core=move(thing.core), evidence=evidence,
+                    sigma_m=round(math.hypot(thing.sigma_m, 0.5 * off_m), 4))
+    return place(world, moved, build_polygon(moved.footprint))
+
+
+def find_room(world: Building, shape: shapely.Polygon, near: str) -> str:
+    """The room in which most of a thing stands, of that where the robot is and those next to it."""
+    if shapely.Polygon(world.outline(near)).contains(shape.centroid):
+        return near
+    doors = {doorway.other(near): doorway for doorway in world.doorways_of(near)}
+    rooms = [near, *(room for room, door in doors.items() if _measure_behind_m(door, shape) <= MAX_BEHIND_DOOR_M)]
+    areas = [shapely.intersection(shapely.Polygon(world.outline(room)), shape).area for room in rooms]
+    return rooms[int(np.argmax(areas))]
+
+
+def _measure_behind_m(door: Doorway, shape: shapely.Polygon) -> float:
+    """How far a thing is from a doorway."""
+    return float(shapely.MultiPoint(np.concatenate(door.thresholds_world)).distance(shape))
+
+
+def find_open_floor(world: Building, locale: str, margin_m: float) -> shapely.Geometry:
+    """The floor of a room, with its open doorways, so far from its walls and from what the file has there."""
+    openings = [shapely.MultiPoint(np.concatenate(doorway.thresholds_world)).convex_hull.buffer(0.01)
+                for doorway in world.doorways_of(locale)]
+    floor = shapely.union_all([shapely.Polygon(world.outline(locale)), *openings])
+    things = [shapely.Polygon(thing.footprint_world) for thing in world.things_of(locale)
+              if thing.is_obstacle and thing.kind != EXTRA_KIND]
+    return shapely.difference(shapely.buffer(floor, -margin_m), shapely.buffer(shapely.union_all(things), margin_m))

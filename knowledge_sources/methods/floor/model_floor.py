@@ -132,15 +132,13 @@ def predict_model_floor(
     camera_from_world = robot.camera_from_world(pose)
     nearest_m = max(DEPTHS_M[0][0], MIN_DEPTH_M)
     aside = STEP * (1 + int(np.ceil((margin_px + aside_px_m / nearest_m) / STEP_PX)) // STEP)
-    pixels = _widen(grid.pixels, aside)  # what is outside the picture may be in it
-    shape = pixels.shape[:2]
-    rays = robot.camera.rays(pixels[::STEP, ::STEP].reshape(-1, 2))
-    bounds = np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)])
+    shape = grid.shape[0], grid.shape[1] + 2 * aside
+    rays, bounds = _find_rays(robot.camera, grid, aside)
     columns = len(range(0, shape[1], STEP))
     left, top, right, bottom = image_window(robot.camera)
     window = min(left, float(bounds[0])), top, max(right, float(bounds[2])), bottom
     colours, normals, surface, depth = cast_rays(
-        robot.world, camera_from_world, np.ascontiguousarray(rays), bounds, window, columns, 1)
+        robot.world, camera_from_world, rays, bounds, window, columns, 1)
     if not len(colours):
         nothing = np.full(grid.shape, -1)
         nowhere = np.full(grid.shape, np.inf, np.float32)
@@ -169,6 +167,15 @@ def predict_model_floor(
             standing_m = np.minimum(standing_m, cv2.erode(own_m, beside))
     inner = np.s_[:, aside:-aside]
     return ModelFloor(kinds[inner], keys, is_plain[inner], ranges_m[inner], standing_m[inner])
+
+
+@lru_cache(maxsize=8)
+def _find_rays(camera: Camera, grid: FloorGrid, aside: int) -> tuple[Floats, Floats]:
+    """Those that are cast, (n, 3) with z = 1, and the least and largest x and y of them (4,): also through pixels
+    ``aside`` of the picture, as what is outside may be in it.
+    """
+    rays = np.ascontiguousarray(camera.rays(_widen(grid.pixels, aside)[::STEP, ::STEP].reshape(-1, 2)))
+    return rays, np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)])
 
 
 def _spread(values: NDArray[Any], columns: int, shape: tuple[int, int]) -> NDArray[Any]:

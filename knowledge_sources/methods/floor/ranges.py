@@ -261,7 +261,7 @@ def _build_footprint(cones: Cones, group: Sequence[tuple[int, Floats]], depth_m:
     """The hull of the arcs of a group and of what is a little behind them, counter-clockwise."""
     points: list[Floats] = []
     for k, arc in group:
-        out = arc - cones.sensors[k]
+        out = arc - (cones.sensors[k] if cones.away_m[k] > 1e-6 else cones.origin)  # what touches a sensor is a point
         out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
         across = 0.01 * np.stack([-out[:, 1], out[:, 0]], axis=-1)  # one point of an arc has a width too
         points += [arc - across, arc + across, arc + depth_m * out]

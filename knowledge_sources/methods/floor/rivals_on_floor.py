@@ -42,9 +42,7 @@ SEEN_BEFORE = math.log(2.0)
 NO_JAMB = -3.0
 """For a jamb where a sight shows what it does not explain."""
 MIN_OBSTACLE_CERTAINTY = 0.9  # with this certainty an obstacle is there: by one sure picture, or by two unsure ones
-JAMB_M = 0.002  # a jamb that stands where the model has it reaches no further into the opening
 MAX_BESIDE_M = 0.15  # a jamb stands at most so far beside: 10 cm, with its casing
-MAX_SLIVER_M = 0.3  # what is narrower, at a jamb, may be the jamb itself, until it is touched
 JAMB_OF = "a jamb of "
 MIN_EXPLAINED = 0.8  # least part of the directions of a sight that such a jamb explains
 MIN_JAMB_SIGMA_M = 0.05  # of a jamb's place: the edge of what is seen may be its casing, or its shade
@@ -214,25 +212,10 @@ def _describe(doorway: Doorway, end: shapely.Polygon, seen: shapely.Polygon, at:
                       math.log(doorway.width_m / (2.0 * MAX_BESIDE_M)))
 
 
-def take_as_jamb(world: Building, obstacle: Obstacle) -> Obstacle:
-    """An obstacle that is seen to take no more than the model's jamb does, where it may be a jamb that stands beside;
-    else the obstacle as it is.
-    """
-    if obstacle.width_m >= MAX_SLIVER_M or obstacle.touched_s is not None:
-        return obstacle
-    shape = build_polygon(obstacle.footprint)
-    for doorway in world.doorways_of(obstacle.locale):
-        ends = (_list_ends(doorway, obstacle.locale, into_m) for into_m in (MAX_BESIDE_M, JAMB_M))
-        for beside, jamb in zip(*ends, strict=True):
-            if beside.intersects(shape):
-                return replace(obstacle, core=list_corners(jamb))
-    return obstacle
-
-
-def _list_ends(doorway: Doorway, locale: str, into_m: float = MAX_BESIDE_M) -> list[shapely.Polygon]:
+def _list_ends(doorway: Doorway, locale: str) -> list[shapely.Polygon]:
     """Both ends of the wall, as far as they may reach into an opening, through the wall."""
     near, far = doorway.threshold_of(locale), doorway.threshold_of(doorway.other(locale))[::-1]
-    into = into_m / doorway.width_m * (near[1] - near[0])
+    into = MAX_BESIDE_M / doorway.width_m * (near[1] - near[0])
     return [build_polygon([a, a + step, b + step, b])
             for a, b, step in ((near[0], far[0], into), (near[1], far[1], -into))]
 

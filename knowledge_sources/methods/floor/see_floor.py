@@ -21,6 +21,7 @@ from knowledge_sources.methods.floor.appearance import (
     fit_appearance,
     learn_appearance,
 )
+from knowledge_sources.methods.floor.looks_round import MAX_HIDDEN_M
 from knowledge_sources.methods.floor.model_floor import (
     SIGHT_M,
     STEP_PX,
@@ -30,7 +31,6 @@ from knowledge_sources.methods.floor.model_floor import (
     predict_model_floor,
 )
 from knowledge_sources.methods.floor.relief import STANDING, Modelled, Relief, TwoPictures, find_relief
-from knowledge_sources.methods.floor.seen_floor import MAX_HIDDEN_M
 from knowledge_sources.methods.floor.standing_regions import (
     StandingRegion,
     compute_parallax_odds,

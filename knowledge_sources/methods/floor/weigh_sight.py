@@ -13,14 +13,10 @@ import shapely
 
 from knowledge_sources.methods.belief import add_evidence, to_log_odds
 from knowledge_sources.methods.floor.footprints import (
+    ThingShape,
     build_free_floor,
     build_polygon,
     deepen,
-    measure_change_m,
-    measure_free_part,
-)
-from knowledge_sources.methods.floor.found_things import (
-    ThingShape,
     find_before,
     find_open_floor,
     find_room,
@@ -28,6 +24,8 @@ from knowledge_sources.methods.floor.found_things import (
     join_shapes,
     leave_free,
     may_be_there,
+    measure_change_m,
+    measure_free_part,
     place,
 )
 from knowledge_sources.methods.floor.rivals_on_floor import (

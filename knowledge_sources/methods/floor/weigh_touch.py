@@ -11,8 +11,7 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor.footprints import Corners, build_polygon, list_corners
-from knowledge_sources.methods.floor.found_things import may_be_there, place
+from knowledge_sources.methods.floor.footprints import Corners, build_polygon, list_corners, may_be_there, place
 from world_models.building.building import Building
 from world_models.entries import Contact, Obstacle, Place
 from world_models.frames import Pose2

@@ -21,14 +21,13 @@ from knowledge_sources.methods.localization.next_view import SAME_LINE_PX, SAME_
 from knowledge_sources.methods.localization.pose_candidates import are_distinct, find_pose_candidates
 from knowledge_sources.methods.localization.refinement import refine_to_likelier
 from knowledge_sources.methods.localization.views import CameraView
-from knowledge_sources.methods.pose import fit_displacements
 from knowledge_sources.methods.verification import (
-    LINE_TOLERANCE_PX,
     LINE_TOLERANCE_RAD,
     MAX_LINE_WEIGHT_PX,
     MIN_COVERED_FRACTION,
     compute_coverage,
     find_errors,
+    find_tolerances_px,
     predict_lines,
 )
 from world_models.building.building import Building
@@ -91,8 +90,7 @@ def list_aliases(
               *(find_fitting_poses(robot, segments_px, room, pose) if search else ())]
     if not others:
         return []
-    views = predict_views_on_grid(robot, (pose, *others), segments_px)
-    own, *there = (score_view(lines_px, segments_px) for lines_px in views)
+    own, *there = (score_view(*view, segments_px) for view in predict_views_on_grid(robot, (pose, *others)))
     return [AliasView(other, compute_margin(own, view)) for other, view in zip(others, there, strict=True)]
 
 
@@ -100,8 +98,8 @@ def compare_places(
     one: tuple[RobotModel, Pose2], other: tuple[RobotModel, Pose2], segments_px: Floats
 ) -> float:
     """By how many lines segments (k, 2, 2) support one robot and pose more than another, as on another storey."""
-    views = (predict_views_on_grid(robot, (pose,), segments_px)[0] for robot, pose in (one, other))
-    return compute_margin(*(score_view(lines_px, segments_px) for lines_px in views))
+    views = (predict_views_on_grid(robot, (pose,))[0] for robot, pose in (one, other))
+    return compute_margin(*(score_view(*view, segments_px) for view in views))
 
 
 def find_repeated_poses(robot: RobotModel, room: str, pose: Pose2) -> list[Pose2]:
@@ -127,18 +125,17 @@ def precompute_views(robot: RobotModel, room: str, pose: Pose2) -> None:
     predict_views_on_grid(robot, (pose, *find_repeated_poses(robot, room, pose)))
 
 
-def predict_views_on_grid(
-    robot: RobotModel, poses: Sequence[Pose2], segments_px: Floats | None = None
-) -> list[Floats]:
-    """Predict the view (n, 2, 2) [px] from each pose: the lines visible from the nearest pose of the grid.
+def predict_views_on_grid(robot: RobotModel, poses: Sequence[Pose2]) -> list[tuple[Floats, Floats]]:
+    """Predict the view from each pose: the lines (n, 2, 2) [px] visible from the nearest pose of the grid.
 
-    Lines of a model that is inexact are displaced as they fit segments (k, 2, 2) best, where these are given.
+    With each comes how far (n,) a segment may lie from it that covers it [px].
     """
-    lines = [robot.camera_from_world(pose).apply(_find_displaced_on_grid(robot, pose, segments_px))
-             for pose in poses]
+    found = [_find_visible_on_grid(robot, pose) for pose in poses]
+    lines = [robot.camera_from_world(pose).apply(some) for pose, (some, _) in zip(poses, found, strict=True)]
     seen, inside = robot.camera.project_segments(np.concatenate(lines).reshape(-1, 2, 3), Pose.identity())
     ends = np.cumsum([len(some) for some in lines])[:-1]
-    return [some[here] for some, here in zip(np.split(seen, ends), np.split(inside, ends), strict=True)]
+    return [(some[here], find_tolerances_px(robot, *of_grid, pose)[here]) for some, here, of_grid, pose in zip(
+        np.split(seen, ends), np.split(inside, ends), found, poses, strict=True)]
 
 
 class ScoredView(NamedTuple):
@@ -148,25 +145,17 @@ class ScoredView(NamedTuple):
     scores: Floats
 
 
-def score_view(lines_px: Floats, segments_px: Floats) -> ScoredView:
+def score_view(lines_px: Floats, tolerances_px: Floats, segments_px: Floats) -> ScoredView:
     """Score the lines of a view (n, 2, 2) by how much of each segments (k, 2, 2) cover, more or less than half."""
     length = np.linalg.norm(lines_px[:, 1] - lines_px[:, 0], axis=1)
     lines = np.minimum(length, MAX_LINE_WEIGHT_PX) / ALIAS_LINE_LENGTH_PX
-    covered = _cover(lines_px, segments_px, LINE_TOLERANCE_PX, LINE_TOLERANCE_RAD)
+    covered = _cover(lines_px, segments_px, tolerances_px, LINE_TOLERANCE_RAD)
     return ScoredView(lines_px, lines * (covered - MIN_COVERED_FRACTION))
 
 
 def compute_margin(one: ScoredView, other: ScoredView) -> float:
     """Compute by how many lines the segments support one view more than another, by the lines not in both."""
     return _sum_own(one, other) - _sum_own(other, one)
-
-
-def _find_displaced_on_grid(robot: RobotModel, pose: Pose2, segments_px: Floats | None) -> Floats:
-    """(n, 2, 3) the lines [m, world] of the grid's nearest pose, displaced as far as the model is inexact."""
-    lines, errors = _find_visible_on_grid(robot, pose)
-    if segments_px is None or errors.is_exact:
-        return lines
-    return fit_displacements(lines, errors, segments_px, robot.camera, robot.mount.camera_from_robot, pose).lines_world
 
 
 def _find_visible_on_grid(robot: RobotModel, pose: Pose2) -> tuple[Floats, LineErrors]:
@@ -193,6 +182,6 @@ def _sum_own(view: ScoredView, other: ScoredView) -> float:
     return float(np.sum(view.scores * (1.0 - common)))
 
 
-def _cover(lines_px: Floats, by_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
+def _cover(lines_px: Floats, by_px: Floats, tolerance_px: float | Floats, tolerance_rad: float) -> Floats:
     """(n,) covered part of each line, 0 where it is not in view."""
     return np.nan_to_num(compute_coverage(lines_px, by_px, tolerance_px, tolerance_rad))

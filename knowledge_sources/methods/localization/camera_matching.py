@@ -33,11 +33,13 @@ class CameraMatch:
 
     Attributes:
         match: the pairs.
+        agreeing: how many of them agree; 0 with too few.
         sharp_part: of the model lines' length in view, what segments cover sharply; 0 with too few pairs.
         prior_chi2: squared distance of the camera from what was believed of it.
     """
 
     match: Match | PoseMatch
+    agreeing: int
     sharp_part: float
     prior_chi2: float
 
@@ -49,7 +51,8 @@ def match_with_camera(
     """Match model lines to data lines within what the priors of pose and camera allow.
 
     The mounting and the pose on the floor move the camera in six unknowns; of several focal lengths the one is taken
-    with which the lines of the model are covered best.
+    with which most pairs agree. How well lines are covered does not tell: from pairs of which some are wrong the same
+    camera is found, and with it the same segments lie near.
 
     Args:
         model_lines_world: (m, 2, 3) [m]. data_px: (k, 2, 2), rectified. camera: without distortion.
@@ -69,7 +72,7 @@ def match_with_camera(
                                pair_px=CAMERA_PAIR_PX, sigma_px=CAMERA_MATCH_SIGMA_PX)
         found.append(rate_match(
             match, lines, data, camera, mount, prior, prior_covariance, camera_covariance))
-    return max(found, key=lambda tried: tried.sharp_part)
+    return max(found, key=lambda tried: (tried.agreeing, tried.sharp_part))
 
 
 def rate_match(
@@ -79,12 +82,12 @@ def rate_match(
     """What a match is worth; arguments as for :func:`match_with_camera`."""
     pairs = np.asarray(match.pairs, np.intp).reshape(-1, 2)
     if len(pairs) < MIN_CAMERA_LINES:
-        return CameraMatch(match, 0.0, 0.0)
+        return CameraMatch(match, 0, 0.0, 0.0)
     estimate = estimate_camera_and_pose(
         lines_world[pairs[:, 0]], data_px[pairs[:, 1]], camera, mount, prior, prior_covariance, camera_covariance,
         sigma_px=CAMERA_LINE_SIGMA_PX)
     sharp = compute_sharp_part(lines_world, data_px, camera, mount, estimate)
-    return CameraMatch(match, sharp, estimate.prior_chi2)
+    return CameraMatch(match, int(np.count_nonzero(estimate.inliers)), sharp, estimate.prior_chi2)
 
 
 def compute_sharp_part(

@@ -327,8 +327,7 @@ def refine_to_likelier(
 def compute_pose_likelihood(
     robot: RobotModel, views: Sequence[CameraView], world_from_now: Pose2
 ) -> PoseLikelihood:
-    """Compute the likelihood of the robot's pose now by all views; lines of an inexact model are displaced as they fit.
-    """
+    """Compute the likelihood of the robot's pose now by all views."""
     visible, matched, looks = 0, 0, list[tuple[int, int, float]]()
     lengths, explained = 0.0, 0.0
     for view in views:

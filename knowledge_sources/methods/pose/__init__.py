@@ -45,7 +45,6 @@ True
 (True, 'too far from the model line')
 """
 
-from knowledge_sources.methods.pose.displacements import MARGINAL_SPREAD, fit_displacements
 from knowledge_sources.methods.pose.estimate import (
     FEW_LINES, MAX_CHI2_SIGMAS, MAX_ITERATIONS, MAX_RESIDUAL_SIGMAS, MIN_LINES, Minimum, PlanarEstimate,
     PoseEstimate, SHARED_PX, build_estimate, build_prior_estimate, compute_covariance, compute_weak_information,
@@ -57,7 +56,8 @@ from knowledge_sources.methods.pose.line_set import (
     compute_squared_distances, cross, invert_information, measure_lines,
 )
 from knowledge_sources.methods.pose.planar import (
-    POINT_OUTLIER_SIGMAS, compute_camera_poses, compute_point_jacobian, planar_from_points, to_pose2,
+    MARGINAL_SPREAD, POINT_OUTLIER_SIGMAS, compute_camera_poses, compute_point_jacobian, compute_sigmas_px,
+    planar_from_points, to_pose2,
 )
 from knowledge_sources.methods.pose.planar_from_lines import planar_from_lines
 from knowledge_sources.methods.pose.r_and_t import (
@@ -73,10 +73,9 @@ __all__ = [
     "SHARED_PX", "SUBSET_SIZE", "TINY", "CameraEstimate", "LandmarkIds", "LineSet", "Minimum",
     "PlanarEstimate", "PoseEstimate", "Rests", "RigidMotion", "add_concentrated", "build_estimate", "build_line_set",
     "build_prior_estimate", "check_landmarks", "compute_camera_poses", "compute_covariance", "compute_image_jacobian",
-    "compute_point_jacobian", "compute_pose_slopes", "compute_protection", "compute_squared_distances",
-    "compute_weak_information", "cross", "estimate_camera_and_pose", "find_beside", "find_width",
-    "fit_displacements",
-    "invert_information", "keep_possible", "knows_more", "measure_lines", "med_r_and_t", "minimise",
+    "compute_point_jacobian", "compute_pose_slopes", "compute_protection", "compute_sigmas_px",
+    "compute_squared_distances", "compute_weak_information", "cross", "estimate_camera_and_pose", "find_beside",
+    "find_width", "invert_information", "keep_possible", "knows_more", "measure_lines", "med_r_and_t", "minimise",
     "planar_from_lines", "planar_from_points", "r_and_t_ml", "reject_behind", "solve_from_subsets", "tell_unavailable",
     "to_pose2", "weigh_places",
 ]

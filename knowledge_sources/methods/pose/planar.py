@@ -1,4 +1,14 @@
-"""A camera on a robot on the floor: three unknowns instead of six; and the pose from points tracked in the image."""
+"""A camera on a robot on the floor: three unknowns instead of six; and the pose from points tracked in the image.
+
+Where the model is inexact its errors are modes (:class:`world_models.building.model_errors.LineErrors`): a wall with
+all that is on it, a door, a thing. To first order in the image, the distance of a segment's end from its model line is
+r + J dx + A a, with the pose's change dx and the modes' amplitudes a in standard deviations, of which a prior is known:
+N(0, I). Errors that lines share do not average out. So the amplitudes are not solved for but integrated out: the
+residuals have the covariance S = sigma^2 I + A A', and the pose of greatest marginal likelihood is that of generalised
+least squares, with the covariance (J' S^-1 J + prior)^-1. It is what a Schmidt-Kalman filter states whose considered
+states are the modes. Source: S. F. Schmidt, Application of state-space methods to navigation problems, Advances in
+Control Systems 3, 1966.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +27,15 @@ from knowledge_sources.methods.pose.estimate import (
 )
 from knowledge_sources.methods.pose.kernels import RigidMotion
 from knowledge_sources.methods.pose.line_set import (
+    OUTLIER_SIGMAS,
     LineSet,
+    build_line_set,
     check_sigma,
     compute_distance_slopes,
     cross,
     invert_information,
 )
+from world_models.building.model_errors import LineErrors
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2, wrap_angle
 
@@ -32,6 +45,15 @@ WEAK_HEADING_RAD = 0.3  # rad; standard deviation of a robot's heading where non
 MAX_FLOOR_ITERATIONS = 20  # levenberg-Marquardt steps for the three unknowns of a robot
 HUBER_SIGMAS = 1.5  # deviation beyond which a point pulls with a constant force (Huber)
 MAX_POINT_ROUNDS = 6  # rounds in which inliers and pose may still change each other
+SHARED_PRIOR_FACTOR = 3.0
+"""A prior of the same model is loosened by so many times what the model's errors make uncertain."""
+MARGINAL_SPREAD = 1.4
+"""Factor on the standard deviations of such a pose, for segments matched to a wrong line nearby (after a few poses on
+generated floors)."""
+MAX_FEW_LINES = 3  # so few lines move a prior of unknown worth only as far as their noise demands
+MAX_MARGINAL_ROUNDS = 12  # rounds in which lines that do not agree are left out
+MAX_MARGINAL_STEPS = 8  # steps of Gauss-Newton in each of them
+MIN_MARGINAL_STEP = 1e-7  # step [m, rad] at which these end (convergence)
 
 FEW = "too few measurements: the prior decides the rest"
 NOT_BETTER = "no pose fits better than the prior"
@@ -160,6 +182,140 @@ def _rotate_into_robot(headings_rad: Floats) -> Floats:
 def _turn_clockwise(vectors: Floats) -> Floats:
     """-z x v: how points in the robot's frame move when the robot turns left."""
     return np.stack([vectors[..., 1], -vectors[..., 0], np.zeros_like(vectors[..., 0])], axis=-1)
+
+
+def compute_displaced_jacobian(
+    lines: LineSet, shifts: Floats, state: Floats, camera_from_robot: Pose
+) -> tuple[Floats, Floats, Floats]:
+    """Distances (n, 2) [px], derivatives (n, 2, 3) by (x, y, heading) and (n, 2, k) by the amplitudes of the modes.
+
+    Args:
+        shifts: (k, n, 3) as in :class:`LineErrors`, one row a line.
+    """
+    points = lines.points[:, 0]
+    distances, by_pose = compute_line_jacobian(points, lines.directions, lines, state, camera_from_robot)
+    rotation, translation = compute_camera_poses(state, camera_from_robot)
+    along = lines.directions @ rotation.T
+    planes = cross(points @ rotation.T + translation, along)
+    _, slopes = compute_distance_slopes(lines, planes)
+    moved = cross(shifts @ rotation.T, along[None])
+    return distances, by_pose, np.einsum("ned,knd->nek", slopes, moved)
+
+
+def compute_sigmas_px(
+    lines_world: Floats, errors: LineErrors, camera: Camera, camera_from_robot: Pose, pose: Pose2
+) -> Floats:
+    """(n,) by how much the model's errors displace each line in the image, across it: a standard deviation [px].
+
+    The larger of a line's two ends; 0 where it is not in view.
+    """
+    rotation, translation = compute_camera_poses(pose.vector, camera_from_robot)
+    projected, _ = camera.project_segments(np.array(lines_world, float), Pose(rotation, translation))
+    sigmas = np.zeros(len(lines_world))
+    seen = np.flatnonzero(np.isfinite(projected).all(axis=(1, 2)))
+    if len(seen) and len(errors.displacement_modes):
+        lines = build_line_set(lines_world[seen], projected[seen], camera, 1.0)
+        _, _, by_mode = compute_displaced_jacobian(lines, errors.displacements[:, seen], pose.vector, camera_from_robot)
+        sigmas[seen] = np.sqrt(np.sum(by_mode**2, axis=2)).max(axis=1)
+    return sigmas
+
+
+class MarginalFit(NamedTuple):
+    """A pose of greatest marginal likelihood.
+
+    Attributes:
+        state: (3,) x [m], y [m], heading [rad].
+        covariance: (3, 3).
+        near: (n,) the lines that agree with it.
+        residuals_px: (n, 2) what of the distances the model's errors do not explain.
+        cost: squared distances over their covariance, plus the prior's share.
+    """
+
+    state: Floats
+    covariance: Floats
+    near: Mask
+    residuals_px: Floats
+    cost: float
+
+
+def maximise_marginal(
+    lines: LineSet, shifts: Floats, sigma_px: float, mount: Pose, prior: PlanarPrior, state: Floats, near: Mask,
+) -> MarginalFit:
+    """The pose of greatest marginal likelihood from lines of which some are wrong.
+
+    Lines whose remaining residual is beyond ``OUTLIER_SIGMAS`` are left out, the worst first.
+
+    Args:
+        shifts: (k, n, 3) displacement of each line by one standard deviation of each mode [m, world].
+        sigma_px: of a segment's end across its line.
+        state, near: where to start, and the lines (n,) that are used at first.
+    """
+    bound, near = 2.0 * OUTLIER_SIGMAS**2, near.copy()
+    prior = _loosen(prior, lines.take(near), shifts[:, near], sigma_px, mount, state)
+    for _ in range(MAX_MARGINAL_ROUNDS):
+        state = _minimise(lines.take(near), shifts[:, near], sigma_px, mount, prior, state)
+        squares = np.where(near, np.sum(_explain(lines, shifts, sigma_px, mount, state, near) ** 2, axis=1), 0.0)
+        worst = float(squares.max(initial=0.0))
+        if worst <= bound * sigma_px**2 or np.count_nonzero(near) <= MAX_FEW_LINES:
+            break
+        near = near & (squares < 0.5 * worst)
+    r, slopes, weights = _linearise(lines.take(near), shifts[:, near], sigma_px, mount, state)
+    away = to_pose2(state).minus(to_pose2(prior.mean))
+    chi2 = float(r @ weights @ r)
+    scatter = MARGINAL_SPREAD**2 * compute_scatter(chi2, len(r), bound)
+    return MarginalFit(
+        state, np.asarray(np.linalg.inv(slopes.T @ weights @ slopes + prior.information) * scatter, float), near,
+        _explain(lines, shifts, sigma_px, mount, state, near), chi2 + float(away @ prior.information @ away))
+
+
+def _loosen(
+    prior: PlanarPrior, lines: LineSet, shifts: Floats, sigma_px: float, mount: Pose, state: Floats,
+) -> PlanarPrior:
+    """The prior without what it may share with these lines: it came of the same model, with the same errors.
+
+    The share is the part of the covariance that the model's errors make. Where the lines tell nothing it is none.
+    """
+    if not prior.given or not np.any(prior.information):
+        return prior
+    _, slopes, weights = _linearise(lines, shifts, sigma_px, mount, state)
+    exact = slopes.T @ slopes / sigma_px**2 + prior.information
+    share = np.linalg.inv(slopes.T @ weights @ slopes + prior.information) - np.linalg.inv(exact)
+    loose = np.linalg.inv(prior.information) + SHARED_PRIOR_FACTOR * share
+    return PlanarPrior(prior.mean, np.asarray(np.linalg.inv(loose), float), True)
+
+
+def _minimise(
+    lines: LineSet, shifts: Floats, sigma_px: float, mount: Pose, prior: PlanarPrior, state: Floats,
+) -> Floats:
+    """Gauss-Newton on generalised least squares."""
+    for _ in range(MAX_MARGINAL_STEPS):
+        r, slopes, weights = _linearise(lines, shifts, sigma_px, mount, state)
+        hessian = slopes.T @ weights @ slopes + prior.information
+        away = to_pose2(state).minus(to_pose2(prior.mean))
+        step = np.linalg.solve(hessian, slopes.T @ weights @ r + prior.information @ away)
+        state = state - step
+        if np.abs(step).max() < MIN_MARGINAL_STEP:
+            break
+    return state
+
+
+def _linearise(
+    lines: LineSet, shifts: Floats, sigma_px: float, mount: Pose, state: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Distances (2n,), their derivatives (2n, 3) by the state, and the inverse of their covariance (2n, 2n)."""
+    distances, by_pose, by_mode = compute_displaced_jacobian(lines, shifts, state, mount)
+    modes = by_mode.reshape(2 * len(lines), -1)
+    weights = np.linalg.inv(sigma_px**2 * np.eye(len(modes)) + modes @ modes.T)
+    return distances.reshape(-1), by_pose.reshape(-1, 3), np.asarray(weights, float)
+
+
+def _explain(lines: LineSet, shifts: Floats, sigma_px: float, mount: Pose, state: Floats, near: Mask) -> Floats:
+    """(n, 2) what the modes, as the lines ``near`` tell them, leave of each line's distances [px]."""
+    distances, _, by_mode = compute_displaced_jacobian(lines, shifts, state, mount)
+    modes = by_mode[near].reshape(-1, by_mode.shape[2])
+    information = modes.T @ modes / sigma_px**2 + np.eye(by_mode.shape[2])
+    amplitudes = np.linalg.solve(information, modes.T @ distances[near].reshape(-1)) / sigma_px**2
+    return np.asarray(distances - by_mode @ amplitudes)
 
 
 def planar_from_points(

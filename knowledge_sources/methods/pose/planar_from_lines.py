@@ -10,7 +10,6 @@ import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.pose import kernels
-from knowledge_sources.methods.pose.displacements import MAX_FEW_LINES, compute_sigmas_px, maximise_marginal
 from knowledge_sources.methods.pose.estimate import (
     BEHIND,
     DISTANCE,
@@ -33,12 +32,15 @@ from knowledge_sources.methods.pose.line_set import (
 )
 from knowledge_sources.methods.pose.planar import (
     FEW,
+    MAX_FEW_LINES,
     MAX_FLOOR_ITERATIONS,
     NOT_BETTER,
     PlanarPrior,
     build_planar_prior,
     compute_camera_poses,
     compute_scatter,
+    compute_sigmas_px,
+    maximise_marginal,
     to_pose2,
     to_rigid_motion,
 )
@@ -87,7 +89,7 @@ def planar_from_lines(
         landmark_ids: n names; pairs within one landmark are not tried as candidates.
         sigma_px: of the segment ends across the line, one number or (n,).
         robust: False takes every line as right.
-        errors: of the model's lines, one row a pair; they are integrated out (:mod:`.displacements`), and
+        errors: of the model's lines, one row a pair; they are integrated out (:mod:`.planar`), and
             ``sigma_px`` is one number. ``None``: the model is exact.
 
     Raises:

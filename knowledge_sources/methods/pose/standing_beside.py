@@ -106,27 +106,35 @@ def weigh_places(
     return (total, edges) if edges >= MIN_EDGES else None
 
 
-def _weigh_edge(edge: Floats, segments: Floats) -> Floats | None:
-    """(p,) the log likelihood of an edge (p, 2, 2) [px], place by place; None where it tells nothing."""
-    lengths = np.linalg.norm(edge[:, 1] - edge[:, 0], axis=1)
-    middle = len(edge) // 2
-    if not np.isfinite(edge).all() or lengths[middle] < MIN_LENGTH_PX:
+def _weigh_edge(places: Floats, segments: Floats) -> Floats | None:
+    """(p,) the log likelihood of an edge (p, 2, 2) [px], place by place; None where it tells nothing.
+
+    Of a place from which it is out of the picture it tells nothing.
+    """
+    lengths = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
+    in_view = lengths >= MIN_LENGTH_PX
+    if 2 * np.count_nonzero(in_view) < len(places):
         return None
+    edge, lengths = places[in_view], lengths[in_view]
+    middle = len(edge) // 2
     along = (edge[:, 1] - edge[:, 0]) / lengths[:, None]
     across = np.column_stack([-along[:, 1], along[:, 0]])
     if abs(float((edge[-1] - edge[0]).mean(axis=0) @ across[middle])) < 2.0 * MIN_MOVE_PX:
         return None
     by = segments[:, 1] - segments[:, 0]
-    turned = np.abs(across @ (by / np.linalg.norm(by, axis=1)[:, None]).T)
-    beside = np.einsum("pc,psec->pse", across, segments[None] - edge[:, None, :1])
-    at = np.einsum("pc,psec->pse", along, segments[None] - edge[:, None, :1])
+    is_like = np.abs(across @ (by / np.linalg.norm(by, axis=1)[:, None]).T) <= math.sin(MAX_TURN_RAD)
+    some = is_like.any(axis=0)  # most lines of a picture are turned otherwise
+    off = segments[some][None] - edge[:, None, :1]
+    beside, at = (np.abs(np.einsum("pc,psec->pse", across, off)), np.einsum("pc,psec->pse", along, off))
     ends = np.clip(at, 0.0, lengths[:, None, None])
-    is_like = (turned <= math.sin(MAX_TURN_RAD)) & (np.ptp(ends, axis=2) >= MIN_COVERED * lengths[:, None])
-    away = np.where(is_like, np.abs(beside).max(axis=2), np.inf)
+    is_like = is_like[:, some] & (np.abs(ends[..., 1] - ends[..., 0]) >= MIN_COVERED * lengths[:, None])
+    away = np.where(is_like, np.maximum(beside[..., 0], beside[..., 1]), np.inf)
     chance = max(int(np.count_nonzero(away[middle] < NEAR_PX)), 1) / (2.0 * NEAR_PX)
     nearest = away.min(axis=1, initial=np.inf)
     found = np.exp(-0.5 * (nearest / EDGE_SIGMA_PX) ** 2) / (math.sqrt(math.tau) * EDGE_SIGMA_PX)
-    return np.asarray(np.log(1.0 - P_SHOWN + P_SHOWN * found / chance))
+    told = np.zeros(len(places))
+    told[in_view] = np.log(1.0 - P_SHOWN + P_SHOWN * found / chance)
+    return told
 
 
 def _blur(log_likelihood: Floats, sigma_m: float) -> Floats:

@@ -16,8 +16,8 @@ from knowledge_sources.methods.verification.color_check import check_colors, pre
 from knowledge_sources.methods.verification.line_check import (
     Agreement, DISPLACEMENT_M, LINE_INDEPENDENCE, LINE_TOLERANCE_PX, LINE_TOLERANCE_RAD, MAX_LINE_WEIGHT_PX,
     MIN_COVERED_FRACTION, MIN_MATCHED_LINES, check_lines, compute_agreement, compute_coverage, compute_log_ratio,
-    compute_p_false, compute_p_share, compute_view_quality, find_distinct, find_errors, list_names, predict_lines,
-    take_distinct,
+    compute_p_false, compute_p_share, compute_view_quality, find_distinct, find_errors, find_tolerances_px, list_names,
+    predict_lines, take_distinct,
 )
 from knowledge_sources.methods.verification.pose_confidence import (
     EVIDENCE_NAMES, EvidenceWeights, MOTION_TOLERANCE_SIGMAS, POSE_CONFIDENCE, PoseConfidence, PoseEvidence, TERMS,
@@ -36,15 +36,16 @@ from knowledge_sources.methods.verification.weigh import (
 
 __all__ = [
     "CHECK_TOLERANCE_M", "DISPLACEMENT_M", "EVIDENCE_NAMES", "LINE_INDEPENDENCE", "LINE_TOLERANCE_PX",
-    "LINE_TOLERANCE_RAD",
-    "LOOK_TURNS_RAD", "MAX_FOLLOWED_PX", "MAX_INEXACT_LOOKS", "MAX_LINE_WEIGHT_PX", "MAX_MILESTONE_LOOKS",
+    "LINE_TOLERANCE_RAD", "LOOK_TURNS_RAD", "MAX_FOLLOWED_PX", "MAX_INEXACT_LOOKS", "MAX_LINE_WEIGHT_PX",
+    "MAX_MILESTONE_LOOKS",
     "MAX_SIGMA_PART", "MAX_SIGMA_RAD", "MIN_COVERED_FRACTION", "MIN_LINES", "MIN_MATCHED_LINES",
     "MOTION_TOLERANCE_SIGMAS", "POSE_CONFIDENCE", "P_WRONG_FOLLOWED", "P_WRONG_IN_DOUBT", "P_WRONG_STANDING",
     "P_WRONG_UNFOLLOWED", "RAYS", "TERMS", "WEIGHTS_FILE", "Agreement", "Before", "EvidenceWeights",
     "PictureEvidence", "PoseConfidence", "PoseEvidence", "Verdict", "Weighed", "cast_rays", "certify",
     "check_colors", "check_lines", "choose_heading", "compute_agreement", "compute_coverage",
     "compute_coverage_elsewhere", "compute_evidence", "compute_log_ratio", "compute_p_false", "compute_p_share",
-    "compute_terms", "compute_view_quality", "find_distinct", "find_errors", "find_untried", "is_last_look",
-    "judge_place", "list_names", "list_seen_locales", "predict_color_check", "predict_face_colors", "predict_lines",
-    "predict_milestone", "take_distinct", "tell_odds", "turn_headings", "weigh_picture",
+    "compute_terms", "compute_view_quality", "find_distinct", "find_errors", "find_tolerances_px",
+    "find_untried", "is_last_look", "judge_place", "list_names", "list_seen_locales", "predict_color_check",
+    "predict_face_colors", "predict_lines", "predict_milestone", "take_distinct", "tell_odds", "turn_headings",
+    "weigh_picture",
 ]

@@ -19,9 +19,9 @@ from numba import njit
 from scipy.special import betainc, betaln
 
 from knowledge_sources.methods.arrays import Floats, Mask
-from knowledge_sources.methods.pose import compute_camera_poses, compute_point_jacobian, fit_displacements, to_pose2
+from knowledge_sources.methods.pose import compute_camera_poses, compute_point_jacobian, compute_sigmas_px
 from world_models.building.building import Building
-from world_models.building.model_errors import LineErrors, find_line_errors
+from world_models.building.model_errors import LineErrors, exact, find_line_errors
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
@@ -52,6 +52,8 @@ faint, or lost among bricks and planks."""
 CERTAINTY_BOUNDS = 0.04, 0.6  # of the chance of a match, as a line counts for or against a pose
 LINE_INDEPENDENCE = 0.5  # weight of a line: lines of one thing are seen or missed together (tempered likelihood)
 LINE_TOLERANCE_RAD = 0.06  # largest angle between a segment and the line that it covers
+MODEL_SIGMAS = 1.0
+"""Deviations of an inexact model within which a segment covers a line: more of them let chance cover as much."""
 MAX_LINE_WEIGHT_PX = 100.0  # length from which a longer line weighs no more
 
 
@@ -104,7 +106,7 @@ class Agreement:
 
 def compute_agreement(
     lines_px: Floats, segments_px: Floats, displaced_px: Floats,
-    tolerance_px: float = LINE_TOLERANCE_PX,
+    tolerance_px: float | Floats = LINE_TOLERANCE_PX,
 ) -> Agreement:
     """Compute how well projected lines agree with segments, and how well they would by chance.
 
@@ -112,11 +114,12 @@ def compute_agreement(
         lines_px: (m, 2, 2) projected at the pose, NaN where not in view.
         segments_px: (k, 2, 2) found in the picture.
         displaced_px: (p, m, 2, 2) the same lines projected at p wrong poses nearby.
-        tolerance_px: how far a segment may lie from the line that it covers.
+        tolerance_px: how far a segment may lie from the line that it covers, one number or (m,).
     """
-    tolerances = tolerance_px, LINE_TOLERANCE_RAD
-    coverage = compute_coverage(lines_px, segments_px, *tolerances)
-    displaced = compute_coverage(displaced_px.reshape(-1, 2, 2), segments_px, *tolerances)
+    tolerances = np.broadcast_to(tolerance_px, len(lines_px))
+    coverage = compute_coverage(lines_px, segments_px, tolerances, LINE_TOLERANCE_RAD)
+    displaced = compute_coverage(displaced_px.reshape(-1, 2, 2), segments_px,
+                                 np.tile(tolerances, len(displaced_px)), LINE_TOLERANCE_RAD)
     displaced = displaced.reshape(displaced_px.shape[:2])
     visible, matched = _count(coverage, MIN_COVERED_FRACTION)
     visible_there, matched_there = _count(displaced, MIN_COVERED_FRACTION)
@@ -199,11 +202,30 @@ def _measure_pattern(lines_px: Floats, segments_px: Floats, tolerance_px: float)
     return np.asarray(np.mean(covered.reshape(len(shifts), -1) >= MIN_COVERED_FRACTION, axis=0))
 
 
-def compute_coverage(lines_px: Floats, segments_px: Floats, tolerance_px: float, tolerance_rad: float) -> Floats:
-    """Compute the part (m,) of each line (m, 2, 2) that lies under segments (k, 2, 2) within the tolerances."""
+def compute_coverage(
+    lines_px: Floats, segments_px: Floats, tolerance_px: float | Floats, tolerance_rad: float
+) -> Floats:
+    """Compute the part (m,) of each line (m, 2, 2) that lies under segments (k, 2, 2) within the tolerances.
+
+    That across a line is one number, or (m,).
+    """
     lines, segments = np.array(lines_px, float, order="C"), np.array(segments_px, float, order="C")
-    covered: Floats = _cover(lines, segments, tolerance_px, math.sin(tolerance_rad), CELLS_PER_LINE)
+    tolerances = np.array(np.broadcast_to(tolerance_px, len(lines)), float, order="C")
+    covered: Floats = _cover(lines, segments, tolerances, math.sin(tolerance_rad), CELLS_PER_LINE)
     return covered
+
+
+def find_tolerances_px(
+    robot: RobotModel, lines_world: Floats, errors: LineErrors, world_from_robot: Pose2,
+    tolerance_px: float = LINE_TOLERANCE_PX,
+) -> Floats:
+    """(m,) how far a segment may lie from each line (m, 2, 3) [m, world] that it covers: as the model's errors leave.
+    """
+    if errors.is_exact:
+        return np.full(len(lines_world), tolerance_px)
+    mount = robot.mount.camera_from_robot
+    sigmas_px = compute_sigmas_px(lines_world, errors, robot.camera, mount, world_from_robot)
+    return np.hypot(tolerance_px, MODEL_SIGMAS * sigmas_px)
 
 
 def _count(coverage: Floats, min_covered: float) -> Any:
@@ -212,7 +234,7 @@ def _count(coverage: Floats, min_covered: float) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def _cover(lines: Any, segments: Any, tolerance_px: float, sine: float, cells: int) -> Any:
+def _cover(lines: Any, segments: Any, tolerances: Any, sine: float, cells: int) -> Any:
     """(m,) part of the cells of each line over which a near and parallel segment lies; NaN where not in view."""
     out = np.empty(len(lines))
     directions = np.empty((len(segments), 2))
@@ -237,7 +259,7 @@ def _cover(lines: Any, segments: Any, tolerance_px: float, sine: float, cells: i
                 x, y = segments[k, e, 0] - u0, segments[k, e, 1] - v0
                 off = max(off, abs(x * v - y * u))
                 low, high = min(low, x * u + y * v), max(high, x * u + y * v)
-            if off <= tolerance_px:
+            if off <= tolerances[i]:
                 for c in range(cells):
                     at = (c + 0.5) / cells * length
                     if low <= at <= high:
@@ -270,23 +292,19 @@ def check_lines(
 ) -> LineCheck:
     """Compare model lines (m, 2, 3) [m, world], visible from a pose, with segments (k, 2, 2) of the picture.
 
-    Where the model is inexact, by ``errors``, its lines are displaced as they fit best: at this pose, and as freely at
-    the wrong ones at which chance is counted. And of a thing of which no more is found than by chance one line is asked
-    for: a shelf that was moved away is one difference, not thirty missed lines. ``landmarks``: m names, or none.
+    Where the model is inexact, by ``errors``, a segment may lie as much further off: at this pose, and at the wrong
+    ones at which chance is counted. And of a thing of which no more is found than by chance one line is asked for: a
+    shelf that was moved away is one difference, not thirty missed lines. ``landmarks``: m names, or none.
     """
-    state = world_from_robot.vector
-    states = np.concatenate([state[None], _displace(state)])
-    if errors is None or errors.is_exact:
-        projected = _project(robot, lines_world, states)
-    else:
-        few = np.concatenate([states[:1], _take_few(states[1:])])
-        projected = np.concatenate([
-            _project_displaced(robot, lines_world, errors, segments_px, s) for s in few])
-        found = compute_agreement(projected[0], segments_px, projected[1:], LINE_TOLERANCE_PX)
+    state, errors = world_from_robot.vector, errors or exact(len(lines_world))
+    projected = _project(robot, lines_world, np.concatenate([state[None], _displace(state)]))
+    plain, near = (find_tolerances_px(robot, lines_world, errors, world_from_robot, tolerance_px)
+                   for tolerance_px in (LINE_TOLERANCE_PX, SHARP_TOLERANCE_PX))
+    if not errors.is_exact:
+        found = compute_agreement(projected[0], segments_px, projected[1:], plain)
         projected[:, _find_unasked(robot.world, projected[0], found, landmarks)] = np.nan
     here, displaced = np.split(projected, [1])
-    agreement, sharp = (compute_agreement(here[0], segments_px, displaced, tolerance_px)
-                        for tolerance_px in (LINE_TOLERANCE_PX, SHARP_TOLERANCE_PX))
+    agreement, sharp = (compute_agreement(here[0], segments_px, displaced, tolerances) for tolerances in (plain, near))
     lengths = np.linalg.norm(here[0, :, 1] - here[0, :, 0], axis=1)
     return LineCheck(agreement, sharp, agreement.covered_length(lengths), here[0])
 
@@ -321,20 +339,6 @@ def _project(robot: RobotModel, lines_world: Floats, states: Floats) -> Floats:
     lines_camera = lines_world.reshape(1, -1, 3) @ np.swapaxes(turns, 1, 2) + shifts[:, None]
     seen, _ = robot.camera.project_segments(lines_camera.reshape(-1, 2, 3), Pose.identity())
     return seen.reshape(len(states), -1, 2, 2)
-
-
-def _project_displaced(
-    robot: RobotModel, lines_world: Floats, errors: LineErrors, segments_px: Floats, state: Floats,
-) -> Floats:
-    """(1, m, 2, 2) the lines as seen from a state (3,), displaced as they fit the segments best [px]."""
-    fit = fit_displacements(
-        lines_world, errors, segments_px, robot.camera, robot.mount.camera_from_robot, to_pose2(state))
-    return _project(robot, fit.lines_world, state[None])
-
-
-def _take_few(states: Floats) -> Floats:
-    """(8, 3) of the wrong states (32, 3): each direction and distance, with one of the turns."""
-    return states[[4 * k + k % 4 for k in range(8)]]
 
 
 def _displace(state: Floats) -> Floats:

@@ -179,8 +179,6 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
     lines, errors = lines[tested], milestone.errors.take(np.flatnonzero(tested))
     agreed = check_lines(robot, lines, segments_px, pose, errors,
                          [milestone.landmarks[i] for i in np.array(milestone.landmark_of, np.intp)[tested]])
-    plain_px = agreed.projected_px if errors.is_exact else check_lines(
-        robot, lines, segments_px, pose).projected_px
     faces = check_colors(robot, pose, read_picture(seen.jpeg).quarter, milestone.face_colors)
     evidence = compute_evidence(pose, fix.covariance, before.pose, before.covariance, agreed, faces)
     p_false = max(POSE_CONFIDENCE.p_false(evidence), LEAST_P_FALSE)
@@ -215,7 +213,7 @@ def weigh_picture(robot: RobotModel, seen: PictureEvidence, before: Before, sett
         p_by_looks=update(0.5, by_looks),
         p_wrong=p_after,
         most_p_wrong=most,
-        shift_px=_median_shift(expected_px, plain_px),
+        shift_px=_median_shift(expected_px, agreed.projected_px),
         tolerance_px=tolerance_px,
         is_weak=before.in_doubt or not followed,
         is_inexact=milestone.is_inexact,

@@ -97,3 +97,15 @@ def test_the_likeliest_stands_first_and_all_share_less_than_certainty(seen: list
     rivals = weigh_rivals("hallway", seen).rivals
     assert all(one.p >= other.p for one, other in itertools.pairwise(rivals))
     assert sum(rival.p for rival in rivals) < 1.0
+
+
+@given(st.lists(st.tuples(st.floats(0.6, 1.2), st.floats(0.01, 0.1)), max_size=4), st.integers(1, 4))
+def test_what_is_too_short_to_have_a_size_takes_none_away(sized: list[tuple[float, float]], short: int) -> None:
+    told = (*(Explanation("wheels", "wheels of a size", 1.0, *one) for one in sized),
+            *[Explanation("wheels", "wheels", 3.0)] * short)
+    (wheels,) = weigh_rivals("motion", [
+        Evidence("motion", "", (one,), 0.0, 0.0, 0.0, 0.0, 0.0, float(k)) for k, one in enumerate(told)]).rivals
+    weights = [sigma**-2 for _, sigma in sized]
+    mean = math.fsum(w * off for w, (off, _) in zip(weights, sized, strict=True)) / (math.fsum(weights) or 1.0)
+    assert wheels.off == pytest.approx(mean) and wheels.what == told[0].what
+    assert wheels.sigma >= math.fsum(weights) ** -0.5 - 1e-12 if sized else wheels.sigma == 0.0

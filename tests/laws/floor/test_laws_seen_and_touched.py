@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from generated_boards import to_world
 from harvey.testing import HALL, house, plain_robot
 from knowledge_sources.methods.floor import MIN_OBSTACLE_CERTAINTY, Sight, build_polygon, see_ranges, touch_again
-from knowledge_sources.methods.floor.found_things import ThingShape, find_same
+from knowledge_sources.methods.floor.footprints import ThingShape, find_same
 from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M
 from knowledge_sources.methods.floor.rivals_on_floor import ShownSight
 from knowledge_sources.methods.floor.weigh_sight import see_again

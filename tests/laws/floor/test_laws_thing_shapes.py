@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import build_polygon
-from knowledge_sources.methods.floor.found_things import CORE_PART, NEARER, ThingShape, join_shapes, leave_free
+from knowledge_sources.methods.floor.footprints import CORE_PART, NEARER, ThingShape, join_shapes, leave_free
 from world_models.frames import Pose2
 
 EYE = np.zeros(2)

@@ -72,6 +72,7 @@ def test_what_cannot_be_changes_nothing_but_its_answer(text: str) -> None:
     assert summary(effects) == [("Redirection", "")] and effects is not None
     (effect,) = effects
     assert isinstance(effect, Revise) and effect.value.answer.startswith("which cannot be: ")
+    assert reasons(effect) == {"Redirection-1"}
 
 
 def test_of_several_that_were_asked_before_it_could_act_the_last_counts() -> None:
@@ -97,11 +98,6 @@ def test_each_effect_names_what_was_asked_and_what_it_replaces(is_lost: bool, is
         expected += [("Revise", "Milestone", {last, "Milestone-1"})] * is_waiting
         expected += [("Revise", "Goal", {last, goal}), ("Post", "Goal", {last, goal, "Hypothesis-1"})]
     assert named == expected
-
-
-def test_what_cannot_be_rests_on_what_was_asked_alone() -> None:
-    (effect,) = decide("(archive 10)") or []
-    assert reasons(effect) == {"Redirection-1"}
 
 
 def test_it_keeps_the_laws_of_all_sources() -> None:

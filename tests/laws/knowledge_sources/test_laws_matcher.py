@@ -22,6 +22,7 @@ from knowledge_sources.methods.calibration.camera_state import (
     SIGMA_TILT_RAD,
     SIGMA_YAW_RAD,
 )
+from knowledge_sources.methods.localization import camera_matching
 from knowledge_sources.methods.localization.camera_matching import CameraMatch
 from knowledge_sources.milestone import matcher
 from knowledge_sources.milestone.matcher import MAX_RIGID_SIGMA_PX, MIN_KNOCK_GAIN, MIN_SHARP_PART, Matcher
@@ -134,9 +135,9 @@ def test_what_is_asked_before_a_camera_is_taken_for_knocked(
     match, other = (SimpleNamespace(pairs=np.zeros((0, 2), np.int64), e_match=error, coverage=0.0)
                     for error in (1.0, 2.0))
     monkeypatch.setattr(matcher, "rate_match", lambda *given: asked.update(rate=given) or CameraMatch(  # type: ignore[arg-type]
-        match, sharp, chi2))
+        match, 9, sharp, chi2))
     monkeypatch.setattr(matcher, "match_with_camera", lambda *given: asked.update(knock=given) or CameraMatch(
-        other, sharp + gain, 0.0))
+        other, 9, sharp + gain, 0.0))
     bench, segments, _ = look(BELIEF, BELIEF, (0.0, 0.0, 0.0))
     made = effect_on(bench.ask(MATCHER, segments), LineMatch).value
     assert (made.is_camera_open, made.error) == (is_open, 2.0 if is_open else 1.0)  # the pairs of the better one
@@ -150,6 +151,21 @@ def test_what_is_asked_before_a_camera_is_taken_for_knocked(
         turns = np.square((SIGMA_TILT_RAD, SIGMA_ROLL_RAD, SIGMA_YAW_RAD))
         assert np.allclose(asked["knock"][5], plain + np.diag([0.0, 0.0, turns[2]]))
         assert np.allclose(asked["knock"][6], np.array(KNOWN) + np.diag([*turns, 0.0, 0.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize("agreeing", [(48, 64, 59), (9, 9, 7), (0, 0, 0)])
+def test_of_several_focal_lengths_the_one_is_taken_with_which_most_pairs_agree(
+    agreeing: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Lines that are covered a little better, by pairs of which more are wrong, do not outweigh that."""
+    tried = [CameraMatch(object(), count, 0.9 - 0.01 * k, 0.0) for k, count in enumerate(agreeing)]  # type: ignore[arg-type]
+    left = iter(tried)
+    monkeypatch.setattr(camera_matching, "match_in_space", lambda *_, **__: None)
+    monkeypatch.setattr(camera_matching, "rate_match", lambda *_: next(left))
+    lines = np.zeros((1, 2, 3))
+    found = camera_matching.match_with_camera(
+        lines, lines[..., :2], ROBOT.camera, ROBOT.mount, to_world(BELIEF), np.eye(3), 1e-4 * np.eye(7))
+    assert found is tried[agreeing.index(max(agreeing))]
 
 
 @pytest.mark.parametrize("more", [-0.02, 0.02])

@@ -72,13 +72,6 @@ def decide_all(
     return effects
 
 
-@pytest.mark.parametrize(("off_m", "is_repeated"), [(TOLERANCE_M - SMALL, False), (TOLERANCE_M + SMALL, True)])
-def test_a_subgoal_is_repeated_beyond_its_tolerance(off_m: float, is_repeated: bool) -> None:
-    effect = decide(off_m, 0)
-    assert isinstance(effect, Revise) and isinstance(effect.value, PlanSketch)
-    assert (effect.value.adjustments == 1, effect.value.status == "done") == (is_repeated, not is_repeated)
-
-
 def test_in_vain_is_doubt_for_the_first_goal_and_blocked_for_a_later_one() -> None:
     last = decide(0.5, MOST - 1)
     assert isinstance(last, Revise) and isinstance(last.value, PlanSketch) and last.value.adjustments == MOST
@@ -86,6 +79,7 @@ def test_in_vain_is_doubt_for_the_first_goal_and_blocked_for_a_later_one() -> No
     assert isinstance(doubt, Post) and isinstance(doubt.value, Discrepancy) and doubt.value.level is Level.GOAL
     assert (doubt.value.magnitude, doubt.value.bounds, doubt.value.unit) == (None, (0.0, 0.0), "px")
     assert isinstance(blocked, Post) and isinstance(blocked.value, Impasse) and blocked.value.kind == "blocked"
+    assert reasons(doubt) == {"Milestone-1", "Goal-1"} and reasons(blocked) == {"Milestone-1", "PlanSketch-1"}
 
 
 def is_repeated(effect: Effect) -> bool:
@@ -134,11 +128,6 @@ def test_a_milestone_that_holds_lets_the_next_subgoal_begin(at: int, status: str
     now = effect.value
     assert (now.at, now.verified, now.status, now.subgoals) == (at, True, status, way)
     assert now.adjustments == (0 if status == "active" else 2)
-
-
-def test_what_is_in_vain_names_what_it_rests_on() -> None:
-    doubt, blocked = decide(0.5, MOST), decide(0.5, MOST, earlier_goals=1)
-    assert reasons(doubt) == {"Milestone-1", "Goal-1"} and reasons(blocked) == {"Milestone-1", "PlanSketch-1"}
 
 
 @pytest.mark.parametrize("status", ["active", "done", "halted", "superseded"])

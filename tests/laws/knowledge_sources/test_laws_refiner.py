@@ -38,6 +38,14 @@ def test_a_subgoal_becomes_straight_legs_from_the_robot_to_its_end(pose: Pose2) 
         assert bench.ask(SOURCE, sketch) is None
 
 
+@pytest.mark.parametrize("rooms", [(HALL, STUDY), (STUDY, HALL)])
+def test_a_subgoal_in_another_locale_is_drawn_by_the_door_that_leads_there(rooms: tuple[str, str]) -> None:
+    bench, (here, there) = Bench(plain_robot()), (Place(room, 4.0, 2.0) for room in rooms)
+    bench.believe(Pose2(4.0, 2.0, 0.0), locale=here.locale)
+    drawn = effect_on(bench.ask(SOURCE, bench.sketch(here, there, primitive=False)), PlanSketch).value
+    assert "study-door" in {step.passage for step in drawn.subgoals}
+
+
 TWO_DOORS = HOUSE + """
 other-door = { between = ["hall", "study"], wall = "east", along = 0.7, width = 1.0, open = true }
 """

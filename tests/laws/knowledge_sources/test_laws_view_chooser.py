@@ -42,13 +42,9 @@ def test_before_a_long_turn_it_looks_along_the_leg_and_else_ahead(side: float) -
     assert first_direction(side * (LONG_TURN + SMALL)) == pytest.approx(side * (LONG_TURN + SMALL))
 
 
-def test_where_there_is_nothing_to_drive_it_looks_ahead() -> None:
-    assert first_direction(2.0, TOLERANCE_M - SMALL) == 0.0
+def test_where_there_is_nothing_to_drive_as_it_is_it_looks_ahead() -> None:
+    assert first_direction(2.0, TOLERANCE_M - SMALL) == first_direction(2.0, primitive=False) == 0.0
     assert first_direction(2.0, TOLERANCE_M + SMALL) == pytest.approx(2.0)
-
-
-def test_a_part_of_the_route_that_is_not_driven_as_it_is_tells_no_direction() -> None:
-    assert first_direction(2.0, primitive=False) == 0.0
 
 
 SOURCE = ViewChooser()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -34,14 +35,15 @@ def ask(told: Sequence[Evidence]) -> tuple[Bench, Entry[Difference], list[Wheels
 
 @given(reaches, st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=8), st.permutations(range(3)))
 def test_it_takes_over_what_all_stretches_tell(reach: float, errors: list[float], order: list[int]) -> None:
-    told = [tell(reach + 0.02 * error, 0.02, float(k)) for k, error in enumerate(errors)]
+    told = [tell(reach + 0.06 * error, 0.06, float(k)) for k, error in enumerate(errors)]
     bench, found, learnt = ask([*(told[k] for k in order), *told[3:]])
     if not learnt:
-        assert abs(reach - TOLD.reach) < 0.06
+        assert abs(reach - TOLD.reach) < 0.25
         return
     (wheels,) = learnt
-    assert wheels.actuator.reach == pytest.approx(reach, abs=0.04)
-    assert wheels.actuator.reach_sigma >= max(TOLD.reach_sigma, 0.02 / len(told) ** 0.5 - 1e-9)
+    assert wheels.actuator.reach == pytest.approx(reach + 0.06 * np.mean(errors))
+    sigma = 0.06 / len(told) ** 0.5 * max(1.0, float(np.std(errors)))
+    assert wheels.actuator.reach_sigma == pytest.approx(max(TOLD.reach_sigma, sigma))
     (effect,) = bench.ask(wheels_calibrator, found) or ()
     assert reasons(effect) == {found.id, "Wheels-1"}
     bench.apply(effect)

@@ -19,7 +19,7 @@ from knowledge_sources.methods.localization.aliasing import (
     predict_views_on_grid,
     score_view,
 )
-from knowledge_sources.methods.verification import compute_coverage, predict_lines
+from knowledge_sources.methods.verification import LINE_TOLERANCE_PX, compute_coverage, predict_lines
 from towers import tower
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
@@ -43,7 +43,8 @@ def find_strongest(robot: RobotModel, segments_px: Floats, room: str, pose: Pose
 
 def margin(one: Floats, other: Floats, seen: Floats) -> float:
     """Of two views, by what was seen."""
-    return aliasing.compute_margin(score_view(one, seen), score_view(other, seen))
+    return aliasing.compute_margin(*(
+        score_view(view, np.full(len(view), LINE_TOLERANCE_PX), seen) for view in (one, other)))
 
 
 @st.composite
@@ -109,7 +110,7 @@ def test_lines_visible_from_the_grid_are_projected_to_where_they_are_seen_from_t
         steps = VIEW_GRID_M, VIEW_GRID_M, VIEW_GRID_RAD
         of_grid = Pose2(*(round(v / by) * by for v, by in zip(
             (pose.x_m, pose.y_m, pose.heading_rad), steps, strict=True)))
-        on_grid, between = predict_views_on_grid(ROBOT, [of_grid, pose])
+        (on_grid, _), (between, _) = predict_views_on_grid(ROBOT, [of_grid, pose])
         assert on_grid == pytest.approx(predict_lines(ROBOT, of_grid).segments_px, abs=1e-6)
         exact = predict_lines(ROBOT, pose).segments_px
         length = np.linalg.norm(exact[:, 1] - exact[:, 0], axis=1)
@@ -155,8 +156,8 @@ def test_the_same_place_on_another_floor_or_with_another_camera_is_another_view(
     plain = []
     for one in asked:
         fresh = replace(one, world=read_world(Source.parse(tower(2), "tower.toml")))
-        plain.append(predict_views_on_grid(fresh, [pose])[0])
+        plain.append(predict_views_on_grid(fresh, [pose])[0][0])
     for one, wanted in (*zip(asked, plain, strict=True), *zip(asked[::-1], plain[::-1], strict=True)):
-        (found,) = predict_views_on_grid(one, [pose])
+        ((found, _),) = predict_views_on_grid(one, [pose])
         assert found.shape == wanted.shape and np.allclose(found, wanted)
     assert all(a.shape != b.shape or not np.allclose(a, b) for k, a in enumerate(plain) for b in plain[:k])

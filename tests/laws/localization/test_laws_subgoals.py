@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from generated_boards import LENGTH_M, WIDTH_M, Bench, to_world
 from harvey.testing import HALL, HOUSE, STUDY, plain_robot
 from knowledge_sources.methods.floor import find_floor, measure_first_seen_m
-from knowledge_sources.methods.floor.seen_floor import sees
+from knowledge_sources.methods.floor.looks_round import sees
 from knowledge_sources.methods.motion import CLEARANCES_M, SubgoalPlanner
 from knowledge_sources.methods.motion.subgoals import (
     LOOKOUT_DIRECTIONS,

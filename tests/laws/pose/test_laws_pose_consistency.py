@@ -26,9 +26,9 @@ from knowledge_sources.methods.pose import (
     OUTLIER_SIGMAS,
     POINT_OUTLIER_SIGMAS,
     PoseEstimate,
-    displacements,
     estimate_camera_and_pose,
     med_r_and_t,
+    planar,
     planar_from_lines,
     planar_from_points,
     r_and_t_ml,
@@ -137,8 +137,8 @@ def test_a_pose_in_an_inexact_model_is_as_far_off_as_it_says(noise: float, monke
     The factor for segments of a wrong line, which none is here, covers noise that is larger than stated.
     """
     if noise == 1.0:  # every segment is of its line, and the prior is independent
-        monkeypatch.setattr(displacements, "MARGINAL_SPREAD", 1.0)
-        monkeypatch.setattr(displacements, "SHARED_PRIOR_FACTOR", 0.0)
+        monkeypatch.setattr(planar, "MARGINAL_SPREAD", 1.0)
+        monkeypatch.setattr(planar, "SHARED_PRIOR_FACTOR", 0.0)
 
     def draw(seed: int) -> float:
         d = Draw(seed, noise)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from knowledge_sources.methods.pose import displacements, planar_from_lines
+from knowledge_sources.methods.pose import planar, planar_from_lines
 from world_models.building.model_errors import LineErrors, exact
 from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2, wrap_angle
@@ -27,8 +27,8 @@ Array = NDArray[np.float64]
 
 @pytest.fixture(autouse=True)
 def alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(displacements, "MARGINAL_SPREAD", 1.0)
-    monkeypatch.setattr(displacements, "SHARED_PRIOR_FACTOR", 0.0)
+    monkeypatch.setattr(planar, "MARGINAL_SPREAD", 1.0)
+    monkeypatch.setattr(planar, "SHARED_PRIOR_FACTOR", 0.0)
 
 
 def build_hall(sigma_m: float = 0.05) -> tuple[Array, LineErrors]:

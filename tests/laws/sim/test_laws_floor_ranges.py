@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor import SeenFloor, see_ranges
+from knowledge_sources.methods.floor import FloorMap, see_ranges
 from knowledge_sources.methods.floor.ranges import RANGE_SIGMAS
 from sim.body.collision import Obstacles
 from sim.body.senses import RangeRing
@@ -137,16 +139,18 @@ def test_more_readings_make_it_narrower() -> None:
     assert shapely.Polygon(last[0].footprint).area < shapely.Polygon(first[0].footprint).area
 
 
-def test_what_touches_the_robot_ends_the_floor_there() -> None:
+@pytest.mark.parametrize("nearer_m", [0.0, 0.02])  # just off its rim; or on a sensor
+def test_what_touches_the_robot_ends_the_floor_there(nearer_m: float) -> None:
     name, pose = place(0, 0.5, 0.5)
     solid = np.concatenate([SOLID.segments_world, box(pose.x_m + 0.56, pose.y_m, 0.4, 0.0)])
     reading = RangeRing(24, sigma_m=0.0, dropout=0.0).measure(solid, pose, np.random.default_rng(1), 0.0)
     assert reading is not None
+    reading = replace(reading, distances_m=tuple(d and max(ROBOT.radius_m, d - nearer_m) for d in reading.distances_m))
     floor = see_ranges(ROBOT, name, pose, 0.01, 0.002, reading, ())
     ahead = int(np.argmin(np.abs(floor.bearings_rad)))
     assert floor.ends[ahead] == "thing" and floor.far_m[ahead] <= 0.36
-    assert not SeenFloor((floor,), np.array([[pose.x_m, pose.y_m, 0.5]])).ask(
-        np.array([[pose.x_m + 0.42, pose.y_m]]))[0].any()
+    told = FloorMap([floor], np.array([[pose.x_m, pose.y_m, 0.5]])).ask(np.array([[pose.x_m + 0.42, pose.y_m]]))
+    assert told.p[0] == 1.0
 
 
 def test_without_an_echo_nothing_is_free() -> None:

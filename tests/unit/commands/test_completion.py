@@ -11,7 +11,7 @@ import pytest
 from experiments import list_names
 from harvey.cli import main
 from harvey.commands import MODULES, find_added_commands
-from sim.scenario_names import list_scenarios
+from sim.scenario_names import find_scenarios
 
 COMPLETE = """
 source "$1"; shift
@@ -32,11 +32,11 @@ def script(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
 @pytest.mark.skipif(shutil.which("bash") is None, reason="expected bash, got none")
 @pytest.mark.parametrize(("words", "expected"), [
     ([""], {*MODULES, *(command.name for command in find_added_commands())}),
-    (["run", ""], {*list_scenarios(), "mine.toml"}),
+    (["run", ""], {*find_scenarios(), "mine.toml"}),
     (["run", "hallway"], {"hallway-kidnap"}),
     (["experiment", ""], {*list_names(), "mine.toml"}),
     (["why", ""], {"mine.toml"}),
-    (["world", ""], {"new", "edit", "check", "show", "compile", "import", "export"}),
+    (["world", ""], {"new", "edit", "check", "show", "compile", "import", "export", "ledger"}),
     (["world", "show", "--o"], {"--out"}),
     (["run", "bump", "--see"], {"--seed"}),
     (["completion", ""], {"bash", "zsh"}),

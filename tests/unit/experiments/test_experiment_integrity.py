@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,11 @@ import numpy as np
 import pytest
 
 from blackboard import Entry
+from experiments.differences.obstacles import Lacking
 from experiments.robustness import integrity
 from experiments.robustness.integrity import KINDS, NO_FAULT, PLACES, Flight, Point, Trial
 from sim.scenario import load_scenario
-from world_models.entries import BodyFault, Hypothesis, Obstruction, PoseFix, Protection, diagonal
+from world_models.entries import BodyFault, Hypothesis, Obstacle, Obstruction, PoseFix, Protection, diagonal
 from world_models.frames import Pose2
 
 
@@ -41,9 +43,13 @@ def test_what_is_further_off_than_it_says_misleads() -> None:
 
 
 def test_entries_name_what_is_wrong() -> None:
-    assert list(integrity.list_words(BodyFault("camera", "frame late", "", "", 1.0))) == ["frame late"]
-    assert list(integrity.list_words(Obstruction(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))))) == ["hidden"]
-    assert list(integrity.list_words("anything else")) == []
+    lacking = Lacking.of_segments(np.array([[[2.0, 0.0], [2.0, 1.0]]]), np.zeros((0, 2, 2)))
+    there = Obstacle("hall/obstacle-1", "hall", ((1.9, 0.2), (2.1, 0.2), (2.1, 0.4), (1.9, 0.4)), 0.02, 2.0, 0.3, 0.2)
+    nowhere = replace(there, footprint=tuple((x + 1.0, y) for x, y in there.footprint))
+    for value, words in ((BodyFault("camera", "frame late", "", "", 1.0), ["frame late"]), ("anything else", []),
+                         (Obstruction(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))), ["hidden"]), (there, ["thing"]),
+                         (nowhere, ["false thing"]), (replace(nowhere, status="suspected"), [])):
+        assert list(integrity.list_words(value, lacking)) == words
 
 
 def fly(trial: Trial, **flaw: Any) -> Flight:

@@ -105,7 +105,7 @@ class Landmark:
         _, first, count = np.unique(np.round(ends, 5), axis=0, return_index=True, return_counts=True)
         return frozen(ends[np.sort(first[count >= 2])].reshape(-1, 3))
 
-    def corner_lines(self, point: int) -> NDArray[np.int64]:
-        """(k,) indices of the model lines that end in corner number ``point``."""
-        near = np.linalg.norm(self.lines_world - self.points_world[point], axis=2).min(axis=1) < 1e-4
-        return np.flatnonzero(near)
+    def corner_lines(self) -> list[NDArray[np.int64]]:
+        """Of each corner (k,) indices of the model lines that end in it."""
+        off = self.lines_world - self.points_world[:, None, None]
+        return [np.flatnonzero(near) for near in np.linalg.norm(off, axis=3).min(axis=2) < 1e-4]

@@ -177,7 +177,7 @@ def _corner_lines(landmarks: Sequence[Landmark]) -> Ints:
     """(C, L) indices of the lines that meet in each corner of all landmarks, padded with -1."""
     rows, before = [], 0
     for mark in landmarks:
-        rows += [before + mark.corner_lines(point) for point in range(len(mark.points_world))]
+        rows += [before + lines for lines in mark.corner_lines()]
         before += len(mark.lines_world)
     widest = max((len(row) for row in rows), default=2)
     return np.array([np.pad(row, (0, widest - len(row)), constant_values=-1) for row in rows],

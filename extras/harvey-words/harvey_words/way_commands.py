@@ -1,4 +1,4 @@
-"""``harvey parse``: what a text about a way means on a building."""
+"""``harvey parse``: what a text about a way means on a building; ``harvey directions``: such a text for a person."""
 
 from __future__ import annotations
 
@@ -17,16 +17,26 @@ if TYPE_CHECKING:
 MOST_CHARACTERS = 10_000
 
 
-def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("text", metavar="TEXT", help="the way, in your words")
+def _add_both(parser: ArgumentParser) -> None:
     parser.add_argument("--world", metavar="W", required=True, help="a world file, or the name of one of the project")
-    parser.add_argument("--start", metavar="PLACE", required=True, help="a room, hall, door or thing, or X,Y in metres")
     parser.add_argument("--heading", metavar="DEG", type=float,
                         help="which way the body faces, counter-clockwise from the world's x (not known)")
-    parser.add_argument("--json", action="store_true", help="print all of the reading as JSON")
+    parser.add_argument("--json", action="store_true", help="print all that is known of the reading as JSON")
 
 
-def _run(args: Namespace) -> int:
+def _add_parse(parser: ArgumentParser) -> None:
+    parser.add_argument("text", metavar="TEXT", help="the way, in your words")
+    parser.add_argument("--start", metavar="PLACE", required=True, help="a room, hall, door or thing, or X,Y in metres")
+    _add_both(parser)
+
+
+def _add_directions(parser: ArgumentParser) -> None:
+    parser.add_argument("start", metavar="FROM", help="a room, hall, door or thing, or X,Y in metres")
+    parser.add_argument("goal", metavar="TO", help="another")
+    _add_both(parser)
+
+
+def _parse(args: Namespace) -> int:
     from harvey_words.reading import RouteError, read_route
 
     if len(args.text) > MOST_CHARACTERS:
@@ -39,6 +49,24 @@ def _run(args: Namespace) -> int:
         raise BadInput(f"--start: {error}") from error
     print(json.dumps(reading.as_data(), indent=1) if args.json else "\n".join(tell(reading)))
     return 0 if reading.is_understood else 1
+
+
+def _direct(args: Namespace) -> int:
+    from harvey_words.directions import write_directions
+    from harvey_words.reading import RouteError
+    from harvey_words.word_map import WordMap
+
+    try:
+        written = write_directions(WordMap(load_file(args.world, [])), args.start, args.goal, args.heading)
+    except RouteError as error:
+        raise BadInput(str(error)) from error
+    if args.json:
+        print(json.dumps({"text": written.text, "clear": written.is_clear, "reading": written.reading.as_data()},
+                         indent=1))
+    else:
+        doubt = "" if written.is_clear else "\nIt can be mistaken: nothing to be seen tells this way from another."
+        print(written.text + doubt)
+    return 0 if written.is_clear else 1
 
 
 def tell(reading: Reading) -> Iterator[str]:
@@ -62,16 +90,27 @@ def name_end(end: RouteEnd) -> str:
     return f"{end.locale}, door {end.door}, {at}" if end.door else f"{end.locale}, {at}"
 
 
-COMMAND = CliCommand(
+PARSE = CliCommand(
     "parse", "read a route instruction on a building: where it leads, how sure that is, and what did not fit",
     (
         ('harvey parse "out of the lab, left, third door" --world research_center --start robot-laboratory',
          "without a robot"),
         ('harvey parse "go to the end of the hall" --world two_ways --start north-hall --heading 0 --json', "as JSON"),
     ),
-    _arguments, _run,
+    _add_parse, _parse,
     "Each way in which the words may be meant is followed on the model of the building: which way the body faces\n"
     "where nobody says so, turns and walks that are left out, a thing called by another's name. The odds of an end\n"
     "are those of its best reading against all other ends, and against none of them.\n"
     "Exit code 0: understood; 1: not sure enough, it asks; 2: the input cannot be used.",
+)
+DIRECTIONS = CliCommand(
+    "directions", "write how a person gets from one place to another, by what is to be seen on the way",
+    (
+        ("harvey directions robot-laboratory library --world research_center", "from a room to a room"),
+        ("harvey directions reception archive --world two_ways --json", "with how it is read again"),
+    ),
+    _add_directions, _direct,
+    "Each step can be said in several ways: by halls, things, crossings, doors counted. What is printed was\n"
+    "read again by the reader of `harvey parse` from the same start, and is what leads there the most surely.\n"
+    "Exit code 0: it leads there; 1: it may be mistaken; 2: there is no such place, or no way.",
 )
