@@ -14,9 +14,7 @@ from hypothesis import strategies as st
 
 from archive_door import DOORWAY, HALL, ROBOT, WORLD, before_door, photograph
 from knowledge_sources.methods.doors import (
-    MAX_LOG_ODDS,
     MIN_LOG_RATIO,
-    SHUT_LOG_ODDS,
     describe,
     is_in_view,
     is_near,
@@ -25,7 +23,7 @@ from knowledge_sources.methods.doors import (
     update_door,
     weigh_leaf,
 )
-from knowledge_sources.methods.doors.belief import MAX_DOUBTED_SIGMAS, MIN_PICTURES
+from knowledge_sources.methods.doors.belief import MAX_DOUBTED_SIGMAS
 from knowledge_sources.methods.doors.leaf import (
     FOOT_STEP_M,
     JAMB_MARGIN_M,
@@ -170,18 +168,6 @@ def look(ratios: list[tuple[float, float]], *, is_shut: bool = False) -> list[Do
         known = now or known
         states.append(known)
     return states
-
-
-@given(st.lists(st.tuples(RATIOS, st.floats(0.0, 5.0)), max_size=12))
-def test_a_door_is_shut_only_at_its_odds_and_by_pictures_from_two_places(looks: list[tuple[float, float]]) -> None:
-    before: DoorState | None = None
-    for state in look(looks):
-        if state is not None:
-            assert abs(state.log_odds) <= MAX_LOG_ODDS and 0.0 <= state.certainty <= 1.0
-            if state.state == "shut" and (before is None or before.state != "shut"):
-                assert state.log_odds >= SHUT_LOG_ODDS and state.pictures >= MIN_PICTURES
-                assert state.certainty >= 0.98
-        before = state
 
 
 def test_two_pictures_shut_a_door_and_a_few_open_it_again() -> None:
