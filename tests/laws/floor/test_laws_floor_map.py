@@ -12,7 +12,6 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ideal_floor_watcher import scan_floor
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import FloorMap, Sweep, sample_sweep
 from knowledge_sources.methods.floor.floor_map import (
@@ -24,6 +23,7 @@ from knowledge_sources.methods.floor.floor_map import (
     find_blind,
     measure_blind_m,
 )
+from perfect_eye import scan_floor
 from world_models.entries import FreeFloor
 from world_models.frames import Pose2
 
