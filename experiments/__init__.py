@@ -63,6 +63,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
     "scale": {
         "agenda": "Activations per second with 10 to 1,000 pending",
         "cost": "Where the processor time of missions goes",
+        "driven-ways": "Ways told in words, driven by the camera",
         "explanations": "Missions of every scenario, explained and replayed",
         "frame-budget": "Time of perception per frame",
         "instructions": "Ways told in words: 300 drawn, 80 written by hand",

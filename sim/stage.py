@@ -125,27 +125,6 @@ def _people(scenario: Scenario, world: World, building: SimulatedBuilding, seed:
         raise scenario.refused(("walkers",), str(error)) from None
 
 
-def move_ends(stage: Stage, scenario: Scenario) -> Stage:
-    """The stage of a scenario that differs in start and goal alone, with the building that is there already.
-
-    Who looks for a mission draws many. Whether the robot has room there is not checked, as ``build_stage`` does.
-
-    Raises:
-        ScenarioError: the world has no such place.
-        ValueError: another part of the world would have to be built.
-    """
-    before = _ends(stage.scenario, stage.world)
-    start, goal = _ends(scenario, stage.world)
-    parts = [_around(stage.world, [end.locale for end in ends]) for ends in (before, (start, goal))]
-    if parts[0] != parts[1]:
-        raise ValueError(f"expected a mission in {parts[0]}, got one in {parts[1]}")
-    heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
-    start_world = replace(start, heading_rad=scenario.start.heading_rad).in_world(stage.world)
-    goal_world = replace(goal, heading_rad=heading).in_world(stage.world)
-    return replace(stage, scenario=scenario, start_world=start_world, goal_world=goal_world,
-                   put_down_world=start_world, goal_floor_m=stage.world.floor_m(goal.locale))
-
-
 def _world(scenario: Scenario) -> World:
     """Load the world with its details. Raises ScenarioError where one cannot be read."""
     try:

@@ -59,7 +59,6 @@ def _place(locale: str, x: str, y: str, z: str) -> Place:
 
 GO = re.compile(r"\s*(?:please\s+)?(?:go|drive|move|(?:bring|take|carry)\s+(?:this|it))"
                 r"(?:\s+from\s+(?P<origin>.+?))?\s+to\s+(?P<destination>.+?)\s*[.!]?\s*", re.IGNORECASE)
-FETCH = re.compile(r"\s*(?:please\s+)?(?:fetch|get)\s+(?P<what>.+?)\s*[.!]?\s*", re.IGNORECASE)
 INSIDE = re.compile(r"(?P<room>.+?)\s+(?:in|of|on)\s+(?:the\s+)?(?P<within>.+)", re.IGNORECASE)
 STOP_WORDS = frozenset(("the", "a", "an", "of", "my"))
 MAX_NAMED = 6
@@ -136,8 +135,6 @@ def parse_destination(text: str, world: World) -> Place:
 def _parse_destination(text: str) -> str:
     """The words for the room. Raises ValueError."""
     match = GO.fullmatch(text)
-    if match is None and FETCH.fullmatch(text):
-        raise ValueError(f"expected a room to go to, got {text!r}: to fetch takes an arm, which this robot has not")
     if match is not None and match["origin"] is not None:
         raise ValueError(f"expected 'Go to ROOM', as the robot goes from where it is, got {text!r}")
     words = match["destination"] if match is not None else text.strip(" .!")
@@ -149,8 +146,6 @@ def _parse_destination(text: str) -> str:
 def _parse_ends(text: str) -> tuple[str, str]:
     """The words for origin and destination. Raises ValueError."""
     match = GO.fullmatch(text)
-    if match is None and FETCH.fullmatch(text):
-        raise ValueError(f"expected a way to go, got {text!r}: to fetch takes an arm, which this robot has not")
     if match is None:
         raise ValueError("expected a goal like (ptrans (locale (x,y,z)) (locale (x,y,z))), 'Go from ROOM to ROOM' or"
                          f" 'Bring this from ROOM to SOMEBODY', got {text!r}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,16 +18,21 @@ from experiments.generated.missions import ROOM_M, ROOMS, draw_ends, draw_headin
 from sim.body.collision import Obstacles
 from sim.ground_truth.table import TrueDoor
 from sim.ground_truth.true_changes import build_leaf
-from sim.scenario import parse_scenario
-from sim.stage import Stage, build_stage, move_ends
+from sim.scenario import Scenario, parse_scenario
+from sim.stage import Stage, build_stage
 from world_models.building.locales import Doorway
 from world_models.building.world import World
+from world_models.commands import parse_command
+from world_models.frames import Pose2, flattened
 
-CASES = ("another way", "no way", "extra door", "stands open", "opens", "shuts", "ajar", "as filed")
+CASES = ("another way", "no way", "extra door", "stands open", "opens", "shuts", "ajar", "as filed", "loose leaf")
 """What differs about the doors: shut, with another way or with none; a door that the model lacks; one that stands
-open and is closed in the model; one that opens or shuts during the mission; one that is ajar, with another way."""
+open and is closed in the model; one that opens or shuts during the mission; one that is ajar, with another way; a leaf
+that stands loose before an open door or behind it, with another way."""
 WAY_MARGIN_M = 0.12
 """Free floor beside the robot on a way that counts as one."""
+LOOSE_M = 0.2, 0.6
+"""So far from its middle a loose leaf stands before an opening, or behind it."""
 OPENS_S, SHUTS_S = (20.0, 60.0), (5.0, 25.0)
 """When a door opens, or shuts."""
 MAX_DRAWS = 60
@@ -75,7 +80,7 @@ def _write_on_floor(folder: Path, seed: int, floor_seed: int, case: str) -> Door
         text = format_mission(f"A generated floor; doors: {case}.", files, ends, draw_heading_deg(rng))
         try:
             scenario = parse_scenario(text, "doors", folder)
-            stage = build_stage(scenario) if stage is None else move_ends(stage, scenario)
+            stage = build_stage(scenario) if stage is None else _move_ends(stage, scenario)
             drawn = _draw_doors(stage, floor, case, rng)
             if drawn is None:
                 continue
@@ -86,6 +91,27 @@ def _write_on_floor(folder: Path, seed: int, floor_seed: int, case: str) -> Door
         path.write_text(text + drawn[1], "utf-8")
         return DoorMission(path, drawn[0])
     return None
+
+
+def _move_ends(stage: Stage, scenario: Scenario) -> Stage:
+    """The stage of a scenario that differs in start and goal alone, with the building that is there already.
+
+    Whether the robot has room there is not checked, as ``build_stage`` does.
+
+    Raises:
+        ValueError: another part of the world would have to be built.
+    """
+    world = stage.world
+    start, goal = parse_command(scenario.goal, world)
+    parts = [{world.locale(end.locale).parent for end in ends}
+             for ends in (parse_command(stage.scenario.goal, world), (start, goal))]
+    if parts[0] != parts[1]:
+        raise ValueError(f"expected a mission in {parts[0]}, got one in {parts[1]}")
+    heading = scenario.arrival.heading_rad if scenario.arrival.matters else 0.0
+    start_world = replace(start, heading_rad=scenario.start.heading_rad).in_world(world)
+    goal_world = replace(goal, heading_rad=heading).in_world(world)
+    return replace(stage, scenario=scenario, start_world=start_world, goal_world=goal_world,
+                   put_down_world=start_world, goal_floor_m=world.floor_m(goal.locale))
 
 
 def _draw_doors(stage: Stage, floor: Floor, case: str, rng: np.random.Generator) -> tuple[str, str] | None:
@@ -114,6 +140,8 @@ def _draw_doors(stage: Stage, floor: Floor, case: str, rng: np.random.Generator)
         return None
     if case != "no way" and _is_only_way(stage.world, door, stage):
         return None
+    if case == "loose leaf":
+        return "", _draw_loose_leaf(stage.world, door, rng)
     when = {"opens": f"until_s = {rng.uniform(*OPENS_S):.1f}\n", "shuts": f"at_s = {rng.uniform(*SHUTS_S):.1f}\n"}
     state = "ajar" if case == "ajar" else "shut"
     swing = ""
@@ -154,6 +182,15 @@ def _draw_extra_door(stage: Stage, rng: np.random.Generator) -> tuple[str, str] 
     heading = math.pi if north else 0.0
     return "", (f'\n[[truth.extra]]\nkind = "door-leaf"\nlocale = "{room}"\nx_m = {x:.4f}\ny_m = {y:.4f}\n'
                 f"heading_rad = {heading:.4f}\n")
+
+
+def _draw_loose_leaf(world: World, door: Doorway, rng: np.random.Generator) -> str:
+    """A leaf along the wall that stands in one of the rooms of an open door and hides it."""
+    room = str(rng.choice(door.between))
+    stands = door.pose_from(room) @ Pose2(-float(rng.uniform(*LOOSE_M)), float(rng.uniform(-0.1, 0.1)), 0.5 * math.pi)
+    own = flattened(world.world_from_locale(room)).inverse() @ stands
+    return (f'\n[[truth.extra]]\nkind = "door-leaf"\nlocale = "{room}"\nx_m = {own.x_m:.4f}\ny_m = {own.y_m:.4f}\n'
+            f"heading_rad = {own.heading_rad:.4f}\n")
 
 
 def _draw_open_door(floor: Floor, rng: np.random.Generator) -> tuple[str, str] | None:

@@ -40,6 +40,8 @@ from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
 
 Matched = tuple[Entry[LineMatch], Entry[Milestone]]
+PUT_DOWN = "command"
+"""Basis of a belief that nothing has moved since the robot was put down."""
 
 
 class MedRAndT(RobotKnowledgeSource):
@@ -91,7 +93,8 @@ class MedRAndT(RobotKnowledgeSource):
         rests = Rests(
             match.value.lines_world[near], match.value.segments_px[near],
             [m.landmarks[m.landmark_of[i]] for i in match.value.pairs[near, 0]], robot.camera, robot.mount,
-            np.zeros(len(known)) if moved is None else moved.step, here, belief.covariance, prior, known)
+            np.zeros(len(known)) if moved is None else moved.step, here, belief.covariance,
+            None if belief.value.basis == PUT_DOWN else prior, known)
         because = match, milestone, belief.entry, *view.where(Difference, lambda d: d.about == name_model(view))
         yield Post(
             PoseFix(
@@ -110,14 +113,14 @@ class MedRAndT(RobotKnowledgeSource):
     def _weigh_model(
         self, view: View, match: Entry[LineMatch], camera: CameraState, here: Pose2, prior: Floats, errors: LineErrors
     ) -> tuple[Evidence | None, bool]:
-        """What is new of whether the model is inexact, where it is not known, and whether that is likelier than not."""
-        if not errors.is_exact or match.value.is_camera_open or len(match.value.pairs) < MIN_CAMERA_LINES:
+        """What is new of whether the model is inexact, where it is not stated, and whether it likely is."""
+        is_found = HELD.of(view).world.root_frame().is_inexact  # then what acquits it is told, too
+        if match.value.is_camera_open or len(match.value.pairs) < MIN_CAMERA_LINES or not (is_found or errors.is_exact):
             return None, False
         known = find_difference(view, name_model(view))
-        evidence = find_model_evidence(
-            match.value.lines_world, match.value.segments_px, errors, camera, here, prior, tell_time_s(view),
-            known.about)
-        if not known.counted and not is_strange(evidence):
+        evidence = find_model_evidence(match.value.lines_world, match.value.segments_px, errors, camera, here, prior,
+                                       tell_time_s(view), known.about)
+        if not (is_found or known.counted or is_strange(evidence)):
             return None, False
         return evidence, is_model_doubted((*known.counted, evidence))
 
@@ -138,11 +141,7 @@ class MedRAndT(RobotKnowledgeSource):
     ) -> PlanarEstimate:
         """The pose with a camera that is taken as it is."""
         return planar_from_lines(
-            match.lines_world,
-            match.segments_px,
-            robot.camera,
-            robot.mount.camera_from_robot,
-            here,
+            match.lines_world, match.segments_px, robot.camera, robot.mount.camera_from_robot, here,
             prior_covariance=prior,
             landmark_ids=[milestone.landmark_of[i] for i in match.pairs[:, 0]],
             sigma_px=SIGMA_ACROSS_PX,

@@ -53,7 +53,8 @@ class ThingMapper(RobotKnowledgeSource):
             if entry is None:
                 yield Post(found.obstacle, (scan,))
             else:
-                yield Revise(entry, found.obstacle, (scan, entry))
+                of = (one for one in view.all(Difference) if one.value.about == found.obstacle.name)
+                yield Revise(entry, found.obstacle, (scan, entry, *of))
 
     def _tell_of(self, view: View, scan: Entry[FreeFloor], belief: Belief) -> Sight:
         """A sight with what it is weighed by."""

@@ -41,16 +41,14 @@ from world_models.frames import Pose2
 MAX_DOUBTED_PICTURES = 3  # the nominal camera is tried too, where so few pictures corrected it, when the robot is lost
 MAX_PROBES = 8  # so many looks are taken when lost and no place fits; then the robot says that it does not know
 
-Candidates = tuple[Entry[Hypothesis], ...]
-
 
 class Localizer(RobotKnowledgeSource):
     """Keeps every place of the floor that agrees with the panorama, and says which next look tells most.
 
     Among places that look alike from here, that is on the way to a view that tells them apart, over floor that is free
     in all of them. Of such places the prior one, or the one it was tracked to, is believed if it is likely
-    enough by these odds and by the pictures. Otherwise the robot stays lost and the candidates stay on the board: it
-    never guesses.
+    enough. Otherwise the robot stays lost and the candidates stay on the board: it never guesses. Either all holds that
+    was learnt of camera and building where it was believed to be, or none of it.
     """
 
     level = closes = Level.GOAL
@@ -75,8 +73,9 @@ class Localizer(RobotKnowledgeSource):
         contacts = list_contacts(view, doubt)
         touched = [locate_contact(view, contact) for contact in contacts]
         cameras, buildings = self._list_cameras(view), self._list_buildings(view)
+        asked = [(cameras[0], buildings[0]), (cameras[-1], buildings[-1])][:max(len(cameras), len(buildings))]
         robots = [find_robot(view, camera).in_building(among).with_obstruction(obstruction).on_floor_of(locale)
-                  for camera in cameras for among in buildings]
+                  for camera, among in asked]
         what = localization.Search(looks, rooms, (locale, here), followed, touched, stated.p_prior)
         seen, which = localization.search(robots, what)
         is_last = len(looks) >= (MAX_FAR_PROBES if seen.candidates else MAX_PROBES)
@@ -95,7 +94,7 @@ class Localizer(RobotKnowledgeSource):
         step = result.next_action if result.status is localization.LocalizationStatus.PROBE else None
         probe = None if step is None else (step.turn_rad, step.move_m)
         because = (panorama, doubt, held.entry, *candidates, *contacts, *(() if hidden is None else (hidden,)))
-        found = Post(PlaceSearch(result.status.value, said, probe, which >= len(buildings)), because)
+        found = Post(PlaceSearch(result.status.value, said, probe, which >= 1 and len(cameras) > 1), because)
         yield found
         yield from (Retract(old, (found,)) for old in candidates)
         if odds is not None:
@@ -125,7 +124,7 @@ class Localizer(RobotKnowledgeSource):
         return (find_building(view),) if bare is None else (find_building(view), bare)
 
 
-def _follow(view: View, candidates: Candidates, building: FrameBuilding) -> list[tuple[str, Pose2]]:
+def _follow(view: View, candidates: Iterable[Entry[Hypothesis]], building: FrameBuilding) -> list[tuple[str, Pose2]]:
     """Room and pose of the candidates of the last search, as the robot has moved since."""
     out, actuator = [], find_robot(view).actuator
     for entry in candidates:

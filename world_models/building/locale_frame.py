@@ -193,6 +193,11 @@ class LocaleFrame:
         parts = remove_element(self.parts, change.name)
         return replace(self, parts=parts, changes=changes, filed=filed, memo={})
 
+    @property
+    def is_inexact(self) -> bool:
+        """Whether it is the building's, of which the model was found to be inexact."""
+        return any(change.what == "inexact" for change in self.changes)
+
     def restored(self, what: ChangeKind, name: str) -> LocaleFrame:
         """The frame without a change of an element: as the file says again."""
         return self.with_changes(change for change in self.changes if (change.what, change.name) != (what, name))

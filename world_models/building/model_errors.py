@@ -133,7 +133,7 @@ def find_sigma_m(building: Building, locale: str, name: str = "") -> float:
     """
     properties = building.locale(locale).properties
     sigmas: Mapping[str, float] = properties.get(SIGMAS, {})
-    found_m = INEXACT_M * any(change.what == "inexact" for change in building.root_frame().changes)
+    found_m = INEXACT_M * building.root_frame().is_inexact
     changes = building.frame(locale).changes
     beside = (change.sigma_m for change in changes if (change.what, change.name) == ("beside", name))
     return float(max(sigmas.get(name, properties.get(SIGMA, 0.0)), found_m, *beside))

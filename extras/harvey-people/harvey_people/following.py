@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from harvey_people.mover import SURE_LOG_ODDS, Mover
-from harvey_people.sightings import SIDE_M, Sighting, is_seen_free
+from harvey_people.sightings import Sighting, is_seen_free
 from world_models.entries import FreeFloor
 
 Floats = NDArray[np.float64]
@@ -22,20 +22,22 @@ TURNS_M2_PER_S3 = 0.3
 """Spectral density of the acceleration: in a second the velocity changes by some 0.5 m/s."""
 GATE = 11.8
 """Squared distance, in standard deviations, within which a sighting may be of somebody: 99.7 % of two dimensions."""
-PRIOR_LOG_ODDS = -3.0
-"""That what is seen for the first time moves: most of what a building's model lacks stands."""
+PRIOR_LOG_ODDS = -2.0
+"""That what is seen for the first time moves: where people are about, one in eight; the rest of it stands."""
 ANYWHERE_PER_M2 = 0.05
 """Density of other things that may come into sight: one on 20 square metres."""
 MOST_LOG_RATIO = 3.9
 """One sighting says no more: one in 50 is misread."""
-MOST_LOG_ODDS, LEAST_LOG_ODDS = 8.0, -5.0
+MOST_LOG_ODDS, LEAST_LOG_ODDS = 8.0, -7.0
 MAX_UNSEEN_S = 3.0
 """Whom nobody has seen for so long may be anywhere."""
+LEAST_STOOD_M = 0.1
+"""Where something stands is known no better: from elsewhere another side of it is seen."""
 SLOW_M_PER_S = 0.2
 """Who is slower stands, as far as anybody can tell."""
 
 
-class Step(NamedTuple):
+class FollowStep(NamedTuple):
     """What becomes of one mover by one sight of the floor.
 
     Attributes:
@@ -47,7 +49,7 @@ class Step(NamedTuple):
     mover: Mover
 
 
-def follow(known: Sequence[Mover], seen: Sequence[Sighting], floor: FreeFloor, numbers: int) -> list[Step]:
+def follow(known: Sequence[Mover], seen: Sequence[Sighting], floor: FreeFloor, numbers: int) -> list[FollowStep]:
     """All movers after one sight of the floor.
 
     Args:
@@ -55,10 +57,10 @@ def follow(known: Sequence[Mover], seen: Sequence[Sighting], floor: FreeFloor, n
     """
     now = [predict(mover, floor.seen_s) for mover in known]
     given = _assign(now, seen)
-    steps = [Step(k, _see(mover, seen[given[k]], floor) if k in given else _miss(mover, floor))
+    steps = [FollowStep(k, _see(mover, seen[given[k]], floor) if k in given else _miss(mover, floor))
              for k, mover in enumerate(now)]
     born = [sighting for j, sighting in enumerate(seen) if j not in given.values()]
-    return [*steps, *(Step(None, _begin(f"mover-{numbers + n}", sighting, floor))
+    return [*steps, *(FollowStep(None, _begin(f"mover-{numbers + n}", sighting, floor))
                       for n, sighting in enumerate(born, start=1))]
 
 
@@ -135,7 +137,7 @@ def _settle(mover: Mover, sighting: Sighting) -> Mover:
     weight = mover.stood_sigma_m**2 / (mover.stood_sigma_m**2 + sigma**2)
     x = mover.stood_x_m + weight * (float(sighting.place[0]) - mover.stood_x_m)
     y = mover.stood_y_m + weight * (float(sighting.place[1]) - mover.stood_y_m)
-    narrower = max(SIDE_M, sigma * math.sqrt(weight))  # from about the same place the same side is seen
+    narrower = max(LEAST_STOOD_M, sigma * math.sqrt(weight))
     return replace(mover, stood_x_m=round(x, 4), stood_y_m=round(y, 4), stood_sigma_m=round(narrower, 4))
 
 

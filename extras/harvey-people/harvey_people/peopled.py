@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -27,12 +26,22 @@ People = tuple[Pedestrian, ...]
 class PeopledRenderer(Renderer):
     """A building with people; they are joined to it only for a picture."""
 
-    people: Callable[[], tuple[Face, ...]]
+    people: People
 
     def radiance(self, camera: Camera, camera_from_world: Pose) -> NDArray[np.float32]:
         """The noiseless image (height, width, 3), RGB in 0..1."""
         still = Renderer(self.mesh, self.light, self.noise, self.samples, self.brightness)
-        return still.with_faces(self.people()).radiance(camera, camera_from_world)
+        return still.with_faces(draw(self.people)).radiance(camera, camera_from_world)
+
+
+def draw(people: People) -> tuple[Face, ...]:
+    """What is drawn of people."""
+    return tuple(face for person in people for face in person.figure.faces(person.corners(), person.floor_m))
+
+
+def people_in(building: SimulatedBuilding) -> People:
+    """Who is in a building, as of its moment."""
+    return building.renderer.people if isinstance(building.renderer, PeopledRenderer) else ()
 
 
 def people_building(still: SimulatedBuilding, people: People, now_s: float, robot: Robot | None = None,
@@ -43,14 +52,13 @@ def people_building(still: SimulatedBuilding, people: People, now_s: float, robo
         still: the building without people.
         robot: as it was at that moment, where that is known.
     """
-    here = [person for person in people if person.floor_m == still.floor_m]
-    faces = tuple(face for person in here for face in person.figure.faces(person.corners(), person.floor_m))
+    here = tuple(person for person in people if person.floor_m == still.floor_m)
     solid = np.concatenate([still.obstacles.segments_world, *(person.segments_world() for person in here)])
     base, on_floor = still.renderer, still.on_floor
     return replace(
         still, renderer=PeopledRenderer(mesh=base.mesh, light=base.light, noise=base.noise, samples=base.samples,
-                                        brightness=base.brightness, people=lambda: faces),
-        obstacles=Obstacles(solid), added=(*still.added, *faces), news=tuple(p.news for p in people if p.news),
+                                        brightness=base.brightness, people=people),
+        obstacles=Obstacles(solid), added=(*still.added, *draw(here)), news=tuple(p.news for p in people if p.news),
         on_floor=None if on_floor is None else lambda floor_m: people_building(on_floor(floor_m), people, now_s),
         at_time=partial(let_walk, still, people, now_s, robot),
     )

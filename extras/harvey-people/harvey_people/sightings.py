@@ -85,6 +85,8 @@ def _turn(floor: FreeFloor, first: int, last: int) -> float:
 
 def is_seen_free(floor: FreeFloor, place: Floats, margin_m: float) -> bool:
     """Whether a place (2,) [m, world] is seen to be free floor, by a margin on either side."""
+    if not floor.bearings_rad:
+        return False
     off = place - (floor.x_m, floor.y_m)
     bearings = np.array(floor.bearings_rad)
     apart = np.abs(np.remainder(bearings - math.atan2(off[1], off[0]) + math.pi, math.tau) - math.pi)

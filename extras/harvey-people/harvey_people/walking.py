@@ -30,6 +30,8 @@ PAST_M = ROBOT_RADIUS_M + 0.45
 """How far beside the robot's axis one passes it."""
 ASIDE_M_PER_S = 0.4
 """One whom the robot stops steps aside so fast."""
+NEAR_M = 1.2
+"""Nearer to the robot's rim than this, a person counts as near."""
 TOUCH_M = 0.01
 """Nearer than this is a touch."""
 
@@ -58,6 +60,7 @@ class Pedestrian:
         waits_until_s: stands until then.
         held_s: how long the robot has been in the way; falls again while it is not.
         news: what this person has just done to the robot, in words.
+        nearest_m, near_s: least distance from the robot's rim so far, and time within NEAR_M of it.
     """
 
     figure: Figure
@@ -74,6 +77,8 @@ class Pedestrian:
     walked_m: float = 0.0
     held_s: float = 0.0
     news: str = ""
+    nearest_m: float = math.inf
+    near_s: float = 0.0
 
     @staticmethod
     def start(
@@ -110,7 +115,11 @@ class Pedestrian:
         there = Pose2(x, y, me.pose.heading_rad + min(most, max(-most, turn)))
         moved = replace(me, pose=there, velocity=velocity,
                         walked_m=me.walked_m + speed * duration_s, held_s=max(0.0, me.held_s - duration_s), news="")
-        return moved._stop_at(me, duration_s, robot, obstacles)
+        moved = moved._stop_at(me, duration_s, robot, obstacles)
+        if robot is None:
+            return moved
+        away_m = moved.pose.distance_to(robot.pose) - ROBOT_RADIUS_M
+        return replace(moved, nearest_m=min(me.nearest_m, away_m), near_s=me.near_s + duration_s * (away_m < NEAR_M))
 
     def _take_aim(self, now_s: float) -> Pedestrian:
         """The next point where this one is reached; at an end it waits, and turns back if it walks again."""

@@ -16,6 +16,7 @@ from sim.scenario import parse_scenario
 from sim.stage import build_stage
 from world_models.entries import Course
 from world_models.frames import Pose2
+from world_models.plugins import GUESTS_GROUP
 
 MISSION = 'world = "research_center"\ngoal = "(ptrans (hallway (4,4,0)) (hallway (9,4,0)))"\n[ranges]\nsensors = 24\n'
 WALKER = ('[[walkers]]\nname = "anna"\nlocale = "hallway"\n'
@@ -23,7 +24,7 @@ WALKER = ('[[walkers]]\nname = "anna"\nlocale = "hallway"\n'
 
 
 def test_every_source_that_is_charged_for_itself_is_there() -> None:
-    assert set(CHARGED_S) <= {source.called() for source in KNOWLEDGE_SOURCES} | set(foreign_sources())
+    assert set(CHARGED_S) <= {source.called() for source in KNOWLEDGE_SOURCES} | set(foreign_sources(GUESTS_GROUP))
     assert WALKERS.charge("localizer") == CHARGED_S["localizer"] and WALKERS.charge("goal_closer") == OTHERS_S
 
 

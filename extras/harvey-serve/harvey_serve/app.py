@@ -40,7 +40,7 @@ HEADERS: Mapping[str, str] = {
 MOST_WATCHERS = 192
 """Who comes to watch when there are so many is told to come later (503); orders are heard all the same."""
 NO_TOKEN = "expected the token that was printed at the start\n"
-MOST_WORDS = 200
+MOST_WORDS = 1000
 """A goal has at most so many bytes."""
 
 
@@ -126,7 +126,7 @@ def build_app(
 
     Args:
         token: what an order must be given with, as ``Authorization: Bearer TOKEN``; "": there are no orders.
-        ask: sends the robot elsewhere, in words; raises ValueError where it cannot be.
+        ask: tells the robot something, as where to go; raises ValueError where it cannot be.
         hosts: names under which it answers; a request for any other is refused (DNS rebinding).
     """
     boards: list[Board] = []
@@ -174,7 +174,7 @@ def build_app(
             ask(text)
         except ValueError as error:
             return PlainTextResponse(f"{error}\n", 400)
-        return PlainTextResponse(f"asked to go: {text}\n")
+        return PlainTextResponse(f"told: {text}\n")
 
     orders = [Route("/orders/{order}", order, methods=["POST"]), Route("/goal", go, methods=["POST"])] if token else []
     return Starlette(

@@ -78,6 +78,7 @@ source.addEventListener("message", (event) => {
   byId("belief").textContent = run.belief === null ? "It has no belief yet." : `${why}${run.belief.ref}: ${run.belief.says}`;
   byId("candidates").replaceChildren(...run.candidates.map((one) =>
     element("li", {}, `may stand at ${one.place}, weight ${one.weight.toFixed(2)}; ${one.evidence}`)));
+  byId("said").replaceChildren(...run.said.map((one) => element("li", {}, `It ${one}`)));
   document.querySelector("#milestones tbody").replaceChildren(...run.milestones.map((one) => {
     const row = cells(`${one.id}: ${one.what}`, one.status);
     row.lastElementChild.className = one.status.replace(" ", "-");
@@ -122,6 +123,8 @@ document.addEventListener("click", (event) => {
   const order = event.target.closest("button[data-order]")?.dataset.order;
   if (order === "stop") stop();
   else if (order !== undefined) post(`/orders/${order}`, null, "answer");
+  const words = event.target.closest("button[data-say]")?.dataset.say;
+  if (words !== undefined) post("/goal", words, "goal-answer");
 });
 byId("go").addEventListener("submit", (event) => {
   event.preventDefault();

@@ -19,6 +19,8 @@ from world_models.building.world import World
 from world_models.camera import Camera
 from world_models.commands import parse_destination
 from world_models.entries import GO_ON
+from world_models.files.toml.mission import TASK_READER
+from world_models.plugins import SOURCES_GROUP, list_absent
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,7 @@ class LivePage:
         teller: tells it to go elsewhere.
         world: the building.
         part: the locale outside which nothing was built; "" for none.
+        hears_all: whether any words are put on the board, where tasks are read and answered, not only places.
     """
 
     live: LiveState
@@ -38,19 +41,30 @@ class LivePage:
     teller: LiveTeller
     world: World
     part: str = ""
+    hears_all: bool = False
 
     def guard(self, body: Body, tick: Callable[[], None] = do_nothing) -> Body:
         """The body behind the gate; ``tick`` is called while the run is paused."""
         return GatedBody(body, self.gate, tick)
 
     def ask(self, text: str) -> None:
-        """Send the robot elsewhere, or on after a stop. Raises ValueError: it has ended, or no such place."""
+        """Tell the robot where to go, or to go on; or any task or answer, as ``harvey tell`` does.
+
+        Raises:
+            ValueError: it has ended, there is no such place, or these words are for nobody.
+        """
         if self.live.ended:
             raise ValueError("expected a run that goes on, got one that has ended")
         if text.strip().lower() == GO_ON:
             self.teller.hear(GO_ON)
             return
-        place = parse_destination(text, self.world)
+        try:
+            place = parse_destination(text, self.world)
+        except ValueError:
+            if not self.hears_all:
+                raise
+            self.teller.hear(" ".join(text.split()))  # the board answers it
+            return
         if self.part and self.part not in self.world.path_of(place.locale):
             raise ValueError(f"expected a room in {self.part}, as only that is simulated here, got {place.locale}")
         if self.world.locale_at(place.in_world(self.world).position) is None:
@@ -71,7 +85,8 @@ def open_page(
         part: as of :class:`LivePage`.
         token: of who may order anything, where there is a gate; "" for a new one.
     """
-    page = LivePage(LiveState(world, camera), gate or Gate(), LiveTeller(), world, part)
+    hears_all = TASK_READER not in list_absent(SOURCES_GROUP)
+    page = LivePage(LiveState(world, camera), gate or Gate(), LiveTeller(), world, part, hears_all)
     token = "" if gate is None else token or secrets.token_urlsafe()
     host, port = listening.getsockname()
     app = build_app(page.live, page.gate, world, title=title, token=token, hosts=(*LOCAL_HOSTS, host),

@@ -22,10 +22,11 @@ from world_models.entries import (
     Milestone,
     PlanSketch,
     PoseFix,
+    Redirection,
     Segments,
 )
 
-DECISIONS, MILESTONES = 12, 12
+DECISIONS, MILESTONES, SAID = 12, 12, 3
 """So many of the last are shown."""
 TRAIL, TRAIL_STEP_M = 500, 0.1
 """So many of the last places, so far from one another, are kept."""
@@ -68,6 +69,7 @@ class LiveState:
         self._lines: dict[str, Any] = {}
         self._goal: Entry[Goal] | None = None
         self._sketches: dict[str, PlanSketch] = {}
+        self._said: dict[str, Redirection] = {}
         self._doubts: dict[str, Discrepancy] = {}
         self._trail: deque[tuple[str, float, float]] = deque(maxlen=TRAIL)
         self.ended = ""
@@ -121,6 +123,7 @@ class LiveState:
             "belief": belief, "candidates": candidates, "picture": self._draw_picture(),
             "milestones": [{"id": id, "what": one.what, "status": one.status}
                            for id, one in self._milestones.items()],
+            "said": [one.sentence() for one in self._said.values()],
             "decisions": [_row(decision) for decision in self._decisions],
         }
         return json.dumps(contents, separators=(",", ":"))
@@ -150,6 +153,10 @@ class LiveState:
             self._milestones[entry.id] = value
             while len(self._milestones) > MILESTONES:
                 del self._milestones[next(iter(self._milestones))]
+        elif isinstance(value, Redirection):
+            self._said[entry.id] = value
+            while len(self._said) > SAID:
+                del self._said[next(iter(self._said))]
         elif isinstance(value, CameraPicture):
             self._frame = entry
             self._lines = {}

@@ -112,8 +112,8 @@ COMMAND = CliCommand(
     ),
     _arguments, _run,
     "The page shows the camera's picture, the plan with the belief and its ellipse, candidates, milestones and the\n"
-    "last decisions with what they rest on. Who has the first address, with the token, can also send the robot\n"
-    "elsewhere ('Go to the library'), pause, resume and stop; who has the second can only watch. A stop ends the run\n"
+    "last decisions with what they rest on. Who has the first address, with the token, can also tell the robot\n"
+    "what to do ('Go to the library'), pause, resume and stop; who has the second can only watch. A stop ends the run\n"
     "as the stop key of a robot does: its files are whole. harvey drive --serve does the same for a robot.\n"
     "Exit code 0: the goal was reached; 1: it was not, or the run was stopped; 2: the input cannot be used.",
 )

@@ -62,12 +62,12 @@ def test_it_is_watched_sent_elsewhere_paused_and_stopped(
         assert page.get_by_role("button", name="Pause").is_visible() and page.locator("#only-watching").is_hidden()
         assert other.get_by_role("button").count() == 0 and other.locator("#only-watching").is_visible()
 
-        page.get_by_label("Send it elsewhere").fill("Go to the attic")
-        page.get_by_role("button", name="Go", exact=True).click()
-        page.locator("#goal-answer", has_text="answers to 'the attic'").wait_for()
-        page.get_by_label("Send it elsewhere").fill("(hallway (12,4,0))")
+        page.get_by_label("Tell it").fill("Go to the attic")
+        page.get_by_role("button", name="Tell", exact=True).click()
+        page.locator("#goal-answer", has_text="the attic").wait_for()
+        page.get_by_label("Tell it").fill("(hallway (12,4,0))")
         page.keyboard.press("Enter")
-        page.locator("#goal-answer", has_text="asked to go: (hallway (12,4,0))").wait_for()
+        page.locator("#goal-answer", has_text="told: (hallway (12,4,0))").wait_for()
 
         page.get_by_role("button", name="Resume").click()
         for watcher in (page, other):

@@ -28,7 +28,7 @@ def test_from_its_page_a_robot_is_sent_elsewhere_paused_and_resumed(tmp_path: Pa
             assert order("orders/pause") == "paused\n"
             with urllib.request.urlopen(f"{address[1]}events") as events:
                 assert any(b'"state":"paused"' in line for line in events)
-            assert order("goal", b"(hallway (7,4,0))") == "asked to go: (hallway (7,4,0))\n"
+            assert order("goal", b"(hallway (7,4,0))") == "told: (hallway (7,4,0))\n"
             assert order("orders/resume") == "running\n"
             driving.communicate()
         finally:

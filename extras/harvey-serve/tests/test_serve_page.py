@@ -7,6 +7,7 @@ import socket
 import threading
 import urllib.request
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ from world_models.entries import (
     MotionReport,
     Place,
     PlanSketch,
+    Redirection,
     Subgoal,
     diagonal,
 )
@@ -160,6 +162,8 @@ def test_a_watcher_is_told_where_it_was_where_it_goes_and_that_it_is_lost() -> N
     moved = [bench.revise(held, locale_from_robot=Pose2(x, 2.0, 0.0)) for x in (1.05, 1.2)]
     told = tell(*map(Revised, moved), Revised(bench.revise(doubt, status="corrected")))
     assert told["lost"] == "" and len(told["trail"]) == 2
+    said = tell(*(Posted(bench.put(Redirection("done", answer=f"answer {number}"))) for number in range(5)))["said"]
+    assert [one[-8:] for one in said] == ["answer 2", "answer 3", "answer 4"]
     gone = [Revised(bench.revise(entry, status="done")) for entry in bench.view.all(PlanSketch)]
     assert tell(*gone)["way"] == []
 
@@ -167,7 +171,7 @@ def test_a_watcher_is_told_where_it_was_where_it_goes_and_that_it_is_lost() -> N
 def test_who_has_the_token_sends_it_elsewhere(page: Page, client: TestClient) -> None:
     for words, told in (("Go to the kitchen", "Go to the kitchen"), (" the \u00d6fen ", "the \u00d6fen")):
         answer = client.post("/goal", headers=BEARER, content=words.encode())
-        assert (answer.status_code, answer.text) == (200, f"asked to go: {told}\n") and page.asked.pop() == told
+        assert (answer.status_code, answer.text) == (200, f"told: {told}\n") and page.asked.pop() == told
 
 
 @pytest.mark.parametrize(("words", "wanted"), [
@@ -206,6 +210,8 @@ def test_where_it_cannot_go_it_is_not_sent(text: str, part: str, wanted: str) ->
         live.ask(text)
     live.ask(" Go on")
     assert teller._said.get_nowait().text == "go on"
+    replace(live, part="", hears_all=True).ask("Fetch the  book")
+    assert teller._said.get_nowait().text == "Fetch the book"
     ended = LivePage(page.live, page.gate, teller, load_world(FLAT))
     page.live.take()
     with pytest.raises(ValueError, match="one that has ended"):

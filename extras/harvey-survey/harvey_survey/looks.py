@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from knowledge_sources.methods.calibration import compute_camera_covariance
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
 from logs.run_head import RunHead
@@ -54,10 +55,11 @@ class Look:
         run: digest of the journal; cycle: of the certificate.
         pose: ``world_from_robot`` by this picture. covariance: (3, 3) of it.
         camera, mount: with which that was found; the height of the mount is above the world's plan z = 0.
+        camera_covariance: (7, 7) of them, over :data:`~world_models.camera.CAMERA_UNKNOWNS`.
         marks: (m) the landmark of each line; numbers: (m,) its number in the landmark.
         pieces_world: (m, 2, 3) the visible pieces, where the file has them [m].
         found, hidden: (m,) masks: which were found; and which stand behind something that the run has found there.
-        pairs: (p,) index of the line. segments_px: (p, 2, 2).
+        pairs: (p,) index of the line. segments_px: (p, 2, 2). every_px: (s, 2, 2) all segments of the picture.
         brightness, contrast: of the picture, 0..255.
     """
 
@@ -68,6 +70,7 @@ class Look:
     covariance: Floats
     camera: Camera
     mount: CameraMount
+    camera_covariance: Floats
     marks: tuple[Landmark, ...]
     numbers: NDArray[np.int64]
     pieces_world: Floats
@@ -75,6 +78,7 @@ class Look:
     hidden: NDArray[np.bool_]
     pairs: NDArray[np.int64]
     segments_px: Floats
+    every_px: Floats
     brightness: float
     contrast: float
 
@@ -154,10 +158,11 @@ class _Reader:
         pieces = np.array(found_pieces)
         yield Look(
             self.run, cycle, self.held.locale, fix.world_from_robot, np.asarray(fix.covariance), camera.pinhole, mount,
+            compute_camera_covariance(self.camera),
             tuple(marks), np.array(numbers, np.int64), pieces, np.asarray(match.coverage)[list(lines)] > FOUND,
             self._find_hidden(fix.world_from_robot, pieces),
             np.array([place[int(match.pairs[k, 0])] for k in pairs], np.int64), match.segments_px[pairs],
-            segments.brightness, segments.contrast)
+            segments.segments_px, segments.brightness, segments.contrast)
 
     def _find_line(self, milestone: Milestone, i: int) -> tuple[Landmark, int, Floats] | None:
         """Of which line an expected piece is one, and where it is by the file; None where that is not known."""

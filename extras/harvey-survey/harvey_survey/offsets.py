@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,6 +35,44 @@ def measure_offsets(look: Look, pose: Pose2, camera_step: Floats, pieces_world: 
     along = ends[:, 1] - ends[:, 0]
     across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
     return np.asarray(np.einsum("pei,pi->pe", look.segments_px - ends[:, :1], across))
+
+
+def match_again(look: Look, pose: Pose2, camera_step: Floats, pieces_world: Floats, within_px: float) -> Look:
+    """The look with each of its segments paired with the line that it lies on, and with no other.
+
+    Args:
+        pieces_world: (m, 2, 3) where the visible piece of each expected line is [m].
+        within_px: both ends of a segment lie no further beside its line.
+    """
+    off, shared, lengths, _ = _lay_beside(look, pose, camera_step, pieces_world)
+    off = np.where(shared > 0.5 * lengths, off, np.inf)
+    nearest = np.argmin(off, axis=0)
+    kept = np.flatnonzero(off[nearest, np.arange(off.shape[1])] < within_px)
+    return replace(look, pairs=nearest[kept], segments_px=look.every_px[kept])
+
+
+def measure_support(look: Look, pose: Pose2, camera_step: Floats, pieces_world: Floats, within_px: float) -> float:
+    """How many of the lines (m, 2, 3) segments lie on, each by the part of its length on which they do."""
+    off, shared, _, line_px = _lay_beside(look, pose, camera_step, pieces_world)
+    covered = np.sum(np.where(off < within_px, np.maximum(shared, 0.0), 0.0), axis=1)
+    return float(np.sum(np.minimum(1.0, covered / line_px)))
+
+
+def _lay_beside(
+    look: Look, pose: Pose2, camera_step: Floats, pieces_world: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Of m lines and s segments: how far a segment's further end lies beside the line, and what length they share
+    (m, s); the lengths along the line of the segments (m, s), and of the lines (m,) [px]."""
+    camera, mount = move_camera(look.camera, look.mount, camera_step)
+    ends = camera.project((mount.camera_from_robot @ pose.lifted().inverse()).apply(pieces_world))
+    along = ends[:, 1] - ends[:, 0]
+    line_px = np.linalg.norm(along, axis=1)
+    along = along / line_px[:, None]
+    to = look.every_px[None] - ends[:, None, :1]
+    off = np.abs(to[..., 1] * along[:, None, None, 0] - to[..., 0] * along[:, None, None, 1]).max(axis=2)
+    at = np.sort(np.einsum("msei,mi->mse", to, along), axis=2)
+    shared = np.minimum(at[..., 1], line_px[:, None]) - np.maximum(at[..., 0], 0.0)
+    return off, shared, at[..., 1] - at[..., 0], line_px
 
 
 def measure_slopes(look: Look, pose: Pose2, camera_step: Floats, pieces_world: Floats) -> tuple[Floats, Floats]:

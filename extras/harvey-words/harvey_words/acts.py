@@ -27,7 +27,6 @@ class _Reader:
     last_stretch: ThingWords | None = None
     wants_orient: bool = False
     goes_on: bool = False
-    ended: str = ""
     side: str = ""
     goals: list[Act] = field(default_factory=list)
     notes_on: bool = False
@@ -39,7 +38,7 @@ class _Reader:
         verbs |= {"be"} if verbs & {"with", "meet", "there", "stand"} else set()
         things, ways, wheres = self._collect(parts, verbs)
         begun, before = len(self.acts), self.acts[-1] if self.acts else None
-        if (self.goes_on and self.ended == "and" and not verbs and things and self.acts[-1].until is None
+        if (self.goes_on and not verbs and things and self.acts[-1].until is None
                 and 0 < len(self.acts[-1].past) < MOST_PASSED):
             last, more = self.acts[-1], things[0]
             self.acts[-1] = (replace(last, units=more.number or 1) if "unit" in more.heads
@@ -50,11 +49,9 @@ class _Reader:
             self.goals += [Act("see", what=one) for one in (*things, *(one for _, one in wheres)) if one.names]
         elif "exit" in verbs:
             self._exit(things, ways, wheres)
-        elif things and self.acts and self.acts[-1].sort == "go" and self.acts[-1].until and (
+        elif things and self._is_walk_told([], []) and (
                 (self.notes_on and not verbs) or verbs in ({"note"}, {"pass"})):
-            self._note_before(things)
-        elif things and verbs == {"pass"} and self.goes_on and self._is_walk_told([], []):
-            self._note_before(things)  # "two blocks, over the crossing with the lamp"
+            self._note_before(things)  # "to the chair, over the crossing with the lamp"
         elif ("note" in verbs or (self.notes_on and not verbs)) and things:
             self.acts += [Act("note", what=thing) for thing in things]
         elif self._is_posture(parts, verbs):
@@ -88,10 +85,10 @@ class _Reader:
             self._state(things, ways, wheres, verbs)
         else:
             self._terse(things, ways, wheres)
-        self.goes_on = clause.end in ("and", "comma") and bool(self.acts) and self.acts[-1].sort == "go"
+        self.goes_on = clause.end == "and" and bool(self.acts) and self.acts[-1].sort == "go"
         begun = len(self.acts) if begun and self.acts[-1] is before else begun
         self.notes_on = clause.end == "and" and bool(self.acts) and (self.notes_on or self.acts[-1].sort == "note")
-        self.wants_orient, self.ended = clause.end == "so", clause.end
+        self.wants_orient = clause.end == "so"
         if parts:
             text = " ".join(word.text for part in parts for word in part.words) or " ".join(verbs)
             self.acts[begun:] = [replace(act, text=text) for act in self.acts[begun:]]
@@ -116,7 +113,7 @@ class _Reader:
                         *things[-1].relations, *self._relation(part.meaning, part.words)))
                 else:
                     if part.words or part.meaning != "at":
-                        wheres.append((part.meaning, describe(part.words) if part.words else self._it()))
+                        wheres.append((part.meaning, self._describe(part.meaning, part.words)))
                         target, located = None, True
                         continue
             elif part.sort == "where" and located and side in SIDES:
@@ -160,7 +157,12 @@ class _Reader:
         cut = [index for index, word in enumerate(words) if word.meaning == "&"]
         if meaning == "between" and cut:
             return ((meaning, describe(words[:cut[0]])), (meaning, describe(words[cut[0] + 1:])))
-        return ((meaning, describe(words)),) if words else ()
+        return ((meaning, self._describe(meaning, words)),) if words else ()
+
+    def _describe(self, meaning: str, words: Sequence[Word]) -> ThingWords:
+        """What follows a preposition: ``past it`` is past what was named in a clause before."""
+        is_it = meaning in RELATIONS and all(word.meaning == "it" for word in words)
+        return describe(words) if words and not is_it else self._it()
 
     # -- the sorts of clauses ----------------------------------------------------------------------------------------
 
@@ -216,10 +218,6 @@ class _Reader:
         number = next((thing.number for thing in things if thing.number and not blocks), 0)
         if way == "" and hall is not None and hall.side != "ahead":
             way = hall.side
-        last = self.acts[-1] if self.acts else Act("")
-        if last == Act("turn", last.way, text=last.text) and not way and hall is not None:
-            way = last.way  # "right, through the brick hall"
-            self.acts.pop()
         self.acts.append(Act("turn", way, along=hall, until=at[0] if at and way else None, past=past if way else (),
                              units=number if not halls else 0))
         rest = [(meaning, one) for meaning, one in wheres
@@ -319,9 +317,6 @@ class _Reader:
         elif "see" in verbs and things and not self.acts:
             self._orient(things, ways, wheres)
             return
-        elif not things and side and self.acts and self.acts[-1].sort == "go" and self.acts[-1].until:
-            until = self.acts[-1].until  # "the pink hall, which will be on your right"
-            self.acts[-1] = replace(self.acts[-1], until=replace(until, side=until.side or side))
         elif not things and (related or side):
             self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), side=side, relations=related)))
         ended = next((one for meaning, one in wheres if meaning in ("at", "in") and "end" in one.heads), None)
@@ -441,9 +436,6 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     for clause in ordered:
         reader.read(clause)
     reader.acts += reader.goals
-    last = reader.acts[-1] if reader.acts else Act("")
-    if last.sort == "turn" and last.along is not None and not last.way:
-        reader.acts.append(replace(last, sort="go"))  # "take the blue hall", and no more
     if not any(act.sort in ("find", "exit", "turn", "go") for act in reader.acts):  # a goal, and no way
         goal = next((index for index, act in enumerate(reader.acts) if act.sort == "see" and act.what
                      and act.what.names), None)

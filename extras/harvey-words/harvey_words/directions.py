@@ -162,19 +162,15 @@ class _Teller:
 
     def _tell_sides(self, state: State) -> Iterator[str]:
         """What lies to the sides and behind, where it is nowhere else."""
-        ways = self.follower.ways(state)
+        halls = {way: self.follower.hall_ahead(replace(state, heading=way)).meanings
+                 for way in self.follower.ways(state)}
         for side, turn in SIDES.items():
-            there = replace(state, heading=turned(state.heading, turn))
-            others = [self.follower.hall_ahead(replace(state, heading=way)).meanings
-                      for way in ways if not is_along(way, there.heading)]
-            place = "behind you" if side == "behind" else f"on your {side}"
-            if any(is_along(way, there.heading) for way in ways):
-                for word in self._words(self.follower.hall_ahead(there).meanings, others):
-                    yield f"Turn so that the {word} hall is {place}."
-            elif len(ways) == len(SIDES):
-                yield f"Turn so that the wall is {place}."
-            for _, name in self._things(there):
-                yield f"Turn so that the {name} is {place}."
+            there, place = state.heading + turn, "behind you" if side == "behind" else f"on your {side}"
+            for way in (way for way in halls if is_along(way, there)):
+                others = [meanings for other, meanings in halls.items() if other != way]
+                yield from (f"Turn so that the {word} hall is {place}." for word in self._words(halls[way], others))
+            things = self._things(replace(state, heading=turned(there, 0.0)))
+            yield from (f"Turn so that the {name} is {place}." for _, name in things)
 
     def _tell_walk(self, state: State, leg: WayLeg, onward: WayLeg | None) -> Wordings:
         """How far: to a thing, to a hall that leaves, so many blocks, to the end."""
@@ -191,7 +187,6 @@ class _Teller:
             taken = self.follower.hall_ahead(State(*onward.begin, onward.heading))
             said += [f"Go on to the {word} hall." for word in self._words(
                 taken.meanings, [self.follower.hall_ahead(state).meanings])]
-        said += [f"{one[:-1]}, past the {name}." for one in said[:2] for name in self._passed(state, length)]
         metres = max(1, round(length))
         into_hall = [""] if state.came and onward is not None and length < OUT_M else []
         return [*into_hall, *said, *([""] if onward is not None and said else []),
@@ -248,9 +243,6 @@ class _Teller:
 
     def _marks(self, state: State, length: float) -> list[str]:
         return [name for sight, name in self._things(state) if abs(sight.ahead_m - length) < HERE_M]
-
-    def _passed(self, state: State, length: float) -> list[str]:
-        return [name for sight, name in self._things(state) if 0.0 < sight.ahead_m < length - HERE_M][:2]
 
     def _marks_before(self, state: State, row: Sequence[NamedSight], rank: int) -> list[str]:
         """Things between a door and the one before it."""

@@ -55,8 +55,6 @@ class WordMatcher:
     def fit_area(self, what: ThingWords, area: Area, senses: Senses) -> tuple[float, Senses]:
         """How well a hall or room fits."""
         score = 0.0
-        if what.is_stretch and not area.is_hall:
-            score += MISFIT
         for word in what.names:
             own, taken = self._fit_word(word, area.meanings, area.colours, _kind(area), senses, id(area))
             if own < INSIDE and word.sort != "MOD":

@@ -13,6 +13,7 @@ from knowledge_sources.reads import NOT_ENDED, NOT_LOST
 from world_models.entries import Goal, Impasse, Milestone, MotionReport, Outcome, Recovery
 
 MOST_WAITED_S = 600.0  # so long it waits for somebody who is asked to help
+SEEN = "was seen"
 Case = tuple[Entry[ToldTask], int, Entry[Any]]
 """A task, the number of its step that is under way, and what happened."""
 
@@ -41,7 +42,7 @@ class StepCloser(KnowledgeSource):
         step, goal = task.value.steps[number], view.get(getattr(cause.value, "goal", ""))
         is_ours = {MotionReport: step.place is not None and 0.0 < step.due_s < find_time_s(view),
                    Recovery: step.place is None and getattr(cause.value, "fault", "") == task.id,
-                   Milestone: step.mark in getattr(cause.value, "landmarks", ()) and not _is_seen(step),
+                   Milestone: step.mark in getattr(cause.value, "landmarks", ()) and SEEN not in step.note,
                    Impasse: goal is not None and goal.value.is_active}.get(type(cause.value), True)
         return (task, number, cause) if is_ours else None
 
@@ -53,7 +54,7 @@ class StepCloser(KnowledgeSource):
         task, number, cause = case
         if isinstance(cause.value, Milestone):
             step = task.value.steps[number]
-            note = f"{step.mark} was seen" + f"; {step.note}" * bool(step.note)
+            note = f"{step.mark} {SEEN}" + f"; {step.note}" * bool(step.note)
             yield Revise(task, task.value.with_step(number, note=note), (task, cause))
             return
         changes = _find_changes(task.value.steps[number], cause.value, find_time_s(view))
@@ -72,10 +73,6 @@ class StepCloser(KnowledgeSource):
         if not ended.value.is_active and not (all(done) and isinstance(cause.value, Goal)):
             said = f"{sum(done)} of {len(done)} steps were done; {ended.value.sentence()}"
             yield Post(Outcome("reached" if all(done) else "blocked", said), (ended,))
-
-
-def _is_seen(step: Step) -> bool:
-    return step.note.startswith(f"{step.mark} was seen")
 
 
 def _find_changes(step: Step, cause: Any, now_s: float) -> dict[str, Any] | None:

@@ -41,17 +41,16 @@ class Step:
     is_told: bool = False
     mark: str = ""
 
-    def tell(self) -> tuple[str, str, str]:
-        """What is done in words and in conceptual dependency, and what it waits for."""
+    def tell(self) -> tuple[str, str]:
+        """What is done, in words and in conceptual dependency."""
         room, span = self.place.locale if self.place else self.phrase, f"{self.wait_s:g} s" if self.wait_s else "a word"
         by = f" by {self.mark}" * bool(self.mark)
         other = f", or where no way leads there to {self.instead.locale}" if self.instead else ""
         return {
-            "ptrans": (f"go to {room}{by}{other}", f"(ptrans robot {self.place or room})",
-                       f"the last milestone of {room}"),
-            "grasp": (f"have {self.what} loaded", f"(grasp helper {self.what})", f"somebody who loads {self.what}"),
-            "atrans": (f"hand over {self.what}", f"(atrans {self.what} robot helper)", f"a taker of {self.what}"),
-            "attend": (f"wait for {span}", f"(attend robot {span})", span)}[self.act]
+            "ptrans": (f"go to {room}{by}{other}", f"(ptrans robot {self.place or room})"),
+            "grasp": (f"have {self.what} loaded", f"(grasp helper {self.what})"),
+            "atrans": (f"hand over {self.what}", f"(atrans {self.what} robot helper)"),
+            "attend": (f"wait for {span}", f"(attend robot {span})")}[self.act]
 
 
 @inference(keep=2, when=lambda task: not task.is_active)

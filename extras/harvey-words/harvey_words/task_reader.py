@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import takewhile
 
 from blackboard import Change, Effect, Entry, KnowledgeSource, Level, Post, Posted, Revise, View, Watch
 from harvey_words.task_entries import Step, ToldTask, active_task, find_time_s
@@ -30,12 +31,13 @@ class TaskReader(KnowledgeSource):
 
     def bind(self, view: View, trigger: Change) -> Entry[Redirection] | None:
         """What was said first and is not answered yet; one place, on the way, is left to the goal changer."""
-        said = next(iter(view.where(Redirection, lambda asked: not asked.answer)), None)
-        is_ours = said is not None and (active_task(view) or not _is_plain(said.value.text) or _is_first(view, said))
-        return said if is_ours else None
+        return next((said for said in _list_unanswered(view) if active_task(view) or not _is_plain(said.value.text)
+                     or _is_first(view, said)), None)
 
     def act(self, view: View, case: Entry[Redirection]) -> Iterable[Effect]:
         said, task, belief = case.value, active_task(view), HELD.of(view)
+        for earlier in takewhile(lambda one: one.id != case.id, _list_unanswered(view)):
+            yield Revise(earlier, replace(earlier.value, answer="but was asked again since"), (earlier, case))
         wait = view.latest(Recovery, lambda one: task is not None and one.fault == task.id and one.status != "over")
         if wait is not None and is_word_to_go_on(said.text):
             answer = Revise(case, replace(said, answer="and goes on with its task"), (case, wait))
@@ -57,6 +59,10 @@ class TaskReader(KnowledgeSource):
         if task is not None:
             yield Revise(task, replace(task.value, status="given up"), (answer, task))
         yield Post(new, (answer, belief.entry))
+
+
+def _list_unanswered(view: View) -> Sequence[Entry[Redirection]]:
+    return view.where(Redirection, lambda asked: not asked.answer)
 
 
 def _is_first(view: View, said: Entry[Redirection]) -> bool:

@@ -37,8 +37,8 @@ def read_way(building: FrameBuilding, text: str, here: Place) -> list[Step]:
         TaskWordsError: it is not sure where the way leads; names the likeliest places and what did not fit.
         MissingEntryError: frames of the building are needed.
     """
-    part = next(name for name in building.path_of(here.locale) if _is_small(building, name))
-    rooms = tuple(list_rooms(building, part))
+    parts = ((name, tuple(list_rooms(building, name))) for name in building.path_of(here.locale)[:-1])
+    part, rooms = next((name, rooms) for name, rooms in parts if len(rooms) <= MOST_ROOMS)
     building.require(rooms)
     plan = building.cached("words", 1, part, lambda: WordMap(_take_part(building, part, rooms)))
     begin = here.in_world(building)
@@ -69,10 +69,6 @@ def list_rooms(building: FrameBuilding, container: str) -> Iterator[str]:
     """The rooms in a container; only the frames of containers are read."""
     for child in building.frame(container).children:
         yield from [child.name] if child.is_room else list_rooms(building, child.name)
-
-
-def _is_small(building: FrameBuilding, part: str) -> bool:
-    return 0 < sum(1 for _ in list_rooms(building, part)) <= MOST_ROOMS
 
 
 def _take_part(building: FrameBuilding, part: str, rooms: tuple[str, ...]) -> World:

@@ -18,8 +18,6 @@ OPEN_ONLY = -1.8
 """That only open doors were counted."""
 BEHIND = 1.5
 """Off for a thing that lies behind when the walk begins, where a door after it is meant."""
-SHUT = -0.5
-"""A shut door without a name, as a goal: people are sent to rooms."""
 OPPOSITE_M = 0.3
 """What is hardly further along than the door one comes out of lies opposite, and is not counted."""
 
@@ -92,8 +90,6 @@ class WordDoors(WordSights):
         """Words, side, rank and relations of a door, together."""
         assert sight.feature is not None
         cost, senses = self.match.fit(what, sight.feature, state.senses)
-        if not what.names and not sight.feature.is_open:
-            cost += SHUT
         side = self.side_of(state, what.side)
         sided = side in ("left", "right") or what.side == "ahead"
         if sided and sight.side != (side or "ahead"):
@@ -149,8 +145,6 @@ class WordDoors(WordSights):
             if mark.feature is None or mark.feature.sort == "opening" or mark is sight:
                 continue
             fit, _ = self.match.fit(other, mark.feature, state.senses)
-            if fit <= MISFIT:
-                continue
             gap = sight.ahead_m - mark.ahead_m
             walked_m = offsets(state.begun or state.at, state.heading, mark.feature.at)[0]
             if walked_m > 0.0 and fit > -1.0:

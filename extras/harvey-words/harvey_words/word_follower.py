@@ -15,7 +15,7 @@ from harvey_words.told_acts import COMPASS, Act, ThingWords
 from harvey_words.word_doors import WordDoors
 from harvey_words.word_map import is_along, moved, turned
 from harvey_words.word_places import HERE_M, POINTS, TURNS, UNSAID_EXIT, UNSAID_WALK, State, best_of
-from harvey_words.word_sights import AGAIN, MISCOUNT, MISSED, NO_WAY, NOT_SEEN, WRONG_COUNT
+from harvey_words.word_sights import AGAIN, MISSED, NO_WAY, NOT_SEEN, WRONG_COUNT
 
 BEAM, DEEP = 80, 14.0
 """Hypotheses that are followed on after an act; none is whose log odds are so far below those of the best."""
@@ -168,19 +168,15 @@ class WordFollower(WordDoors):
         return replace(state, locale=locale, at=moved(state.at, state.heading, metres))
 
     def _count(self, state: State, act: Act) -> Iterator[State]:
-        """So many places on; what only leads straight on counts, or else only what is seen to be a crossing does."""
-        for through in (True, False):
-            nodes = self.nodes(state, through)
-            if not through and len(nodes) == len(self.nodes(state, True)):
-                return
-            price = 0.0 if through else MISCOUNT
-            if len(nodes) >= act.units:
-                yield replace(self.stand(state, nodes[act.units - 1]), odds=state.odds + price)
-            elif nodes:
-                yield replace(self.stand(state, nodes[-1]), odds=state.odds + price + MISSED)
-            if act.until is not None and act.until.names and through:
-                for new in self.reach(state, act.until):
-                    yield replace(new, odds=new.odds + WRONG_COUNT)
+        """So many places on; what only leads straight on counts."""
+        nodes = self.nodes(state, through=True)
+        if len(nodes) >= act.units:
+            yield self.stand(state, nodes[act.units - 1])
+        elif nodes:
+            yield replace(self.stand(state, nodes[-1]), odds=state.odds + MISSED)
+        if act.until is not None and act.until.names:
+            for new in self.reach(state, act.until):
+                yield replace(new, odds=new.odds + WRONG_COUNT)
 
     def _pass(self, state: State, what: ThingWords) -> Iterator[State]:
         """Beyond what is passed."""

@@ -177,9 +177,8 @@ class WordMap:
             faces = self._surfaces.get(thing.name, [])
             short = thing.name.rpartition("/")[2]
             words = self.lexicon.meanings(f"{thing.kind} , {short} , {said.get(short, '')}") | _textures(faces)
-            yield NamedFeature(thing.name, "thing", name, (x, y), self._toward_wall(areas[name], (x, y),
-                                                                                    thing.protrusion_m),
-                          words, words, _colours(faces), own_kind=thing.kind)
+            yield NamedFeature(thing.name, "thing", name, (x, y), None, words, words, _colours(faces),
+                               own_kind=thing.kind)
 
     def _shut_door(self, locale: str, leaf: Face, said: Mapping[str, str]) -> NamedFeature:
         short = leaf.name.split("/")[1]
@@ -190,15 +189,6 @@ class WordMap:
         words = self.lexicon.meanings(f"{short} {said.get(short, '')}") | _textures(faces)
         return NamedFeature(short, "door", locale, (x, y), math.atan2(-normal[1], -normal[0]), words, words,
                        _colours(faces))
-
-    def _toward_wall(self, area: Area, at: Point, protrusion_m: float | None) -> float | None:
-        """The direction to the nearest wall of what hangs or stands at one."""
-        if protrusion_m is None:
-            return None
-        ahead, left = offsets(area.middle, area.axis, at)
-        gaps = {0.0: area.half[0] - ahead, math.pi: area.half[0] + ahead,
-                math.pi / 2: area.half[1] - left, -math.pi / 2: area.half[1] + left}
-        return turned(area.axis, min(gaps, key=lambda turn: gaps[turn]))
 
     # -- looking ---------------------------------------------------------------------------------------------------
 

@@ -60,12 +60,6 @@ class WordSights(WordPlaces):
             if side not in TURNS or is_along(way, state.heading + TURNS[side]):
                 fit = self.match.fit_area(what, self.hall_ahead(replace(state, heading=way)), state.senses)
                 best = max(best, fit, key=lambda pair: pair[0])
-        if what.is_stretch and what.heads:
-            looking = replace(state, heading=turned(state.heading, TURNS.get(side, 0.0)))
-            for node in self.nodes(looking) if what.names else ():
-                own, senses = self._fit_sight(looking, node, what)
-                best = max(best, (own - 0.7 - 0.02 * node.ahead_m, senses), key=lambda pair: pair[0])
-            return best
         far = side in ("ahead", "behind", "left", "right") or not self.area(state).is_hall
         looking = replace(state, heading=turned(state.heading, TURNS.get(side, 0.0))) if side in TURNS else state
         for sight in self.sights(looking):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -13,9 +14,9 @@ from hypothesis import strategies as st
 
 from harvey.cli import main
 from harvey_words import Reading, RouteError, read_route, write_directions
-from harvey_words.experiments.instructions import draw_routes, read_paragraphs, run
-from harvey_words.experiments.mazes import HALLS, THINGS, write_maze
-from harvey_words.experiments.told_routes import tell_maze
+from harvey_words.experiments.instructions import PARAGRAPHS, draw_routes, read_paragraphs, run
+from harvey_words.experiments.mazes import Hall, Node, write_maze
+from harvey_words.experiments.told_routes import draw_maze, tell_maze
 from harvey_words.lexicon import Lexicon, lexicon_data
 from harvey_words.word_map import WordMap
 from world_models.files.toml.source import Source
@@ -31,13 +32,19 @@ def centre() -> WordMap:
 
 
 @cache
-def maze(mirrored: bool = False) -> WordMap:
-    """The maze, or its mirror image with west for east."""
-    def flip(node: tuple[int, int]) -> tuple[int, int]:
+def maze() -> WordMap:
+    return WordMap(load_world(PARAGRAPHS.with_name("maze.toml")))
+
+
+@cache
+def drawn_maze(seed: int, mirrored: bool) -> tuple[Sequence[Hall], dict[Node, str], WordMap]:
+    """A maze, or its mirror image with west for east."""
+    def flip(node: Node) -> Node:
         return (3 - node[0], node[1]) if mirrored else node
-    halls = [(flip(one), flip(two), floor, picture) for one, two, floor, picture in HALLS]
-    text = write_maze(halls, {flip(node): kind for node, kind in THINGS.items()})
-    return WordMap(read_world(Source.parse(text, "maze")))
+    drawn, things = draw_maze(np.random.default_rng(seed))
+    halls = [(flip(one), flip(two), floor, picture) for one, two, floor, picture in drawn]
+    text = write_maze(halls, {flip(node): kind for node, kind in things.items()})
+    return halls, things, WordMap(read_world(Source.parse(text, "maze")))
 
 
 def end_of(reading: Reading) -> str:
@@ -53,6 +60,8 @@ def end_of(reading: Reading) -> str:
     ("It is the door between the fountain and the fire hose.", "library"),
     ("Go right, past the vending machine. Allen's office is after the machine room.", "allens-office"),
     ("go to the library", "library"),
+    ("When you come out of the lab the students are the first door on the right if you turn right.", "graduate-office"),
+    ("Turn right coming out. On your left, second open door.", "machine-room"),
 ])
 def test_a_way_from_the_laboratory(text: str, end: str) -> None:
     reading = read_route(text, centre(), LAB)
@@ -91,11 +100,11 @@ def test_paraphrases_read_the_same(words: tuple[str, ...], loud: bool) -> None:
 @SPEEDY
 @given(st.integers(0, 10**6))
 def test_left_for_right_in_a_mirrored_maze_ends_at_the_mirrored_place(seed: int) -> None:
-    told = tell_maze(HALLS, dict(THINGS), np.random.default_rng(seed))
+    (halls, things, plan), (_, _, mirror) = drawn_maze(seed % 3, False), drawn_maze(seed % 3, True)
+    told = tell_maze(halls, things, np.random.default_rng(seed))
     other = told.text.replace("left", "?").replace("right", "left").replace("?", "right")
     x, y = told.start.split("-")[1:]
-    one, mirrored = (read_route(told.text, maze(), told.start),
-                     read_route(other, maze(mirrored=True), f"c-{3 - int(x)}-{y}"))
+    one, mirrored = read_route(told.text, plan, told.start), read_route(other, mirror, f"c-{3 - int(x)}-{y}")
     assert one.end is not None and mirrored.end is not None
     assert one.end.odds == pytest.approx(mirrored.end.odds, abs=1e-6)
     if one.is_understood:
@@ -182,9 +191,10 @@ def test_the_experiment_reads_routes_and_paragraphs() -> None:
     assert len(list(read_paragraphs())) == 80
     report = run(quick=True, seed=3)
     assert all(claim[1] for claim in report.claims) and report.rows[0][1] == 30 and report.rows[1][1] == 80
-    name, texts, arrive, *_, elsewhere, _ = report.rows[3]
-    assert name == "of development" and isinstance(arrive, int) and isinstance(elsewhere, int)
-    assert texts == 197 and arrive >= 0.9 * 197 and elsewhere <= 0.04 * 197
+    for row, count, least in zip(report.rows[3:5], (197, 80), (0.9, 0.8), strict=True):
+        name, texts, arrive, *_, elsewhere, _ = row
+        assert "of development" in str(name) and isinstance(arrive, int) and isinstance(elsewhere, int)
+        assert texts == count and arrive >= least * count and elsewhere <= 0.04 * count
 
 
 # -- directions ------------------------------------------------------------------------------------------------------
@@ -202,7 +212,7 @@ def test_directions_lead_there_when_they_are_read_again(start: str, goal: str) -
 
 
 @pytest.mark.parametrize(("start", "goal", "world", "code", "says"), [
-    (LAB, "library", "research_center", 0, "It is the next door on the right."),
+    (LAB, "library", "research_center", 0, "door on the right."),
     ("library", LAB, "research_center", 0, "Turn left."),
     ("reception", "archive", "two_ways", 0, "Leave the room"),
     (LAB, "nowhere", "research_center", 2, ""),

@@ -35,6 +35,19 @@ def test_what_is_not_understood_is_named(text: str) -> None:
         read_wanted(text)
 
 
+@pytest.mark.parametrize(("text", "places", "told"), [
+    ("go to the lab, then turn left and it is the second door", ["lab"], ["turn left and it is the second door"]),
+    ("Fetch the book, then turn left, second door", ["home of", "", "start"], ["turn left, second door"]),
+    ("Leave the lab. Go past the sign. Then come back.", ["start"], ["Leave the lab. Go past the sign"]),
+    ("Take the teal door and go to the end", [], ["Take the teal door and go to the end"]),
+    ("Go to the north hall and take the book to Allen", ["north hall", "home of", "", "allen", ""], []),
+])
+def test_a_way_in_a_task_is_told_apart_from_places(text: str, places: list[str], told: list[str]) -> None:
+    steps = read_wanted(text)
+    assert [step.phrase for step in steps if not step.is_told] == places
+    assert [step.phrase for step in steps if step.is_told] == told
+
+
 @given(st.text(max_size=10_000) | st.lists(st.sampled_from(str(TEXTS).split())).map(" ".join))
 def test_no_text_raises_anything_else(text: str) -> None:
     try:
@@ -65,11 +78,12 @@ def test_the_scenario_of_the_readme_is_read() -> None:
 
 
 def test_a_task_is_done_replayed_and_gone_on_with(tmp_path: Path) -> None:
-    said = "Wait for a word, then go to the north hall, then come back within 1 second"
+    said = "Wait for a word, then leave by the rust door and walk to the fire hose, then come back within 1 second"
     mission = parse_scenario(f'world = "two_ways"\ngoal = "(ptrans (reception (15,12,0)) (archive (9,6,0)))"\n'
                              f'task = "{said}"\nstart.put_down_sigma_m = 0.03\n[[helper]]\nroom = "reception"\n')
     whole = harvey.run(mission, out=tmp_path / "whole")
-    assert whole.outcome == "blocked" and "2 of 3 steps were done" in whole.reason and whole.final_error_m is not None
+    assert whole.outcome == "blocked" and "3 of 4 steps were done" in whole.reason and whole.final_error_m is not None
+    assert "hose" in whole.reason and "was seen" in whole.reason
     assert harvey.open_run(tmp_path / "whole").replay() is None
     cut = cut_off(RunDirectory(tmp_path / "whole"), tmp_path / "cut", 12)
     assert resume_mission(cut, find_remains(cut)).reason == whole.reason

@@ -2,7 +2,7 @@
 
 In reading order:
 
-* :mod:`rival_views`: how well a leaf explains what is seen, what is beyond, and a leaf that is ajar;
+* :mod:`rival_views`: how well a leaf explains what is seen, and what is beyond;
 * :mod:`leaf`: the part of a picture that looks through a doorway; is what the model has beyond seen there, or a leaf?
 * :mod:`belief`: from the pictures of a door to its state; does a shut door explain a picture that is not as expected?
 """

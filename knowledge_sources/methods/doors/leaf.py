@@ -2,7 +2,7 @@
 
 Light is not modelled, so that only ratios of colors count: what is beyond has the model's colors up to one gain. A leaf
 has one color from its foot to its head, whatever that is; and where the floor beyond should be seen at the foot of the
-opening, there is more of the leaf.
+opening, there is more of the leaf. Where its foot is seen before the wall or behind it, a leaf stands there.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from world_models.camera import NEAR_PLANE_M
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 
-MAX_DISTANCE_M = 7.0  # largest distance of a doorway that is looked at
+MAX_DISTANCE_M = 5.0  # largest distance of a doorway that is looked at: there a row is 5 cm of the floor
 MIN_AWAY_M = 0.5  # least distance of the camera from the plane of the opening
 MIN_SINE = 0.35  # least sine of the angle at which the opening is seen
 MIN_WIDTH_PX = 20.0  # least width of an opening in the picture
@@ -36,6 +36,10 @@ JAMB_MARGIN_M = 0.05  # distance that samples keep from jambs, head and floor
 MARGIN_SIGMAS = 2.0  # standard deviations of the pose that are added to that distance
 MIN_SAMPLES = 40  # fewest samples by which an opening is judged
 
+FOOT_REACH_M, FOOT_STEP_M = 1.0, 0.05
+"""So far before an opening, and behind it, the foot of a leaf is looked for, in such steps of the floor."""
+FOOT_ACROSS = (0.3, 0.4, 0.5, 0.6, 0.7)
+"""Parts of the opening's width through which that floor is looked at."""
 NOTHING = shapely.Polygon()
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom [px]."""
@@ -56,6 +60,8 @@ class SeenOpening:
         is_whole: (n,) whether the model has the same surface all round the sample.
         sine: of the angle at which it is seen, 1 from the front.
         frame_pixels: (k, 2) samples of what is round the opening: casing and wall; frame_colors: (k, 3) of the model.
+        foot_pixels: (m, 2) samples of the floor before the opening and behind it; foot_off_m: (m,) how far behind the
+            wall each is, negative before it, 0 within it and what the pose leaves open.
     """
 
     box_px: Box
@@ -67,7 +73,9 @@ class SeenOpening:
     is_whole: Mask
     frame_pixels: Floats
     frame_colors: Floats
-    sine: float = 1.0
+    sine: float
+    foot_pixels: Floats
+    foot_off_m: Floats
 
 
 def is_in_view(
@@ -138,7 +146,25 @@ def predict_opening(
     is_whole = np.all(np.abs(look - look[:, :1]) < 1e-4, axis=(1, 2))
     frame = beside[mine] & clear & is_whole & (depth[mine] < first_m[mine] + OWN_SURFACE_M)
     return SeenOpening(box, distance_m, pixels[free, 0], across[mine][free], height_m[mine][free], known[mine][free],
-                       is_whole[free], pixels[frame, 0], known[mine][frame], sine)
+                       is_whole[free], pixels[frame, 0], known[mine][frame], sine,
+                       *_list_foot(robot, camera_from_world, doorway, locale, margin_m))
+
+
+def _list_foot(
+    robot: RobotModel, camera_from_world: Pose, doorway: Doorway, locale: str, margin_m: float
+) -> tuple[Floats, Floats]:
+    """The floor before an opening and behind it that is seen through its middle: pixels, and how far off its wall."""
+    (left, right), outward = doorway.threshold_of(locale), doorway.outward_from(locale)
+    eye = camera_from_world.inverse().translation[:2]
+    deep = np.tile(np.arange(-FOOT_REACH_M, FOOT_REACH_M + doorway.depth_m, FOOT_STEP_M), len(FOOT_ACROSS))
+    through = np.repeat(left + np.outer(FOOT_ACROSS, right - left), len(deep) // len(FOOT_ACROSS), axis=0)
+    floor = eye + (1.0 + deep / ((left - eye) @ outward))[:, None] * (through - eye)
+    near = camera_from_world.apply(np.column_stack([floor, np.full(len(floor), robot.world.floor_m(locale))]))
+    ahead = near[:, 2] > NEAR_PLANE_M
+    pixels, off_m = robot.camera.project(near[ahead]), deep - np.clip(deep, -margin_m, doorway.depth_m + margin_m)
+    size = np.array([robot.camera.width, robot.camera.height]) - 1.0
+    in_view = np.all((pixels >= BORDER_PX) & (pixels <= size - BORDER_PX), axis=1)
+    return pixels[in_view], off_m[ahead][in_view]
 
 
 def _find_box(
@@ -217,12 +243,13 @@ MAX_LEAF_TINT = 0.08  # largest difference of log color, without brightness, wit
 MAX_GAIN_BRIGHTNESS = 0.15  # largest difference of log brightness from the model's, up to one gain
 MAX_GAIN_TINT = 0.06  # largest difference of log color, without brightness, from the model's, up to one gain
 FOOT_M = 0.35  # height of what counts as the foot of an opening
+MIN_FOOT_TOLD = 0.9  # least share of the floor's samples that tell where a leaf's foot is
 MIN_FOOT_SAMPLES = 8  # fewest samples at the foot, and above it, by which both compare
 MIN_FRAME_SAMPLES = 12  # fewest samples round an opening that show whether something stands before it
 MIN_FRAME_SHARE = 0.6  # least share of them that has the model's color, up to one gain, where nothing stands before it
 MAX_FRAME_LEAF_SHARE = 0.4  # largest share of them that has the color of the opening, where that is a leaf
 MIN_LEAF_SINE = 0.6  # least sine of the angle at which a leaf differs from an open doorway: 37 degrees
-MAX_RIVAL_BETTER = 0.15  # most by which a rival may explain it better [mean log]; chosen on floors 7000 to 7407
+MAX_RIVAL_BETTER = 0.15  # most by which what is beyond may explain it better [mean log]; chosen on floors 7000 to 7407
 MAX_LOG_RATIO = 4.5  # most that one picture may add to the log odds of a door: 90 to 1
 
 MAX_COMPARED = 60
@@ -234,20 +261,18 @@ class LeafEvidence:
     """What a picture says of an opening.
 
     Attributes:
-        samples: number of samples; compared: of those for which the model has a color.
         uniform: largest share of all samples that have one color, 0..1.
         expected_uniform: the same share of what the model has beyond.
-        agreeing: largest share of the compared samples that have the model's color, up to one gain.
+        agreeing: largest share of those that the model has a color for that have that, up to one gain.
         foot: log ratio of the colors at the foot of the opening and above it; NaN where one is not in view.
         expected_foot: the same of what the model has beyond.
         frame: share of the samples round the opening that have the model's color, 0..1; NaN where there are too few.
         frame_leaf: share of them that has the opening's own color.
         sine: of the angle at which the opening is seen, 1 from the front.
-        views: how badly a leaf explains the opening, and its rivals.
+        views: how badly a leaf explains the opening, and what is beyond.
+        foot_off_m: how far behind its wall, or before it (negative), the foot of the leaf is seen; NaN where it is not.
     """
 
-    samples: int
-    compared: int
     uniform: float
     expected_uniform: float
     agreeing: float
@@ -257,6 +282,7 @@ class LeafEvidence:
     frame_leaf: float
     sine: float = 1.0
     views: Views = ALIKE
+    foot_off_m: float = math.nan
 
     @property
     def features(self) -> tuple[float, ...]:
@@ -272,8 +298,6 @@ class LeafEvidence:
 
 
 FULL_FOOT, ALIKE_FOOT, LEAST_UNIFORM = 0.3, 0.2, 0.7
-FEATURES = ("one color", "one color where several are expected", "several colors", "as expected",
-            "as expected where several are", "no floor beyond", "another color at the foot", "bias")
 WEIGHTS = (4.04, 1.33, -3.65, -7.24, -1.59, 2.18, -1.03, 4.79)
 """Of each of the features: logistic regression on 2,305 rendered pictures of doors of generated floors (seeds 2000 to
 2109), a third of them with a thing near the door. Of 1,039 open doors none had log odds above 3."""
@@ -286,12 +310,13 @@ def measure_opening(
     bright: all that is overexposed has one color.
     """
     lens = robot.lens
-    pixels = np.concatenate([opening.pixels, opening.frame_pixels])
+    pixels = np.concatenate([opening.pixels, opening.frame_pixels, opening.foot_pixels])
     at = pixels if lens == robot.camera else lens.project(robot.camera.rays(pixels))
     height, width = image.shape[:2]
     part = (at + 0.5) / (lens.width, lens.height) * (width, height)
     column, row = np.clip(part.astype(np.int64), 0, (width - 1, height - 1)).T
-    seen, around = np.split(cv2.blur(image, (3, 3))[row, column].astype(np.float64), [len(opening.pixels)])
+    seen, around, floor = np.split(cv2.blur(image, (3, 3))[row, column].astype(np.float64),
+                                   np.cumsum([len(opening.pixels), len(opening.frame_pixels)]))
     is_exposed = seen.max(axis=1) <= MAX_GREY
     if np.median(seen) < MIN_GREY or is_exposed.mean() < MIN_EXPOSED_SHARE:
         return None
@@ -300,18 +325,18 @@ def measure_opening(
     if np.count_nonzero(compared) < MIN_COMPARED:
         return None
     expected = np.log(255.0 * opening.colors[compared] + DARK_OFFSET)
-    frame, frame_leaf = _compare_frame(
-        np.log(around + DARK_OFFSET), opening.frame_colors, np.median(colors, axis=0))
+    leaf = np.median(colors, axis=0)
+    frame, frame_leaf = _compare_frame(np.log(around + DARK_OFFSET), opening.frame_colors, leaf)
     one, other = MAX_LEAF_BRIGHTNESS, MAX_LEAF_TINT
     surfaces = np.unique(np.round(opening.colors[compared], 3), axis=0, return_inverse=True)[1].ravel()
     views = fit_views(colors[compared], surfaces, opening.across[compared], opening.height_m[compared])
     return LeafEvidence(
-        len(colors), len(expected),
         find_largest_share(colors, one, other), find_largest_share(expected, one, other),
         find_largest_share(colors[compared] - expected, MAX_GAIN_BRIGHTNESS, MAX_GAIN_TINT),
         _compare_foot(colors, opening.height_m),
         _compare_foot(expected, opening.height_m[compared]),
         frame, frame_leaf, opening.sine, views,
+        _find_foot(np.log(floor + DARK_OFFSET), opening, leaf),
     )
 
 
@@ -332,6 +357,27 @@ def _compare_foot(logs: Floats, height_m: Floats) -> float:
     return float(np.abs(np.median(low, axis=0) - np.median(high, axis=0)).max())
 
 
+def _find_foot(logs: Floats, opening: SeenOpening, leaf: Floats) -> float:
+    """Where the floor, of log colors (m, 3), ends and a leaf of a log color begins; NaN where nothing tells them apart.
+    """
+    is_leaf = _are_alike(logs, leaf)
+    if min(np.sum(is_leaf), np.sum(~is_leaf)) < MIN_FOOT_SAMPLES:
+        return math.nan
+    floor = np.median(logs[~is_leaf], axis=0)
+    is_leaf = np.linalg.norm(logs - leaf, axis=1) < np.linalg.norm(logs - floor, axis=1)
+    places = np.unique(opening.foot_off_m)
+    told = [np.mean((opening.foot_off_m >= place) == is_leaf) for place in places]
+    return float(places[np.argmax(told)]) if max(told) >= MIN_FOOT_TOLD else math.nan
+
+
+def _are_alike(logs: Floats, leaf: Floats) -> Mask:
+    """Which log colors (n, 3) a leaf may have that has a color."""
+    off = logs - leaf
+    level = off.mean(axis=1)
+    tint = np.abs(off - level[:, None]).max(axis=1)
+    return np.asarray((np.abs(level) <= MAX_LEAF_BRIGHTNESS) & (tint <= MAX_LEAF_TINT))
+
+
 def _compare_frame(seen: Floats, colors: Floats, leaf: Floats) -> tuple[float, float]:
     """The shares of what is round an opening that have the model's color and the opening's own; NaN without samples."""
     known = ~np.isnan(colors[:, 0])
@@ -339,11 +385,7 @@ def _compare_frame(seen: Floats, colors: Floats, leaf: Floats) -> tuple[float, f
         return math.nan, math.nan
     expected = np.log(255.0 * colors[known] + DARK_OFFSET)
     agreeing = find_largest_share(seen[known] - expected, MAX_GAIN_BRIGHTNESS, MAX_GAIN_TINT)
-    off = seen - leaf
-    level = off.mean(axis=1)
-    tint = np.abs(off - level[:, None]).max(axis=1)
-    alike = (np.abs(level) <= MAX_LEAF_BRIGHTNESS) & (tint <= MAX_LEAF_TINT)
-    return agreeing, float(alike.mean())
+    return agreeing, float(_are_alike(seen, leaf).mean())
 
 
 def weigh_leaf(evidence: LeafEvidence) -> float:
@@ -352,19 +394,14 @@ def weigh_leaf(evidence: LeafEvidence) -> float:
     A leaf stands in its frame: where what is round the opening is not as the model has it, or has the color of the
     opening, something may stand before it. And nothing supports a leaf seen diagonally: an open doorway shows but
     its jamb and a bare wall from there. What a rival explains better says nothing: what is beyond, in other colors than
-    the model has; or a leaf that is ajar, which is neither shut nor open.
+    the model has; or a leaf that stands there, loose or ajar: its foot is seen before the wall or behind it.
     """
-    ratio, (shut, opened, ajar) = float(np.dot(evidence.features, WEIGHTS)), evidence.views
-    if ratio > 0.0 and not (is_framed(evidence) and evidence.sine >= MIN_LEAF_SINE):
-        return 0.0
-    if (shut - opened if ratio > 0.0 else opened - ajar) > MAX_RIVAL_BETTER:
+    ratio, (shut, opened) = float(np.dot(evidence.features, WEIGHTS)), evidence.views
+    is_framed = evidence.frame >= MIN_FRAME_SHARE and evidence.frame_leaf <= MAX_FRAME_LEAF_SHARE
+    is_other = shut - opened > MAX_RIVAL_BETTER or abs(evidence.foot_off_m) > FOOT_STEP_M
+    if ratio > 0.0 and (is_other or not is_framed or evidence.sine < MIN_LEAF_SINE):
         return 0.0
     return min(max(ratio, -MAX_LOG_RATIO), MAX_LOG_RATIO)
-
-
-def is_framed(evidence: LeafEvidence) -> bool:
-    """Whether the opening is seen in its frame of casing and wall."""
-    return evidence.frame >= MIN_FRAME_SHARE and evidence.frame_leaf <= MAX_FRAME_LEAF_SHARE
 
 
 def describe(evidence: LeafEvidence, ratio: float) -> str:

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from knowledge_sources.methods.belief import PRIORS_BESIDE, weigh_rivals
 from knowledge_sources.methods.floor.footprints import measure_change_m
 from world_models.building.changes import find_along, outline_door
 from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
 from world_models.building.locales import Doorway
 from world_models.building.model_errors import INEXACT_M, Side
 from world_models.entries import DOOR_STATES, Difference, DoorState, Obstacle, UserReport
+from world_models.entries.difference import SURE
 
 MIN_BESIDE_SIGMAS = 3.0
 """What stands beside is drawn there from so many standard deviations on."""
@@ -51,23 +51,21 @@ def revise_by_door(frame: LocaleFrame, door: DoorState, by: str) -> LocaleFrame:
     return frame.restored("shut", door.door) if door.state == "open" and is_shut else frame
 
 
-def revise_by_difference(frame: LocaleFrame, by: str, *, is_explained: bool) -> LocaleFrame:
-    """The building's frame, whose model is surely inexact; or as filed, where a wall that is redrawn explains it."""
-    is_known = any(change.what == "inexact" for change in frame.changes)
-    if is_explained:
-        return frame.restored("inexact", frame.name) if is_known else frame
-    return frame if is_known else frame.changed(FrameChange("inexact", frame.name, by))
+def revise_by_difference(frame: LocaleFrame, found: Difference, by: str) -> LocaleFrame:
+    """The building's frame, whose model is surely inexact, or surely as it was measured; else the same frame."""
+    what = found.leader
+    if what.p < SURE or what.kind != ("chance" if frame.is_inexact else "wall"):
+        return frame
+    change = FrameChange("inexact", frame.name, by)
+    return frame.restored("inexact", frame.name) if frame.is_inexact else frame.changed(change)
 
 
-def redraw_door(frame: LocaleFrame, door: Doorway, found: Difference, by: str, *, are_beside: bool) -> LocaleFrame:
+def redraw_door(frame: LocaleFrame, door: Doorway, found: Difference, by: str) -> LocaleFrame:
     """A frame in which a door stands where it was surely found, or where the file has it again; else the same frame.
 
     Args:
         door: as the file has it.
-        are_beside: whether the doors of the building surely stand beside: then one in its place is the exception.
     """
-    if are_beside:
-        found = weigh_rivals(found.about, found.counted, PRIORS_BESIDE)
     known, jamb = next((c for c in frame.changes if (c.what, c.name) == ("beside", door.name)), None), found.leader
     if found.is_sure and jamb.kind == "jamb":
         if abs(jamb.off) < MIN_BESIDE_SIGMAS * jamb.sigma or jamb.sigma > MAX_BESIDE_SIGMA_M:

@@ -10,8 +10,8 @@ apart is in it: a pose that rests on one wall alone is no surer than what was be
 One thing is a landmark, all that is on one side, what is near or what is far; and the belief. A side and a landmark are
 held against the belief as it is stated: the model is false there, and the belief is not. What is near or far is held
 against a loosened belief: lines that were taken for their neighbours come with a belief that was pushed, and they
-disagree with depth. The camera's own state is an unknown beside the pose, with what is known of it. How much the lines
-scatter is taken from the picture itself.
+disagree with depth. A robot that was only just put down was not pushed. The camera's own state is an unknown beside the
+pose, with what is known of it. How much the lines scatter is taken from the picture itself.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ class Rests(NamedTuple):
     Attributes:
         lines_world: (n, 2, 3) [m] of the lines that agree; segments_px: (n, 2, 2); landmarks: n names.
         camera, mount: as it was solved for; step: (7,) from what was believed of it.
-        belief: before; covariance: (3, 3) of it over (x, y, heading), as stated; loosened: as the prior of the pose.
+        belief: before; covariance: (3, 3) of it over (x, y, heading), as stated; loosened: as it may have been pushed;
+            None: it was not.
         camera_covariance: (7, 7) of what was believed of the camera.
         seen_from: where the robot was when it saw each line, as looks of one turn round; none: at the pose itself.
     """
@@ -60,7 +61,7 @@ class Rests(NamedTuple):
     step: Floats
     belief: Pose2
     covariance: Floats
-    loosened: Floats
+    loosened: Floats | None
     camera_covariance: Floats
     seen_from: Sequence[Pose2] = ()
 
@@ -74,8 +75,9 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
     hessians = np.einsum("nea,neb->nab", slopes, slopes) / variance
     gradients = np.einsum("nea,ne->na", slopes, distances) / variance
     offset = np.concatenate([pose.minus(rests.belief), rests.step])[FREE]
+    known = STATED_FACTOR * rests.covariance + LEAST
     stated, loosened = (build_information(prior, rests.camera_covariance)[np.ix_(FREE, FREE)]
-                        for prior in (STATED_FACTOR * rests.covariance + LEAST, rests.loosened))
+                        for prior in (known, known if rests.loosened is None else rests.loosened))
     camera = np.array(loosened)
     camera[:POSE, :POSE] = 0.0
     everything = np.ones(len(distances), bool)

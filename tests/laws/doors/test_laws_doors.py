@@ -27,6 +27,7 @@ from knowledge_sources.methods.doors import (
 )
 from knowledge_sources.methods.doors.belief import MAX_DOUBTED_SIGMAS, MIN_PICTURES
 from knowledge_sources.methods.doors.leaf import (
+    FOOT_STEP_M,
     JAMB_MARGIN_M,
     MAX_DISTANCE_M,
     MAX_LOG_RATIO,
@@ -37,8 +38,11 @@ from knowledge_sources.methods.doors.leaf import (
 )
 from knowledge_sources.methods.doors.rival_views import Views
 from knowledge_sources.methods.features import read_picture
+from sim.body.simulated_building import SimulatedBuilding
+from sim.ground_truth.things import build_thing
+from sim.render.sensor import SensorParameters, expose
 from world_models.entries import DoorPicture, DoorState, Hypothesis, diagonal
-from world_models.frames import Pose2, wrap_angle
+from world_models.frames import Pose, Pose2, wrap_angle
 
 SURE = np.diag([0.01**2, 0.01**2, 0.005**2])
 RATIOS = st.floats(-MAX_LOG_RATIO, MAX_LOG_RATIO)
@@ -54,7 +58,7 @@ def weigh(pose: Pose2, is_shut: bool, gain: float = 1.0) -> float | None:
 
 
 @pytest.mark.parametrize("gain", [0.5, 1.0])
-@pytest.mark.parametrize(("away_m", "aside_m"), [(1.6, 0.2), (2.5, -0.3), (4.0, 0.4), (5.5, 0.0)])
+@pytest.mark.parametrize(("away_m", "aside_m"), [(1.6, 0.2), (2.5, -0.3), (4.0, 0.4), (4.8, 0.0)])
 def test_a_leaf_is_told_from_what_is_beyond_in_any_light(away_m: float, aside_m: float, gain: float) -> None:
     pose = before_door(away_m, aside_m)
     shut, opened = (weigh(pose, is_shut, gain) for is_shut in (True, False))
@@ -96,6 +100,22 @@ def test_what_stands_before_an_opening_is_no_leaf_of_it(aside_m: float, is_hidde
     assert opening is None if is_hidden else np.array_equal(opening.pixels, plain.pixels)  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize("before_m", [0.0, 0.25, 0.7, -0.5])
+def test_a_leaf_that_stands_before_an_opening_or_behind_it_is_none_of_its_door(before_m: float) -> None:
+    """Its foot is seen on the floor elsewhere than in the wall, where that of the door's own leaf is."""
+    pose, at = before_door(2.6, 0.3), DOORWAY.pose_from(HALL) @ Pose2(-before_m, 0.0, 0.5 * math.pi)
+    stands = Pose.from_rotation_vector(np.array([0.0, 0.0, at.heading_rad]), np.array([at.x_m, at.y_m, 0.0]))
+    leaf = build_thing("door-leaf", "loose", HALL, stands)
+    seen = SimulatedBuilding.of_faces([*WORLD.faces, *leaf]).renderer.radiance(
+        ROBOT.lens, ROBOT.camera_from_world(pose))
+    image = expose(seen, SensorParameters(), np.random.default_rng(1), lights_on=True)
+    opening = predict_opening(ROBOT, pose, SURE, DOORWAY, HALL, WORLD)
+    evidence = None if opening is None else measure_opening(ROBOT, opening, image[::2, ::2])
+    assert evidence is not None and (weigh_leaf(evidence) > 0.0) is (before_m == 0.0)
+    off_m = 0.0 if before_m == 0.0 else -before_m - math.copysign(0.1, -before_m)  # but for the wall, and the pose
+    assert evidence.foot_off_m == pytest.approx(off_m, abs=0.1)
+
+
 def test_a_wall_where_the_door_should_be_is_no_leaf() -> None:
     """A robot that is elsewhere sees no frame where it expects it."""
     pose = before_door(2.5, 0.0)
@@ -129,7 +149,7 @@ def test_the_largest_share_is_at_least_one_sample_and_the_same_in_any_light(
 def test_one_picture_says_no_more_than_it_may_and_nothing_for_a_leaf_without_a_frame(
     uniform: float, expected: float, agreeing: float, foot: float, expected_foot: float, frame: float, own: float
 ) -> None:
-    evidence = LeafEvidence(200, 150, uniform, expected, agreeing, foot, expected_foot, frame, own)
+    evidence = LeafEvidence(uniform, expected, agreeing, foot, expected_foot, frame, own)
     ratio = weigh_leaf(evidence)
     assert abs(ratio) <= MAX_LOG_RATIO
     assert weigh_leaf(replace(evidence, frame=math.nan)) <= 0.0
@@ -192,7 +212,7 @@ def test_an_overexposed_opening_says_nothing(is_shut: bool) -> None:
     assert weigh(before_door(2.0, 0.0), is_shut, gain=9.0) is None
 
 
-LEAF = LeafEvidence(200, 150, 1.0, 0.5, 0.0, 0.0, 1.0, 1.0, 0.0)
+LEAF = LeafEvidence(1.0, 0.5, 0.0, 0.0, 1.0, 1.0, 0.0)
 """All of one color where several and the floor are expected, in its frame, from the front."""
 
 
@@ -212,12 +232,11 @@ SEEN_OPEN = replace(LEAF, uniform=0.5, agreeing=1.0, foot=1.0)
 
 @pytest.mark.parametrize("off", [1e-6, -1e-6])
 def test_what_a_rival_explains_better_says_nothing(off: float) -> None:
-    """For a leaf, where what is beyond explains it better; for an open doorway, where a leaf that is ajar does."""
+    """For a leaf, where what is beyond explains it better, or its foot is not seen in its wall."""
     better, told = MAX_RIVAL_BETTER + off, off < 0.0
-    assert (weigh_leaf(replace(LEAF, views=Views(0.0, -better, 0.0))) > 0.0) is told
-    assert (weigh_leaf(replace(SEEN_OPEN, views=Views(0.0, 0.0, -better))) < 0.0) is told
-    assert weigh_leaf(replace(LEAF, views=Views(0.0, 0.0, -better))) > 0.0  # ajar is as little open
-    assert weigh_leaf(replace(SEEN_OPEN, views=Views(0.0, -better, -better))) < 0.0
+    assert (weigh_leaf(replace(LEAF, views=Views(0.0, -better))) > 0.0) is told
+    assert all((weigh_leaf(replace(LEAF, foot_off_m=side * (FOOT_STEP_M + off))) > 0.0) is told for side in (-1, 1))
+    assert weigh_leaf(replace(SEEN_OPEN, views=Views(0.0, -better), foot_off_m=1.0)) < 0.0
 
 
 def see(known: DoorState | None, ratio: float, x_m: float, heading_rad: float = 0.0) -> DoorState | None:

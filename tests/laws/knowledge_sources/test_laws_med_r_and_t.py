@@ -43,14 +43,14 @@ offs = st.builds(Pose2, st.floats(-0.06, 0.06), st.floats(-0.06, 0.06), st.float
 
 def match_lines(
     belief: Pose2, truth: Pose2, *, noise_px: float = 0.0, wrong: int = 0, seed: int = 0,
-    walls_m: float = 0.0, camera: Sequence[float] = (0.0,) * 7,
+    walls_m: float = 0.0, camera: Sequence[float] = (0.0,) * 7, basis: str = "milestone",
 ) -> tuple[Bench, Entry[LineMatch], Entry[Milestone]]:
     """A board on which each expected line is matched to where it is truly seen; the first few wrongly.
 
     ``walls_m``: deviation of walls and doors from the model. ``camera``: its step from what is believed.
     """
     bench, rng = Bench(ROBOT), np.random.default_rng(seed)
-    bench.believe(belief, diagonal(SIGMA_M, SIGMA_RAD))
+    bench.believe(belief, diagonal(SIGMA_M, SIGMA_RAD), basis=basis)
     milestone = bench.await_milestone(look_heading_rad=to_world(belief).heading_rad)
     expected = bench.apply(effect_on(bench.ask(ViewPredictor(), milestone), Milestone))[0].entry
     lines = np.array(expected.value.expected)
@@ -201,6 +201,12 @@ def test_each_line_is_of_its_own_landmark_whichever_segment_shows_it(
     solve(bench, bench.put(replace(match.value, pairs=pairs, lines_world=match.value.lines_world[kept],
                                    segments_px=match.value.segments_px[kept], coverage=np.ones(len(kept)))))
     assert given["landmark_ids"] == [milestone.value.landmark_of[i] for i in kept]
+
+
+@pytest.mark.parametrize("basis", ["command", "odometry", "tracks", "milestone", "relocalization"])
+def test_only_a_robot_that_was_just_put_down_cannot_have_been_pushed(basis: str) -> None:
+    levels = [solve(*match_lines(BELIEF, BELIEF, noise_px=0.3, basis=of)[:2]).protection for of in (basis, "milestone")]
+    assert levels[0] < levels[1] if basis == "command" else levels[0] == levels[1]
 
 
 def test_it_keeps_the_laws_of_all_sources() -> None:

@@ -24,7 +24,7 @@ from knowledge_sources.methods.floor.weigh_sight import (
 from knowledge_sources.model.thing_mapper import ThingMapper
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall, carton, known_by_sight
-from world_models.entries import CameraPicture, Discrepancy, Evidence, FreeFloor, Obstacle, ObstacleStatus
+from world_models.entries import CameraPicture, Difference, Discrepancy, Evidence, FreeFloor, Obstacle, ObstacleStatus
 from world_models.entries.floor import FloorSense
 
 SOURCE, S = ThingMapper(), DEFAULT.action
@@ -124,7 +124,8 @@ def test_odds_multiply_only_where_it_is_seen_from_elsewhere(before: float, p_thi
     (effect,) = effects or ()
     is_elsewhere = ahead_m >= FLOOR_VIEW_DISTANCE_M / 2.0
     expected = probability(odds_of(before), odds_of(p_thing)) if is_elsewhere else max(before, p_thing)
-    assert isinstance(effect, Revise) and effect.entry is old and set(effect.because) == {scan, old}
+    of = hall.board.view.latest(Difference)
+    assert isinstance(effect, Revise) and effect.entry is old and set(effect.because) == {scan, old, of}
     assert effect.value.certainty == but_for_dirt(min(expected, S.max_obstacle_certainty))
     assert effect.value.status == (
         "there" if old.value.is_there or effect.value.certainty >= MIN_OBSTACLE_CERTAINTY else "suspected")
@@ -147,7 +148,7 @@ def test_floor_that_is_seen_free_from_elsewhere_lowers_the_odds_by_a_stated_fact
         assert effects == ()
         return
     (effect,) = effects
-    assert isinstance(effect, Revise) and set(effect.because) == {scan, old}
+    assert isinstance(effect, Revise) and set(effect.because) == {scan, old, hall.board.view.latest(Difference)}
     odds = CAMOUFLAGED_FREE_ODDS if is_camouflaged else FREE_FLOOR_ODDS if is_told else LOOKS_FREE_ODDS
     certainty = probability(odds_of(before), odds)
     assert effect.value.certainty == pytest.approx(certainty, rel=1e-6)

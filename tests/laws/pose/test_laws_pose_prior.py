@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
-from experiments.paper.pose_solvers import trunc_r_and_t
-from knowledge_sources.methods.pose import PoseEstimate, med_r_and_t, r_and_t_ml
+from experiments.paper.pose_scenes import PoseScene, draw_prior, end_noise, wrong_landmarks
+from knowledge_sources.methods.pose import PoseEstimate, r_and_t_ml
+from pose_laws import ROBUST, SCENES, SIGMA_PX, Solver, by_solver, measure_error, scenes, seeds
 from world_models.frames import Pose
 
-ROBUST = [med_r_and_t, trunc_r_and_t]
-SCENES = [campus(), corridor()]
-SIGMA_PX = 0.4
 PRIOR_M, PRIOR_RAD = 0.1, 0.01
-Solver = Callable[..., PoseEstimate]
-
-seeds = st.integers(0, 2**32 - 1)
-scenes = st.sampled_from([0, 1]).map(SCENES.__getitem__)
 quick = settings(max_examples=12, deadline=None, derandomize=True)
-
-
-def by_solver(solvers: list[Any]) -> Any:
-    return pytest.mark.parametrize("solver", solvers, ids=lambda f: f.__name__)
 
 
 def solve(solver: Solver, scene: PoseScene, segments: Any, prior: Pose, factor: float | None) -> PoseEstimate:
@@ -37,11 +24,6 @@ def solve(solver: Solver, scene: PoseScene, segments: Any, prior: Pose, factor: 
         scene.lines_world, segments, scene.camera, prior, landmark_ids=scene.landmark_ids, sigma_px=SIGMA_PX,
         prior_covariance=None if factor is None else factor * spread,
     )
-
-
-def measure_error(found: Pose, truth: Pose) -> tuple[float, float]:
-    apart = found @ truth.inverse()
-    return float(np.linalg.norm(apart.rotation_vector)), float(np.linalg.norm(apart.translation))
 
 
 @by_solver(ROBUST)

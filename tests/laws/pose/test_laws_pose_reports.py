@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.paper.pose_scenes import PoseScene, campus, corridor, draw_prior, end_noise, wrong_landmarks
-from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
+from experiments.paper.pose_scenes import PoseScene, draw_prior, end_noise, wrong_landmarks
 from knowledge_sources.methods.pose import (
     MAX_BESIDE_PX,
     MAX_CHI2_SIGMAS,
@@ -21,24 +18,11 @@ from knowledge_sources.methods.pose import (
     build_line_set,
     compute_image_jacobian,
     measure_lines,
-    med_r_and_t,
-    r_and_t_ml,
 )
 from knowledge_sources.methods.pose.estimate import BEHIND, DISTANCE, NO_LENGTH, NO_OVERLAP
+from pose_laws import ROBUST, SIGMA_PX, SOLVERS, Solver, by_solver, scenes, seeds
 
-SOLVERS = [r_then_t, r_and_t, r_and_t_ml, med_r_and_t, trunc_r_and_t]
-ROBUST = [med_r_and_t, trunc_r_and_t]
-SCENES = [campus(), corridor()]
-SIGMA_PX = 0.4
-Solver = Callable[..., PoseEstimate]
-
-seeds = st.integers(0, 2**32 - 1)
-scenes = st.sampled_from([0, 1]).map(SCENES.__getitem__)
 quick = settings(max_examples=8, deadline=None, derandomize=True)
-
-
-def by_solver(solvers: list[Any]) -> Any:
-    return pytest.mark.parametrize("solver", solvers, ids=lambda f: f.__name__)
 
 
 def solve(solver: Solver, scene: PoseScene, segments: Any, rng: np.random.Generator) -> PoseEstimate:

@@ -106,9 +106,13 @@ def test_no_side_of_a_corridor_that_stands_elsewhere_moves_the_pose_beyond_it(
 
 @quick
 @given(seeds, st.floats(-0.3, 0.3), st.floats(-0.3, 0.3))
-def test_no_belief_that_was_pushed_moves_the_pose_beyond_it(seed: int, x_m: float, y_m: float) -> None:
+def test_no_belief_that_was_pushed_or_told_wrongly_moves_the_pose_beyond_it(seed: int, x_m: float, y_m: float) -> None:
+    """Put down as told it was not pushed, so that what is near or far leaves no more open; were it told wrongly."""
     found, rests, truth = look(seed, belief=(x_m, y_m, 0.0))
-    assert is_within(found, truth, protect(found, rests))
+    pushed, put_down = protect(found, rests), protect(found, rests._replace(loosened=None))
+    assert is_within(found, truth, pushed) and is_within(found, truth, put_down)
+    right, sure, _ = look(seed)
+    assert protect(right, sure._replace(loosened=None)).place_m <= protect(right, sure).place_m
 
 
 @quick

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -137,11 +139,13 @@ def test_more_readings_make_it_narrower() -> None:
     assert shapely.Polygon(last[0].footprint).area < shapely.Polygon(first[0].footprint).area
 
 
-def test_what_touches_the_robot_ends_the_floor_there() -> None:
+@pytest.mark.parametrize("nearer_m", [0.0, 0.02])  # just off its rim; or on a sensor
+def test_what_touches_the_robot_ends_the_floor_there(nearer_m: float) -> None:
     name, pose = place(0, 0.5, 0.5)
     solid = np.concatenate([SOLID.segments_world, box(pose.x_m + 0.56, pose.y_m, 0.4, 0.0)])
     reading = RangeRing(24, sigma_m=0.0, dropout=0.0).measure(solid, pose, np.random.default_rng(1), 0.0)
     assert reading is not None
+    reading = replace(reading, distances_m=tuple(d and max(ROBOT.radius_m, d - nearer_m) for d in reading.distances_m))
     floor = see_ranges(ROBOT, name, pose, 0.01, 0.002, reading, ())
     ahead = int(np.argmin(np.abs(floor.bearings_rad)))
     assert floor.ends[ahead] == "thing" and floor.far_m[ahead] <= 0.36

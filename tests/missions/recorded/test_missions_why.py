@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from blackboard import registry_of
@@ -17,6 +18,8 @@ from experiments.scale.explanations import write_hour
 from harvey.agent import Agent, build_agent
 from harvey.cli import main
 from harvey.replay.why_not_again import board_at, changes, in_cycle, why_absent
+from knowledge_sources.methods.motion.clearance import LATENCY_S
+from knowledge_sources.reads import FloorAhead, current_leg, find_belief
 from logs.explain.diff import grounds, parting, same
 from logs.explain.phrases import describe_decision
 from logs.explain.web import check
@@ -184,3 +187,23 @@ def test_an_answer_needs_none_of_the_heavy_libraries(runs: tuple[Path, Path]) ->
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     loaded = set(re.findall(r"'(\w+)'", done.stdout.splitlines()[-1]))
     assert loaded & {"scipy", "cv2", "numba", "rerun", "shapely", "networkx"} == set()
+
+
+def test_every_move_bears_the_harm_of_each_touch_that_the_map_of_its_cycle_leaves_possible(
+    history: Timeline, agent: Agent
+) -> None:
+    """At its speed on the move; behind its end after braking: the robot can stop within its clearance."""
+    moves, borne, wheels = 0, agent.settings.action.creep_speed_m_per_s, agent.robot.actuator
+    for decision in history.decisions():
+        commands = [m.fields for m in decision.made if m.type == "MotorCommand" and m.fields["move_m"] > 0.0]
+        for command in commands:
+            view = board_at(history, decision.cycle, KNOWN, agent.store).view
+            (leg, *_), belief = current_leg(view) or (None,), find_belief(view)
+            assert leg is not None and belief is not None
+            clearance = FloorAhead(view, leg.value, belief, agent.settings).measure_clearance(1.5)
+            speed, move_m = command["speed_m_per_s"] or wheels.speed_m_per_s, wheels.reach * command["move_m"]
+            stops_m = np.maximum(clearance.at_m - LATENCY_S * speed, 0.0) * (clearance.at_m > move_m - 0.01)
+            met = np.maximum(speed**2 - 2.0 * wheels.brake_m_per_s2 * stops_m, 0.0)
+            assert (clearance.p * met <= borne**2 + 1e-4).all() and move_m <= clearance.room_m + 0.01
+            moves += 1
+    assert moves > 5

@@ -19,11 +19,11 @@ Key = tuple[str | int, ...]
 
 def find_line_numbers(text: str) -> dict[Key, int]:
     """The line (from 1) on which each value of a valid TOML text starts."""
-    return _Scanner(text).scan()
+    return TomlScanner(text).scan()
 
 
 @dataclass
-class _Scanner:
+class TomlScanner:
     """Scans TOML that ``tomllib`` has accepted, and notes where values start."""
 
     text: str

@@ -15,32 +15,17 @@ from experiments.drives import Trial
 from experiments.report import Report
 from harvey.campaign.mission_task import Task
 from harvey_words.directions import write_directions
+from harvey_words.experiments.instructions import OTHERS, read_paragraphs
 from harvey_words.experiments.told_routes import Told, tell_rooms
 from harvey_words.word_map import WordMap
 from world_models.entries import Goal
 from world_models.files.world_files import WORLDS, load_world
 
 MISSIONS, QUICK_MISSIONS = 100, 10
+FRESH = OTHERS["fresh, then of development"]
 AT_GOAL_M = 0.5
 """True distance from the last goal within which a mission ended at it."""
-ROWS = {"told by the generator": "research_center", "directions": "research_center", "own words": ""}
-OWN_WORDS = (
-    ("research_center", "robot-laboratory", "conference-room",
-     "Go out of the lab and turn right. It is the first open door on your left, a rust coloured one."),
-    ("research_center", "library", "machine-room",
-     "Leave the library, turn left, and go in at the first door on the right hand side."),
-    ("research_center", "mail-room", "robot-laboratory",
-     "Come out and go left down the hallway. The lab is the second door on the right."),
-    ("research_center", "terminal-room", "allens-office",
-     "Turn left when you come out. Allen's office is the first open door on the right."),
-    ("two_ways", "reception", "archive",
-     "Go out by the rust door. Walk down the hall past the fountain, and through the door at the end."),
-    ("two_ways", "archive", "reception",
-     "Leave by the navy door and follow the north hall to its end. The reception is behind the door ahead."),
-    ("two_ways", "reception", "archive",
-     "Take the teal door, go to the end of the south hall, and in at the door there."),
-)
-"""World, start, end and text of ways in words that neither the generator nor the writer of directions has."""
+TOLD, DIRECTIONS, PEOPLE = "told by the generator", "directions", "fresh paragraphs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,18 +52,20 @@ class WayEnd(drives.End):
 def draw_way(trial: Trial) -> tuple[str, Told]:
     """A world, and a way in it."""
     rng = np.random.default_rng([trial.seed, 64])
-    if trial.row == "own words":
-        world, start, end, text = OWN_WORDS[trial.seed % len(OWN_WORDS)]
-        return world, Told(start, end, text)
-    world = ROWS[trial.row]
-    plan = WordMap(load_world(WORLDS / f"{world}.toml"))
+    centre = "research-center" if trial.row != DIRECTIONS or rng.random() < 0.7 else "two-ways"
+    if trial.row == PEOPLE:
+        told = [(plan, Told(start, end, text)) for _, plan, start, _, end, text in read_paragraphs(FRESH)
+                if end in plan.areas and not plan.areas[end].is_hall]
+        plan, told_way = told[trial.seed % len(told)]
+        return plan.world.name, told_way
+    plan = WordMap(load_world(WORLDS / f"{centre.replace('-', '_')}.toml"))
     rooms = sorted(name for name, area in plan.areas.items() if not area.is_hall)
     while True:
-        if trial.row == "directions":
+        if trial.row == DIRECTIONS:
             start, end = (str(room) for room in rng.choice(rooms, 2, replace=False))
-            return world, Told(start, end, write_directions(plan, start, end).text)
-        if (told := tell_rooms(plan, rng)) is not None and told.end in rooms:
-            return world, told
+            return centre, Told(start, end, write_directions(plan, start, end).text)
+        if (way := tell_rooms(plan, rng)) is not None and way.end in rooms:
+            return centre, way
 
 
 def drive(trial: Trial) -> WayEnd:
@@ -92,8 +79,8 @@ def drive(trial: Trial) -> WayEnd:
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / "way.toml"
-        path.write_text(f'world = "{world}"\ngoal = "Go from {told.start} to {told.start}"\ntask = "{told.text}"\n'
-                        "start.put_down_sigma_m = 0.03\n", encoding="utf-8")
+        path.write_text(f'world = "{world.replace("-", "_")}"\ngoal = "Go from {told.start} to {told.start}"\n'
+                        f'task = "{told.text}"\nstart.put_down_sigma_m = 0.03\n', encoding="utf-8")
         driven = drives.drive_task(Task(str(path), (), trial.seed), note)
     return WayEnd.of(trial, driven, told_to=told.end, drove_to=goals[-1] if goals else "")
 
@@ -108,7 +95,7 @@ FIGURES: Mapping[str, drives.Figure[WayEnd]] = {
 
 def run(quick: bool, seed: int, missions: int | None = None) -> Report:
     """Drive so many ways, a row after the other."""
-    first, rows = drives.first_seed(seed), list(ROWS)
+    first, rows = drives.first_seed(seed), [TOLD, DIRECTIONS, *([PEOPLE] if FRESH.exists() else [])]
     trials = [Trial(rows[k % len(rows)], first + k)
               for k in range(missions or (QUICK_MISSIONS if quick else MISSIONS))]
     driven = drives.drive_all("driven-ways", drive, trials, WayEnd, quick=quick, seed=seed, missions=missions,

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 
 Node = tuple[int, int]
 Hall = tuple[Node, Node, str, str]
 PITCH_M, WIDTH_M = 4.0, 1.6
 COLOURS = {"brick": (0.58, 0.3, 0.25), "blue": (0.2, 0.3, 0.6), "grass": (0.3, 0.55, 0.25), "gravel": (0.5, 0.5, 0.5),
            "flower": (0.85, 0.55, 0.62), "wood": (0.45, 0.3, 0.2), "yellow": (0.8, 0.7, 0.2)}
-HALLS: tuple[Hall, ...] = (
-    ((0, 2), (1, 2), "brick", "butterfly"), ((1, 2), (2, 2), "brick", "butterfly"),
-    ((2, 2), (3, 2), "brick", "butterfly"), ((0, 1), (1, 1), "blue", "fish"), ((1, 1), (2, 1), "blue", "fish"),
-    ((2, 1), (3, 1), "blue", "fish"), ((0, 0), (1, 0), "wood", "tower"), ((1, 0), (2, 0), "wood", "tower"),
-    ((2, 0), (3, 0), "wood", "tower"), ((0, 1), (0, 2), "grass", "fish"), ((1, 1), (1, 2), "flower", "butterfly"),
-    ((1, 0), (1, 1), "flower", "butterfly"), ((2, 1), (2, 2), "gravel", "tower"), ((3, 0), (3, 1), "yellow", "fish"))
-THINGS: Mapping[Node, str] = {(0, 2): "easel", (2, 2): "hatrack", (1, 1): "lamp", (2, 1): "chair", (0, 0): "sofa",
-                              (3, 0): "stool"}
 
 
-def write_maze(halls: Iterable[Hall] = HALLS, things: Mapping[Node, str] = THINGS) -> str:
+def write_maze(halls: Sequence[Hall], things: Mapping[Node, str]) -> str:
     """The text of its world file."""
-    halls = tuple(halls)
     half = WIDTH_M / 2
     lines = ['name = "maze"', 'units = "metres"', 'include = ["standard"]', "[finishes]"]
     lines += [f'{floor}-floor = {{ colour = {list(rgb)}, words = "{floor}" }}' for floor, rgb in COLOURS.items()]
