@@ -39,7 +39,7 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
                      "follow": "harvey-ros2", "directions": "harvey-words", "parse": "harvey-words",
                      "serve": "harvey-serve", **dict.fromkeys(("world.export", "world.import"), "harvey-buildings")},
     "harvey.experiments": {
-        "calibrate": "harvey-survey", "driven-ways": "harvey-words",
+        **dict.fromkeys(("calibrate", "survey"), "harvey-survey"), "driven-ways": "harvey-words",
         "imported-building": "harvey-buildings", "instructions": "harvey-words",
         "other-worlds": "harvey-miniworld", "people": "harvey-people", "rosmaps": "harvey-buildings",
         "watchers": "harvey-serve"},
