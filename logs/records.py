@@ -85,9 +85,10 @@ def knowing(kinds: Registry) -> Iterator[None]:
 @cache
 def _foreign_kinds() -> Registry:
     from blackboard import KnowledgeSource, registry_of
-    from world_models.plugins import SOURCES_GROUP, load_plugin_classes
+    from world_models.plugins import GUESTS_GROUP, SOURCES_GROUP, load_plugin_classes
 
-    return registry_of(load_plugin_classes(SOURCES_GROUP, KnowledgeSource).values(), KINDS)
+    found = [load_plugin_classes(group, KnowledgeSource).values() for group in (SOURCES_GROUP, GUESTS_GROUP)]
+    return registry_of([source for sources in found for source in sources], KINDS)
 
 
 def kinds_for(type: str) -> Registry:

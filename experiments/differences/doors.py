@@ -1,7 +1,7 @@
 """Missions on floors whose doors differ from the model: does the robot see it, and find another way?
 
 A door on the way is shut, with another way or with none; it opens or shuts during the mission; a door that the model
-has closed stands open; there is a door that the model lacks; and nothing differs.
+has closed stands open; there is a door that the model lacks; a leaf stands before an open one; and nothing differs.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from world_models.words import listed
 
 SHARES: Mapping[str, float] = {
     "another way": 0.3, "no way": 0.25, "extra door": 0.05, "stands open": 0.05, "opens": 0.05, "shuts": 0.05,
-    "ajar": 0.05, "as filed": 0.2,
+    "ajar": 0.05, "as filed": 0.15, "loose leaf": 0.05,
 }
 """Of the missions, of each case of :data:`experiments.generated.door_missions.CASES`. A leaf that is ajar stands into a
 room: that is for those who see what is in the way, and only counted here."""
 MISSIONS = 1_000
-QUICK = ("another way", "no way", "shuts", "as filed")
+QUICK = ("another way", "no way", "shuts", "as filed", "loose leaf")
 HARMLESS = ("opens", "shuts", "stands open", "extra door", "as filed")
 MIN_OTHER_WAY, MIN_BLOCKED = 0.99, 1.0
 
@@ -114,6 +114,7 @@ def _claims(driven: Driven[DoorEnd]) -> Iterator[Claim]:
     cases = [case for case in HARMLESS if case in driven.rows]
     yield drives.claim_share(f"{listed(cases, 9)}: harms nothing: at least {MIN_OTHER_WAY:.0%} reach",
                              lambda e: e.is_right, [end for case in cases for end in driven.rows[case]], MIN_OTHER_WAY)
-    yield drives.claim_none("as filed: no door is held to be shut", driven.rows["as filed"],
-                            lambda e: bool(e.false_states))
+    for case in ("as filed", "loose leaf"):
+        yield drives.claim_none(f"{case}: no door is held to be shut", driven.rows[case],
+                                lambda e: bool(e.false_states))
     yield drives.claim_none("no milestone is accepted at a wrong place", driven.ends)

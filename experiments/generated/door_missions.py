@@ -23,12 +23,16 @@ from sim.stage import Stage, build_stage
 from world_models.building.locales import Doorway
 from world_models.building.world import World
 from world_models.commands import parse_command
+from world_models.frames import Pose2, flattened
 
-CASES = ("another way", "no way", "extra door", "stands open", "opens", "shuts", "ajar", "as filed")
+CASES = ("another way", "no way", "extra door", "stands open", "opens", "shuts", "ajar", "as filed", "loose leaf")
 """What differs about the doors: shut, with another way or with none; a door that the model lacks; one that stands
-open and is closed in the model; one that opens or shuts during the mission; one that is ajar, with another way."""
+open and is closed in the model; one that opens or shuts during the mission; one that is ajar, with another way; a leaf
+that stands loose before an open door or behind it, with another way."""
 WAY_MARGIN_M = 0.12
 """Free floor beside the robot on a way that counts as one."""
+LOOSE_M = 0.2, 0.6
+"""So far from its middle a loose leaf stands before an opening, or behind it."""
 OPENS_S, SHUTS_S = (20.0, 60.0), (5.0, 25.0)
 """When a door opens, or shuts."""
 MAX_DRAWS = 60
@@ -136,6 +140,8 @@ def _draw_doors(stage: Stage, floor: Floor, case: str, rng: np.random.Generator)
         return None
     if case != "no way" and _is_only_way(stage.world, door, stage):
         return None
+    if case == "loose leaf":
+        return "", _draw_loose_leaf(stage.world, door, rng)
     when = {"opens": f"until_s = {rng.uniform(*OPENS_S):.1f}\n", "shuts": f"at_s = {rng.uniform(*SHUTS_S):.1f}\n"}
     state = "ajar" if case == "ajar" else "shut"
     swing = ""
@@ -176,6 +182,15 @@ def _draw_extra_door(stage: Stage, rng: np.random.Generator) -> tuple[str, str] 
     heading = math.pi if north else 0.0
     return "", (f'\n[[truth.extra]]\nkind = "door-leaf"\nlocale = "{room}"\nx_m = {x:.4f}\ny_m = {y:.4f}\n'
                 f"heading_rad = {heading:.4f}\n")
+
+
+def _draw_loose_leaf(world: World, door: Doorway, rng: np.random.Generator) -> str:
+    """A leaf along the wall that stands in one of the rooms of an open door and hides it."""
+    room = str(rng.choice(door.between))
+    stands = door.pose_from(room) @ Pose2(-float(rng.uniform(*LOOSE_M)), float(rng.uniform(-0.1, 0.1)), 0.5 * math.pi)
+    own = flattened(world.world_from_locale(room)).inverse() @ stands
+    return (f'\n[[truth.extra]]\nkind = "door-leaf"\nlocale = "{room}"\nx_m = {own.x_m:.4f}\ny_m = {own.y_m:.4f}\n'
+            f"heading_rad = {own.heading_rad:.4f}\n")
 
 
 def _draw_open_door(floor: Floor, rng: np.random.Generator) -> tuple[str, str] | None:

@@ -30,6 +30,7 @@ from world_models.entries import (
 )
 from world_models.frames import Pose2
 
+MAX_COUNTED_BESIDE_M = 0.02  # a base stops, and counts, as near as this to what was asked of it
 MIN_CLAIMED_PART = 0.7  # if the wheels claim less than this part of a move, something stopped the robot
 
 
@@ -72,6 +73,10 @@ class DeadReckoner(RobotKnowledgeSource):
             covariance = covariance + _compute_partial_covariance(pose, *missing)
         moved = held.moved_to(pose, covariance, "odometry", locale=str(locale), motion=reported.id)
         more_m, suspected = bound_wheels_m(view, actuator, report.move_m)
+        contact = None if request is None else find_contact(view, request.id)
+        beside_m = 0.0 if request is None or on_the_move else abs(report.move_m - request.value.move_m)
+        if beside_m > MAX_COUNTED_BESIDE_M and fault is None and contact is None:  # one of both is wrong
+            more_m += beside_m
         moved = replace(moved, excess_m=moved.excess_m + more_m)
         step = Revise(belief, moved, (reported, belief, *suspected, *(() if fault is None else (fault,))))
         yield step
@@ -89,7 +94,6 @@ class DeadReckoner(RobotKnowledgeSource):
             yield Post(PictureRequest("track"), (step,))
         if request is None or fault is not None:
             return
-        contact = find_contact(view, request.id)
         what = "something was touched on the move" if on_the_move else (
             f"something stopped the robot: the wheels report {report.move_m:.2f} m of {request.value.move_m:.2f} m")
         is_short = not on_the_move and report.move_m < MIN_CLAIMED_PART * request.value.move_m

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Posted, Revise, Revised, View, Watch
+from knowledge_sources.methods.belief import weigh_among
 from knowledge_sources.methods.calibration import compute_scale_sigma
 from knowledge_sources.methods.floor import (
     is_width,
@@ -59,8 +60,7 @@ class ModelReviser(RobotKnowledgeSource):
     Of two that say otherwise the newer counts. All that is new of a locale comes into its frame at once, so that who
     reads why it was revised finds all of it. A door is in the frames of both its rooms, a wall in those of all at it.
     Walls are redrawn once it is sure that they are elsewhere, and not the camera is otherwise; where no wall explains
-    that the model is inexact, the whole building is, until looks acquit it. A frame is revised only where a plan may
-    change by it.
+    that the model is inexact, the whole building is, until looks acquit it. What changes no plan revises no frame.
     What cannot be taken up, because the model has nothing of that name, is answered. It acts at once, before the next
     increment: the door may be just ahead.
     """
@@ -123,10 +123,12 @@ class ModelReviser(RobotKnowledgeSource):
     def _list_differences(self, view: View) -> Iterator[Statement]:
         """What differences say of doors, of walls, and of all of the building where no wall explains it."""
         doors, building, name = list_filed_doors(view), find_building(view), name_model(view)
-        others = view.where(Difference, lambda d: d.about == DOORS and d.is_sure)
+        general = view.where(Difference, lambda d: d.about == DOORS)
         for found in view.where(Difference, lambda d: d.about in doors):
-            door, (*older, newer) = doors[found.value.about], sorted((found, *others), key=lambda entry: entry.cycle)
-            revise = partial(redraw_door, door=door, found=found.value, by=found.author, are_beside=bool(others))
+            door, (*older, newer) = doors[found.value.about], sorted((found, *general), key=lambda entry: entry.cycle)
+            here = door.pose_from(door.between[0]).position
+            others = [told for entry in general for told in entry.value.counted if (told.x_m, told.y_m) != tuple(here)]
+            revise = partial(redraw_door, door=door, found=weigh_among(found.value, others), by=found.author)
             yield Statement(newer, door.between, revise, besides=tuple(older))
         models = view.where(Difference, lambda d: d.about == name and d.is_sure and d.leader.kind == "wall")
         camera = view.latest(CameraState)

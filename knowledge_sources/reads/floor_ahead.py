@@ -94,9 +94,7 @@ class FloorAhead:
         search = _find_last_search(view)  # what was seen before it was found does not count
         self._reasons: dict[str, Entry[Any]] = {} if search is None else {search.id: search}
         self._map = FloorMap(
-            [entry.value for entry in self._scans], np.array([disc.circle for disc in self._discs]),
-            [thing.footprint_world for name in self._locales
-             for thing in self._robot.world.things_of(name) if thing.is_obstacle])
+            [entry.value for entry in self._scans], np.array([disc.circle for disc in self._discs]))
         self._wider = [(polygon, 1.0, whole.plan.overhang_m) for polygon in found]
         self._wider += [(polygon, entry.value.certainty, UNSURE_GAP_M) for entry, polygon in self._suspected
                         if not entry.value.is_there]
@@ -119,7 +117,8 @@ class FloorAhead:
         places = shapely.points(swept.points)
         p = self._tell(swept)
         for polygon, certainty, wider_m in self._wider:
-            near = 1.0 - (shapely.distance(places, polygon) + SEEN_MARGIN_M) / wider_m
+            away_m = shapely.distance(places, polygon)
+            near = 1.0 - np.where(away_m > 0.0, away_m + SEEN_MARGIN_M, 0.0) / wider_m
             steps = np.ceil(np.where(swept.at_m > 0.0, near.clip(0.0), 0.0) * WIDER_STEPS)  # else it is there already
             p = np.maximum(p, certainty * steps / WIDER_STEPS)
         p[(swept.at_m > self._to_go_m) & (shapely.distance(places, self._floor) > SEEN_MARGIN_M)] = 1.0

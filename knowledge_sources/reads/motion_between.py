@@ -7,6 +7,7 @@ much of that they have in common. On a straight way the wheels tell it to 0.2.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from statistics import NormalDist
 
@@ -17,13 +18,15 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import TYPICAL_M, MotionBetween
 from knowledge_sources.reads.conditions import Belief
 from world_models.actuator import ActuatorModel
-from world_models.entries import RISK, BodyFault, Difference, Drift, FloorView, MotionReport
+from world_models.entries import RISK, BodyFault, Difference, Drift, FloorView, MotionReport, MotorCommand
 from world_models.frames import Pose2, wrap_angle
 
 MOTION = "motion"
 """What differs where pictures and wheels do not agree on the way."""
 WHEELS_PART = 0.25
 """Wheels that are wrong go by such a part more or less than they count, one standard deviation."""
+LAGS_S = tuple(0.1 * tenth for tenth in range(1, 11))
+"""So long before the wheels' report pictures may have been taken, each as likely [s]: less does no harm."""
 MAX_APART_SIGMAS = 3.0
 """Wheels that say otherwise than what is believed by more than this slipped, or the robot was pushed."""
 
@@ -80,6 +83,23 @@ def follow_reports(actuator: ActuatorModel, drift: Drift, reports: list[MotionRe
         turned = report.turn_rad if report.move_m and part else part * report.turn_rad  # it turns first, then moves
         moved = moved @ actuator.predict_motion(turned, part * report.move_m, drift.curvature_per_m)
     return moved
+
+
+def list_lagging(view: View, actuator: ActuatorModel, drift: Drift, since: int) -> tuple[Pose2, ...]:
+    """How the robot moved by so many of the last reports, had it each time been seen so much before, for each lag."""
+    reports = sorted((entry.value for entry in view.all(MotionReport)), key=lambda report: report.sim_time_s)
+    began_s = reports[-since].sim_time_s - reports[-since].duration_s
+    seen = ([follow_reports(actuator, drift, reports, at_s - lag) for at_s in (began_s, reports[-1].sim_time_s)]
+            for lag in LAGS_S)
+    return tuple(a.inverse() @ b for a, b in seen)
+
+
+def list_asked(view: View, reports: Sequence[Entry[MotionReport]]) -> list[MotionReport]:
+    """The reports as they would be if each motion were the one that was asked for; of a course nothing was asked."""
+    asked = [view.get(report.because[0].id) for report in reports]
+    return [replace(report.value, turn_rad=of.value.turn_rad, move_m=of.value.move_m)
+            if of is not None and isinstance(of.value, MotorCommand) else report.value
+            for report, of in zip(reports, asked, strict=True)]
 
 
 def _measure_unsure_m(motion: MotionBetween) -> float:

@@ -11,8 +11,8 @@ from blackboard import Change, Effect, Level, Post, Posted, View, Watch
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import hedge
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, add_reports, follow_reports, is_worth_telling
-from knowledge_sources.reads.motion_between import MOTION, WHEELS_PART
+from knowledge_sources.reads import HELD, add_reports, is_worth_telling
+from knowledge_sources.reads.motion_between import LAGS_S, MOTION, WHEELS_PART, list_asked, list_lagging
 from knowledge_sources.reads.place_believed import MAX_P_RIVAL
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
@@ -35,8 +35,6 @@ BEND_RAD_PER_M, ASIDE_M_PER_RAD = 0.1, 0.05
 """Wheels that turn wrongly bend so much, and slip so far aside, one standard deviation."""
 MIN_REACH_M = 0.2
 """A shorter way does not tell how far the wheels go."""
-LAGS_S = tuple(0.1 * tenth for tenth in range(1, 11))
-"""So long before the wheels' report pictures may have been taken, each as likely [s]: less does no harm."""
 ELSEWHERE = 1.0, 1.0, 1.0
 """How far off a robot is that was pushed or carried, or takes one place for another [m, m, rad]."""
 
@@ -50,7 +48,8 @@ class CorrectionMonitor(RobotKnowledgeSource):
     """Says where the motion from one picture to the next is not the one that the wheels counted.
 
     A picture that never changes says that the robot stands. Wheels may go another part of the way than they count, or
-    turn otherwise: that is told apart, as a turn says nothing of the first, nor a straight way of the second.
+    turn otherwise: that is told apart, as a turn says nothing of the first, nor a straight way of the second. If
+    they went as they were asked, and counted something else, the count is wrong.
     A late picture shows where the robot was a while before, which is the same place only where it stood for so long.
     """
 
@@ -72,7 +71,7 @@ class CorrectionMonitor(RobotKnowledgeSource):
         actuator, drift = HELD.of(view).robot.actuator, view.latest(Drift)
         known = Drift.unknown(actuator, here.heading_rad) if drift is None else drift.value
         explained = _explain(seen, _spread(began.value, ended.value), actuator, known, [one.value for one in reports],
-                             _list_lagging(view, actuator, known, len(reports)))
+                             list_asked(view, reports), list_lagging(view, actuator, known, len(reports)))
         if not is_worth_telling(view, MOTION, explained):
             return None
         shows = f"by pictures it moved {seen.x_m:+.2f} m ahead and {math.degrees(seen.heading_rad):+.0f} degrees"
@@ -94,20 +93,13 @@ def _spread(began: PoseFix, ended: PoseFix) -> Floats:
     return np.asarray(arm @ turn @ began.covariance @ turn.T @ arm.T + turn @ ended.covariance @ turn.T + 2.0 * shared)
 
 
-def _list_lagging(view: View, actuator: ActuatorModel, drift: Drift, since: int) -> tuple[Pose2, ...]:
-    """How the robot moved by so many of the last reports, had it each time been seen so much before, for each lag."""
-    reports = sorted((entry.value for entry in view.all(MotionReport)), key=lambda report: report.sim_time_s)
-    began_s = reports[-since].sim_time_s - reports[-since].duration_s
-    seen = ([follow_reports(actuator, drift, reports, at_s - lag) for at_s in (began_s, reports[-1].sim_time_s)]
-            for lag in LAGS_S)
-    return tuple(a.inverse() @ b for a, b in seen)
-
-
 def _explain(
     seen: Pose2, spread: Floats, actuator: ActuatorModel, drift: Drift, reports: list[MotionReport],
-    lagging: tuple[Pose2, ...],
+    asked: list[MotionReport], lagging: tuple[Pose2, ...],
 ) -> tuple[Explanation, ...]:
-    """What each rival makes of a motion by pictures, with its covariance, and of what the wheels report of it."""
+    """What each rival makes of a motion by pictures, with its covariance, of what the wheels report of it, and of what
+    was asked of them.
+    """
     rolled = add_reports(actuator, drift, reports)
     moved, off = rolled.moved, seen.minus(rolled.moved)
     usual = spread + np.diag(np.square([rolled.sigma_m, rolled.sigma_m, rolled.sigma_rad]))
@@ -117,18 +109,21 @@ def _explain(
     along = np.array([*moved.position, 0.0])
     bent = np.diag(np.square([aside_m, aside_m, WHEELS_PART * turned_rad + BEND_RAD_PER_M * gone_m]))
     plain = _log_density(off, usual)
+    told = add_reports(actuator, drift, asked).moved
     late = [_log_density(seen.minus(moved), usual) - plain for moved in lagging]
     ratios: dict[RivalKind, float] = {
         "wheels": _log_density(off, usual + WHEELS_PART**2 * np.outer(along, along)) - plain,
         "turns": _log_density(off, usual + bent) - plain,
         "still camera": _log_density(seen.minus(Pose2(0.0, 0.0, 0.0)), spread) - plain,
         "late pictures": float(np.logaddexp.reduce(late)) - math.log(len(late)),
+        "odometry": _log_density(seen.minus(told), usual) - plain,
         "elsewhere": _log_density(off, usual + np.diag(np.square(ELSEWHERE))) - plain}
     reach, sigma = _measure_reach(seen, moved, usual, actuator.reach)
     what = {"wheels": f"wheels that go {reach:.2f} m a metre" if sigma else "wheels that go another part of the way",
             "turns": f"wheels that turned by {math.degrees(off[2]):+.1f} degrees more than they count",
             "late pictures": f"pictures that are {LAGS_S[int(np.argmax(late))]:.1f} s late",
             "still camera": "a camera whose picture does not change",
+            "odometry": f"wheels that counted {moved.x_m - told.x_m:+.2f} m more than they went",
             "elsewhere": "a robot that was moved, or is elsewhere"}
     return (Explanation("chance", "chance", 0.0), *(
         Explanation(kind, what[kind], left, *((reach, sigma) if kind == "wheels" else ()))

@@ -91,6 +91,7 @@ class SimulatedBody:
         self._contact: Contact | None = None
         self._motion = ContinuousMotion()
         self._frozen_until_s, self._lag_s, self._delivered, self._owed_s = 0.0, 0.0, b"", 0.0
+        self._most_jump_m = 0.0
         self._truth = Truth(start, locale=building.locale_at(start))
         there = self._draw_put_down(put_down_rng, put_down_sigma_m, put_down_sigma_rad)
         self._truth = Truth(there, locale=building.locale_at(there))
@@ -178,6 +179,8 @@ class SimulatedBody:
         self._turn(command.turn_rad)
         done = self._move(command.move_m, command.speed_m_per_s)
         turn, move = self._wheels.quantize(command.turn_rad, command.move_m * done)
+        if self._most_jump_m and move:
+            move += float(self.fault_rng.uniform(-self._most_jump_m, self._most_jump_m))
         now_s = self._truth.time_s
         return MotionReport(turn_rad=turn, move_m=move, duration_s=now_s - began_s, sim_time_s=now_s)
 
@@ -434,6 +437,10 @@ class SimulatedBody:
     def delay_camera(self, lag_s: float) -> None:
         """Have the camera deliver what it saw so long ago from now on."""
         self._lag_s = lag_s
+
+    def miscount(self, most_m: float) -> None:
+        """Have the encoders count each motion by up to so much wrongly from now on."""
+        self._most_jump_m = most_m
 
     def add_occluder(self, occluder: Occluder) -> None:
         """Put something before the camera, until its time is over."""

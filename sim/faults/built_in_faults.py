@@ -305,6 +305,27 @@ class PicturesLag(Fault):
 
 
 @dataclass(frozen=True, slots=True)
+class OdometryJumps(Fault):
+    """From then on the count of the wheels jumps in each motion ahead that is told at once, and they go as before.
+
+    Attributes:
+        most_m: by how much at most, ahead or back [m].
+    """
+
+    kind: ClassVar[str] = "odometry_jumps"
+    bounds: ClassVar[Mapping[str, Bounds]] = {"most_m": Bounds(0.0, 10.0, above=True)}
+
+    most_m: float = 0.3
+
+    @property
+    def words(self) -> str:
+        return f"the wheels' count jumps by up to {self.most_m:g} m in each motion from then on"
+
+    def apply(self, body: FaultTarget) -> None:
+        body.miscount(self.most_m)
+
+
+@dataclass(frozen=True, slots=True)
 class CameraKnocked(Fault):
     """Something knocks against the camera: its mounting is turned, and stays so.
 

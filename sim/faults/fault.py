@@ -61,6 +61,10 @@ class FaultTarget(Protocol):
         """Have the camera deliver what it saw so long ago from now on, as if it were new."""
         ...
 
+    def miscount(self, most_m: float) -> None:
+        """Have the encoders count each motion by up to so much wrongly from now on."""
+        ...
+
     def turn_camera(self, tilt_rad: float, roll_rad: float, yaw_rad: float) -> None:
         """Turn the camera's mounting from now on: downward, clockwise as it looks, to the left."""
         ...

@@ -14,6 +14,7 @@ from sim.faults.built_in_faults import (
     LinkLost,
     Nonsense,
     Occlusion,
+    OdometryJumps,
     PicturesLag,
     Stall,
 )
@@ -26,7 +27,7 @@ GROUP = "harvey.faults"
 """Entry points of this group name fault classes; an entry point's name is the ``kind`` of its class."""
 BUILT_IN: tuple[type[Fault], ...] = (
     Bump, Kidnap, LightsOff, Occlusion, LinkLost, Nonsense, Stall, CameraUnplugged, LateFrames, DroppedFrames,
-    CameraFrozen, PicturesLag, CameraKnocked,
+    CameraFrozen, PicturesLag, CameraKnocked, OdometryJumps,
 )
 
 

@@ -41,7 +41,6 @@ ROBOT = plain_robot()
 SMALL = 1e-9
 metres = st.floats(-6.0, 6.0)
 free_poses = st.builds(Pose2, metres, metres, st.floats(-3.0, 3.0))
-actuators = st.builds(ActuatorModel)
 
 
 def flip(pose: Pose2) -> Pose2:

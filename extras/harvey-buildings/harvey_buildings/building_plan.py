@@ -177,6 +177,10 @@ class NavigationGraph:
         return found, total, longest
 
 
+MODELLED_M, TRACED_M = 0.03, 0.05
+"""Standard deviations of what was built by a model, and of a plan that was traced, or scanned with cells as large."""
+
+
 @dataclass
 class BuildingPlan:
     """The contents of a building file.
@@ -187,6 +191,7 @@ class BuildingPlan:
         without_wall: pairs of spaces that touch without a wall between them.
         barriers: footprints of walls and railings by storey: no wide opening is placed across one.
         network: the graph to plan on that came with the file, where it has one.
+        sigma_m: how well such a file knows where walls, doors and things are; a standard deviation.
     """
 
     name: str
@@ -201,6 +206,7 @@ class BuildingPlan:
     links: list[RoomLink] = field(default_factory=list)
     report: ImportReport = field(default_factory=ImportReport)
     network: NavigationGraph | None = None
+    sigma_m: float = MODELLED_M
     _by_name: dict[str, Space] = field(default_factory=dict, repr=False)
 
     def on(self, storey: str) -> list[Space]:

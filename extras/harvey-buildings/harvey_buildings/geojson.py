@@ -21,6 +21,7 @@ import numpy as np
 import shapely
 
 from harvey_buildings.building_plan import (
+    TRACED_M,
     BuildingError,
     BuildingPlan,
     Floats,
@@ -212,7 +213,7 @@ SAME_PLACE = 0.3
 def read_geojson(path: Path, *, watched: Watched = pass_on) -> BuildingPlan:
     """The plan of a GeoJSON file. Raises BuildingError where it cannot be read or has no room."""
     features, frame = read_features(path)
-    plan = BuildingPlan(slug(path.stem) or "building", path.name)
+    plan = BuildingPlan(slug(path.stem) or "building", path.name, sigma_m=TRACED_M)
     reader = _Reader(plan, features)
     reader.add_rooms(watched)
     if not plan.spaces:

@@ -16,6 +16,7 @@ import numpy as np
 import shapely
 
 from harvey_buildings.building_plan import (
+    TRACED_M,
     BuildingError,
     BuildingPlan,
     Names,
@@ -110,7 +111,7 @@ class _Reader:
 
     def read(self) -> tuple[BuildingPlan, NavigationGraph | None]:
         title = slug(self.path.stem) or "building"
-        self.plan, names = BuildingPlan(title, self.path.name), Names(title)
+        self.plan, names = BuildingPlan(title, self.path.name, sigma_m=TRACED_M), Names(title)
         self.boundaries = read_boundaries(self.root, self.origin)
         self._find_units()
         self._read_storeys(names)

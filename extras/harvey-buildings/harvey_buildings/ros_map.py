@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from harvey_buildings.building_plan import (
+    TRACED_M,
     BuildingError,
     BuildingPlan,
     Floats,
@@ -249,7 +250,8 @@ def read_ros_map(path: Path, wall_height_m: float = WALL_HEIGHT_M, *, watched: W
     floor, things = clean_floor(grid.cells == FREE, grid.cell_m)
     labels, gaps = part_rooms(floor, grid.cell_m)
     labels = fill_to_walls(labels, grid.cells == FREE, max(1, round(0.15 / grid.cell_m)))
-    plan = BuildingPlan(slug(path.stem) or "map", path.name, [Storey(STOREY, 0.0)])
+    plan = BuildingPlan(slug(path.stem) or "map", path.name, [Storey(STOREY, 0.0)],
+                        sigma_m=max(TRACED_M, file.resolution_m))
     names = _add_rooms(plan, labels, gaps, grid, wall_height_m, watched)
     if not names:
         raise BuildingError(f"{file.image.name}: expected a room of {1.5:g} m2 or more with walls, got none in "

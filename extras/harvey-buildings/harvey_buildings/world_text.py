@@ -40,7 +40,9 @@ def world_text(layout: Layout) -> str:
     plan = layout.plan
     lines = [f"# Made from {_plain(plan.source)} by harvey world import. Metres; each room's origin is the south-west "
              "corner of its bounds.",
-             f"name = {_text(plan.name)}", 'units = "metres"', "", HEAD]
+             f"name = {_text(plan.name)}", 'units = "metres"',
+             f"sigma_cm = {_n(100.0 * plan.sigma_m)}   # how well such a file knows its places; 1 if measured",
+             "", HEAD]
     for storey in plan.storeys:
         if storey.name in layout.north_m:
             lines += _storey(storey, layout.north_m[storey.name])

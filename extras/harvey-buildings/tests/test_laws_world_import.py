@@ -48,6 +48,7 @@ def test_the_gml_text_is_sound_before_it_is_spoilt(tmp_path: Path) -> None:
     assert _judge(tmp_path / "a.gml", GML) == "sound"
     assert "open = true" in import_building(tmp_path / "a.gml").text
     assert 'kind = "elevator"' in import_building(tmp_path / "a.gml").text
+    assert "sigma_cm = 5 " in import_building(tmp_path / "a.gml").text  # a plan that was traced
 
 
 @LAW
@@ -60,6 +61,7 @@ def test_spoilt_gml_is_an_error_or_a_world(tmp_path: Path, changes: list[tuple[i
 def test_the_ifc_text_is_sound_before_it_is_spoilt(tmp_path: Path) -> None:
     assert _judge(tmp_path / "a.ifc", IFC) == "sound"
     assert "open = true" in import_building(tmp_path / "a.ifc").text
+    assert "sigma_cm = 3 " in import_building(tmp_path / "a.ifc").text  # as it was to be built
 
 
 @pytest.mark.skipif(find_spec("ifcopenshell") is None, reason="needs ifcopenshell")

@@ -37,7 +37,7 @@ SLOW_M_PER_S = 0.2
 """Who is slower stands, as far as anybody can tell."""
 
 
-class Step(NamedTuple):
+class FollowStep(NamedTuple):
     """What becomes of one mover by one sight of the floor.
 
     Attributes:
@@ -49,7 +49,7 @@ class Step(NamedTuple):
     mover: Mover
 
 
-def follow(known: Sequence[Mover], seen: Sequence[Sighting], floor: FreeFloor, numbers: int) -> list[Step]:
+def follow(known: Sequence[Mover], seen: Sequence[Sighting], floor: FreeFloor, numbers: int) -> list[FollowStep]:
     """All movers after one sight of the floor.
 
     Args:
@@ -57,10 +57,10 @@ def follow(known: Sequence[Mover], seen: Sequence[Sighting], floor: FreeFloor, n
     """
     now = [predict(mover, floor.seen_s) for mover in known]
     given = _assign(now, seen)
-    steps = [Step(k, _see(mover, seen[given[k]], floor) if k in given else _miss(mover, floor))
+    steps = [FollowStep(k, _see(mover, seen[given[k]], floor) if k in given else _miss(mover, floor))
              for k, mover in enumerate(now)]
     born = [sighting for j, sighting in enumerate(seen) if j not in given.values()]
-    return [*steps, *(Step(None, _begin(f"mover-{numbers + n}", sighting, floor))
+    return [*steps, *(FollowStep(None, _begin(f"mover-{numbers + n}", sighting, floor))
                       for n, sighting in enumerate(born, start=1))]
 
 

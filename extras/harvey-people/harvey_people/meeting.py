@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import ncx2
+from scipy.special import chndtr
 
 from harvey_people.following import predict
 from harvey_people.mover import Mover
@@ -52,7 +52,7 @@ def _meets(mover: Mover, place: Floats, at_s: float, reach_m: float) -> float:
     variance = 0.5 * (then.covariance[0][0] + then.covariance[1][1])
     away2 = float(np.sum((then.state[:2] - place) ** 2))
     moves = 1.0 / (1.0 + math.exp(-mover.log_odds))
-    return moves * float(ncx2.cdf(reach_m**2 / variance, 2, away2 / variance))
+    return moves * float(chndtr(reach_m**2 / variance, 2, away2 / variance))  # non-central chi squared
 
 
 def may_go(clearance: Clearance, move_m: float, actuator: ActuatorModel) -> bool:

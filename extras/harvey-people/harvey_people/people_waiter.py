@@ -58,7 +58,8 @@ class PeopleWaiter(RobotKnowledgeSource):
         because = (leg, belief.entry, *movers, *(() if wait is None else (wait,)))
         if meets is None:
             assert wait is not None
-            yield Revise(wait, replace(wait.value, status="over"), because)
+            now_s = max((entry.value.at_s for entry in movers), default=wait.value.at_s)
+            yield Revise(wait, replace(wait.value, status="over", at_s=now_s), because)
             return
         if wait is None:
             yield Post(meets, because)

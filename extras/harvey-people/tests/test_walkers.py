@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 import harvey_people
+from harvey_people import people_experiment
+from harvey_people.peopled import people_in
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, scenario_from_tables
 from sim.stage import build_stage
 
@@ -37,3 +39,12 @@ def test_a_shipped_scenario_can_be_set_up_and_people_walk(path: Path) -> None:
 def test_mistakes_are_told(text: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         build_stage(parse_scenario(MISSION + text))
+
+
+def test_people_that_are_drawn_for_the_experiment_fit_its_building() -> None:
+    stage = build_stage(parse_scenario("walkers = []\n" + people_experiment.MISSION))
+    assert not people_in(stage.body(0).building)
+    for seed in range(30):
+        walkers = parse_scenario(people_experiment.MISSION + people_experiment.draw_walkers(seed)).walkers
+        assert walkers is not None
+        assert 1 <= len(people_in(walkers.enter(stage.building, stage.world, seed))) <= 3

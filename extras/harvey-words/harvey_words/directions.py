@@ -165,11 +165,12 @@ class _Teller:
         halls = {way: self.follower.hall_ahead(replace(state, heading=way)).meanings
                  for way in self.follower.ways(state)}
         for side, turn in SIDES.items():
-            for way, own in halls.items():
-                if is_along(way, state.heading + turn):
-                    others = [meanings for other, meanings in halls.items() if other != way]
-                    place = "behind you" if side == "behind" else f"on your {side}"
-                    yield from (f"Turn so that the {word} hall is {place}." for word in self._words(own, others))
+            there, place = state.heading + turn, "behind you" if side == "behind" else f"on your {side}"
+            for way in (way for way in halls if is_along(way, there)):
+                others = [meanings for other, meanings in halls.items() if other != way]
+                yield from (f"Turn so that the {word} hall is {place}." for word in self._words(halls[way], others))
+            things = self._things(replace(state, heading=turned(there, 0.0)))
+            yield from (f"Turn so that the {name} is {place}." for _, name in things)
 
     def _tell_walk(self, state: State, leg: WayLeg, onward: WayLeg | None) -> Wordings:
         """How far: to a thing, to a hall that leaves, so many blocks, to the end."""

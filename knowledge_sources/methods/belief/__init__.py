@@ -12,10 +12,11 @@ from knowledge_sources.methods.belief.places import (
     compute_chi2,
     compute_p_aliases,
 )
-from knowledge_sources.methods.belief.rivals import PRIORS, PRIORS_BESIDE, add_evidence, hedge, weigh_rivals
+from knowledge_sources.methods.belief.rivals import PRIORS, add_evidence, hedge, weigh_among, weigh_rivals
 
 __all__ = [
-    "MAX_CAMERA_CHI2", "MAX_SLIP_CHI2", "MIN_P_BELIEVED", "PRIORS", "PRIORS_BESIDE", "SLIP_SIGMA_M", "SLIP_SIGMA_RAD",
+    "MAX_CAMERA_CHI2", "MAX_SLIP_CHI2", "MIN_P_BELIEVED", "PRIORS", "SLIP_SIGMA_M", "SLIP_SIGMA_RAD",
     "Alike", "BelievedPlace", "Look", "add_evidence", "add_looks", "bound_p_aliases", "compute_chi2",
-    "compute_p_aliases", "hedge", "measure_common", "to_log_odds", "to_probability", "update", "weigh_rivals",
+    "compute_p_aliases", "hedge", "measure_common", "to_log_odds", "to_probability", "update", "weigh_among",
+    "weigh_rivals",
 ]

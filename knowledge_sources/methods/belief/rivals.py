@@ -14,7 +14,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 
-from knowledge_sources.methods.belief.odds import Alike, Look, add_looks, measure_common
+from knowledge_sources.methods.belief.odds import (
+    Alike,
+    Look,
+    add_looks,
+    measure_common,
+    to_log_odds,
+    to_probability,
+)
 from world_models.entries import Difference, Evidence, Explanation, Rival
 from world_models.entries.difference import RivalKind
 from world_models.frames import Pose2
@@ -22,11 +29,11 @@ from world_models.frames import Pose2
 PRIORS: Mapping[RivalKind, float] = {
     "chance": 3.0, "thing": 0.0, "leaf": -1.0, "jamb": 0.0, "wall": 0.0, "dirt": -1.0,
     "still camera": -4.0, "late pictures": -4.5, "lens": -4.0, "focal length": -2.0,
-    "mounting": -2.0, "wheels": -2.0, "turns": -2.0, "elsewhere": -3.0, "mover": -1.0,
+    "mounting": -2.0, "wheels": -2.0, "turns": -2.0, "odometry": -4.0, "elsewhere": -3.0, "mover": -1.0,
 }
 """Log odds of a rival before any evidence, against what nobody has thought of: what is ordinary first."""
-PRIORS_BESIDE = {**PRIORS, "chance": -2.0}
-"""The same of a door where doors stand beside in general, by some 8 cm: of eight one is within a centimetre."""
+CHANCE_BESIDE = -2.0
+"""Of chance where others stand beside in general, by some 8 cm: of eight one is within a centimetre."""
 P_MISREAD = 0.02
 """Part of the looks that are misread as a whole: such a one looks as if its best rival were so (pictures of honest
 missions, development seeds: 1 of 67 matched wrongly)."""
@@ -49,6 +56,16 @@ def weigh_rivals(about: str, evidence: Sequence[Evidence], priors: Mapping[Rival
 def add_evidence(known: Difference, one: Evidence) -> Difference:
     """What is known of a difference with one evidence more."""
     return weigh_rivals(one.about, (*known.counted, one))
+
+
+def weigh_among(found: Difference, others: Sequence[Evidence]) -> Difference:
+    """A difference of a door where others tell whether doors stand beside: so much likelier it does before a look."""
+    known = weigh_rivals(found.about, others).find("jamb") if others else None
+    if known is None:
+        return found
+    alone, beside = to_probability(PRIORS["chance"]), to_probability(CHANCE_BESIDE)
+    chance = to_log_odds(alone + known.p * (beside - alone))
+    return weigh_rivals(found.about, found.counted, {**PRIORS, "chance": chance})
 
 
 def hedge(ratios: Mapping[RivalKind, float]) -> dict[RivalKind, float]:

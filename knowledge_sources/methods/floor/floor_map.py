@@ -16,7 +16,6 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,14 +69,9 @@ class MapAnswer(NamedTuple):
 class FloorMap:
     """The floor by some evidence, in the world's frame."""
 
-    def __init__(self, sights: Sequence[FreeFloor], discs: Floats, taken: Sequence[Floats] = ()) -> None:
-        """Take the evidence.
-
-        Args:
-            discs: (n, 3) x, y, radius of floor that the robot has been on, or a person has seen [m, world].
-            taken: corners (k, 2) of what is held to stand on the floor.
-        """
-        self._sights, self._discs, self._taken = sights, discs, taken
+    def __init__(self, sights: Sequence[FreeFloor], discs: Floats) -> None:
+        """Take the evidence; discs: (n, 3) x, y, radius of floor that the robot has been on, or a person has seen."""
+        self._sights, self._discs = sights, discs
         when = [(sight.seen_s, sight.sense, sight.x_m, sight.y_m) for sight in sights]
         self._newest_first = sorted(range(len(sights)), key=when.__getitem__, reverse=True)
         self._apart = _list_apart([(k, sights[k]) for k in self._newest_first if sights[k].sense == "ranges"])
@@ -123,9 +117,6 @@ class FloorMap:
                 is_open[here] &= part >= 0.0
             is_silent[here] &= part >= 0.0
             np.copyto(by[here], k, where=is_surer | tells)
-        for corners in self._taken:
-            outline = np.round((corners / CELL_M - 0.5 - low)[:, ::-1] * 256.0).astype(np.int32)
-            cv2.fillPoly(seen, [outline], 100.0, shift=8)
         return free, seen + heard, by
 
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from knowledge_sources.methods.belief import PRIORS_BESIDE, weigh_rivals
 from knowledge_sources.methods.floor.footprints import measure_change_m
 from world_models.building.changes import find_along, outline_door
 from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
@@ -61,15 +60,12 @@ def revise_by_difference(frame: LocaleFrame, found: Difference, by: str) -> Loca
     return frame.restored("inexact", frame.name) if frame.is_inexact else frame.changed(change)
 
 
-def redraw_door(frame: LocaleFrame, door: Doorway, found: Difference, by: str, *, are_beside: bool) -> LocaleFrame:
+def redraw_door(frame: LocaleFrame, door: Doorway, found: Difference, by: str) -> LocaleFrame:
     """A frame in which a door stands where it was surely found, or where the file has it again; else the same frame.
 
     Args:
         door: as the file has it.
-        are_beside: whether the doors of the building surely stand beside: then one in its place is the exception.
     """
-    if are_beside:
-        found = weigh_rivals(found.about, found.counted, PRIORS_BESIDE)
     known, jamb = next((c for c in frame.changes if (c.what, c.name) == ("beside", door.name)), None), found.leader
     if found.is_sure and jamb.kind == "jamb":
         if abs(jamb.off) < MIN_BESIDE_SIGMAS * jamb.sigma or jamb.sigma > MAX_BESIDE_SIGMA_M:

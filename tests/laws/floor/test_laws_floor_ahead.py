@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from blackboard import Entry
 from generated_boards import Bench, to_world
 from harvey.testing import HALL, HOUSE, STUDY, house, plain_robot
-from ideal_floor_watcher import scan_floor
 from knowledge_sources.methods.floor import Lookout, find_floor
 from knowledge_sources.reads import SEEN_MARGIN_M, FloorAhead, find_robot, floor_ahead
 from knowledge_sources.reads.floor_ahead import (
@@ -26,6 +25,7 @@ from knowledge_sources.reads.floor_ahead import (
     list_free_discs,
 )
 from knowledge_sources.settings import DEFAULT
+from perfect_eye import scan_floor
 from world_models.building.locales import EXTRA_KIND
 from world_models.entries import FreeFloor, Place, PlaceSearch, Subgoal
 from world_models.entries.floor import FloorSense

@@ -19,7 +19,16 @@ from knowledge_sources.reads.motion_between import WHEELS_PART
 from knowledge_sources.senses import correction_monitor as own
 from knowledge_sources.senses.correction_monitor import CorrectionMonitor
 from world_models.actuator import ActuatorModel
-from world_models.entries import SHARED_SIGMA_M, Certificate, Drift, Evidence, MotionReport, PoseFix, Rival
+from world_models.entries import (
+    SHARED_SIGMA_M,
+    Certificate,
+    Drift,
+    Evidence,
+    MotionReport,
+    MotorCommand,
+    PoseFix,
+    Rival,
+)
 from world_models.frames import Pose2
 
 SOURCE, WHEELS, HERE = CorrectionMonitor(), ActuatorModel(), Pose2(2.0, 1.5, 0.3)
@@ -33,14 +42,15 @@ def certify(bench: Bench, pose: Pose2, verdict: str = "verified", p_false: float
 
 
 def go(
-    step: Pose2, turn_rad: float, move_m: float, before_m: float = 0.0, **told: object
+    step: Pose2, turn_rad: float, move_m: float, before_m: float = 0.0, jump_m: float = 0.0, **told: object
 ) -> tuple[Bench, Entry[Certificate]]:
     """Pictures before and after a motion that the wheels counted and that moved the robot by a step, after another."""
     bench = Bench(plain_robot(actuator=WHEELS))
     bench.believe(HERE)
     bench.move(0.0, before_m)
     certify(bench, HERE, **told)  # type: ignore[arg-type]
-    bench.move(turn_rad, move_m)
+    asked = bench.put(MotorCommand(turn_rad, move_m))
+    bench.put(MotionReport(turn_rad, move_m + jump_m, 1.0, 2.0), asked)
     return bench, certify(bench, HERE @ step)
 
 
@@ -107,6 +117,17 @@ def test_wheels_that_count_wrongly_are_no_reason_to_mistrust_pictures(way_m: flo
     seen = say(go(Pose2((1.0 + part) * moved.x_m, 0.0, 0.0), 0.0, way_m, way_m))
     assert not seen or weigh_rivals("motion", seen * 4).p_misled < 0.01
     assert way_m < 0.5 or lead(seen).kind == "wheels"
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.4, 1.5), st.floats(0.15, 0.5), st.sampled_from((-1.0, 1.0)), errors)
+def test_wheels_that_go_as_asked_and_count_something_else_count_wrongly(
+    way_m: float, jump: float, side: float, error: Pose2
+) -> None:
+    seen = say(*(go(WHEELS.predict_motion(0.0, m) @ error, 0.0, m, jump_m=side * jump * m) for m in (way_m, 0.5)))
+    assert weigh_rivals("motion", seen * 3).leader.kind in ("odometry", "wheels")
+    seen += say(go(WHEELS.predict_motion(0.0, way_m) @ error, 0.0, way_m, jump_m=-side * jump * way_m))
+    assert lead(seen).kind == "odometry"
 
 
 @settings(max_examples=60, deadline=None)

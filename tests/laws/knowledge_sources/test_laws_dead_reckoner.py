@@ -24,7 +24,7 @@ from generated_boards import (
     to_world,
 )
 from harvey.testing import HALL, STUDY, SURE, check_source, house, plain_robot
-from knowledge_sources.action.dead_reckoner import MIN_CLAIMED_PART, DeadReckoner
+from knowledge_sources.action.dead_reckoner import MAX_COUNTED_BESIDE_M, MIN_CLAIMED_PART, DeadReckoner
 from knowledge_sources.methods.calibration import SIGMA_YAW_RAD
 from knowledge_sources.reads import PLACED_BY
 from knowledge_sources.settings import DEFAULT
@@ -232,7 +232,7 @@ def test_it_asks_for_a_picture_unless_one_was_taken_on_the_move(rolling: bool, f
         assert reasons(effect_on(told.effects, PictureRequest)) == {"Hypothesis"}
 
 
-@pytest.mark.parametrize("part", [MIN_CLAIMED_PART - SMALL, MIN_CLAIMED_PART + SMALL])
+@pytest.mark.parametrize("part", [MIN_CLAIMED_PART - SMALL, MIN_CLAIMED_PART + SMALL, 1.0, 1.2])
 @pytest.mark.parametrize("contact", [False, True])
 @pytest.mark.parametrize("fault", [False, True])
 def test_what_stopped_it_is_a_difference_unless_the_body_says_what_it_was(
@@ -241,6 +241,8 @@ def test_what_stopped_it_is_a_difference_unless_the_body_says_what_it_was(
     told = reckon(Pose2(2.0, 2.0, 0.0), 0.0, part * 0.5, asked=MotorCommand(0.0, 0.5), contact=contact, fault=fault)
     found, is_stopped = made(told.effects, Discrepancy), not fault and (contact or part < MIN_CLAIMED_PART)
     assert len(found) == is_stopped
+    is_odd = not fault and not contact and abs(part - 1.0) * 0.5 > MAX_COUNTED_BESIDE_M  # then it may be as far off
+    assert told.moved.excess_m == pytest.approx(abs(part - 1.0) * 0.5 if is_odd else 0.0)
     if is_stopped:
         bound = DEFAULT.plan.max_deviation_px
         assert replace(found[0], what="") == Discrepancy(Level.ACTION, "", math.inf, (bound, bound), "px")

@@ -14,7 +14,7 @@ from blackboard import Post, Posted, Revise
 from harvey.testing import answer, check_source
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.model.model_reviser import ModelReviser
-from knowledge_sources.reads import find_building, name_model
+from knowledge_sources.reads import find_building, list_filed_doors, name_model
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall
 from world_models.building.locale_frame import FRAME_OF, FrameChange, LocaleFrame
@@ -168,15 +168,21 @@ def test_walls_that_are_farther_apart_explain_a_model_that_seems_inexact(order: 
     assert name_model(hall.board.view) == f"{MODEL} with 2 walls redrawn"  # of which nothing is known yet
 
 
+@pytest.mark.parametrize("is_own", [False, True])
 @pytest.mark.parametrize("order", [1, -1])
-def test_one_sure_look_redraws_a_door_only_where_doors_surely_stand_beside(order: int) -> None:
+def test_one_sure_look_redraws_a_door_only_where_others_stand_beside(order: int, is_own: bool) -> None:
     hall, told = Hall((SOURCE,)), (Explanation("chance", "", 0.0), Explanation("jamb", "", 3.5, 0.1, 0.015))
-    looks = [Evidence(name, "", told, x_m, 0.0, 0.0, 0.3, 0.2, 1.0)
-             for name, x_m in ((DOOR, 0.0), (DOORS, 4.0), (DOORS, 8.0))]
+    own = (door := list_filed_doors(hall.board.view)[DOOR]).pose_from(door.between[0])
+    places = ((own.x_m, own.y_m),) * 2 if is_own else ((4.0, 0.0), (8.0, 0.0))
+    looks = [Evidence(name, "", told, *at, 0.0, 0.3, 0.2, 1.0)
+             for name, at in ((DOOR, (0.0, 0.0)), *((DOORS, place) for place in places))]
     first, last = (weigh_rivals(said[0].about, said) for said in (looks[:1], looks[1:])[::order])
     one = hall.put(first)
     assert not changes(hall, HALL) and not changes(hall, "archive")
     both = {one.id, hall.put(last).id}
+    if is_own:  # what a door says of the doors says nothing more of itself
+        assert not changes(hall, HALL)
+        return
     for room in ROOMS:
         (drawn,), entry = changes(hall, room), hall.board.view.latest(LocaleFrame, lambda f, room=room: f.name == room)
         assert (drawn.what, drawn.name, drawn.sigma_m) == ("beside", DOOR, 0.015)

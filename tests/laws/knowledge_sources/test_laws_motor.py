@@ -25,7 +25,6 @@ from generated_boards import (
     to_world,
 )
 from harvey.testing import HALL, check_source, house, plain_robot
-from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.motor import LOOKAHEAD_M, Motor
 from knowledge_sources.methods.floor import P_CAMOUFLAGED, find_floor
 from knowledge_sources.methods.motion import MAX_HEADING_ERROR_RAD, count_increment, plan_increment
@@ -34,6 +33,7 @@ from knowledge_sources.methods.motion.pure_pursuit import MAX_START_OFFSET_M
 from knowledge_sources.reads import FloorAhead
 from knowledge_sources.reads.floor_ahead import TOUCH_HOLDS_M
 from knowledge_sources.settings import DEFAULT
+from perfect_eye import scan_floor
 from world_models.actuator import ActuatorModel
 from world_models.entries import Contact, Discrepancy, Drift, Leg, MotorCommand, Obstacle, Place
 from world_models.entries.task import MilestoneStatus

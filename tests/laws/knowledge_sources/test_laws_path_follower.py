@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from blackboard import Effect, Entry, Level, Revise, Revised
 from generated_boards import Bench, effect_on, made, mirrored, mirrored_place, reasons, to_world
 from harvey.testing import HALL, check_source, house, plain_robot
-from ideal_floor_watcher import scan_floor
 from knowledge_sources.action.path_follower import (
     MAX_ROLLING_ERROR_RAD,
     MAX_ROLLING_START_ERROR_RAD,
@@ -29,6 +28,7 @@ from knowledge_sources.methods.motion.pure_pursuit import MAX_CURVATURE_PER_M
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import FloorAhead
 from knowledge_sources.settings import DEFAULT
+from perfect_eye import scan_floor
 from world_models.actuator import ActuatorModel
 from world_models.entries import Course, Discrepancy, Drift, Leg, MotionReport, MotorCommand, Outcome, Place
 from world_models.frames import Pose2

@@ -10,16 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.paper.pose_scenes import PoseScene, corridor, draw_prior, end_noise, wrong_landmarks
-from experiments.paper.pose_solvers import r_and_t, r_then_t, trunc_r_and_t
+from experiments.paper.pose_solvers import r_and_t, r_then_t
 from knowledge_sources.methods.pose import (
     build_line_set,
     compute_image_jacobian,
     compute_weak_information,
     measure_lines,
-    med_r_and_t,
     r_and_t_ml,
 )
-from pose_laws import SIGMA_PX, SOLVERS, Solver, by_solver, measure_error, scenes, seeds, solve
+from pose_laws import ROBUST, SIGMA_PX, SOLVERS, Solver, by_solver, measure_error, scenes, seeds, solve
 from world_models.camera import Camera
 from world_models.frames import Pose
 
@@ -94,7 +93,7 @@ def test_moving_the_world_moves_the_pose_with_it(solver: Solver, scene: PoseScen
     assert is_same(second.camera_from_world @ moved_from_world, first.camera_from_world)
 
 
-@pytest.mark.parametrize("solver", [med_r_and_t, trunc_r_and_t], ids=lambda f: f.__name__)
+@by_solver(ROBUST)
 @pytest.mark.parametrize("version", ["lines", "landmarks"])
 @given(scene=scenes, seed=seeds)
 @settings(max_examples=8, deadline=None, derandomize=True)
@@ -144,7 +143,7 @@ def test_few_lines_never_make_a_prior_worse(scene: PoseScene, count: int, seed: 
     scene = take_some(scene, rng, count)
     truth = scene.camera_from_world
     prior = draw_prior(truth, 0.1, 0.01, rng)
-    for solver in (r_and_t_ml, med_r_and_t, trunc_r_and_t):
+    for solver in (r_and_t_ml, *ROBUST):
         found = solve(solver, scene, scene.segments_px, prior)
         assert weigh_error(found.camera_from_world, truth) <= weigh_error(prior, truth) * 1.02 + 1e-6
 
@@ -158,12 +157,12 @@ def test_few_noisy_lines_never_make_a_prior_worse(count: int, scene: PoseScene, 
     scene = take_some(scene, rng, count)
     truth, segments = scene.camera_from_world, end_noise(scene.segments_px, SIGMA_PX, rng)
     prior = draw_prior(truth, 0.1, 0.01, rng)
-    for solver in (r_and_t_ml, med_r_and_t, trunc_r_and_t):
+    for solver in (r_and_t_ml, *ROBUST):
         found = solve(solver, scene, segments, prior)
         assert weigh_error(found.camera_from_world, truth) <= weigh_error(prior, truth) * 1.02 + 1e-6
 
 
-@pytest.mark.parametrize("solver", [r_then_t, r_and_t], ids=lambda f: f.__name__)
+@by_solver([r_then_t, r_and_t])
 @given(scene=scenes, count=st.integers(0, 2), seed=seeds)
 @quick
 def test_r_then_t_and_r_and_t_return_the_prior_below_three_lines(

@@ -19,6 +19,7 @@ SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 THRESHOLDS = np.zeros((2, 2, 2))
 
 Passages = tuple[Doorway | Link, ...]
+Hierarchy = tuple[dict[str, str | None], Passages, Passages, list[str]]
 Frames = Mapping[str, LocaleFrame]
 
 
@@ -30,7 +31,7 @@ def build_source(parents: dict[str, str | None], passages: Sequence[Doorway | Li
 
 
 @st.composite
-def hierarchies(draw: st.DrawFn) -> tuple[dict[str, str | None], Passages, Passages, list[str]]:
+def hierarchies(draw: st.DrawFn) -> Hierarchy:
     """Parents, passages, some of these that are shut, and the rooms."""
     parents: dict[str, str | None] = {"world": None}
     containers = ["world"]
@@ -77,9 +78,7 @@ def refine_route(source: Frames, origin: str, destination: str, shut: Passages, 
 
 @settings(deadline=None, max_examples=300)
 @given(hierarchies(), st.data())
-def test_a_route_is_that_of_a_world_without_the_shut_passages(
-    world: tuple[dict[str, str | None], Passages, Passages, list[str]], data: st.DataObject
-) -> None:
+def test_a_route_is_that_of_a_world_without_the_shut_passages(world: Hierarchy, data: st.DataObject) -> None:
     parents, passages, shut, rooms = world
     source = build_source(parents, passages)
     without = build_source(parents, [passage for passage in passages if passage not in shut])
@@ -89,9 +88,7 @@ def test_a_route_is_that_of_a_world_without_the_shut_passages(
 
 @settings(deadline=None, max_examples=300)
 @given(hierarchies(), st.data())
-def test_a_route_exists_where_a_chain_of_open_passages_does(
-    world: tuple[dict[str, str | None], Passages, Passages, list[str]], data: st.DataObject
-) -> None:
+def test_a_route_exists_where_a_chain_of_open_passages_does(world: Hierarchy, data: st.DataObject) -> None:
     parents, passages, shut, rooms = world
     source = build_source(parents, passages)
     a, b = data.draw(st.sampled_from(rooms)), data.draw(st.sampled_from(rooms))
@@ -137,9 +134,7 @@ class Watched(Mapping[str, Any]):
 
 @settings(deadline=None, max_examples=200)
 @given(hierarchies(), st.data())
-def test_only_containers_above_shut_passages_and_what_their_edges_join_are_read(
-    world: tuple[dict[str, str | None], Passages, Passages, list[str]], data: st.DataObject
-) -> None:
+def test_only_containers_above_shut_passages_and_what_they_join_are_read(world: Hierarchy, data: st.DataObject) -> None:
     parents, passages, shut, rooms = world
     source = build_source(parents, passages)
     a, b = data.draw(st.sampled_from(rooms)), data.draw(st.sampled_from(rooms))

@@ -49,7 +49,6 @@ def history(*records: EntryRecord) -> MemoryTimeline:
         record.cycle, "plan", (), (), (), (), None, None, 0, (record,), "", {}, ()) for record in records)
 
 
-SKETCH = PlanSketch("Goal-1", (), "hallway", (), status="superseded")
 RUN = history(
     entry("CameraPicture-3.0", CameraPicture(b"", 3, 1.0), (), 1),
     entry("Obstacle-1.0", BOX, ("CameraPicture-3.0",), 2),

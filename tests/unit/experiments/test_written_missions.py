@@ -38,7 +38,7 @@ def write_twice(folder: Path, write: Callable[[Path], Path]) -> tuple[Scenario, 
     return scenario, build_stage(scenario)
 
 
-@pytest.mark.parametrize("case", ["another way", "no way", "stands open"])
+@pytest.mark.parametrize("case", ["another way", "no way", "stands open", "loose leaf"])
 def test_a_door_is_otherwise(tmp_path: Path, case: str) -> None:
     scenario, _ = write_twice(tmp_path, lambda folder: write_door_mission(folder, 3, case).path)
     door = write_door_mission(tmp_path, 3, case).door

@@ -1,42 +1,17 @@
-"""A watcher of the floor that sees what the model has, and things that a test puts there: for tests of the motion."""
+"""What a perfect eye sees of a floor with things on it: for tests of the map and of the motion."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
 
-from blackboard import Change, Effect, Entry, Level, Post, Posted, View, Watch
-from knowledge_sources.methods.floor import find_floor
-from knowledge_sources.reads import find_belief, find_building, find_robot
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import CameraPicture, FreeFloor, Hypothesis
+from world_models.entries import FreeFloor
 from world_models.frames import Pose2
 
 FAR_M = 8.0
-
-
-class IdealFloorWatcher(RobotKnowledgeSource):
-    """Posts after each picture what a perfect eye would see of the floor."""
-
-    level = Level.ACTION
-    on = (Watch(CameraPicture, (Posted,)),)
-    writes = (FreeFloor,)
-
-    def bind(self, view: View, trigger: Change) -> tuple[Entry[Hypothesis], Entry[CameraPicture]] | None:
-        belief, frame = find_belief(view), view.latest(CameraPicture)
-        return None if belief is None or frame is None else (belief, frame)
-
-    def act(self, view: View, case: tuple[Entry[Hypothesis], Entry[CameraPicture]]) -> Iterable[Effect]:
-        belief, frame = case
-        robot, building = find_robot(view), find_building(view)
-        pose = belief.value.world_from_robot(building)
-        near = building.rooms_near(pose.position, 6.0)
-        scan = scan_floor(find_floor(building, near), pose, belief.value.locale, frame.value.sim_time_s,
-                          forward_m=robot.mount.forward_m)
-        yield Post(scan, (frame, belief))
 
 
 def scan_floor(
