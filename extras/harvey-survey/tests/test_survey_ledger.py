@@ -13,7 +13,7 @@ from harvey.cli import main
 from harvey.errors import BadInput
 from harvey_survey.ledger import Ledger, read_ledger
 from harvey_survey.ledger_output import is_sure
-from harvey_survey.looks import read_looks
+from harvey_survey.seen_pictures import read_looks
 from logs.run_directory import RunDirectory
 from world_models.files.world_files import WORLDS, load_world
 
