@@ -181,7 +181,8 @@ class View:
     def newest(self, index: Index[T], key: Hashable) -> Entry[T] | None:
         """The newest posting that an index files under a key, or None."""
         store = self._board._stores.get(index.kind)
-        return None if store is None else store.newest(index, key)
+        found = () if store is None else store.having(index, key)
+        return found[-1] if found else None
 
     def keys(self, index: Index[T]) -> Collection[Hashable]:
         """The keys under which an index files something now."""

@@ -58,12 +58,8 @@ class EntryStore:
 
     def having(self, index: Index[Any], key: Hashable) -> list[Entry[Any]]:
         """The entries with a key, in order of posting."""
-        return sorted(self._filed(index).get(key, {}).values(), key=_number)
-
-    def newest(self, index: Index[Any], key: Hashable) -> Entry[Any] | None:
-        """The one of them that was posted last, or None."""
         found = self._filed(index).get(key, {}).values()
-        return next(iter(found)) if len(found) == 1 else max(found, key=_number, default=None)
+        return list(found) if len(found) < 2 else sorted(found, key=_number)
 
     def keys(self, index: Index[Any]) -> Collection[Hashable]:
         """The keys that some entry has."""

@@ -7,7 +7,6 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from enum import Enum, IntEnum
-from functools import cache
 from math import inf, isfinite, nan
 from typing import Any, NamedTuple
 
@@ -41,7 +40,7 @@ def plain(value: Any) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         if hasattr(value, "journal_form"):
             return plain(value.journal_form())
-        return {name: plain(getattr(value, name)) for name in _fields_of(type(value))}
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, tuple | list):
@@ -51,11 +50,6 @@ def plain(value: Any) -> Any:
     if hasattr(value, "tolist"):
         return plain(value.tolist())
     raise ValueError(f"expected a value of plain data, got a {type(value).__name__}")
-
-
-@cache
-def _fields_of(kind: type[Any]) -> tuple[str, ...]:
-    return tuple(field.name for field in dataclasses.fields(kind))
 
 
 class Decision(NamedTuple):

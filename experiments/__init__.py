@@ -56,6 +56,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "malformed-worlds": "World and building files with errors put in",
         "missions": "1,000 missions without trouble and 1,000 with",
         "other-worlds": "Missions in rooms drawn by others (miniworld)",
+        "people": "Missions among people who walk (harvey-people)",
         "rosmaps": "ROS maps traced into worlds: rooms, doorways, missions",
         "serial-chaos": "Drivers of bases over serial lines with errors",
         "soak": "Errands in one building, day after day: 1,000 km",

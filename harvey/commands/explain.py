@@ -80,9 +80,8 @@ def _run_why(args: Namespace) -> int:
 
 def _describe_unfinished(run: RunDirectory, cycle: int) -> str:
     """What to say first of a run that has no outcome."""
-    what = (f"The run is still going on, in cycle {cycle} or later." if is_being_written(run.journal) else
-            f"The run was cut off in cycle {cycle}, before it had an outcome: harvey resume {run.path} goes on with"
-            " it.")
+    what = (f"The run is still going on, in cycle {cycle} or later." if is_being_written(run.journal) else f"The run"
+            f" was cut off in cycle {cycle}, before it had an outcome: harvey resume {run.path} goes on with it.")
     return f"{what}\nThe last thing that its journal tells of:\n"
 
 
@@ -168,23 +167,19 @@ def _run_story(args: Namespace) -> int:
     story = tell_run(run, history)
     print(json.dumps(asdict(story), indent=2) if args.json else "\n".join(story_lines(story)))
     if history.cut_off is not None and not is_being_written(run.journal):
-        raise BadInput(
-            f"{run.path}: the run was cut off in cycle {history.cut_off}, before it had an outcome; harvey"
-            f" resume {run.path} goes on with it"
-        )
+        raise BadInput(f"{run.path}: the run was cut off in cycle {history.cut_off}, before it had an outcome; harvey"
+                       f" resume {run.path} goes on with it")
     return 0
 
 
 STORY = CliCommand(
-    "story",
-    "a run told in a page of text: plans, lost and found, contacts, milestones, how it ended",
+    "story", "a run told in a page of text: plans, lost and found, contacts, milestones, how it ended",
     (
         ("harvey story runs/hallway-kidnap-0", "what happened, in the order of subjects, with cycles and times"),
         ("harvey story runs/hallway-kidnap-0 | head -20", "its first lines: how it ended, and what went wrong"),
         ("harvey story runs/hallway-kidnap-0 --json", "the same for machines, each sentence with cycle and entries"),
     ),
-    _add_story_arguments,
-    _run_story,
+    _add_story_arguments, _run_story,
     "From the journal, as the robot knew it; what only the simulator knows is from result.json, and is called that.\n"
     "Exit code 2 where the run was cut off before it had an outcome: what there is of it is told all the same.",
 )
@@ -196,7 +191,7 @@ def _add_diff_arguments(parser: ArgumentParser) -> None:
 
 
 def _run_diff(args: Namespace) -> int:
-    from logs.explain.diff import agreement, apart, because, describe, first_difference, settings
+    from logs.explain.diff import apart, because, describe, first_difference, settings
     from logs.run_head import RunHead
     from logs.timeline import Timeline
 
@@ -216,7 +211,7 @@ def _run_diff(args: Namespace) -> int:
     if one is None or other is None:
         print("\n".join(describe(agreed, one, other)))
     else:
-        print("\n".join([agreement(agreed), "", *because(ours, theirs, agreed, set_differently)]))
+        print("\n".join([next(describe(agreed, one, other)), "", *because(ours, theirs, agreed, set_differently)]))
     if one is None and other is None:
         return 0
     print(f"\nHow they went:\n{apart(first, second, ours, theirs)}")

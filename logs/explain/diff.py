@@ -48,17 +48,12 @@ def first_difference(ours: Timeline, theirs: Timeline) -> tuple[int, DecisionRec
     return agreed, ours.cycle_of(agreed + 1), theirs.cycle_of(agreed + 1)
 
 
-def agreement(agreed: int) -> str:
-    """How long the runs agree."""
-    return f"The two runs agree for {count(agreed, 'decision')}."
-
-
 def describe(agreed: int, one: DecisionRecord | None, other: DecisionRecord | None) -> Iterator[str]:
     """The answer in plain words; the runs are called first and second."""
     if one is None and other is None:
         yield f"The two runs agree in all of their {count(agreed, 'decision')}."
         return
-    yield agreement(agreed)
+    yield f"The two runs agree for {count(agreed, 'decision')}."
     if one is None or other is None:
         (ended, name), d = (("first", "second"), other) if one is None else (("second", "first"), one)
         acts = "nothing is chosen" if d is None or d.chosen is None else (
@@ -88,12 +83,8 @@ def differing_leaves(a: Any, b: Any, path: str = "") -> Iterator[tuple[str, Any,
 
 def _values(a: Any, b: Any, most: int) -> list[str]:
     """The differing values of two JSON values, the first of them in a few words each."""
-    leaves = [_against(*leaf) for leaf in differing_leaves(a, b)]
+    leaves = [f"{path}: {_short(one)} against {_short(other)}" for path, one, other in differing_leaves(a, b)]
     return leaves[:most] + [f"and {len(leaves) - most} more"] * (len(leaves) > most)
-
-
-def _against(path: str, a: Any, b: Any) -> str:
-    return f"{path}: {_short(a)} against {_short(b)}"
 
 
 def _short(value: Any) -> str:
@@ -190,7 +181,7 @@ def because(ours: Timeline, theirs: Timeline, agreed: int, settings: tuple[str, 
     """Why the runs part, in sentences. The runs are called first and second."""
     where = parting(ours, theirs, agreed)
     if where.observation:
-        late = where.decision and _cycle(ours, theirs, where.observation) > where.decision
+        late = 0 < where.decision < (ours.cycle_of_ref(where.observation) or theirs.cycle_of_ref(where.observation))
         later = ", after they had decided differently" if late else ""
         yield from _tell_entry(ours, theirs, where.observation, "observation", later)
         if all(is_a(history.entry(where.observation), CameraPicture) for history in (ours, theirs)):
@@ -202,12 +193,9 @@ def because(ours: Timeline, theirs: Timeline, agreed: int, settings: tuple[str, 
         yield from _tell_grounds(ours, theirs, where.motion)
 
 
-def _cycle(ours: Timeline, theirs: Timeline, ref: str) -> int:
-    return ours.cycle_of_ref(ref) or theirs.cycle_of_ref(ref)
-
-
 def _tell_entry(ours: Timeline, theirs: Timeline, ref: str, what: str, later: str = "") -> Iterator[str]:
-    yield f"The first {what} that differs is {ref}, in cycle {_cycle(ours, theirs, ref)}{later}:"
+    cycle = ours.cycle_of_ref(ref) or theirs.cycle_of_ref(ref)
+    yield f"The first {what} that differs is {ref}, in cycle {cycle}{later}:"
     yield from _both(ours.entry(ref), theirs.entry(ref))
 
 

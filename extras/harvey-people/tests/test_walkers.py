@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from harvey_people.peopled import people_in
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, scenario_from_tables
 from sim.stage import build_stage
 
-SCENARIOS = sorted((Path(harvey_people.__file__).parent / "scenarios").glob("*.toml"))
+SCENARIOS = sorted(harvey_people.SCENARIOS.glob("*.toml"))
 MISSION = 'world = "research_center"\ngoal = "(ptrans (hallway (4,4,0)) (hallway (24,4,0)))"\n'
 WALKER = '[[walkers]]\nlocale = "hallway"\n'
 
@@ -48,3 +49,9 @@ def test_people_that_are_drawn_for_the_experiment_fit_its_building() -> None:
         walkers = parse_scenario(people_experiment.MISSION + people_experiment.draw_walkers(seed)).walkers
         assert walkers is not None
         assert 1 <= len(people_in(walkers.enter(stage.building, stage.world, seed))) <= 3
+
+
+def test_the_walkers_of_the_readme_can_be_set_up() -> None:
+    text = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    block, = re.findall(r"^```toml\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    assert people_in(build_stage(parse_scenario(MISSION + block)).body(0).building)

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from harvey_survey.looks import Look, light_of, read_looks
 from harvey_survey.offsets import SIGMA_PX, measure_offsets, measure_slopes
+from harvey_survey.seen_pictures import SeenPicture, light_of, read_looks
 from logs.run_directory import RunDirectory
 from world_models.building.model_errors import WALL, LineErrors, find_line_errors
 from world_models.building.world import World
@@ -32,7 +32,7 @@ STILL = np.zeros(len(CAMERA_UNKNOWNS))
 
 
 @dataclass(frozen=True, slots=True)
-class Counts:
+class LedgerCounts:
     """How often something was expected, found, hidden by what was found on the floor, and missing."""
 
     expected: int = 0
@@ -43,8 +43,8 @@ class Counts:
     def missing(self) -> int:
         return self.expected - self.found - self.hidden
 
-    def plus(self, found: bool, hidden: bool) -> Counts:
-        return Counts(self.expected + 1, self.found + found, self.hidden + (hidden and not found))
+    def plus(self, found: bool, hidden: bool) -> LedgerCounts:
+        return LedgerCounts(self.expected + 1, self.found + found, self.hidden + (hidden and not found))
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +78,14 @@ class LineEntry:
     """
 
     number: int
-    counts: Counts
+    counts: LedgerCounts
     off_m: float
     spread_m: float
     direction: tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Element:
+class LedgerElement:
     """A wall (a face), a door or a thing.
 
     Attributes:
@@ -99,11 +99,11 @@ class Element:
     room: str
     kind: str
     source: str
-    counts: Counts
+    counts: LedgerCounts
     pictures: int
     unseen: int
-    by_light: dict[str, Counts]
-    by_distance: dict[str, Counts]
+    by_light: dict[str, LedgerCounts]
+    by_distance: dict[str, LedgerCounts]
     lines: tuple[LineEntry, ...]
 
 
@@ -119,7 +119,7 @@ class Ledger:
     world: str
     runs: tuple[str, ...]
     looks: int
-    elements: tuple[Element, ...]
+    elements: tuple[LedgerElement, ...]
     offsets: tuple[Offset, ...]
 
     def offsets_of(self, name: str) -> tuple[Offset, ...]:
@@ -132,7 +132,7 @@ def read_ledger(world: World, path: Path, runs: Sequence[RunDirectory]) -> Ledge
     return build_ledger(world, read_looks(world, path, runs))
 
 
-def build_ledger(world: World, looks: Sequence[Look]) -> Ledger:
+def build_ledger(world: World, looks: Sequence[SeenPicture]) -> Ledger:
     """The ledger by looks."""
     tallies: dict[str, _Tally] = {}
     measured: dict[tuple[str, tuple[float, float, float]], list[tuple[float, float]]] = {}
@@ -150,12 +150,12 @@ def build_ledger(world: World, looks: Sequence[Look]) -> Ledger:
                   tuple(offset for offset in combined if offset is not None))
 
 
-def errors_of(world: World, look: Look, unstated_m: float) -> LineErrors:
+def errors_of(world: World, look: SeenPicture, unstated_m: float) -> LineErrors:
     """The modes of a look's lines; what nothing is stated of has this deviation [m]."""
     return find_line_errors(world, look.marks, look.numbers.tolist(), unstated_m)
 
 
-def _group_by_mark(look: Look) -> dict[str, list[int]]:
+def _group_by_mark(look: SeenPicture) -> dict[str, list[int]]:
     groups: dict[str, list[int]] = {}
     for i, mark in enumerate(look.marks):
         groups.setdefault(mark.name, []).append(i)
@@ -167,15 +167,15 @@ class _Tally:
     """What is counted of one landmark so far; offsets: of each line, of each segment its offset and slopes [px, px/m].
     """
 
-    counts: Counts = Counts()
+    counts: LedgerCounts = LedgerCounts()
     pictures: int = 0
     unseen: int = 0
-    by_light: dict[str, Counts] = field(default_factory=dict)
-    by_distance: dict[str, Counts] = field(default_factory=dict)
-    by_line: dict[int, Counts] = field(default_factory=dict)
+    by_light: dict[str, LedgerCounts] = field(default_factory=dict)
+    by_distance: dict[str, LedgerCounts] = field(default_factory=dict)
+    by_line: dict[int, LedgerCounts] = field(default_factory=dict)
     offsets: dict[int, list[tuple[Floats, Floats]]] = field(default_factory=dict)
 
-    def add(self, look: Look, rows: Sequence[int]) -> None:
+    def add(self, look: SeenPicture, rows: Sequence[int]) -> None:
         self.pictures += 1
         self.unseen += not any(look.found[i] for i in rows)
         light, far = light_of(look), look.distances_m
@@ -184,20 +184,20 @@ class _Tally:
             distance = DISTANCES[int(far[i] > NEAR_M) + int(far[i] > FAR_M)]
             self.counts = self.counts.plus(*seen)
             for counts, key in ((self.by_light, light), (self.by_distance, distance)):
-                counts[key] = counts.get(key, Counts()).plus(*seen)
-            self.by_line[int(look.numbers[i])] = self.by_line.get(int(look.numbers[i]), Counts()).plus(*seen)
+                counts[key] = counts.get(key, LedgerCounts()).plus(*seen)
+            self.by_line[int(look.numbers[i])] = self.by_line.get(int(look.numbers[i]), LedgerCounts()).plus(*seen)
 
-    def build(self, name: str, room: str, kind: str, source: str) -> Element:
+    def build(self, name: str, room: str, kind: str, source: str) -> LedgerElement:
         lines = tuple(_build_line(n, counts, self.offsets.get(n, [])) for n, counts in sorted(self.by_line.items()))
-        return Element(name, room, kind, source, self.counts, self.pictures, self.unseen, _in_order(self.by_light),
-                       _in_order(self.by_distance), lines)
+        return LedgerElement(name, room, kind, source, self.counts, self.pictures, self.unseen,
+                             _in_order(self.by_light), _in_order(self.by_distance), lines)
 
 
-def _in_order(counts: dict[str, Counts]) -> dict[str, Counts]:
+def _in_order(counts: dict[str, LedgerCounts]) -> dict[str, LedgerCounts]:
     return {key: counts[key] for key in ("dark", "middling", "bright", *DISTANCES) if key in counts}
 
 
-def _build_line(number: int, counts: Counts, offsets: Sequence[tuple[Floats, Floats]]) -> LineEntry:
+def _build_line(number: int, counts: LedgerCounts, offsets: Sequence[tuple[Floats, Floats]]) -> LineEntry:
     """The direction in which a line's offsets show best is that of the largest information."""
     if not offsets:
         return LineEntry(number, counts, 0.0, 0.0, (0.0, 0.0, 0.0))
@@ -212,7 +212,7 @@ def _build_line(number: int, counts: Counts, offsets: Sequence[tuple[Floats, Flo
     return LineEntry(number, counts, mean_m, spread_m, (x, y, z))
 
 
-def _list_offsets(look: Look) -> list[tuple[tuple[str, int], Floats, Floats]]:
+def _list_offsets(look: SeenPicture) -> list[tuple[tuple[str, int], Floats, Floats]]:
     """Of each pair: its line, the offsets (2,) of its segment and their slopes (2, 3) with the place of the line."""
     pieces = look.pieces_world[look.pairs]
     offsets = measure_offsets(look, look.pose, STILL, pieces)
@@ -221,7 +221,7 @@ def _list_offsets(look: Look) -> list[tuple[tuple[str, int], Floats, Floats]]:
             for k, i in enumerate(look.pairs.tolist())]
 
 
-def _measure_modes(world: World, look: Look) -> list[tuple[str, tuple[float, float, float], float, float]]:
+def _measure_modes(world: World, look: SeenPicture) -> list[tuple[str, tuple[float, float, float], float, float]]:
     """How far each mode is off by one picture, its pose as it was found: name, direction, mean [m] and variance."""
     every = errors_of(world, look, WITHIN_M).restate(1.0)
     errors = every.take(look.pairs)

@@ -13,7 +13,7 @@ import numpy as np
 
 from harvey.commands.plan_picture import draw_drawing
 from harvey.errors import BadInput
-from harvey_survey.ledger import Counts, Element, Ledger, Offset
+from harvey_survey.ledger import Ledger, LedgerCounts, LedgerElement, Offset
 from logs.tables import table
 from world_models.building.model_errors import WALL
 from world_models.building.plan_view import DrawnStorey, draw_storeys
@@ -47,7 +47,7 @@ def format_ledger(ledger: Ledger) -> str:
     return "\n\n".join([*parts, star])
 
 
-def _shares(counts: dict[str, Counts]) -> str:
+def _shares(counts: dict[str, LedgerCounts]) -> str:
     return ", ".join(f"{name} {c.found}/{c.expected}" for name, c in counts.items())
 
 
@@ -101,7 +101,7 @@ def write_plan(world: World, ledger: Ledger, out: Path) -> None:
         raise BadInput(f"--plan {out}: expected a file to write to, got: {error.strerror}") from None
 
 
-def _draw_element(axes: Any, ledger: Ledger, element: Element, at: Any) -> None:
+def _draw_element(axes: Any, ledger: Ledger, element: LedgerElement, at: Any) -> None:
     share = 1.0 - element.unseen / element.pictures
     colour = next(colour for least, colour, _ in COLOURS if share >= least)
     axes.plot(*at, "o", color=colour, markersize=4.0 + min(6.0, float(np.sqrt(element.pictures))), zorder=2000)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from harvey_survey.looks import Look
+from harvey_survey.seen_pictures import SeenPicture
 from knowledge_sources.methods.features import SIGMA_ACROSS_PX
 from world_models.camera import CAMERA_UNKNOWNS, move_camera
 from world_models.frames import Pose2
@@ -22,7 +22,7 @@ SIGMA_PX = SIGMA_ACROSS_PX
 """Standard deviation of a segment's end across its line [px]."""
 
 
-def measure_offsets(look: Look, pose: Pose2, camera_step: Floats, pieces_world: Floats) -> Floats:
+def measure_offsets(look: SeenPicture, pose: Pose2, camera_step: Floats, pieces_world: Floats) -> Floats:
     """(p, 2) how far both ends of each segment lie beside their lines [px].
 
     Args:
@@ -37,7 +37,9 @@ def measure_offsets(look: Look, pose: Pose2, camera_step: Floats, pieces_world: 
     return np.asarray(np.einsum("pei,pi->pe", look.segments_px - ends[:, :1], across))
 
 
-def match_again(look: Look, pose: Pose2, camera_step: Floats, pieces_world: Floats, within_px: float) -> Look:
+def match_again(
+    look: SeenPicture, pose: Pose2, camera_step: Floats, pieces_world: Floats, within_px: float
+) -> SeenPicture:
     """The look with each of its segments paired with the line that it lies on, and with no other.
 
     Args:
@@ -51,7 +53,9 @@ def match_again(look: Look, pose: Pose2, camera_step: Floats, pieces_world: Floa
     return replace(look, pairs=nearest[kept], segments_px=look.every_px[kept])
 
 
-def measure_support(look: Look, pose: Pose2, camera_step: Floats, pieces_world: Floats, within_px: float) -> float:
+def measure_support(
+    look: SeenPicture, pose: Pose2, camera_step: Floats, pieces_world: Floats, within_px: float
+) -> float:
     """How many of the lines (m, 2, 3) segments lie on, each by the part of its length on which they do."""
     off, shared, _, line_px = _lay_beside(look, pose, camera_step, pieces_world)
     covered = np.sum(np.where(off < within_px, np.maximum(shared, 0.0), 0.0), axis=1)
@@ -59,7 +63,7 @@ def measure_support(look: Look, pose: Pose2, camera_step: Floats, pieces_world: 
 
 
 def _lay_beside(
-    look: Look, pose: Pose2, camera_step: Floats, pieces_world: Floats
+    look: SeenPicture, pose: Pose2, camera_step: Floats, pieces_world: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Of m lines and s segments: how far a segment's further end lies beside the line, and what length they share
     (m, s); the lengths along the line of the segments (m, s), and of the lines (m,) [px]."""
@@ -75,7 +79,7 @@ def _lay_beside(
     return off, shared, at[..., 1] - at[..., 0], line_px
 
 
-def measure_slopes(look: Look, pose: Pose2, camera_step: Floats, pieces_world: Floats) -> tuple[Floats, Floats]:
+def measure_slopes(look: SeenPicture, pose: Pose2, camera_step: Floats, pieces_world: Floats) -> tuple[Floats, Floats]:
     """By how much the offsets change with pose and camera, (p, 2, 10), and with the place of each line, (p, 2, 3)."""
     here = measure_offsets(look, pose, camera_step, pieces_world)
     by_state = []

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from harvey.errors import BadInput
-from harvey_survey.changes import Change
+from harvey_survey.survey_changes import SurveyChange
 from harvey_survey.text_edits import apply_changes
 
 AXES = ("into", "along", "up", "x", "y")
@@ -31,7 +31,7 @@ class Proposal:
     """A change with its number in the patch; why_not: why it cannot be made in the text, or ""."""
 
     number: int
-    change: Change
+    change: SurveyChange
     is_accepted: bool = True
     why_not: str = ""
 
@@ -60,7 +60,7 @@ class Patch:
         return replace(self, proposals=tuple(replace(one, is_accepted=decide(one)) for one in self.proposals))
 
 
-def build_patch(path: Path, changes: Sequence[Change], runs: int, pictures: int) -> Patch:
+def build_patch(path: Path, changes: Sequence[SurveyChange], runs: int, pictures: int) -> Patch:
     """The patch of a world file, its changes numbered from 1; all that can be made are accepted."""
     left = {(change.kind, change.name): why for change, why in apply_changes(path, changes)[1]}
     proposals = tuple(
@@ -118,7 +118,7 @@ def _read_proposal(table: dict[str, Any]) -> Proposal:
     if not kind or bool(moved) == bool(table.get("gone", False)):
         raise ValueError(f"a change that names no wall, door or thing, or says nothing of it: {table}")
     sigmas = {axis: float(table[f"{axis}_sigma_cm"]) for axis in moved}
-    change = Change(kind, str(table[kind]), moved, sigmas, float(table["certainty"]), str(table["evidence"]))
+    change = SurveyChange(kind, str(table[kind]), moved, sigmas, float(table["certainty"]), str(table["evidence"]))
     return Proposal(int(table["number"]), change, bool(table["accepted"]), str(table.get("why_not", "")))
 
 

@@ -106,9 +106,9 @@ def _run_survey(args: Namespace) -> int:
 def _survey(args: Namespace, path: Path) -> Patch:
     """The patch by the runs; prints by what it was made."""
     from harvey_survey.adjustment import adjust
-    from harvey_survey.changes import propose_changes
-    from harvey_survey.looks import read_looks
     from harvey_survey.patch_file import build_patch
+    from harvey_survey.seen_pictures import read_looks
+    from harvey_survey.survey_changes import propose_changes
     from logs.run_directory import open_run
 
     world = load_file(str(path), [])

@@ -17,10 +17,10 @@ from experiments.report import Report
 from experiments.trials import campaign_folder, judge_rare, judge_share, run_trials
 from harvey.simulation.simulated_run import build_head, run_mission
 from harvey_survey.adjustment import Adjustment, adjust
-from harvey_survey.changes import Change, propose_changes
 from harvey_survey.ledger import build_ledger
-from harvey_survey.looks import read_looks
 from harvey_survey.patch_file import build_patch, write_world
+from harvey_survey.seen_pictures import read_looks
+from harvey_survey.survey_changes import SurveyChange, propose_changes
 from harvey_survey.wrong_buildings import write_missions
 from logs.run_directory import RunDirectory
 from sim.ground_truth.inexact import TrueInexact, displace
@@ -47,7 +47,7 @@ WITHIN_95 = 1.96
 
 
 @dataclass(frozen=True, slots=True)
-class Building:
+class BuildingCase:
     """What is driven: a seed, the missions before and after, and where."""
 
     seed: int
@@ -81,7 +81,7 @@ class SurveyedBuilding:
     driven: int
 
 
-def survey_building(case: Building) -> SurveyedBuilding:
+def survey_building(case: BuildingCase) -> SurveyedBuilding:
     """Drive, survey, judge, and drive again."""
     folder = Path(case.folder) / f"floor-{case.seed}"
     paths = write_missions(folder, case.seed, TRUTH, case.missions + case.after, SIGMA_M)
@@ -174,7 +174,7 @@ class SurveyTruth:
                 shares.append(float((found.offs_m[k] - true_m) / found.sigmas_m[k]))
         return shares
 
-    def is_wrong(self, change: Change, model: World, surveyed: World) -> bool:
+    def is_wrong(self, change: SurveyChange, model: World, surveyed: World) -> bool:
         """Whether a change makes the model no better."""
         if change.is_gone:
             return change.name not in self.missing
@@ -198,7 +198,7 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
     buildings, each, after = QUICK if quick else (BUILDINGS, MISSIONS, AFTER)
     folder = campaign_folder("survey", seed, quick=quick)
     first = FIRST_SEED + 1000 * seed
-    cases = [Building(first + k, missions or each, after, str(folder)) for k in range(buildings)]
+    cases = [BuildingCase(first + k, missions or each, after, str(folder)) for k in range(buildings)]
     ends = run_trials(survey_building, cases, SurveyedBuilding, folder, "building")
     return report(ends)
 

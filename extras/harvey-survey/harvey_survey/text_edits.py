@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from harvey_survey.changes import Change
+from harvey_survey.survey_changes import SurveyChange
 from world_models.building.model_errors import WALL
 from world_models.files.construction.builder import compute_world_poses
 from world_models.files.construction.specs import ThingSpec, WorldSpec
@@ -64,13 +64,13 @@ class _Places(WorldReader):
         return spec
 
 
-def apply_changes(path: Path, changes: Sequence[Change]) -> tuple[str, tuple[tuple[Change, str], ...]]:
+def apply_changes(path: Path, changes: Sequence[SurveyChange]) -> tuple[str, tuple[tuple[SurveyChange, str], ...]]:
     """The text of a world file with changes made, and those that could not be made, each with the reason.
 
     Raises WorldError where the file cannot be read.
     """
     editor = _Editor(Source.read(path))
-    left: list[tuple[Change, str]] = []
+    left: list[tuple[SurveyChange, str]] = []
     for change in changes:
         try:
             editor.make(change)
@@ -94,7 +94,7 @@ class _Editor:
         self._grown: dict[Key, float] = {}
         self._gone: list[str] = []
 
-    def make(self, change: Change) -> None:
+    def make(self, change: SurveyChange) -> None:
         """Raises CannotEditError, and has then changed nothing."""
         if change.is_gone:
             self._find_place(change.name)

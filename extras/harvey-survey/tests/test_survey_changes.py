@@ -13,10 +13,10 @@ import pytest
 from harvey.cli import main
 from harvey.errors import BadInput
 from harvey_survey.adjustment import adjust
-from harvey_survey.changes import Change, find_gone, propose_changes, weigh_gone
-from harvey_survey.looks import Look, read_looks
 from harvey_survey.offsets import measure_offsets
 from harvey_survey.patch_file import build_patch, format_patch, read_patch, write_world
+from harvey_survey.seen_pictures import SeenPicture, read_looks
+from harvey_survey.survey_changes import SurveyChange, find_gone, propose_changes, weigh_gone
 from harvey_survey.text_edits import apply_changes
 from world_models.building.model_errors import find_line_errors
 from world_models.building.world import World
@@ -66,26 +66,26 @@ def world() -> World:
 
 
 @pytest.fixture(scope="module")
-def looks(recorded: Any, world: World) -> tuple[Look, ...]:
+def looks(recorded: Any, world: World) -> tuple[SeenPicture, ...]:
     return read_looks(world, WORLD, [recorded(name) for name in NAMES])
 
 
-def moved(kind: str, name: str, **by_cm: float) -> Change:
-    return Change(kind, name, by_cm, dict.fromkeys(by_cm, 0.5), 0.999, "found elsewhere")
+def moved(kind: str, name: str, **by_cm: float) -> SurveyChange:
+    return SurveyChange(kind, name, by_cm, dict.fromkeys(by_cm, 0.5), 0.999, "found elsewhere")
 
 
-def gone(name: str) -> Change:
-    return Change("thing", name, {}, {}, 0.999, "never found")
+def gone(name: str) -> SurveyChange:
+    return SurveyChange("thing", name, {}, {}, 0.999, "never found")
 
 
-def test_right_model_stays(world: World, looks: tuple[Look, ...]) -> None:
+def test_right_model_stays(world: World, looks: tuple[SeenPicture, ...]) -> None:
     found = adjust(world, looks, 0.05)
     assert propose_changes(world, looks, found) == ()
     z = found.offs_m / found.sigmas_m
     assert np.mean(np.abs(z[found.pictures > 0]) < 1.96) > 0.9
 
 
-def test_displacement_is_found_in_any_order(world: World, looks: tuple[Look, ...]) -> None:
+def test_displacement_is_found_in_any_order(world: World, looks: tuple[SeenPicture, ...]) -> None:
     """Segments are moved as if two things stood elsewhere by 8 cm; noise stays what it was."""
     wanted = {"allens-office/window-1 along": 0.08, "allens-office/white-board-1 along": -0.08}
     displaced = []
@@ -109,7 +109,7 @@ def test_displacement_is_found_in_any_order(world: World, looks: tuple[Look, ...
     np.testing.assert_allclose(again.offs_m, found.offs_m, atol=1e-9)
 
 
-def test_gone_needs_looks_from_several_places(world: World, looks: tuple[Look, ...]) -> None:
+def test_gone_needs_looks_from_several_places(world: World, looks: tuple[SeenPicture, ...]) -> None:
     name = "allens-office/window-1"
     overlooked = [replace(look, found=look.found & np.array([mark.name != name for mark in look.marks]))
                   for look in looks if any(mark.name == name for mark in look.marks)]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harvey_survey.changes import Change
+from harvey_survey.survey_changes import SurveyChange
 from harvey_survey.survey_experiment import SIGMA_M, TRUTH, SurveyedBuilding, SurveyTruth, report
 from harvey_survey.wrong_buildings import write_missions
 from world_models.files.world_files import load_world
@@ -41,7 +41,7 @@ def test_truth_is_centimetres_from_the_model(folder: Path) -> None:
     there = np.mean(truth.world.landmark(name).lines_world - model.landmark(name).lines_world, axis=(0, 1))
     direction = there / np.linalg.norm(there)
     assert truth.displacement(f"{name} along", direction) == pytest.approx(np.linalg.norm(there))
-    kept, missing = Change("thing", names[-1], {}, {}, 1.0, ""), sorted(truth.missing)[0]
+    kept, missing = SurveyChange("thing", names[-1], {}, {}, 1.0, ""), sorted(truth.missing)[0]
     assert truth.is_wrong(kept, model, model) and not truth.is_wrong(replace(kept, name=missing), model, model)
     assert truth.displacement(f"{missing} along", direction) is None
 

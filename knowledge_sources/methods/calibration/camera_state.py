@@ -16,15 +16,9 @@ from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
 HEIGHT, FOCAL = (CAMERA_UNKNOWNS.index(name) for name in ("height_m", "focal"))
-SIGMA_TILT_RAD = math.radians(1.5)
-"""Standard deviation of the mounting's tilt (issue: mounted by hand, up to 3 degrees and 8 cm otherwise than
-believed, taken for two deviations)."""
-SIGMA_ROLL_RAD = math.radians(1.5)
-"""Standard deviation of its roll (issue: mounted by hand, up to 3 degrees and 8 cm otherwise than believed, taken for
-two deviations)."""
-SIGMA_YAW_RAD = math.radians(1.5)
-"""Standard deviation of its yaw (issue: mounted by hand, up to 3 degrees and 8 cm otherwise than believed, taken for
-two deviations)."""
+SIGMA_TILT_RAD = SIGMA_ROLL_RAD = SIGMA_YAW_RAD = math.radians(1.5)
+"""Standard deviations of the mounting's tilt, roll and yaw (issue: mounted by hand, up to 3 degrees and 8 cm otherwise
+than believed, taken for two deviations)."""
 SIGMA_HEIGHT_M = 0.04
 """Standard deviation of its height (issue: mounted by hand, up to 3 degrees and 8 cm otherwise than believed, taken
 for two deviations)."""

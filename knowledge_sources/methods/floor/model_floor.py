@@ -171,9 +171,7 @@ def predict_model_floor(
 
 @lru_cache(maxsize=8)
 def _find_rays(camera: Camera, grid: FloorGrid, aside: int) -> tuple[Floats, Floats]:
-    """Those that are cast, (n, 3) with z = 1, and the least and largest x and y of them (4,): also through pixels
-    ``aside`` of the picture, as what is outside may be in it.
-    """
+    """(n, 3) with z = 1, also ``aside`` pixels outside of the picture; and their least and largest x and y (4,)."""
     rays = np.ascontiguousarray(camera.rays(_widen(grid.pixels, aside)[::STEP, ::STEP].reshape(-1, 2)))
     return rays, np.concatenate([rays[:, :2].min(axis=0), rays[:, :2].max(axis=0)])
 

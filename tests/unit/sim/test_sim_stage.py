@@ -10,18 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim import scenario as scenario_file
 from sim.body.simulated_body import SimulatedBody
-from sim.body.simulated_building import SimulatedBuilding
 from sim.faults.built_in_faults import Bump, Kidnap
 from sim.render.mesh import Pinhole, project_mesh
 from sim.render.rasterizer import find_visible_patches
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
 from sim.scenario_names import list_scenarios
 from sim.stage import Stage, build_stage
-from world_models.building.world import World
 from world_models.entries import MotorCommand
-from world_models.files.toml.source import Node
 from world_models.frames import Pose2
 
 
@@ -154,31 +150,3 @@ def test_the_quick_locale_finder_agrees_with_the_world(main_stage: Stage) -> Non
     for x, y in rng.uniform((-1.0, -8.0), (30.0, 9.0), (200, 2)):
         expected = main_stage.world.locale_at((x, y)) or ""
         assert main_stage.building.locale_at(Pose2(x, y, 0.0)) == expected
-
-
-def test_who_walks_there_is_told_where_the_robot_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a package reads from ``[[walkers]]`` enters the building; without the package it is said what to install."""
-    text = 'world = "research_center"\ngoal = "(ptrans (hallway (4,4,0)) (hallway (9,4,0)))"\n[[walkers]]\n'
-    with monkeypatch.context() as absent, pytest.raises(ScenarioError, match=r"it needs harvey\.movers of a package"):
-        absent.setattr(scenario_file, "list_absent", lambda group: {"walkers": f"{group} of a package"})
-        parse_scenario(text)
-    told: list[tuple[float, Pose2]] = []
-
-    class Nobody:
-        def read(self, _node: Node) -> Nobody:
-            return self
-
-        def enter(self, building: SimulatedBuilding, _world: World, seed: int) -> SimulatedBuilding:
-            def follow(time_s: float, robot: Pose2) -> SimulatedBuilding:
-                told.append((time_s, robot))
-                return replace(building, news=(f"seed {seed}",))
-            return replace(building, at_time=follow)
-
-        def charge(self, _who: str) -> float:
-            return 0.0
-
-    monkeypatch.setattr(scenario_file, "list_absent", lambda _group: {})
-    monkeypatch.setattr(scenario_file, "load_plugins", lambda *_: {"walkers": Nobody()})
-    body = build_stage(parse_scenario(text)).body(7)
-    body.wait(2.0)
-    assert told == [(2.0, body.truth.world_from_robot)] and body.happened == ("seed 7",)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harvey_survey.adjustment import Adjustment
-from harvey_survey.looks import Look
+from harvey_survey.seen_pictures import SeenPicture
 from knowledge_sources.methods.belief import Alike, add_looks, to_log_odds, to_probability
 from knowledge_sources.methods.belief import Look as Sight
 from world_models.building.model_errors import ALONG, MEASURED_M, WALL
@@ -43,7 +43,7 @@ found. Counted in twelve missions on two floors (seeds 9001 and 9002) that no ex
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class SurveyChange:
     """One change of a world file.
 
     Attributes:
@@ -67,14 +67,14 @@ class Change:
         return not self.moved
 
 
-def propose_changes(world: World, looks: Sequence[Look], found: Adjustment) -> tuple[Change, ...]:
+def propose_changes(world: World, looks: Sequence[SeenPicture], found: Adjustment) -> tuple[SurveyChange, ...]:
     """What is surely gone, then what is surely elsewhere; by name."""
     gone = find_gone(world, looks)
     names = {change.name for change in gone}
     return (*gone, *(change for change in find_moved(world, found) if change.name not in names))
 
 
-def find_gone(world: World, looks: Sequence[Look]) -> tuple[Change, ...]:
+def find_gone(world: World, looks: Sequence[SeenPicture]) -> tuple[SurveyChange, ...]:
     """The things that are surely gone."""
     things = {thing.name for thing in world.things}
     sights: dict[str, list[Sight]] = {}
@@ -93,7 +93,7 @@ def find_gone(world: World, looks: Sequence[Look]) -> tuple[Change, ...]:
         certainty = to_probability(to_log_odds(PRIOR_GONE) + add_looks(sights[name], APART))
         if certainty >= SURE:
             lines, seen = (sum(part) for part in zip(*counted[name], strict=True))
-            changes.append(Change("thing", name, {}, {}, certainty,
+            changes.append(SurveyChange("thing", name, {}, {}, certainty,
                                   f"{seen} of its {lines} lines were found, in {len(counted[name])} pictures"))
     return tuple(changes)
 
@@ -104,7 +104,7 @@ def weigh_gone(expected: int, seen: int) -> float:
     return GONE_RATIOS[size, "none" if not seen else "few" if seen < FEW * expected else "some"]
 
 
-def find_moved(world: World, found: Adjustment) -> tuple[Change, ...]:
+def find_moved(world: World, found: Adjustment) -> tuple[SurveyChange, ...]:
     """What is surely elsewhere: walls, doors and things."""
     things = {thing.name: thing for thing in world.things}
     merged: dict[tuple[str, str], list[tuple[str, float, int]]] = {}
@@ -119,7 +119,7 @@ def find_moved(world: World, found: Adjustment) -> tuple[Change, ...]:
         sure = [(axis, sign, k) for axis, sign, k in parts if _is_sure(found, k)]
         if sure:
             k = max((k for _, _, k in sure), key=lambda k: abs(found.offs_m[k]) / found.sigmas_m[k])
-            changes.append(Change(
+            changes.append(SurveyChange(
                 kind, name, {axis: round(100.0 * sign * float(found.offs_m[k]), 2) for axis, sign, k in sure},
                 {axis: round(100.0 * float(found.sigmas_m[k]), 2) for axis, _, k in sure}, _weigh_moved(found, k),
                 f"found elsewhere in {found.pictures[k]} pictures, by {found.segments[k]} segments"))

@@ -48,7 +48,7 @@ FOUND = 0.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Look:
+class SeenPicture:
     """One picture of a verified place: m lines were expected, and p pairs of a line and a segment found.
 
     Attributes:
@@ -88,7 +88,7 @@ class Look:
         return np.asarray(np.linalg.norm(self.pieces_world.mean(axis=1)[:, :2] - self.pose.position, axis=1))
 
 
-def read_looks(world: World, path: Path, runs: Sequence[RunDirectory]) -> tuple[Look, ...]:
+def read_looks(world: World, path: Path, runs: Sequence[RunDirectory]) -> tuple[SeenPicture, ...]:
     """The looks of all runs; the same whatever their order, and of a run that is given twice once.
 
     Args:
@@ -126,7 +126,7 @@ class _Reader:
     held: Hypothesis | None = None
     camera: CameraState | None = None
 
-    def read(self, timeline: Timeline) -> Iterator[Look]:
+    def read(self, timeline: Timeline) -> Iterator[SeenPicture]:
         for record in timeline.of_kind(*READ, LocaleFrame):
             value: Any = record.value
             self.newest[record.id] = value
@@ -139,7 +139,7 @@ class _Reader:
             elif isinstance(value, Certificate) and value.verdict == "verified" and value.fix in self.newest:
                 yield from self._build(value, record.cycle)
 
-    def _build(self, certificate: Certificate, cycle: int) -> Iterator[Look]:
+    def _build(self, certificate: Certificate, cycle: int) -> Iterator[SeenPicture]:
         """The look of a verified place; none where nothing was matched."""
         fix: PoseFix = self.newest[certificate.fix]
         match: LineMatch = self.newest[fix.match]
@@ -156,7 +156,7 @@ class _Reader:
             return
         marks, numbers, found_pieces = zip(*lines.values(), strict=True)
         pieces = np.array(found_pieces)
-        yield Look(
+        yield SeenPicture(
             self.run, cycle, self.held.locale, fix.world_from_robot, np.asarray(fix.covariance), camera.pinhole, mount,
             compute_camera_covariance(self.camera),
             tuple(marks), np.array(numbers, np.int64), pieces, np.asarray(match.coverage)[list(lines)] > FOUND,
@@ -202,6 +202,6 @@ class _Reader:
         return np.array([any(sight.crosses(thing) for thing in there) for sight in sights], bool)
 
 
-def light_of(look: Look) -> str:
+def light_of(look: SeenPicture) -> str:
     """``dark``, ``middling`` or ``bright``, by thirds of what a picture can show."""
     return ("dark", "middling", "bright")[min(2, math.floor(look.brightness / 256.0 * 3.0))]
