@@ -120,7 +120,7 @@ def test_footprints_are_joined_and_taken_back_as_in_a_mirror_and_as_elsewhere(
         one, other = (deepen(shape, eye.position, depth_m) for shape in moved)
         joined, left = join_footprints(one, other, free), take_free(one, free)
         corners = list_corners(joined)
-        return [free.area, one.area, joined.area, left.area, measure_free_part(moved[0], free),
+        return [free.area, one.area, joined.area, left.area, measure_free_part(one, free),
                 measure_common_directions(one, other, eye.position), shapely.Polygon(corners).area if corners else 0.0]
 
     plain = measure(lambda p: p, Pose2(0.0, 0.0, 0.0), 1.0)

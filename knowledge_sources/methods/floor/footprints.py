@@ -79,10 +79,7 @@ def _find_runs(free: Any) -> list[Floats]:
 
 
 def deepen(footprint: Any, eye: Any, depth_m: float) -> shapely.Polygon:
-    """What a thing is taken to cover whose near side alone is seen from an ``eye`` (2,): at least so deep behind that.
-
-    A footprint that is as deep already stays.
-    """
+    """What a thing is taken to cover whose near side alone is seen from an ``eye`` (2,): at least so deep."""
     polygon = build_polygon(footprint)
     corners = shapely.get_coordinates(polygon)[:-1]
     away = corners.mean(axis=0) - np.asarray(eye, float)
@@ -100,10 +97,7 @@ def join_footprints(known: shapely.Geometry, seen: shapely.Geometry, free: shape
 
 
 def take_free(known: shapely.Geometry, free: shapely.Geometry) -> shapely.Geometry:
-    """What is left of a footprint without the floor that is seen to be free: the hull of its largest piece.
-
-    A sliver, which rounding leaves, is nothing.
-    """
+    """What is left of a footprint without the floor that is free: the hull of its largest piece, no sliver."""
     pieces = [piece for piece in shapely.get_parts(shapely.difference(known, free)) if piece.area > MIN_SIDE_M**2]
     return shapely.convex_hull(max(pieces, key=lambda piece: piece.area, default=shapely.Polygon()))
 
@@ -114,10 +108,9 @@ def measure_hull_part(one: shapely.Geometry, other: shapely.Geometry) -> float:
     return float(shapely.convex_hull(both).area / max(both.area, MIN_SIDE_M**2))
 
 
-def measure_free_part(footprint: Any, free: shapely.Geometry) -> float:
-    """Which part of a footprint is seen to be free floor, 0..1."""
-    polygon = build_polygon(footprint)
-    return float(shapely.intersection(polygon, free).area / polygon.area)
+def measure_free_part(where: shapely.Geometry, free: shapely.Geometry) -> float:
+    """Which part of some floor is seen to be free, 0..1."""
+    return float(shapely.intersection(where, free).area / where.area)
 
 
 def measure_change_m(one: Any, other: Any) -> float:
@@ -233,9 +226,7 @@ def _join(one: shapely.Geometry, other: shapely.Geometry) -> shapely.Geometry:
     return shapely.convex_hull(shapely.union(one, other))
 
 
-def find_same(
-    known: Mapping[str, Obstacle], shape: shapely.Polygon, sigma_m: float, most_hull: float
-) -> str | None:
+def find_same(known: Mapping[str, Obstacle], shape: shapely.Polygon, sigma_m: float, most_hull: float) -> str | None:
     """Which obstacle a thing is another sight of: that of which it covers most, within the standard deviations.
 
     What lies next to an obstacle, so that a hull round both would take much floor that neither takes, is another thing.

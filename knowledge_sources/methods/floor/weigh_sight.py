@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 
 from knowledge_sources.methods.belief import add_evidence, to_log_odds
+from knowledge_sources.methods.floor.floor_map import BEAM_RAD
 from knowledge_sources.methods.floor.footprints import (
     ThingShape,
     build_free_floor,
@@ -28,6 +29,7 @@ from knowledge_sources.methods.floor.footprints import (
     measure_free_part,
     place,
 )
+from knowledge_sources.methods.floor.ranges import MAX_RANGE_THING_M
 from knowledge_sources.methods.floor.rivals_on_floor import (
     MIN_MOVED_M,
     Box,
@@ -49,8 +51,8 @@ from world_models.camera import Camera
 from world_models.entries import Difference, Evidence, Explanation, FloorThing, FreeFloor, Obstacle
 
 MIN_THING_CERTAINTY = 0.5  # what is seen on the floor with less certainty than this tells of no obstacle
-MIN_FREE_PART = 0.5  # part of an obstacle's footprint that must be seen free to tell that it is not there any more
-MAX_SHARED_PART = 0.25  # where a thing that is seen takes more of the footprint, the rest seen free tells nothing of it
+MIN_FREE_PART = 0.5  # part of where an obstacle may stand that must be seen free to tell that it is not there any more
+MAX_SHARED_PART = 0.25  # where a thing that is seen takes more of that, the rest seen free tells nothing of it
 FREE_FLOOR_ODDS = (1.0 - MAX_P_SEEN_ONCE) / MAX_P_SEEN_ONCE
 """Odds of an obstacle that is there while all of its footprint is seen free: a picture unsays what a picture said."""
 LOOKS_FREE_ODDS = 0.2  # the same where the floor there looks free, and nothing else tells
@@ -140,9 +142,7 @@ def is_telling(thing: FloorThing) -> bool:
     return thing.p_thing >= MIN_THING_CERTAINTY and thing.sigma_m <= MAX_OBSTACLE_SIGMA_M
 
 
-def weigh_sight(
-    sight: Sight, known: Mapping[str, Obstacle], settings: Settings
-) -> Iterator[Sighted]:
+def weigh_sight(sight: Sight, known: Mapping[str, Obstacle], settings: Settings) -> Iterator[Sighted]:
     """What a sight tells of each thing in it, and of each obstacle whose floor it shows.
 
     Args:
@@ -162,9 +162,7 @@ def weigh_sight(
             continue
         new = _shape_of(sight, thing)
         rest = {id: o for id, o in known.items() if id not in drafts and (may_be_there(o) or sight.is_dirt(o))}
-        whole = MAX_HULL_PART
-        if f.sense == "ranges":  # an echo tells how far a thing is, not where in its cone: any in it may be heard
-            whole = math.inf
+        whole = math.inf if f.sense == "ranges" else MAX_HULL_PART  # any thing in the cone of an echo may be heard
         id = find_before(rest, new.seen, sight.eye, settings.plan.overhang_m) if thing.is_cut else None
         shown = _show(sight, thing, new)
         if shown.jamb is not None and thing.is_cut and id is None:  # before anything wider is believed
@@ -197,8 +195,10 @@ def weigh_sight(
     for id, obstacle in known.items():
         if id in drafts or not may_be_there(obstacle):
             continue
-        if sight.is_from_elsewhere(obstacle) and measure_free_part(obstacle.footprint, seen) <= MAX_SHARED_PART:
-            gone = miss(sight, obstacle, confirmed if obstacle.is_camouflaged else free, confirmed, s)
+        shared = measure_free_part(where_it_may_stand(sight, obstacle), seen)
+        if sight.is_from_elsewhere(obstacle) and shared <= MAX_SHARED_PART:
+            is_told = not obstacle.is_camouflaged and obstacle.by != "ranges"  # from the floor, by its looks
+            gone = miss(sight, obstacle, free if is_told else confirmed, confirmed, s)
             if gone is not None:
                 yield gone._replace(known=id)
 
@@ -277,8 +277,7 @@ def see_first(
 
 def _explain(sight: Sight, name: str, thing: FloorThing, shown: ShownSight, settings: ActionSettings) -> Evidence:
     """What a sight of a thing says of it. Where it is dirt, what it shows further on is no further evidence."""
-    explanations = explain_sight(
-        thing.p_thing, shown, sight.know(name), settings.max_obstacle_certainty)
+    explanations = explain_sight(thing.p_thing, shown, sight.know(name), settings.max_obstacle_certainty)
     return sight.tell(name, thing.evidence, explanations, MIN_MOVED_M if shown.still else MIN_WAY_M)
 
 
@@ -328,6 +327,15 @@ def _join_sight(sight: Sight, known: Obstacle, new: ThingShape, free: shapely.Ge
     return joined if own.is_empty else joined._replace(whole=own)
 
 
+def where_it_may_stand(sight: Sight, known: Obstacle) -> shapely.Geometry:
+    """Where a known obstacle may stand: as far round what was seen of it as its doubt reaches, or an echo's cone."""
+    heard_m = min(known.seen_from_m - sight.rim_m, MAX_RANGE_THING_M) if known.by == "ranges" else 0.0
+    doubt_m = max(2.0 * known.sigma_m, math.tan(0.5 * BEAM_RAD) * heard_m)
+    grown = build_polygon(known.core or known.footprint).buffer(doubt_m)
+    own = shapely.intersection(grown, find_open_floor(sight.world, known.locale, TOUCH_MARGIN_M))
+    return grown if own.is_empty else own
+
+
 def miss(
     sight: Sight, known: Obstacle, free: shapely.Geometry, confirmed: shapely.Geometry, settings: ActionSettings
 ) -> Sighted | None:
@@ -336,14 +344,13 @@ def miss(
     Args:
         confirmed: where it would be seen to stand, whatever it looks like.
     """
-    free_part = measure_free_part(known.footprint, free)
+    where = where_it_may_stand(sight, known)
+    free_part = measure_free_part(where, free)
     if free_part >= MIN_FREE_PART:
-        confirmed_part = measure_free_part(known.footprint, confirmed)
-        odds = CAMOUFLAGED_FREE_ODDS if known.is_camouflaged else LOOKS_FREE_ODDS
-        if not known.is_camouflaged and confirmed_part >= MIN_FREE_PART:
-            odds = FREE_FLOOR_ODDS
-        explanations = explain_free(free_part * math.log(odds), sight.know(known.name))
-        told = sight.tell(known.name, f"{free_part:.0%} of its floor is seen free", explanations)
+        looks = FREE_FLOOR_ODDS if measure_free_part(where, confirmed) >= MIN_FREE_PART else LOOKS_FREE_ODDS
+        odds = CAMOUFLAGED_FREE_ODDS if known.is_camouflaged else looks
+        explanations = explain_free(math.log1p(free_part * (odds - 1.0)), sight.know(known.name))
+        told = sight.tell(known.name, f"{free_part:.0%} of the floor where it may stand is seen free", explanations)
         return Sighted(None, judge_thing(known, sight.weigh(told), settings), told)
     left = leave_free(ThingShape.of(known), free)
     footprint, core = left.list_corners()

@@ -50,7 +50,7 @@ def test_joined_footprints_hold_both_and_lose_what_is_free() -> None:
     assert joined.buffer(1e-9).covers(known) and joined.buffer(1e-9).covers(seen)
     free = shapely.box(1.0, -1.0, 2.1, 1.0)
     assert join_footprints(known, seen, free).bounds == pytest.approx((2.1, -0.2, 2.5, 0.2))
-    assert measure_free_part(SQUARE, free) == pytest.approx(0.25)
+    assert measure_free_part(known, free) == pytest.approx(0.25)
     assert take_free(known, shapely.box(1.0, -1.0, 3.0, 1.0)).is_empty
 
 

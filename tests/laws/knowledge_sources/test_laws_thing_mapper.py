@@ -22,6 +22,7 @@ from knowledge_sources.methods.floor.weigh_sight import (
     MIN_WAY_M,
 )
 from knowledge_sources.model.thing_mapper import ThingMapper
+from knowledge_sources.reads import SEEN_MARGIN_M
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall, carton, known_by_sight
 from world_models.entries import CameraPicture, Difference, Discrepancy, Evidence, FreeFloor, Obstacle, ObstacleStatus
@@ -157,19 +158,22 @@ def test_floor_that_is_seen_free_from_elsewhere_lowers_the_odds_by_a_stated_fact
     assert effect.value.seen_s == 2.0
 
 
-@given(st.floats(2.3, 2.6))
-@settings(max_examples=15, deadline=None)
-def test_where_a_part_is_seen_free_so_much_of_the_factor_counts(far_m: float) -> None:
+@given(st.floats(2.45, 2.9), st.floats(0.02, 0.1), st.booleans(), st.floats(0.5, 1.5))
+@settings(max_examples=25, deadline=None)
+def test_free_floor_tells_as_much_as_it_is_of_where_a_thing_may_stand(
+    far_m: float, sigma_m: float, is_heard: bool, from_m: float
+) -> None:
+    """What was surely there may stand beside its footprint: by its sigma, or anywhere in the cone of an echo."""
     hall = Hall(())
-    old = hold(hall, known("suspected", 0.7))
-    scan = hall.look(seen_s=9.0, far_m=far_m)
-    _, effects = ask(hall, scan)
+    thing = replace(known(certainty=0.98), sigma_m=sigma_m, seen_from_m=from_m)
+    hold(hall, replace(thing, by="ranges") if is_heard else thing)
+    _, effects = ask(hall, scan := hall.look(seen_s=9.0, far_m=far_m))
+    cone_m = math.tan(math.radians(12.5)) * (from_m - hall.robot.radius_m - SEEN_MARGIN_M)
+    where = shapely.Polygon(CARTON).buffer(max(2.0 * sigma_m, cone_m * is_heard))
     seen = shapely.Point(scan.x_m, scan.y_m).buffer(far_m - scan.sigma_m[0], quad_segs=200)
-    part = shapely.intersection(shapely.Polygon(CARTON), seen).area / shapely.Polygon(CARTON).area
-    (effect,) = effects or ()
-    odds = effect.value.certainty / (1.0 - effect.value.certainty)
-    told = math.log(odds / odds_of(0.7)) / math.log(FREE_FLOOR_ODDS)
-    assert isinstance(effect, Revise) and effect.entry is old and told == pytest.approx(part, abs=0.02)
+    part = shapely.intersection(where, seen).area / where.area
+    odds = odds_of((effects or ())[0].value.certainty) / odds_of(0.98)
+    assert odds == pytest.approx(1.0 - part * (1.0 - FREE_FLOOR_ODDS), rel=0.1)
 
 
 @given(st.floats(0.3, 0.999), st.floats(0.55, 0.95))
