@@ -345,7 +345,8 @@ def miss(
         confirmed: where it would be seen to stand, whatever it looks like.
     """
     where = where_it_may_stand(sight, known)
-    free_part = measure_free_part(where, free)
+    likeliest = build_polygon(known.core or known.footprint)
+    free_part = min(measure_free_part(part, free) for part in (likeliest, where))
     if free_part >= MIN_FREE_PART:
         looks = FREE_FLOOR_ODDS if measure_free_part(where, confirmed) >= MIN_FREE_PART else LOOKS_FREE_ODDS
         odds = CAMOUFLAGED_FREE_ODDS if known.is_camouflaged else looks
