@@ -60,6 +60,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
         "rosmaps": "ROS maps traced into worlds: rooms, doorways, missions",
         "serial-chaos": "Drivers of bases over serial lines with errors",
         "soak": "Errands in one building, day after day: 1,000 km",
+        "survey": "Buildings that are wrong, surveyed by missions in them",
     },
     "scale": {
         "agenda": "Activations per second with 10 to 1,000 pending",

@@ -116,10 +116,9 @@ def compute_agreement(
         displaced_px: (p, m, 2, 2) the same lines projected at p wrong poses nearby.
         tolerance_px: how far a segment may lie from the line that it covers, one number or (m,).
     """
-    tolerances = np.broadcast_to(tolerance_px, len(lines_px))
-    coverage = compute_coverage(lines_px, segments_px, tolerances, LINE_TOLERANCE_RAD)
-    displaced = compute_coverage(displaced_px.reshape(-1, 2, 2), segments_px,
-                                 np.tile(tolerances, len(displaced_px)), LINE_TOLERANCE_RAD)
+    coverage = compute_coverage(lines_px, segments_px, tolerance_px, LINE_TOLERANCE_RAD)
+    tolerances = np.broadcast_to(tolerance_px, displaced_px.shape[:2]).reshape(-1)
+    displaced = compute_coverage(displaced_px.reshape(-1, 2, 2), segments_px, tolerances, LINE_TOLERANCE_RAD)
     displaced = displaced.reshape(displaced_px.shape[:2])
     visible, matched = _count(coverage, MIN_COVERED_FRACTION)
     visible_there, matched_there = _count(displaced, MIN_COVERED_FRACTION)

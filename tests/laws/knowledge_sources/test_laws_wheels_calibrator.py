@@ -42,7 +42,7 @@ def test_it_takes_over_what_all_stretches_tell(reach: float, errors: list[float]
         return
     (wheels,) = learnt
     assert wheels.actuator.reach == pytest.approx(reach + 0.06 * np.mean(errors))
-    sigma = 0.06 / len(told) ** 0.5 * max(1.0, float(np.std(errors)))
+    sigma = 0.06 / len(told) ** 0.5 * max(1.0, float(np.std(errors, ddof=1)))
     assert wheels.actuator.reach_sigma == pytest.approx(max(TOLD.reach_sigma, sigma))
     (effect,) = bench.ask(wheels_calibrator, found) or ()
     assert reasons(effect) == {found.id, "Wheels-1"}
