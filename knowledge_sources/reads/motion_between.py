@@ -95,8 +95,10 @@ def list_lagging(view: View, actuator: ActuatorModel, drift: Drift, since: int) 
 
 
 def list_asked(view: View, reports: Sequence[Entry[MotionReport]]) -> list[MotionReport]:
-    """The reports as they would be if each motion were the one that was asked for; of a course nothing was asked."""
-    asked = [view.get(report.because[0].id) for report in reports]
+    """The reports as they would be if each motion were the one that was asked for; of a course nothing was asked, nor
+    of a recording.
+    """
+    asked = [view.get(report.because[0].id) if report.because else None for report in reports]
     return [replace(report.value, turn_rad=of.value.turn_rad, move_m=of.value.move_m)
             if of is not None and isinstance(of.value, MotorCommand) else report.value
             for report, of in zip(reports, asked, strict=True)]
