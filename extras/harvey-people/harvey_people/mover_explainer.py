@@ -27,7 +27,7 @@ class MoverExplainer(RobotKnowledgeSource):
     """Has those who walk compete with things: where one surely was when a thing was seen, it rather was that one.
 
     It is evidence of the thing's difference, beside what looks like a thing, a jamb or dirt; the thing stays as certain
-    as it leaves it. Who does not walk any longer explains nothing: he is in the way.
+    as it leaves it. A person who stands explains nothing: that is a thing in the way.
     """
 
     level, priority = Level.ACTION, Priority.ENTER  # before the model is revised by it
@@ -56,7 +56,7 @@ class MoverExplainer(RobotKnowledgeSource):
 
 
 def explains(mover: Mover, thing: Obstacle) -> bool:
-    """Whether somebody was where a thing was last seen, at that moment, to two standard deviations of his place."""
+    """Whether somebody was where a thing was last seen, at that moment, to two standard deviations of the place."""
     lasts_s = thing.seen_s - mover.at_s
     if abs(lasts_s) > MAX_UNSEEN_S:
         return False

@@ -119,8 +119,8 @@ def run(quick: bool, seed: int) -> Report:
         "Missions among people (social force, 1995)", "the robot", FIGURES,
         notes=(
             "towards a person: contacts in which the robot moved. walked into: by people, the robot's way or none."
-            f" nearest: a person's middle from the robot's rim; within {NEAR_M:g} m of it, of the time, each person by"
-            " himself. 30 % of the people make no way. Each act is charged a stated time, in which people walk.",
+            f" nearest: a person's middle from the robot's rim; within {NEAR_M:g} m of it, of the time, each person"
+            " alone. 30 % of the people make no way. Each act is charged a stated time, in which people walk.",
             "Without them: the sources of the core alone, to which people are things in the way.",
         ),
         claims=_claims(driven), is_flawed=lambda e: not e.is_reached or e.towards > 0,

@@ -21,11 +21,11 @@ ARRIVED_M = 0.2
 """So near to a point of the way, it is reached."""
 TURNING_RAD_PER_S = 3.0
 STANDS_M_PER_S = 0.05
-"""One who is slower keeps looking where he did."""
+"""A slower person keeps looking the same way."""
 PATIENCE_S = 2.0
-"""One who makes no way does so once he has stood before the robot so long."""
+"""A person who makes no way steps aside after standing before the robot for so long."""
 SEES_ROUND_M = 3.0
-"""From so far away one who makes way walks to the side of a robot on his way."""
+"""From so far away a person who makes way walks to the side of a robot that is ahead."""
 PAST_M = ROBOT_RADIUS_M + 0.45
 """How far beside the robot's axis one passes it."""
 ASIDE_M_PER_S = 0.4

@@ -88,8 +88,8 @@ def test_the_mover_explainer_keeps_the_laws_and_a_thing_is_as_certain_as_it_leav
 
 @pytest.mark.parametrize(("mover", "seen"), [
     (replace(COMES, status="may move"), thing()),        # who may stand explains nothing
-    (COMES, thing(3.2, 4.0)),                            # he was not there
-    (COMES, thing(3.2, 2.0, NOW_S - 2.0)),               # not then: he was two metres on
+    (COMES, thing(3.2, 4.0)),                            # was not there
+    (COMES, thing(3.2, 2.0, NOW_S - 2.0)),               # not then: was two metres on
     (COMES, replace(thing(), touched_s=NOW_S)),          # what was touched is there
 ])
 def test_who_was_not_there_explains_nothing(mover: Mover, seen: Obstacle) -> None:
@@ -123,7 +123,7 @@ def test_a_way_that_stays_blocked_ends_as_blocked_by_people() -> None:
 
 
 @pytest.mark.parametrize("mover", [
-    replace(COMES, vx_m_per_s=1.2),                      # he walks away
+    replace(COMES, vx_m_per_s=1.2),                      # walks away
     replace(COMES, x_m=3.2, log_odds=-7.0, vx_m_per_s=0.0, status="may move"),  # it stands: a thing's matter
     replace(COMES, y_m=9.0),                             # far off
 ])
