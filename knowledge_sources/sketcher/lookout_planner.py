@@ -81,20 +81,25 @@ class LookoutPlanner(RobotKnowledgeSource):
     def _list_in_order(
         self, view: View, impasse: Impasse, goal: Goal, belief: Belief, looked: int
     ) -> Sequence[Entry[Obstacle]]:
-        """The obstacles in the order in which they are worth a look; a look further each time."""
+        """The obstacles in the order in which they are worth a look, a look further each time; none where no way would
+        lead without any, as behind a shut door.
+        """
         here = shapely.Point(belief.pose.position)
         behind = [o for o in find_obstacles(view) if o.id in impasse.behind]
         nearest = sorted(behind, key=lambda o: (build_polygon(o.value.footprint).distance(here), o.value.name))
-        alone = [o for o in nearest if self._leads_without(view, goal, belief.value, o)]
+        alone = [o for o in nearest if self._leads_without(view, goal, belief.value, (o,))]
+        if not alone and not self._leads_without(view, goal, belief.value, tuple(find_obstacles(view))):
+            return ()
         first = looked % max(1, len(alone or nearest))
         ordered = [*alone, *(o for o in nearest if o not in alone)]
         return (*ordered[first:], *ordered[:first])
 
-    def _leads_without(self, view: View, goal: Goal, belief: Hypothesis, without: Entry[Obstacle]) -> bool:
-        """Whether a way would lead to the goal if one obstacle were next to nothing."""
-        middle = build_polygon(without.value.footprint).centroid
-        least = list_corners(middle.buffer(MIN_SIDE_M))
-        obstacles = [replace(o.value, core=least if o.id == without.id else ()) for o in find_obstacles(view)]
+    def _leads_without(
+        self, view: View, goal: Goal, belief: Hypothesis, without: Sequence[Entry[Obstacle]]
+    ) -> bool:
+        """Whether a way would lead to the goal if some obstacles were next to nothing."""
+        least = {o.id: list_corners(build_polygon(o.value.footprint).centroid.buffer(MIN_SIDE_M)) for o in without}
+        obstacles = [replace(o.value, core=least.get(o.id, ())) for o in find_obstacles(view)]
         planner = SubgoalPlanner(find_robot(view), self._settings.plan, obstacles, by_cores=True)
         return not planner.explain_unfit(goal.destination) and find_way_to_goal((planner,), belief, goal) is not None
 

@@ -186,9 +186,12 @@ def _taken_for(value: Difference) -> str:
 
 
 def _is_decided(value: Difference, was: str) -> bool:
-    """Whether a rival becomes sure, or another one leads than before. That something stands there its thing tells."""
+    """Whether a rival becomes sure, or another one leads than before. That something stands there its thing tells, and
+    that all rather is as expected only what was sure before.
+    """
     now = _taken_for(value)
     leads_anew = was != "" and now != "" and now.removeprefix("surely ") != was.removeprefix("surely ")
+    leads_anew &= not now.endswith("chance") or was.startswith("surely ")
     return leads_anew or (value.is_sure and now != was and value.leader.kind != "thing")
 
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from blackboard import Entry
+from blackboard import Entry, Revise
 from generated_boards import LENGTH_M, WIDTH_M, Bench, effect_on, made, reasons, to_world
 from harvey.testing import HALL, STUDY, check_source, plain_robot
 from knowledge_sources.methods.motion.subgoals import DOOR_LOOK_APART_M, MIN_DOOR_LOOK_SINE, MIN_LOOKOUT_CHANGE_M
 from knowledge_sources.settings import DEFAULT
 from knowledge_sources.sketcher.lookout_planner import LookoutPlanner
-from world_models.building.locale_frame import FRAME_OF
+from world_models.building.locale_frame import FRAME_OF, FrameChange
 from world_models.entries import DoorCondition, DoorPicture, DoorState, Impasse, Obstacle, Place, PlanSketch
 from world_models.frames import Pose2
 
@@ -80,6 +80,20 @@ def test_first_what_alone_leaves_a_way_the_nearest_first_and_another_each_time(s
         bench.apply(*effects or ())
         bench.revise(bench.view.latest(PlanSketch), status="done")  # type: ignore[arg-type]
     assert looked_at == [(near.id, far.id)[k % 2] for k in range(MOST)]
+
+
+@pytest.mark.parametrize("is_shut", [False, True])
+def test_behind_a_shut_door_no_thing_is_worth_a_look(is_shut: bool) -> None:
+    """What stands in the study bars the way; but with its door shut, no look at it shows a way."""
+    bench = Bench(plain_robot())
+    bench.believe(Pose2(4.5, 2.0, 0.0))
+    bench.pursue(Place(STUDY, 3.0, 2.0))
+    thing = bench.stand(8.4, 2.0, 0.1, 1.5)
+    if is_shut:
+        for frame in (bench.frame(HALL), bench.frame(STUDY)):
+            bench.apply(Revise(frame, frame.value.changed(FrameChange("shut", "study-door", "")), ()))
+    effects = bench.ask(SOURCE, bench.put(Impasse("blocked", "no way", "Goal-1", (thing.id,))))
+    assert (effects is None) is is_shut
 
 
 def test_no_lookout_is_gone_to_a_third_time() -> None:
