@@ -87,21 +87,24 @@ class LookoutPlanner(RobotKnowledgeSource):
         here = shapely.Point(belief.pose.position)
         behind = [o for o in find_obstacles(view) if o.id in impasse.behind]
         nearest = sorted(behind, key=lambda o: (build_polygon(o.value.footprint).distance(here), o.value.name))
-        alone = [o for o in nearest if self._leads_without(view, goal, belief.value, (o,))]
-        if not alone and not self._leads_without(view, goal, belief.value, tuple(find_obstacles(view))):
+        obstacles = {o.id: replace(o.value, core=()) for o in find_obstacles(view)}
+        if not self._leads(view, goal, belief.value, ()):
             return ()
+        alone = [o for o in nearest
+                 if self._leads(view, goal, belief.value, [*({**obstacles, o.id: _shrink(o.value)}).values()])]
         first = looked % max(1, len(alone or nearest))
         ordered = [*alone, *(o for o in nearest if o not in alone)]
         return (*ordered[first:], *ordered[:first])
 
-    def _leads_without(
-        self, view: View, goal: Goal, belief: Hypothesis, without: Sequence[Entry[Obstacle]]
-    ) -> bool:
-        """Whether a way would lead to the goal if some obstacles were next to nothing."""
-        least = {o.id: list_corners(build_polygon(o.value.footprint).centroid.buffer(MIN_SIDE_M)) for o in without}
-        obstacles = [replace(o.value, core=least.get(o.id, ())) for o in find_obstacles(view)]
+    def _leads(self, view: View, goal: Goal, belief: Hypothesis, obstacles: Sequence[Obstacle]) -> bool:
+        """Whether a way would lead to the goal if no more than that were there."""
         planner = SubgoalPlanner(find_robot(view), self._settings.plan, obstacles, by_cores=True)
         return not planner.explain_unfit(goal.destination) and find_way_to_goal((planner,), belief, goal) is not None
+
+
+def _shrink(obstacle: Obstacle) -> Obstacle:
+    """It, as if it were next to nothing."""
+    return replace(obstacle, core=list_corners(build_polygon(obstacle.footprint).centroid.buffer(MIN_SIDE_M)))
 
 
 def _plan_door_look(view: View, planner: SubgoalPlanner, belief: Hypothesis, door: DoorState) -> Subgoal | None:
