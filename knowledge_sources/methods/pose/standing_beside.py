@@ -19,7 +19,7 @@ from knowledge_sources.methods.pose.planar import compute_camera_poses
 from world_models.camera import Camera
 from world_models.frames import Pose, Pose2
 
-PLACES_M = np.linspace(-0.25, 0.25, 101)
+PLACES_M = np.linspace(-0.4, 0.4, 161)
 """Where a door may stand, from its place in the file along its wall: no casing is misplaced by its own half width."""
 BESIDE_M, MEASURED_M = 0.08, 0.01
 """Deviations of what stands beside, and of what stands where it was measured."""
