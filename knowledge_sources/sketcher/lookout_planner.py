@@ -11,7 +11,7 @@ import shapely
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor import MIN_SIDE_M, build_polygon, list_corners
+from knowledge_sources.methods.floor import build_polygon
 from knowledge_sources.methods.motion import SubgoalPlanner
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
@@ -20,13 +20,14 @@ from knowledge_sources.reads import (
     find_building,
     find_frames,
     find_obstacles,
+    find_planner,
     find_robot,
     find_way_to_goal,
-    list_planners,
     supersede,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import DoorState, Goal, Hypothesis, Impasse, Obstacle, PlanSketch, Subgoal
+from world_models.frame_building import FrameBuilding
 
 
 class Case(NamedTuple):
@@ -57,7 +58,7 @@ class LookoutPlanner(RobotKnowledgeSource):
         looked = len(lookouts)
         if goal is None or looked >= self._settings.plan.max_lookouts:
             return None
-        planner = list_planners(view, self._settings.plan)[0]
+        planner = find_planner(view, self._settings.plan)
         for door in view.where(DoorState, lambda d: d.may_be_shut and belief.locale in d.between):
             subgoal = _plan_door_look(view, planner, belief.value, door.value)
             if subgoal is not None:
@@ -91,12 +92,13 @@ class LookoutPlanner(RobotKnowledgeSource):
         return (*ordered[first:], *ordered[:first])
 
     def _leads_without(self, view: View, goal: Goal, belief: Hypothesis, without: Entry[Obstacle]) -> bool:
-        """Whether a way would lead to the goal if one obstacle were next to nothing."""
-        middle = build_polygon(without.value.footprint).centroid
-        least = list_corners(middle.buffer(MIN_SIDE_M))
-        obstacles = [replace(o.value, core=least if o.id == without.id else ()) for o in find_obstacles(view)]
-        planner = SubgoalPlanner(find_robot(view), self._settings.plan, obstacles, by_cores=True)
-        return not planner.explain_unfit(goal.destination) and find_way_to_goal((planner,), belief, goal) is not None
+        """Whether a way would lead to the goal if one obstacle were not there."""
+        frames = [frame.value.restored("extra", without.value.name)
+                  for frame in find_frames(view, (without.value.locale,))]
+        robot = find_robot(view).in_building(FrameBuilding(view, frames, "without one"))
+        rest = [o.value for o in find_obstacles(view) if o.id != without.id]
+        planner = SubgoalPlanner(robot, self._settings.plan, rest)
+        return not planner.explain_unfit(goal.destination) and find_way_to_goal(planner, belief, goal) is not None
 
 
 def _plan_door_look(view: View, planner: SubgoalPlanner, belief: Hypothesis, door: DoorState) -> Subgoal | None:
