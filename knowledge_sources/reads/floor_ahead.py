@@ -181,8 +181,9 @@ class FloorAhead:
         along, free_m = np.arange(0.0, way_m + STEP_M, STEP_M), way_m
         points = shapely.points(self._find_ahead(along))
         touched = [pair for pair in self._suspected if pair[0].value.touched_s is not None]
-        stands = [(*pair, 0.0, -1e-9) for pair in self._suspected]
-        stands += [(*pair, TOUCHED_GAP_M, TOUCHED_AWAY * STEP_M) for pair in (*touched, *self._touches)]
+        stands: list[tuple[Entry[Any], shapely.Geometry, float, float]] = [
+            *((*pair, 0.0, -1e-9) for pair in self._suspected),
+            *((*pair, TOUCHED_GAP_M, TOUCHED_AWAY * STEP_M) for pair in (*touched, *self._touches))]
         for entry, polygon, near_m, away_m in stands:
             gaps = shapely.distance(points, polygon)
             met = np.flatnonzero((gaps[1:] < self._robot.radius_m + near_m) & (gaps[1:] < gaps[:-1] + away_m))

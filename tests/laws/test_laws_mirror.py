@@ -25,7 +25,7 @@ from knowledge_sources.methods.motion import (
     measure_progress,
 )
 from knowledge_sources.methods.motion.pure_pursuit import compute_curvature_to
-from knowledge_sources.methods.motion.routes import find_shortest_route, list_obstacles
+from knowledge_sources.methods.motion.routes import find_shortest_route
 from knowledge_sources.methods.pose import planar_from_points
 from knowledge_sources.methods.tracking.edge_alignment import _Edges, _solve
 from knowledge_sources.methods.verification import predict_color_check
@@ -227,7 +227,7 @@ def test_a_room_is_as_free_as_it_is_whatever_was_asked_before() -> None:
     asked = [(clearance_m, is_round) for clearance_m in (0.3, 0.4) for is_round in (False, True)]
     for clearance_m, is_round in (*asked, *reversed(asked)):
         found = find_free_space(world, locale, clearance_m, is_round=is_round)
-        plain = compute_free_space(world.outline(locale), list_obstacles(world, locale), clearance_m,
+        plain = compute_free_space(world.outline(locale), world.obstacles(locale), clearance_m,
                                    is_round=is_round)
         assert found.equals(plain)
 

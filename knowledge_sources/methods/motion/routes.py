@@ -41,12 +41,7 @@ def find_free_space(
 ) -> shapely.Geometry:
     """Where the robot's centre may be in a locale, ``clearance_m`` from walls and things; cached."""
     return building.cached("free spaces", MAX_FREE_SPACES, (locale, clearance_m, is_round), lambda: compute_free_space(
-        building.outline(locale), list_obstacles(building, locale), clearance_m, is_round=is_round))
-
-
-def list_obstacles(building: Building, locale: str) -> list[Floats]:
-    """The corners (k, 2) of what the robot could hit in a locale."""
-    return [thing.footprint_world for thing in building.things_of(locale) if thing.is_obstacle]
+        building.outline(locale), building.obstacles(locale), clearance_m, is_round=is_round))
 
 
 def compute_free_space(
@@ -202,29 +197,6 @@ def _drop_repeats(points: list[Floats]) -> list[Floats]:
         if np.linalg.norm(point - kept[-1]) > SLACK_M:
             kept.append(point)
     return kept
-
-
-JOINT_M = 0.005
-"""Rooms and the doorway between them overlap by this, so that no gap is left by rounding."""
-
-
-def compute_free_passage(
-    rooms: Sequence[Any], thresholds: Any, obstacles: Sequence[Any], clearance_m: float
-) -> shapely.Geometry:
-    """Where the robot's centre may be in two rooms and the doorway between them.
-
-    Args:
-        rooms: the outlines (k, 2) of both.
-        thresholds: (n, 2) corners of the doorway's floor.
-        obstacles: corners (k, 2) of what stands in the rooms.
-        clearance_m: of the robot's centre from all of them.
-    """
-    parts = [shapely.Polygon(np.asarray(room, float)) for room in rooms]
-    parts.append(shapely.convex_hull(shapely.multipoints(np.asarray(thresholds, float).reshape(-1, 2))))
-    floor = shapely.union_all([shapely.buffer(part, JOINT_M, join_style="mitre") for part in parts])
-    free = shapely.buffer(floor, -clearance_m - JOINT_M)
-    solid = [shapely.buffer(shapely.Polygon(np.asarray(corners, float)), clearance_m) for corners in obstacles]
-    return shapely.difference(free, shapely.union_all(solid)) if solid else free
 
 
 def find_line_through(

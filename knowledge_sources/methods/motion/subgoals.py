@@ -13,9 +13,8 @@ from shapely import Geometry, LineString, Point
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import build_polygon, find_floor, measure_first_seen_m
+from knowledge_sources.methods.floor.looks_round import JOINT_M
 from knowledge_sources.methods.motion.routes import (
-    JOINT_M,
-    compute_free_passage,
     compute_free_space,
     find_free_space,
     find_line_through,
@@ -23,7 +22,6 @@ from knowledge_sources.methods.motion.routes import (
     find_shortest_route,
     is_clear,
     list_lookouts,
-    list_obstacles,
 )
 from knowledge_sources.settings import PlanSettings
 from world_models.building.locales import Doorway, Link, Passage
@@ -195,7 +193,7 @@ class SubgoalPlanner:
         if None in ends and not isinstance(passage, Link) and (diagonal or not self._cluttered.intersection(sides)):
             middles = [self._find_middle(passage, side) for side in sides]
             for clearance_m in CLEARANCES_M:
-                free = self._find_free_passage(passage, sides, clearance_m)
+                free = self._find_free_passage(sides, clearance_m)
                 line = find_line_through(free, middles, passage.outward_from(origin), DOORWAY_DISTANCES_M,
                                          DOORWAY_OFFSETS_M)
                 if line is not None:
@@ -206,15 +204,13 @@ class SubgoalPlanner:
                           and side not in self._cluttered else end for side, end in zip(sides, ends, strict=True))
         return None if before is None or behind is None else _Ends(before, behind, self._way_tolerance_m(passage))
 
-    def _find_free_passage(self, passage: Doorway, rooms: tuple[str, str], margin_m: float) -> Geometry:
-        """Where the robot's centre may be in two rooms and the doorway between them, with a margin round the robot."""
-        building = self._building
+    def _find_free_passage(self, rooms: tuple[str, str], margin_m: float) -> Geometry:
+        """Where the robot's centre may be in two rooms and their doorways, with a margin round the robot."""
         found = tuple(obstacle.footprint for obstacle in self._obstacles if obstacle.locale in rooms)
-        key = (passage.name, rooms, margin_m, found)
-        return building.cached("free passages", MAX_FREE_PASSAGES, key, lambda: compute_free_passage(
-            [building.outline(room) for room in rooms], np.concatenate(passage.thresholds_world),
-            [*found, *(corners for room in rooms for corners in list_obstacles(building, room))],
-            self._robot.radius_m + margin_m))
+        key = (rooms, margin_m, found)
+        return self._building.cached("free passages", MAX_FREE_PASSAGES, key, lambda: shapely.buffer(
+            shapely.difference(find_floor(self._building, rooms), shapely.union_all([*map(build_polygon, found)])),
+            -self._robot.radius_m - margin_m - JOINT_M))
 
     def _way_tolerance_m(self, passage: Passage) -> float:
         """Tolerance at the place before a passage, so that the robot passes it straight without contact."""
