@@ -72,18 +72,13 @@ class Bench(testing.Bench):
         return next(entry for entry in self.view.all(LocaleFrame) if entry.value.name == locale)
 
     def stand(self, x_m: float, y_m: float, along_m: float, across_m: float, locale: str = HALL,
-              core: Sequence[tuple[float, float]] = (), **fields: Any) -> Entry[Obstacle]:
-        """Something that stands round a place of a locale, half so long and wide; the locale's frame has it.
-
-        ``core``: corners of what was seen of it, in the locale's frame; by default all.
-        """
-        def corners(points: Iterable[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-            return tuple((float(x), float(y)) for x, y in (to_world(Pose2(*p, 0.0), locale).position for p in points))
-
-        box = [(x_m + i * along_m, y_m + k * across_m) for i, k in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        number = 1 + len(self.view.all(Obstacle))
-        thing = self.put(Obstacle(f"{locale}/obstacle-{number}", locale, corners(box), 0.02, x_m, y_m,
-                                  2.0 * max(along_m, across_m), core=corners(core), **fields))
+              **fields: Any) -> Entry[Obstacle]:
+        """Something that stands round a place of a locale, half so long and wide; the locale's frame has it."""
+        box = [to_world(Pose2(x_m + i * along_m, y_m + k * across_m, 0.0), locale).position
+               for i, k in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        number, corners = 1 + len(self.view.all(Obstacle)), tuple((float(x), float(y)) for x, y in box)
+        thing = self.put(Obstacle(f"{locale}/obstacle-{number}", locale, corners, 0.02, x_m, y_m,
+                                  2.0 * max(along_m, across_m), **fields))
         self.apply(*self.ask(ModelReviser(), thing) or ())
         return thing
 

@@ -14,7 +14,7 @@ from knowledge_sources.methods.floor import Sight, is_telling, may_be_there
 from knowledge_sources.methods.floor.rivals_on_floor import tell_of_door
 from knowledge_sources.methods.floor.weigh_sight import weigh_sight
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, SEEN_MARGIN_M, SURE, Belief, find_known_free
+from knowledge_sources.reads import HELD, SURE, Belief
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import CameraPicture, Difference, Evidence, FreeFloor, Obstacle
 
@@ -25,7 +25,6 @@ class ThingMapper(RobotKnowledgeSource):
     What is seen is joined with what is known there already. It is there when it is certain enough, by one sure picture
     or two unsure ones; and gone when most of its footprint is seen to be free
     floor, or it rather is dirt on the lens. Of a jamb that stands beside the wall's end is there, and its door is told.
-    Where its feet were not seen, it may reach to the robot's rim.
     """
 
     level, priority = Level.ACTION, Priority.REVISE
@@ -58,13 +57,11 @@ class ThingMapper(RobotKnowledgeSource):
 
     def _tell_of(self, view: View, scan: Entry[FreeFloor], belief: Belief) -> Sight:
         """A sight with what it is weighed by."""
-        is_any_cut = any(thing.is_cut for thing in scan.value.things)
-        known_free = find_known_free(view, belief.entry, self._settings.action) if is_any_cut else shapely.Polygon()
         pictures = (found.id for ref in scan.because
                     if (found := view.get(ref.id)) is not None and isinstance(found.value, CameraPicture))
         seen_by = next(pictures, scan.id) if scan.value.sense == "camera" else scan.id
         before = [one.value.things for one in view.newest_first(FreeFloor)
                   if one.value.sense == "camera" and one is not scan]
         differences = {entry.value.about: entry.value for entry in view.all(Difference)}
-        return Sight(scan.value, seen_by, belief.world, belief.robot.radius_m + SEEN_MARGIN_M, known_free,
-                     belief.robot.camera, before, differences)
+        under = shapely.Point(belief.pose.position).buffer(belief.robot.radius_m)
+        return Sight(scan.value, seen_by, belief.world, under, belief.robot.camera, before, differences)

@@ -19,7 +19,6 @@ from knowledge_sources.methods.floor import (
     FloorMap,
     Lookout,
     Sweep,
-    build_free_floor,
     build_polygon,
     choose_look,
     find_blind,
@@ -175,19 +174,18 @@ class FloorAhead:
         return None
 
     def _measure_room_m(self, way_m: float) -> float:
-        """How far the robot can go straight ahead before its rim comes to what may stand there; 0..way."""
-        return min(self._measure_to_things_m(way_m, touched=True), self._measure_to_things_m(way_m))
+        """How far the robot can go straight ahead before its rim comes to what may stand there; 0..way.
 
-    def _measure_to_things_m(self, way_m: float, *, touched: bool = False) -> float:
-        """The same of what was touched, along which the robot does not go, but away from it; or of all else.
+        Along what was touched it does not go, but away from it.
         """
         along, free_m = np.arange(0.0, way_m + STEP_M, STEP_M), way_m
         points = shapely.points(self._find_ahead(along))
-        stands = [(entry, polygon) for entry, polygon in self._suspected
-                  if not touched or entry.value.touched_s is not None]
-        for entry, polygon in [*stands, *(self._touches if touched else ())]:
+        touched = [pair for pair in self._suspected if pair[0].value.touched_s is not None]
+        stands: list[tuple[Entry[Any], shapely.Geometry, float, float]] = [
+            *((*pair, 0.0, -1e-9) for pair in self._suspected),
+            *((*pair, TOUCHED_GAP_M, TOUCHED_AWAY * STEP_M) for pair in (*touched, *self._touches))]
+        for entry, polygon, near_m, away_m in stands:
             gaps = shapely.distance(points, polygon)
-            near_m, away_m = (TOUCHED_GAP_M, TOUCHED_AWAY * STEP_M) if touched else (0.0, -1e-9)
             met = np.flatnonzero((gaps[1:] < self._robot.radius_m + near_m) & (gaps[1:] < gaps[:-1] + away_m))
             if len(met):
                 free_m = min(free_m, float(along[met[0]]))
@@ -251,11 +249,9 @@ class FloorAhead:
 
 
 def _list_what_may_stand(view: View) -> list[tuple[Entry[Obstacle], shapely.Polygon]]:
-    """What the robot does not creep into: all that what is suspected may take; of what is there what was seen of it,
-    as the goal sketcher passes through the rest only where nothing else is left.
-    """
-    found = [(entry, entry.value) for entry in view.where(Obstacle, lambda o: o.status != "gone")]
-    return [(entry, build_polygon(o.core if o.core and o.is_there else o.footprint)) for entry, o in found]
+    """What the robot does not creep into."""
+    found = view.where(Obstacle, lambda o: o.status != "gone")
+    return [(entry, build_polygon(entry.value.footprint)) for entry in found]
 
 
 def _list_touches(view: View, here: Pose2) -> list[tuple[Entry[Contact], shapely.Point]]:
@@ -275,16 +271,6 @@ def find_swept_next(belief: Belief, leg: Leg, settings: ActionSettings) -> shape
     here = shapely.Point(belief.pose.position)
     way = shapely.LineString([here, (leg.x1_m, leg.y1_m)])
     return shapely.intersection(way, here.buffer(settings.act_within_m)).buffer(belief.robot.radius_m + SEEN_MARGIN_M)
-
-
-def find_known_free(view: View, belief: Entry[Hypothesis], settings: ActionSettings) -> shapely.Geometry:
-    """The floor of the locales here that was seen to be free, or driven over, or reported to be free [m, world]."""
-    robot, scans = find_robot(view), _find_scans(view, belief, settings)
-    discs = list_free_discs(view, robot, belief.value.world_from_robot(robot.world), scans)
-    seen = [build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
-            for f in (entry.value for entry in scans)]
-    circles = np.array([disc.circle for disc in discs])
-    return shapely.union_all([*seen, *shapely.buffer(shapely.points(circles[:, :2]), circles[:, 2])])
 
 
 class FreeDisc(NamedTuple):

@@ -1,9 +1,9 @@
-"""What the knowledge sources of plan sketches have in common: planners round obstacles, and the sketches of a goal."""
+"""What the knowledge sources of plan sketches have in common: a planner round obstacles, the sketches of a goal."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
 import shapely
@@ -26,26 +26,14 @@ INEXACT_TOLERANCE_SIGMAS = 2.0
 Way = tuple[Subgoal, ...]
 
 
-def list_planners(view: View, settings: PlanSettings) -> list[SubgoalPlanner]:
-    """Planners in the order in which they are asked: round all that obstacles may take, then what is seen of them.
-
-    Where the feet of an obstacle were not seen, the floor round it may be free: the robot drives as if it were, and
-    only into what it then sees to be free.
-    """
-    robot, obstacles = find_robot(view), [entry.value for entry in find_obstacles(view)]
-    ways = [False, *([True] if any(obstacle.core for obstacle in obstacles) else [])]
-    return [SubgoalPlanner(robot, settings, obstacles, by_cores=by_cores) for by_cores in ways]
+def find_planner(view: View, settings: PlanSettings) -> SubgoalPlanner:
+    """It plans round what stands in the way; the robot drives only into what it then sees to be free."""
+    return SubgoalPlanner(find_robot(view), settings, [entry.value for entry in find_obstacles(view)])
 
 
-def find_way(planners: Iterable[SubgoalPlanner], ask: Callable[[SubgoalPlanner], Way | None]) -> Way | None:
-    """The first way that a planner finds."""
-    return next((way for way in map(ask, planners) if way is not None), None)
-
-
-def find_way_to_goal(planners: Iterable[SubgoalPlanner], belief: Hypothesis, goal: Goal) -> Way | None:
+def find_way_to_goal(planner: SubgoalPlanner, belief: Hypothesis, goal: Goal) -> Way | None:
     """From locale to locale, from where the robot believes to be."""
-    here = place_of(belief)
-    return find_way(planners, lambda p: p.plan_between_locales(here, goal.destination, GOAL_TOLERANCE_M))
+    return planner.plan_between_locales(place_of(belief), goal.destination, GOAL_TOLERANCE_M)
 
 
 def find_obstacles(view: View, locales: Collection[str] | None = None) -> tuple[Entry[Obstacle], ...]:

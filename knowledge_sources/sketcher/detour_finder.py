@@ -11,8 +11,8 @@ from knowledge_sources.reads import (
     HELD,
     find_first_level,
     find_obstacles,
+    find_planner,
     find_way_to_goal,
-    list_planners,
     name_obstacles,
     place_of,
     supersede,
@@ -45,8 +45,8 @@ class DetourFinder(RobotKnowledgeSource):
 
     def act(self, view: View, case: Halted) -> Iterable[Effect]:
         (leg, drawn), goal, belief = case, GOAL.of(view), HELD.of(view).entry
-        planner = list_planners(view, self._settings.plan)[0]
-        leads_there = find_way_to_goal((planner,), belief.value, goal.value) is not None
+        planner = find_planner(view, self._settings.plan)
+        leads_there = find_way_to_goal(planner, belief.value, goal.value) is not None
         if leads_there and drawn.value.halts < MAX_ADJUSTMENTS:
             yield from supersede(view, leg, "halted")
             return

@@ -14,10 +14,10 @@ from knowledge_sources.reads import (
     find_building,
     find_frames,
     find_obstacles,
+    find_planner,
     find_way_to_goal,
     is_just_found,
     list_locales,
-    list_planners,
     name_obstacles,
     supersede,
 )
@@ -57,15 +57,15 @@ class GoalSketcher(RobotKnowledgeSource):
         pursued, belief = GOAL.of(view), HELD.of(view).entry
         goal, here, because = pursued.value, belief.value, (pursued, belief, *case)
         yield from supersede(view, pursued)
-        planners = list_planners(view, self._settings.plan)
-        unfit = planners[-1].explain_unfit(goal.destination)
+        planner = find_planner(view, self._settings.plan)
+        unfit = planner.explain_unfit(goal.destination)
         if unfit:
             taking = [o for o in find_obstacles(view, (goal.destination.locale,)) if o.value.name in unfit]
             occupied = f"is occupied by {' and '.join(o.value.words() for o in taking)}: it " if taking else ""
             reason = f"the goal {goal.destination} {occupied}{unfit}"
             yield Post(Impasse("blocked", reason, pursued.id, tuple(o.id for o in taking)), (*because, *taking))
             return
-        way = find_way_to_goal(planners, here, goal)
+        way = find_way_to_goal(planner, here, goal)
         if way is None:
             obstacles, why = find_obstacles(view), self._explain_no_way(view, here.locale, goal.destination.locale)
             behind = tuple(o.id for o in obstacles)

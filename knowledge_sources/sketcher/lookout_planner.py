@@ -11,7 +11,7 @@ import shapely
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.floor import MIN_SIDE_M, build_polygon, list_corners
+from knowledge_sources.methods.floor import build_polygon
 from knowledge_sources.methods.motion import SubgoalPlanner
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
@@ -20,13 +20,14 @@ from knowledge_sources.reads import (
     find_building,
     find_frames,
     find_obstacles,
+    find_planner,
     find_robot,
     find_way_to_goal,
-    list_planners,
     supersede,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import DoorState, Goal, Hypothesis, Impasse, Obstacle, PlanSketch, Subgoal
+from world_models.frame_building import FrameBuilding
 
 
 class Case(NamedTuple):
@@ -57,7 +58,7 @@ class LookoutPlanner(RobotKnowledgeSource):
         looked = len(lookouts)
         if goal is None or looked >= self._settings.plan.max_lookouts:
             return None
-        planner = list_planners(view, self._settings.plan)[0]
+        planner = find_planner(view, self._settings.plan)
         for door in view.where(DoorState, lambda d: d.may_be_shut and belief.locale in d.between):
             subgoal = _plan_door_look(view, planner, belief.value, door.value)
             if subgoal is not None:
@@ -87,24 +88,24 @@ class LookoutPlanner(RobotKnowledgeSource):
         here = shapely.Point(belief.pose.position)
         behind = [o for o in find_obstacles(view) if o.id in impasse.behind]
         nearest = sorted(behind, key=lambda o: (build_polygon(o.value.footprint).distance(here), o.value.name))
-        obstacles = {o.id: replace(o.value, core=()) for o in find_obstacles(view)}
-        if not self._leads(view, goal, belief.value, ()):
+        alone = [o for o in nearest if self._leads_without(view, goal, belief.value, (o,))]
+        if not alone and not self._leads_without(view, goal, belief.value, tuple(find_obstacles(view))):
             return ()
-        alone = [o for o in nearest
-                 if self._leads(view, goal, belief.value, [*({**obstacles, o.id: _shrink(o.value)}).values()])]
         first = looked % max(1, len(alone or nearest))
         ordered = [*alone, *(o for o in nearest if o not in alone)]
         return (*ordered[first:], *ordered[:first])
 
-    def _leads(self, view: View, goal: Goal, belief: Hypothesis, obstacles: Sequence[Obstacle]) -> bool:
-        """Whether a way would lead to the goal if no more than that were there."""
-        planner = SubgoalPlanner(find_robot(view), self._settings.plan, obstacles, by_cores=True)
-        return not planner.explain_unfit(goal.destination) and find_way_to_goal((planner,), belief, goal) is not None
-
-
-def _shrink(obstacle: Obstacle) -> Obstacle:
-    """It, as if it were next to nothing."""
-    return replace(obstacle, core=list_corners(build_polygon(obstacle.footprint).centroid.buffer(MIN_SIDE_M)))
+    def _leads_without(
+        self, view: View, goal: Goal, belief: Hypothesis, without: Sequence[Entry[Obstacle]]
+    ) -> bool:
+        """Whether a way would lead to the goal if some obstacles were not there."""
+        names, frames = {o.value.name for o in without}, find_frames(view, {o.value.locale for o in without})
+        bare = [frame.value.with_changes(c for c in frame.value.changes if c.what != "extra" or c.name not in names)
+                for frame in frames]
+        robot = find_robot(view).in_building(FrameBuilding(view, bare, "without some"))
+        rest = [o.value for o in find_obstacles(view) if o not in without]
+        planner = SubgoalPlanner(robot, self._settings.plan, rest)
+        return not planner.explain_unfit(goal.destination) and find_way_to_goal(planner, belief, goal) is not None
 
 
 def _plan_door_look(view: View, planner: SubgoalPlanner, belief: Hypothesis, door: DoorState) -> Subgoal | None:

@@ -16,11 +16,10 @@ from knowledge_sources.reads import (
     find_first_level,
     find_frames,
     find_obstacles,
-    find_way,
+    find_planner,
     find_way_to_goal,
     is_just_found,
     list_locales,
-    list_planners,
     name_obstacles,
     place_of,
     supersede,
@@ -58,16 +57,16 @@ class Refiner(RobotKnowledgeSource):
         return Case(trigger.entry, s.current, goal)
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
-        (sketch, subgoal, goal), planners, belief = case, list_planners(view, self._settings.plan), HELD.of(view).entry
+        (sketch, subgoal, goal), planner, belief = case, find_planner(view, self._settings.plan), HELD.of(view).entry
         s, locale = sketch.value, find_building(view).common(subgoal.origin.locale, subgoal.destination.locale)
-        way = find_way(planners, lambda planner: _plan(planner, subgoal, belief.value))
+        way = _plan(planner, subgoal, belief.value)
         if way is not None:
             frames = find_frames(view, list_locales(way))
             found = is_just_found(belief.value)
             yield Post(PlanSketch(s.goal, (*s.path, s.at), locale, way, verified=found), (sketch, belief, *frames))
             return
         obstacles = find_obstacles(view, (locale,)) or find_obstacles(view)
-        if obstacles and _takes_another_way(view, find_way_to_goal(planners, belief.value, goal.value)):
+        if obstacles and _takes_another_way(view, find_way_to_goal(planner, belief.value, goal.value)):
             yield from supersede(view, sketch)
             return
         reason = f"no way through {locale} to {subgoal.destination}{name_obstacles(obstacles)}"

@@ -25,7 +25,7 @@ from knowledge_sources.methods.motion import (
     measure_progress,
 )
 from knowledge_sources.methods.motion.pure_pursuit import compute_curvature_to
-from knowledge_sources.methods.motion.routes import find_shortest_route, list_obstacles
+from knowledge_sources.methods.motion.routes import find_shortest_route
 from knowledge_sources.methods.pose import planar_from_points
 from knowledge_sources.methods.tracking.edge_alignment import _Edges, _solve
 from knowledge_sources.methods.verification import predict_color_check
@@ -221,15 +221,13 @@ def test_chance_is_what_agrees_with_the_colours_of_other_faces(faces: list[tuple
 
 
 def test_a_room_is_as_free_as_it_is_whatever_was_asked_before() -> None:
-    """Each question has its own answer: locale, clearance, shape, and where things are taken to stand."""
+    """Each question has its own answer: locale, clearance and shape."""
     world = load_world(WORLDS / "research_center.toml")
-    locale, thing = next((name, t) for name in world.locales for t in world.things_of(name) if t.is_obstacle)
-    moved = tuple((float(x) + 0.3, float(y) + 0.2) for x, y in thing.footprint_world)
-    asked = [(clearance_m, is_round, instead) for clearance_m in (0.3, 0.4) for is_round in (False, True)
-             for instead in ({}, {thing.name: moved})]
-    for clearance_m, is_round, instead in (*asked, *reversed(asked)):
-        found = find_free_space(world, locale, clearance_m, is_round=is_round, instead=instead)
-        plain = compute_free_space(world.outline(locale), list_obstacles(world, locale, instead), clearance_m,
+    locale = next(name for name in world.locales for t in world.things_of(name) if t.is_obstacle)
+    asked = [(clearance_m, is_round) for clearance_m in (0.3, 0.4) for is_round in (False, True)]
+    for clearance_m, is_round in (*asked, *reversed(asked)):
+        found = find_free_space(world, locale, clearance_m, is_round=is_round)
+        plain = compute_free_space(world.outline(locale), world.obstacles(locale), clearance_m,
                                    is_round=is_round)
         assert found.equals(plain)
 

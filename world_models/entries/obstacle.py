@@ -112,7 +112,6 @@ class Obstacle:
         name: under which the frame of its locale has it, as ``hallway/obstacle-1``.
         locale: where it stands.
         footprint: (k, 2) corners, counter-clockwise, of what it is taken to cover of the floor [m, world].
-        core: (k, 2) corners of the part of that which was seen: the rest may be free floor. () where all of it was.
         sigma_m: standard deviation of the place of its near side.
         x_m, y_m: where it is, in the locale's frame: where it was touched, or the middle of its footprint.
         width_m: how wide it is taken to be.
@@ -142,7 +141,6 @@ class Obstacle:
     by: ObstacleSense = "touch"
     evidence: str = ""
     status: ObstacleStatus = "there"
-    core: Corners = ()
     is_camouflaged: bool = False
     seen_from_m: float = math.inf
 

@@ -61,7 +61,7 @@ def explains(mover: Mover, thing: Obstacle) -> bool:
     if abs(lasts_s) > MAX_UNSEEN_S:
         return False
     x, y = mover.state[:2] + lasts_s * mover.state[2:]
-    seen = shapely.Polygon(thing.core or thing.footprint)
+    seen = shapely.Polygon(thing.footprint)
     return bool(seen.distance(shapely.Point(x, y)) <= BODY_M + 2.0 * min(mover.sigma_m, BODY_M))
 
 

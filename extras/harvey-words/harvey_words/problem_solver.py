@@ -13,7 +13,7 @@ from harvey_words.task_entries import ToldTask, active_task, find_time_s, leave_
 from harvey_words.task_tour import order_stops
 from knowledge_sources.methods.motion import SubgoalPlanner
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import HELD, NOT_ENDED, NOT_LOST, find_building, list_planners, place_of
+from knowledge_sources.reads import HELD, NOT_ENDED, NOT_LOST, find_building, find_planner, place_of
 from knowledge_sources.reads.sketches import GOAL_TOLERANCE_M
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.building import Building
@@ -60,7 +60,7 @@ class ProblemSolver(RobotKnowledgeSource):
         if len(stops) < 2:
             return first
         after = next((task.steps[number].place for number in others if number not in stops), None)
-        planner, world = list_planners(view, self._settings.plan)[0], find_building(view)
+        planner, world = find_planner(view, self._settings.plan), find_building(view)
         places = [place_of(HELD.of(view).value), *(place for stop in stops if (place := task.steps[stop].place))]
         ways = np.array([[measure_way(planner, world, a, b) for b in places] for a in places])
         ends = [0.0 if after is None else measure_way(planner, world, place, after) for place in places[1:]]

@@ -19,7 +19,7 @@ from shapely.geometry.polygon import orient
 
 from knowledge_sources.methods.arrays import Floats
 from world_models.building.building import Building
-from world_models.building.locales import EXTRA_KIND, Doorway
+from world_models.building.locales import EXTRA_KIND
 from world_models.entries import Obstacle, Place
 from world_models.frames import Pose2
 
@@ -37,8 +37,6 @@ MIN_COMMON_DIRECTIONS = 0.6
 """A sight without feet tells nothing new where this part of its directions is that of what is known."""
 REACH_M = 10.0
 """No thing is further off than this when it is seen."""
-CORE_PART = 0.9
-"""Where more of a thing than this part was seen, all of it counts as seen."""
 
 
 def build_polygon(footprint: Any) -> shapely.Polygon:
@@ -168,27 +166,16 @@ class ThingShape(NamedTuple):
     """What is known of the shape of a thing [m, world].
 
     Attributes:
-        seen: what was seen of it; whole: with what it may take besides.
+        taken: what it takes of the floor, as far as that was seen, and as deep as is assumed.
         from_m: from how near it was seen; infinite where its feet were not.
     """
 
-    seen: shapely.Geometry
-    whole: shapely.Geometry
+    taken: shapely.Geometry
     from_m: float
 
     @staticmethod
     def of(obstacle: Obstacle) -> ThingShape:
-        seen, whole = (build_polygon(corners) for corners in (obstacle.core or obstacle.footprint, obstacle.footprint))
-        return ThingShape(seen, whole, obstacle.seen_from_m)
-
-    def list_corners(self) -> tuple[Corners, Corners]:
-        """Of the whole, and of what was seen; () for the latter where it is about all."""
-        footprint = list_corners(self.whole)
-        if not footprint:
-            return (), ()
-        whole = build_polygon(footprint)
-        core = shapely.intersection(whole, self.seen)
-        return footprint, list_corners(core) if 0.0 < core.area < CORE_PART * whole.area else ()
+        return ThingShape(build_polygon(obstacle.footprint), obstacle.seen_from_m)
 
 
 def join_shapes(known: ThingShape, new: ThingShape, free: shapely.Geometry, eye: Floats) -> ThingShape:
@@ -198,21 +185,14 @@ def join_shapes(known: ThingShape, new: ThingShape, free: shapely.Geometry, eye:
     directions in which nothing was known.
     """
     if new.from_m < NEARER * known.from_m:
-        behind = _build_sector(new.seen, eye)
-        seen, whole = (take_free(shapely.difference(shape, behind), free) for shape in (known.seen, known.whole))
-        return ThingShape(_join(new.seen, seen), _join(new.whole, whole), new.from_m)
+        known_beside = shapely.difference(known.taken, _build_sector(new.taken, eye))
+        return ThingShape(join_footprints(known_beside, new.taken, free), new.from_m)
     if not math.isfinite(new.from_m):
-        if measure_common_directions(known.seen, new.seen, eye) >= MIN_COMMON_DIRECTIONS:
-            return leave_free(known, free)
+        if measure_common_directions(known.taken, new.taken, eye) >= MIN_COMMON_DIRECTIONS:
+            return known._replace(taken=take_free(known.taken, free))
     elif NEARER * new.from_m > known.from_m:
         return known
-    seen = join_footprints(known.seen, new.seen, free)
-    return ThingShape(seen, _join(join_footprints(known.whole, new.whole, free), seen), min(known.from_m, new.from_m))
-
-
-def leave_free(known: ThingShape, free: shapely.Geometry) -> ThingShape:
-    """What is left of a shape without the floor that is seen to be free."""
-    return ThingShape(take_free(known.seen, free), take_free(known.whole, free), known.from_m)
+    return ThingShape(join_footprints(known.taken, new.taken, free), min(known.from_m, new.from_m))
 
 
 def _build_sector(shape: shapely.Geometry, eye: Floats) -> shapely.Geometry:
@@ -220,10 +200,6 @@ def _build_sector(shape: shapely.Geometry, eye: Floats) -> shapely.Geometry:
     to = shapely.get_coordinates(shape) - eye
     rim = eye + REACH_M * to / np.maximum(np.linalg.norm(to, axis=1, keepdims=True), 1e-9)
     return shapely.convex_hull(shapely.multipoints(np.vstack([eye, rim])))
-
-
-def _join(one: shapely.Geometry, other: shapely.Geometry) -> shapely.Geometry:
-    return shapely.convex_hull(shapely.union(one, other))
 
 
 def find_same(known: Mapping[str, Obstacle], shape: shapely.Polygon, sigma_m: float, most_hull: float) -> str | None:
@@ -266,11 +242,9 @@ def move_thing(world: Building, thing: Obstacle, by: Pose2, off_m: float, eviden
 
     How much of that the belief was wrong already when it was seen, is not known: half of it is added to its deviation.
     """
-    def move(corners: Corners) -> Corners:
-        return tuple((round(float(x), 3), round(float(y), 3)) for x, y in by.apply(corners)) if corners else ()
-
-    moved = replace(thing, footprint=move(thing.footprint), core=move(thing.core), evidence=evidence,
-                    sigma_m=round(math.hypot(thing.sigma_m, 0.5 * off_m), 4))
+    footprint = tuple((round(float(x), 3), round(float(y), 3)) for x, y in by.apply(thing.footprint))
+    sigma_m = round(math.hypot(thing.sigma_m, 0.5 * off_m), 4)
+    moved = replace(thing, footprint=footprint, evidence=evidence, sigma_m=sigma_m)
     return place(world, moved, build_polygon(moved.footprint))
 
 
@@ -279,14 +253,11 @@ def find_room(world: Building, shape: shapely.Polygon, near: str) -> str:
     if shapely.Polygon(world.outline(near)).contains(shape.centroid):
         return near
     doors = {doorway.other(near): doorway for doorway in world.doorways_of(near)}
-    rooms = [near, *(room for room, door in doors.items() if _measure_behind_m(door, shape) <= MAX_BEHIND_DOOR_M)]
+    behind_m = {room: shapely.MultiPoint(np.concatenate(door.thresholds_world)).distance(shape)
+                for room, door in doors.items()}
+    rooms = [near, *(room for room, far_m in behind_m.items() if far_m <= MAX_BEHIND_DOOR_M)]
     areas = [shapely.intersection(shapely.Polygon(world.outline(room)), shape).area for room in rooms]
     return rooms[int(np.argmax(areas))]
-
-
-def _measure_behind_m(door: Doorway, shape: shapely.Polygon) -> float:
-    """How far a thing is from a doorway."""
-    return float(shapely.MultiPoint(np.concatenate(door.thresholds_world)).distance(shape))
 
 
 def find_open_floor(world: Building, locale: str, margin_m: float) -> shapely.Geometry:

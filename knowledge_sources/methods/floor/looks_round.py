@@ -18,6 +18,8 @@ from world_models.robot import RobotModel
 MAX_HIDDEN_M = 0.2  # floor counts as seen where nothing higher than this can hide below the picture's lower border
 
 MAX_FLOORS = 64
+JOINT_M = 0.005
+"""Rooms and the doorway between them overlap by this, so that no gap is left by rounding."""
 BORDER_PX = 8.0
 """What is nearer to the border of the picture does not count as seen."""
 MIN_DEPTH_M = 0.1
@@ -42,7 +44,7 @@ def _compute_floor(building: Building, names: Sequence[str]) -> shapely.Geometry
     parts = [shapely.Polygon(building.outline(name)) for name in names]
     parts += [shapely.convex_hull(shapely.MultiPoint(d.thresholds_world.reshape(-1, 2))) for d in doorways.values()]
     things = [shapely.Polygon(corners) for name in names for corners in building.obstacles(name)]
-    floor = shapely.union_all([shapely.buffer(part, 0.005, join_style="mitre") for part in parts])
+    floor = shapely.union_all([shapely.buffer(part, JOINT_M, join_style="mitre") for part in parts])
     return shapely.difference(floor, shapely.union_all(things)) if things else floor
 
 

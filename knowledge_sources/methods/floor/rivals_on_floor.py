@@ -142,12 +142,14 @@ def explain_seen_in_patch(looks: int) -> tuple[Explanation, ...]:
 
 
 def judge_thing(thing: Obstacle, difference: Difference, settings: ActionSettings) -> Obstacle:
-    """A thing as certain as its difference says, that something blocks the way there; gone where nothing may."""
+    """A thing as certain as its difference says, that something blocks the way there; gone where nothing may. What was
+    held to be there is suspected again where evidence counts against it, and it is not certain.
+    """
     p = math.fsum(rival.p for rival in difference.rivals if rival.kind in BLOCKING)
     certainty = min(p, settings.max_obstacle_certainty)
     if certainty < settings.min_gone_certainty:
         return replace(thing, certainty=certainty, status="gone")
-    is_held = thing.is_there and difference.find("elsewhere") is None
+    is_held = thing.is_there and difference.find("elsewhere") is None and certainty >= thing.certainty
     is_there = is_held or certainty >= MIN_OBSTACLE_CERTAINTY
     return replace(thing, certainty=certainty, status="there" if is_there else "suspected")
 

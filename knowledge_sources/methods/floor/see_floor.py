@@ -125,7 +125,7 @@ def see_free_floor(
     eye = pose @ Pose2(robot.mount.forward_m, 0.0, 0.0)
     shown = read_picture(jpeg)
     if grid is None or is_dark(*compute_mean_and_deviation(shown.grey)):
-        return _blind(locale, eye, seen_s), ()
+        return FreeFloor("camera", locale, eye.x_m, eye.y_m, (), (), (), (), (), (), seen_s), ()
     sigma_rad = math.sqrt(max(float(covariance[2, 2]), 0.0))
     margin_px = MODEL_MARGIN_PX + 2.0 * sigma_rad * robot.camera.fx
     sigma_m = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0))
@@ -415,14 +415,14 @@ def _build_thing(
     at, left_right = np.flatnonzero(region.mask.any(axis=1)), np.flatnonzero(region.mask.any(axis=0))
     (left, top), (right, bottom) = grid.pixels[at[0], left_right[0]], grid.pixels[at[-1], left_right[-1]]
     own = CUT_SIGMA_M if region.is_cut else STEP_PX * foot_m**2 / (grid.camera_height_m * robot.camera.fy)
-    part = float(region.parts.min())
-    if part < 1.0:
-        own = math.hypot(own, PART_SIGMA * foot_m / part)
+    part, most_p = float(region.parts.min()), MAX_P_SEEN_ONCE
+    if part < 1.0:  # one picture before tells how far it is: that may be another thing's place
+        own, most_p = math.hypot(own, PART_SIGMA * foot_m / part), P_SEEN_ONCE
     return FloorThing(
         footprint=tuple((round(float(x), 3), round(float(y), 3)) for x, y in world),
         sigma_m=round(math.hypot(spread, own), 4),
         height_m=round(height_m, 3), sigma_height_m=round(sigma_height_m, 3),
-        p_thing=min(MAX_P_SEEN_ONCE, round(odds / (1.0 + odds), 4)),
+        p_thing=min(most_p, round(odds / (1.0 + odds), 4)),
         box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut,
         is_camouflaged=looks_like_floor)
 
@@ -449,8 +449,3 @@ def _learn(
     colours = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)[grid.top:][driven].astype(float)
     learnt = learn_appearance(known, locale, colours)
     return () if learnt is None or learnt == known else (learnt,)
-
-
-def _blind(locale: str, eye: Pose2, seen_s: float) -> FreeFloor:
-    """Nothing is seen of the floor: the camera looks over it, or it is dark."""
-    return FreeFloor("camera", locale, eye.x_m, eye.y_m, (), (), (), (), (), (), seen_s)

@@ -23,11 +23,12 @@ from knowledge_sources.methods.floor.footprints import (
     find_room,
     find_same,
     join_shapes,
-    leave_free,
+    list_corners,
     may_be_there,
     measure_change_m,
     measure_free_part,
     place,
+    take_free,
 )
 from knowledge_sources.methods.floor.ranges import MAX_RANGE_THING_M
 from knowledge_sources.methods.floor.rivals_on_floor import (
@@ -73,8 +74,7 @@ class Sight(NamedTuple):
         floor: the sight.
         seen_by: id of the picture or of the reading.
         world: the building as it is known.
-        rim_m: to here from the eye a thing may reach whose feet are not seen.
-        known_free: the floor that was known to be free before [m, world].
+        under: the floor that the robot stands on [m, world].
         camera: by which it was seen.
         before: the things in earlier pictures, the newest first.
         differences: what is known of things, by their names.
@@ -83,8 +83,7 @@ class Sight(NamedTuple):
     floor: FreeFloor
     seen_by: str
     world: Building
-    rim_m: float
-    known_free: shapely.Geometry
+    under: shapely.Polygon
     camera: Camera
     before: Sequence[Sequence[FloorThing]] = ()
     differences: Mapping[str, Difference] = MappingProxyType({})
@@ -149,7 +148,8 @@ def weigh_sight(sight: Sight, known: Mapping[str, Obstacle], settings: Settings)
         known: what is known on the floor, by id.
     """
     f, s = sight.floor, settings.action
-    free = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist())
+    free = shapely.union(sight.under, build_free_floor(
+        f.x_m, f.y_m, f.bearings_rad, f.near_m, np.subtract(f.far_m, f.sigma_m).tolist()))
     confirmed = free if f.sense == "ranges" else shapely.Polygon()  # where a camouflaged thing would be seen
     if f.confirmed_m:
         confirmed = build_free_floor(f.x_m, f.y_m, f.bearings_rad, f.near_m,
@@ -163,12 +163,13 @@ def weigh_sight(sight: Sight, known: Mapping[str, Obstacle], settings: Settings)
         new = _shape_of(sight, thing)
         rest = {id: o for id, o in known.items() if id not in drafts and (may_be_there(o) or sight.is_dirt(o))}
         whole = math.inf if f.sense == "ranges" else MAX_HULL_PART  # any thing in the cone of an echo may be heard
-        id = find_before(rest, new.seen, sight.eye, settings.plan.overhang_m) if thing.is_cut else None
-        shown = _show(sight, thing, new)
+        seen = build_polygon(thing.footprint)
+        id = find_before(rest, seen, sight.eye, settings.plan.overhang_m) if thing.is_cut else None
+        shown = _show(sight, thing)
         if shown.jamb is not None and thing.is_cut and id is None:  # before anything wider is believed
             beside = shown.jamb.shape
-            new = ThingShape(beside, beside, float(beside.distance(shapely.Point(sight.eye))))
-        shape = new.whole
+            new = ThingShape(beside, float(beside.distance(shapely.Point(sight.eye))))
+        shape = new.taken
         id = id or find_same(rest, shape, thing.sigma_m, whole)
         if id is not None:
             again = see_again(sight, known[id], thing, new, shown, free, s)
@@ -224,29 +225,20 @@ def lose_to_patch(sight: Sight, known: Obstacle, patches: Sequence[Box], setting
     return Sighted(None, replace(judge_thing(known, difference, settings), evidence=evidence), told)
 
 
-def _show(sight: Sight, thing: FloorThing, shape: ThingShape) -> ShownSight:
+def _show(sight: Sight, thing: FloorThing) -> ShownSight:
     """What a sight shows of a thing, beside how it looks."""
     if sight.floor.sense != "camera":
         return ShownSight()
-    within_m = 2.0 * thing.sigma_m
-    jamb = find_jamb_beside(sight.world, sight.floor.locale, shape.seen, sight.eye) if thing.is_cut else None
-    leaf = None if thing.is_cut else find_leaf(sight.world, sight.floor.locale, shape.seen, within_m)
+    within_m, seen = 2.0 * thing.sigma_m, build_polygon(thing.footprint)
+    jamb = find_jamb_beside(sight.world, sight.floor.locale, seen, sight.eye) if thing.is_cut else None
+    leaf = None if thing.is_cut else find_leaf(sight.world, sight.floor.locale, seen, within_m)
     return ShownSight(jamb, leaf, len(find_fixed(thing, sight.before, sight.camera)))
 
 
 def _shape_of(sight: Sight, thing: FloorThing) -> ThingShape:
-    """What a sight shows of a thing, and what that may take: as deep as is assumed, and where its feet are not seen
-    from the robot's rim on, but for floor that is known free.
-    """
-    seen, whole = build_polygon(thing.footprint), deepen(thing.footprint, sight.eye, OBSTACLE_DEPTH_M)
-    if not thing.is_cut:
-        return ThingShape(seen, whole, float(seen.distance(shapely.Point(sight.eye))))
-    away = shapely.get_coordinates(whole)[:-1] - sight.eye
-    rim = sight.eye + sight.rim_m * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
-    reaching = build_polygon(np.concatenate([shapely.get_coordinates(whole), rim]))
-    unseen = shapely.get_parts(shapely.difference(reaching, sight.known_free))
-    largest = max(unseen, key=lambda part: part.area, default=shapely.Polygon())
-    return ThingShape(seen, build_polygon(shapely.get_coordinates(shapely.union(whole, largest))), math.inf)
+    """What a sight shows of a thing, as deep as is assumed: where its feet are not seen, the map says what is free."""
+    taken = deepen(thing.footprint, sight.eye, OBSTACLE_DEPTH_M)
+    return ThingShape(taken, math.inf if thing.is_cut else float(taken.distance(shapely.Point(sight.eye))))
 
 
 def _is_explained(sight: Sight, thing: FloorThing, shape: shapely.Polygon) -> bool:
@@ -261,9 +253,9 @@ def see_first(
 ) -> Sighted | None:
     """A thing that was not known; None where it stands on no floor."""
     f, world = sight.floor, sight.world
-    locale = find_room(world, shape.whole, f.locale)
-    own = shapely.intersection(shape.whole, find_open_floor(world, locale, 0.0))
-    footprint, core = shape._replace(whole=own).list_corners()
+    locale = find_room(world, shape.taken, f.locale)
+    own = shapely.intersection(shape.taken, find_open_floor(world, locale, 0.0))
+    footprint = list_corners(own)
     if not footprint:
         return None
     name = f"{locale}/obstacle-{number}"
@@ -271,7 +263,7 @@ def see_first(
     difference = sight.weigh(told)
     found = Obstacle(
         name, locale, footprint, thing.sigma_m, 0.0, 0.0, 0.0, thing.height_m, thing.sigma_height_m, 0.0, f.seen_s,
-        None, f.sense, _tell(thing, sight, difference), "suspected", core, thing.is_camouflaged, shape.from_m)
+        None, f.sense, _tell(thing, sight, difference), "suspected", thing.is_camouflaged, shape.from_m)
     return Sighted(None, judge_thing(place(world, found, own), difference, settings), told)
 
 
@@ -295,10 +287,8 @@ def see_again(
     difference = sight.know(known.name) if told is None else sight.weigh(told)
     judged = known if told is None else judge_thing(known, difference, s)
     joined = _join_sight(sight, known, shape, free)
-    footprint, core = joined.list_corners()
-    seen_before = known.core or known.footprint
-    moved = max(measure_change_m(known.footprint, footprint),
-                measure_change_m(seen_before, core or footprint)) >= s.min_footprint_change_m
+    footprint = list_corners(joined.taken)
+    moved = measure_change_m(known.footprint, footprint) >= s.min_footprint_change_m
     surer = abs(judged.certainty - known.certainty) > 0.005 or judged.status != known.status
     higher = thing.sigma_height_m < 0.7 * known.sigma_height_m
     if not (moved or surer or higher or f.seen_s - known.seen_s >= SEEN_AGAIN_S):
@@ -308,7 +298,7 @@ def see_again(
                   sigma_m=min(known.sigma_m, thing.sigma_m), evidence=_tell(thing, sight, difference),
                   is_camouflaged=known.is_camouflaged and thing.is_camouflaged)
     if moved and footprint:
-        new = place(world, replace(new, footprint=footprint, core=core, seen_from_m=joined.from_m), joined.whole)
+        new = place(world, replace(new, footprint=footprint, seen_from_m=joined.from_m), joined.taken)
     return Sighted(None, new, told)
 
 
@@ -318,20 +308,20 @@ def _join_sight(sight: Sight, known: Obstacle, new: ThingShape, free: shapely.Ge
     if known.status == "gone":
         joined = new
     elif f.sense == "ranges":  # nor how wide it is
-        joined = leave_free(old, free)
+        joined = old._replace(taken=take_free(old.taken, free))
     else:
         joined = join_shapes(old, new, free, np.array(sight.eye))
     if known.touched_s is not None:
-        joined = ThingShape(shapely.union(joined.seen, old.seen), shapely.union(joined.whole, old.seen), joined.from_m)
-    own = shapely.intersection(joined.whole, find_open_floor(sight.world, known.locale, 0.0))
-    return joined if own.is_empty else joined._replace(whole=own)
+        joined = joined._replace(taken=shapely.union(joined.taken, old.taken))
+    own = shapely.intersection(joined.taken, find_open_floor(sight.world, known.locale, 0.0))
+    return joined if own.is_empty else joined._replace(taken=own)
 
 
 def where_it_may_stand(sight: Sight, known: Obstacle) -> shapely.Geometry:
     """Where a known obstacle may stand: as far round what was seen of it as its doubt reaches, or an echo's cone."""
-    heard_m = min(known.seen_from_m - sight.rim_m, MAX_RANGE_THING_M) if known.by == "ranges" else 0.0
+    heard_m = min(known.seen_from_m, MAX_RANGE_THING_M) if known.by == "ranges" else 0.0
     doubt_m = max(2.0 * known.sigma_m, math.tan(0.5 * BEAM_RAD) * heard_m)
-    grown = build_polygon(known.core or known.footprint).buffer(doubt_m)
+    grown = build_polygon(known.footprint).buffer(doubt_m)
     own = shapely.intersection(grown, find_open_floor(sight.world, known.locale, TOUCH_MARGIN_M))
     return grown if own.is_empty else own
 
@@ -345,7 +335,7 @@ def miss(
         confirmed: where it would be seen to stand, whatever it looks like.
     """
     where = where_it_may_stand(sight, known)
-    likeliest = build_polygon(known.core or known.footprint)
+    likeliest = build_polygon(known.footprint)
     free_part = min(measure_free_part(part, free) for part in (likeliest, where))
     if free_part >= MIN_FREE_PART:
         looks = FREE_FLOOR_ODDS if measure_free_part(where, confirmed) >= MIN_FREE_PART else LOOKS_FREE_ODDS
@@ -353,11 +343,11 @@ def miss(
         explanations = explain_free(math.log1p(free_part * (odds - 1.0)), sight.know(known.name))
         told = sight.tell(known.name, f"{free_part:.0%} of the floor where it may stand is seen free", explanations)
         return Sighted(None, judge_thing(known, sight.weigh(told), settings), told)
-    left = leave_free(ThingShape.of(known), free)
-    footprint, core = left.list_corners()
+    left = take_free(likeliest, free)
+    footprint = list_corners(left)
     if not footprint or measure_change_m(known.footprint, footprint) < settings.min_footprint_change_m:
         return None
-    return Sighted(None, place(sight.world, replace(known, footprint=footprint, core=core), left.whole))
+    return Sighted(None, place(sight.world, replace(known, footprint=footprint), left))
 
 
 def _tell(thing: FloorThing, sight: Sight, difference: Difference) -> str:

@@ -75,7 +75,5 @@ def touch_again(world: Building, touched: Touched, known: Obstacle) -> Obstacle:
     """A known obstacle after it was touched: it reaches to where it was touched."""
     corner, when_s = build_polygon(touched.build_square(TOUCHED_SIDE_M)), touched.contact.when_s
     joined = shapely.convex_hull(shapely.union_all([build_polygon(known.footprint), corner]))
-    core = list_corners(shapely.union(build_polygon(known.core), corner)) if known.core else ()
-    new = replace(known, footprint=list_corners(joined), core=core, seen_s=when_s, touched_s=when_s,
-                  status="there")
+    new = replace(known, footprint=list_corners(joined), seen_s=when_s, touched_s=when_s, status="there")
     return place(world, new, joined)

@@ -6,10 +6,9 @@ All coordinates are on the floor, in one frame, in metres.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from heapq import heappop, heappush
 from itertools import combinations, count
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,8 +18,6 @@ from shapely.geometry.polygon import orient
 from knowledge_sources.methods.arrays import Floats, Ints
 from world_models.building.building import Building
 from world_models.building.locales import EXTRA_KIND
-
-Footprint = tuple[tuple[float, float], ...]
 
 SLACK_M = 1e-6
 """Distance below which two places are the same: rounding of shapely's geometry."""
@@ -40,32 +37,11 @@ MAX_FREE_SPACES = 64
 
 
 def find_free_space(
-    building: Building, locale: str, clearance_m: float, *, is_round: bool = False,
-    instead: Mapping[str, Footprint] = MappingProxyType({}),
+    building: Building, locale: str, clearance_m: float, *, is_round: bool = False
 ) -> shapely.Geometry:
-    """Where the robot's centre may be in a locale, ``clearance_m`` from walls and things; cached.
-
-    ``instead``: footprints (k, 2) by the names of things that are taken to stand differently.
-    """
-    key = (locale, clearance_m, is_round, tuple(sorted(instead.items())))
-    return building.cached("free spaces", MAX_FREE_SPACES, key, lambda: compute_free_space(
-        building.outline(locale), list_obstacles(building, locale, instead), clearance_m, is_round=is_round))
-
-
-def list_obstacles(
-    building: Building, locale: str, instead: Mapping[str, Footprint] = MappingProxyType({})
-) -> list[Floats]:
-    """The corners (k, 2) of what the robot could hit in a locale; ``instead`` as in :func:`find_free_space`."""
-    return [corners for _, corners in _list_footprints(building, locale, instead)]
-
-
-def _list_footprints(
-    building: Building, locale: str, instead: Mapping[str, Footprint], *, of_model: bool = False
-) -> list[tuple[str, Floats]]:
-    """The names and the corners (k, 2) of what the robot could hit in a locale."""
-    return [(thing.name, np.asarray(instead[thing.name], float) if thing.name in instead else thing.footprint_world)
-            for thing in building.things_of(locale)
-            if thing.is_obstacle and not (of_model and thing.kind == EXTRA_KIND)]
+    """Where the robot's centre may be in a locale, ``clearance_m`` from walls and things; cached."""
+    return building.cached("free spaces", MAX_FREE_SPACES, (locale, clearance_m, is_round), lambda: compute_free_space(
+        building.outline(locale), building.obstacles(locale), clearance_m, is_round=is_round))
 
 
 def compute_free_space(
@@ -150,37 +126,19 @@ def list_shortest_routes(pairs: Ints, lengths: Floats) -> Iterator[tuple[float, 
                 heappush(todo, (away + length, next(number), [*route, node]))
 
 
-def measure_wall_distance_m(outline: Any, openings: Sequence[Any], point: Any) -> float:
-    """Distance of a point (2,) to the sides of a room (k, 2), less its openings, each the corners (n, 2) of its floor.
-
-    In an open doorway the walls are far, although it is at the border of the room.
-    """
-    walls = shapely.LinearRing(np.asarray(outline, float))
-    if len(openings):
-        hulls = [shapely.MultiPoint(np.asarray(opening, float)).convex_hull for opening in openings]
-        walls = walls.difference(shapely.union_all([hull.buffer(SLACK_M) for hull in hulls]))
-    return float(walls.distance(shapely.Point(point)))
-
-
-def measure_thing_distance_m(footprint: Any, point: Any) -> float:
-    """Distance of a point (2,) from a thing with a footprint (k, 2); 0 within it."""
-    return float(shapely.Polygon(np.asarray(footprint, float)).distance(shapely.Point(point)))
-
-
-def find_nearest(
-    building: Building, locale: str, point: Any, instead: Mapping[str, Footprint] = MappingProxyType({}), *,
-    of_model: bool = False,
-) -> tuple[float, str]:
+def find_nearest(building: Building, locale: str, point: Any, *, of_model: bool = False) -> tuple[float, str]:
     """Distance [m] of a point (2,) [world] from the nearest wall or obstacle of a locale, and which of them it is.
 
     Args:
-        instead: footprints by the names of things that are taken to stand differently.
         of_model: without what the model lacks.
     """
-    openings = [np.concatenate(doorway.thresholds_world) for doorway in building.doorways_of(locale)]
-    near = [(measure_wall_distance_m(building.outline(locale), openings, point), "a wall")]
-    near += [(measure_thing_distance_m(corners, point), name)
-             for name, corners in _list_footprints(building, locale, instead, of_model=of_model)]
+    at, walls = shapely.Point(point), shapely.LinearRing(np.asarray(building.outline(locale), float))
+    openings = [shapely.MultiPoint(np.concatenate(doorway.thresholds_world)).convex_hull.buffer(SLACK_M)
+                for doorway in building.doorways_of(locale)]  # there the walls are far, although it is at the border
+    near = [(float(walls.difference(shapely.union_all(openings)).distance(at)), "a wall")]
+    near += [(float(shapely.Polygon(thing.footprint_world).distance(at)), thing.name)
+             for thing in building.things_of(locale)
+             if thing.is_obstacle and not (of_model and thing.kind == EXTRA_KIND)]
     return min(near)
 
 
@@ -239,29 +197,6 @@ def _drop_repeats(points: list[Floats]) -> list[Floats]:
         if np.linalg.norm(point - kept[-1]) > SLACK_M:
             kept.append(point)
     return kept
-
-
-JOINT_M = 0.005
-"""Rooms and the doorway between them overlap by this, so that no gap is left by rounding."""
-
-
-def compute_free_passage(
-    rooms: Sequence[Any], thresholds: Any, obstacles: Sequence[Any], clearance_m: float
-) -> shapely.Geometry:
-    """Where the robot's centre may be in two rooms and the doorway between them.
-
-    Args:
-        rooms: the outlines (k, 2) of both.
-        thresholds: (n, 2) corners of the doorway's floor.
-        obstacles: corners (k, 2) of what stands in the rooms.
-        clearance_m: of the robot's centre from all of them.
-    """
-    parts = [shapely.Polygon(np.asarray(room, float)) for room in rooms]
-    parts.append(shapely.convex_hull(shapely.multipoints(np.asarray(thresholds, float).reshape(-1, 2))))
-    floor = shapely.union_all([shapely.buffer(part, JOINT_M, join_style="mitre") for part in parts])
-    free = shapely.buffer(floor, -clearance_m - JOINT_M)
-    solid = [shapely.buffer(shapely.Polygon(np.asarray(corners, float)), clearance_m) for corners in obstacles]
-    return shapely.difference(free, shapely.union_all(solid)) if solid else free
 
 
 def find_line_through(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import chain, pairwise
 from typing import NamedTuple
 
@@ -14,9 +13,8 @@ from shapely import Geometry, LineString, Point
 
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import build_polygon, find_floor, measure_first_seen_m
+from knowledge_sources.methods.floor.looks_round import JOINT_M
 from knowledge_sources.methods.motion.routes import (
-    JOINT_M,
-    compute_free_passage,
     compute_free_space,
     find_free_space,
     find_line_through,
@@ -24,7 +22,6 @@ from knowledge_sources.methods.motion.routes import (
     find_shortest_route,
     is_clear,
     list_lookouts,
-    list_obstacles,
 )
 from knowledge_sources.settings import PlanSettings
 from world_models.building.locales import Doorway, Link, Passage
@@ -75,18 +72,15 @@ class SubgoalPlanner:
     """Plans the subgoals of a sketch, for one robot in the building as it is known now."""
 
     def __init__(
-        self, robot: RobotModel, settings: PlanSettings, obstacles: Sequence[Obstacle] = (), *, by_cores: bool = False
+        self, robot: RobotModel, settings: PlanSettings, obstacles: Sequence[Obstacle] = ()
     ) -> None:
         """Prepare to plan.
 
         Args:
             obstacles: what stands somewhere and is not in the file; ways are sought round it, and by other doors.
-            by_cores: whether obstacles take only what was seen of them: their feet were not, and may be elsewhere.
         """
         self._robot, self._building, self._settings = robot, robot.world, settings
-        there = tuple(obstacle for obstacle in obstacles if obstacle.is_there)
-        self._cores = {o.name: o.core for o in there if o.core} if by_cores else {}
-        self._obstacles = tuple(replace(o, footprint=o.core) if o.name in self._cores else o for o in there)
+        self._obstacles = tuple(obstacle for obstacle in obstacles if obstacle.is_there)
         self._cluttered = frozenset(obstacle.locale for obstacle in self._obstacles)
         first_m = measure_first_seen_m(robot) if settings.approaches_seeing else 0.0
         self._seeing_m = [part * first_m for part in SEEING_PARTS if part * first_m > DOORWAY_DISTANCES_M[0]]
@@ -96,7 +90,7 @@ class SubgoalPlanner:
         building, name = self._building, there.locale
         if not building.locale(name).contains((there.x_m, there.y_m)):
             return f"is not within {name}"
-        distance_m, what = find_nearest(building, name, there.in_world(building).position, self._cores)
+        distance_m, what = find_nearest(building, name, there.in_world(building).position)
         radius_m, margin_m = self._robot.radius_m, CLEARANCES_M[-1]
         if distance_m >= radius_m + margin_m:
             return ""
@@ -199,7 +193,7 @@ class SubgoalPlanner:
         if None in ends and not isinstance(passage, Link) and (diagonal or not self._cluttered.intersection(sides)):
             middles = [self._find_middle(passage, side) for side in sides]
             for clearance_m in CLEARANCES_M:
-                free = self._find_free_passage(passage, sides, clearance_m)
+                free = self._find_free_passage(sides, clearance_m)
                 line = find_line_through(free, middles, passage.outward_from(origin), DOORWAY_DISTANCES_M,
                                          DOORWAY_OFFSETS_M)
                 if line is not None:
@@ -210,15 +204,13 @@ class SubgoalPlanner:
                           and side not in self._cluttered else end for side, end in zip(sides, ends, strict=True))
         return None if before is None or behind is None else _Ends(before, behind, self._way_tolerance_m(passage))
 
-    def _find_free_passage(self, passage: Doorway, rooms: tuple[str, str], margin_m: float) -> Geometry:
-        """Where the robot's centre may be in two rooms and the doorway between them, with a margin round the robot."""
-        building, cores = self._building, self._cores
+    def _find_free_passage(self, rooms: tuple[str, str], margin_m: float) -> Geometry:
+        """Where the robot's centre may be in two rooms and their doorways, with a margin round the robot."""
         found = tuple(obstacle.footprint for obstacle in self._obstacles if obstacle.locale in rooms)
-        key = (passage.name, rooms, margin_m, tuple(sorted(cores.items())), found)
-        return building.cached("free passages", MAX_FREE_PASSAGES, key, lambda: compute_free_passage(
-            [building.outline(room) for room in rooms], np.concatenate(passage.thresholds_world),
-            [*found, *(corners for room in rooms for corners in list_obstacles(building, room, cores))],
-            self._robot.radius_m + margin_m))
+        key = (rooms, margin_m, found)
+        return self._building.cached("free passages", MAX_FREE_PASSAGES, key, lambda: shapely.buffer(
+            shapely.difference(find_floor(self._building, rooms), shapely.union_all([*map(build_polygon, found)])),
+            -self._robot.radius_m - margin_m - JOINT_M))
 
     def _way_tolerance_m(self, passage: Passage) -> float:
         """Tolerance at the place before a passage, so that the robot passes it straight without contact."""
@@ -381,8 +373,7 @@ class SubgoalPlanner:
 
     def _free_space(self, locale: str, margin_m: float, *, is_round: bool = False) -> Geometry:
         """Where the robot's centre may be with a margin round the robot; cached."""
-        return find_free_space(
-            self._building, locale, self._robot.radius_m + margin_m, is_round=is_round, instead=self._cores)
+        return find_free_space(self._building, locale, self._robot.radius_m + margin_m, is_round=is_round)
 
 
 def _divide(route: list[Floats], max_leg_m: float) -> list[Floats]:

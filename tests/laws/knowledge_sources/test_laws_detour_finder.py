@@ -45,10 +45,8 @@ def test_so_many_times_in_a_row_all_sketches_end_and_then_it_sees_no_way_on(halt
 
 
 def test_it_sees_no_way_on_where_none_leads_round_all_that_may_stand_there() -> None:
-    """What was seen of a thing leaves a way; what it may take does not: that is what halted the leg."""
     bench, leg = halt(aim=Place(STUDY, 3.0, 2.0))
-    seen = ((4.0, 3.8), (4.2, 3.8), (4.2, 3.9), (4.0, 3.9))
-    thing = bench.stand(4.1, 2.0, 0.2, 1.95, core=seen)
+    thing = bench.stand(4.1, 2.0, 0.2, 1.95)
     effect = effect_on(bench.ask(SOURCE, leg), Impasse)
     assert effect.value.behind == (thing.id,) and thing.value.words() in effect.value.reason
     assert {r.id for r in effect.because} == {leg.id, "Hypothesis-1", thing.id}

@@ -91,19 +91,6 @@ def test_only_what_takes_the_goal_is_behind_it_and_named(side: float) -> None:
     assert thing.value.words() in effect.value.reason and other.value.words() not in effect.value.reason
 
 
-@pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_of_what_was_seen_without_its_feet_the_rest_may_be_free(side: float) -> None:
-    """As far as its footprint reaches it takes the goal, or all of the way there; what was seen of it does not."""
-    far = 2.0 + 1.7 * side
-    seen = ((5.8, far), (6.2, far), (6.2, far - 0.1 * side), (5.8, far - 0.1 * side))
-    for length, aim in ((0.6, Place(HALL, 6.0, 2.0 - 0.5 * side)), (0.2, AIM)):
-        for core in ((), seen):
-            bench = Bench(plain_robot())
-            bench.believe(Pose2(1.0, 2.0, 0.0))
-            bench.stand(6.0, 2.0, length, 1.95, core=core)
-            assert bool(made(bench.ask(SOURCE, bench.pursue(aim)), PlanSketch)) == bool(core)
-
-
 @pytest.mark.parametrize("is_shut", [False, True])
 def test_where_no_way_is_left_it_says_what_leaves_none(is_shut: bool) -> None:
     """All that stands there, as each may be wrong; or the door that is shut, which nothing that stands is behind."""

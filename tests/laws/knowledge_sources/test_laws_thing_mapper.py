@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from blackboard import Effect, Entry, Level, Post, Posted, Revise
 from harvey.testing import answer, check_source
 from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, MIN_OBSTACLE_CERTAINTY, MIN_THING_CERTAINTY
+from knowledge_sources.methods.floor.ranges import MAX_RANGE_THING_M
 from knowledge_sources.methods.floor.weigh_sight import (
     CAMOUFLAGED_FREE_ODDS,
     FREE_FLOOR_ODDS,
@@ -22,7 +23,6 @@ from knowledge_sources.methods.floor.weigh_sight import (
     MIN_WAY_M,
 )
 from knowledge_sources.model.thing_mapper import ThingMapper
-from knowledge_sources.reads import SEEN_MARGIN_M
 from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall, carton, known_by_sight
 from world_models.entries import CameraPicture, Difference, Discrepancy, Evidence, FreeFloor, Obstacle, ObstacleStatus
@@ -168,7 +168,7 @@ def test_free_floor_tells_as_much_as_it_is_of_where_a_thing_may_stand(
     thing = replace(known(certainty=0.98), sigma_m=sigma_m, seen_from_m=from_m)
     hold(hall, replace(thing, by="ranges") if is_heard else thing)
     _, effects = ask(hall, scan := hall.look(seen_s=9.0, far_m=far_m))
-    cone_m = math.tan(math.radians(12.5)) * (from_m - hall.robot.radius_m - SEEN_MARGIN_M)
+    cone_m = math.tan(math.radians(12.5)) * min(from_m, MAX_RANGE_THING_M)
     where = shapely.Polygon(CARTON).buffer(max(2.0 * sigma_m, cone_m * is_heard))
     seen = shapely.Point(scan.x_m, scan.y_m).buffer(far_m - scan.sigma_m[0], quad_segs=200)
     part = shapely.intersection(where, seen).area / where.area

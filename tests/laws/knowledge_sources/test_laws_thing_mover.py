@@ -26,8 +26,6 @@ SOURCE, S = ThingMover(), DEFAULT.action
 WORLD = load_world(WORLDS / "two_ways.toml")
 BELIEF = Hypothesis(HALL, Pose2(2.0, 1.2, 0.4), diagonal(0.01, 0.005), "relocalization")
 PLAIN = Pose2(0.05, -0.02, 0.01)
-CORE = tuple((x, y + 0.1) for x, y in CARTON[:2]) + CARTON[2:]
-"""What was seen of it: without its front."""
 things = st.tuples(st.sampled_from(get_args(ObstacleStatus)), st.booleans())
 """How it is known, and whether it was touched."""
 verdicts = st.sampled_from(get_args(MilestoneVerdict))
@@ -36,7 +34,7 @@ corrections = st.builds(Pose2, st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.fl
 
 def thing(status: ObstacleStatus = "there", *, is_touched: bool = False, number: int = 1) -> Obstacle:
     return Obstacle(f"{HALL}/obstacle-{number}", HALL, CARTON, 0.05, 0.0, 0.0, 0.5, certainty=0.9,
-                    touched_s=1.0 if is_touched else None, status=status, core=CORE)
+                    touched_s=1.0 if is_touched else None, status=status)
 
 
 def open_hall() -> Blackboard:
@@ -85,7 +83,7 @@ def test_as_seen_from_the_robot_it_stays_where_it_was(by: Pose2) -> None:
     now, turned = complex(here.x_m, here.y_m), cmath.exp(1j * here.heading_rad)
     before_turned = turned * cmath.exp(-1j * by.heading_rad)
     before = now - before_turned * complex(by.x_m, by.y_m)
-    for (x0, y0), (x1, y1) in zip(CARTON + CORE, moved.footprint + moved.core, strict=True):
+    for (x0, y0), (x1, y1) in zip(CARTON, moved.footprint, strict=True):
         as_seen = (complex(x0, y0) - before) / before_turned
         assert abs((complex(x1, y1) - now) / turned - as_seen) < 2e-3
     assert moved.certainty == 0.9 and moved.status == "there"

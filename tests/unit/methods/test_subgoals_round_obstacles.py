@@ -10,7 +10,6 @@ import shapely
 
 from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.motion import CLEARANCES_M, SubgoalPlanner
-from knowledge_sources.methods.motion.routes import list_obstacles
 from knowledge_sources.settings import DEFAULT
 from two_doors import two_doors
 from world_models.actuator import ActuatorModel
@@ -111,7 +110,7 @@ def test_things_of_the_model_beside_a_doorway_are_passed_without_contact(seed: i
         for part in planner.plan_between_locales(here, there, 0.1) or ():
             if part.passage == doorway.name:
                 leg = shapely.LineString([end.in_world(world).position for end in (part.origin, part.destination)])
-                things = [thing for room in rooms for thing in list_obstacles(world, room)]
+                things = [thing for room in rooms for thing in world.obstacles(room)]
                 assert all(leg.distance(shapely.Polygon(thing)) >= robot.radius_m for thing in things), doorway.name
                 passed += 1
     assert passed >= 6
