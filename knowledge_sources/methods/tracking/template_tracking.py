@@ -47,6 +47,8 @@ SEARCH_MARGIN_PX = 2.0  # what is added to that half-width
 MIN_SIGMA_PX = 0.3
 """Least standard deviation of a landmark's place, as the model's corner is not exactly the seen one (experiment
 table1)."""
+LEAST_SIGMAS = np.array([1e-3, 1e-3, 3e-4])
+"""Least standard deviations of what wheels and tracks tell of a motion [m, m, rad], whatever they say."""
 MIN_SCALE = 0.55  # least scale of a landmark's view against its template
 MAX_SCALE = 1.8  # largest scale of a landmark's view against its template
 
@@ -112,16 +114,20 @@ def correct_pose(
 ) -> PoseCorrection:
     """Solve for the pose from landmarks that were found; no surer than the beliefs at which their templates were cut.
 
+    Landmarks tell the motion since then, and so does what was believed before: how far off the belief was when the
+    templates were cut says nothing of that motion. So it counts neither as freedom to move nor twice.
+
     Args:
         pose, covariance: ``world_from_robot`` as believed, and (3, 3) over (x, y, heading), world.
     """
+    since = covariance - _compute_anchor_covariance(pose, seen, anchors)
     estimate = planar_from_points(
         np.array([t.point_world for t in seen]),
         np.array([t.found_px for t in seen]),
         robot.camera,
         robot.mount.camera_from_robot,
         pose,
-        covariance,
+        _hold_positive(since),
         sigma_px=np.array([t.sigma_px for t in seen]),
     )
     after = estimate.world_from_robot
@@ -207,6 +213,13 @@ def _compute_anchor_covariance(pose: Pose2, seen: list[Track], anchors: tuple[An
         lever[0, 2], lever[1, 2] = -(pose.y_m - anchor.y_m), pose.x_m - anchor.x_m
         parts.append(lever @ np.array(anchor.covariance) @ lever.T)
     return np.asarray(np.mean(parts, axis=0))
+
+
+def _hold_positive(covariance: Floats) -> Floats:
+    """A difference of covariances (3, 3) as one: nothing is surer than :data:`LEAST_SIGMAS`."""
+    scale = np.outer(LEAST_SIGMAS, LEAST_SIGMAS)
+    values, vectors = np.linalg.eigh(covariance / scale)
+    return np.asarray((vectors * np.maximum(values, 1.0)) @ vectors.T * scale)
 
 
 def action_px(robot: RobotModel, belief: Hypothesis, points_world: Floats, settings: Settings = DEFAULT) -> float:

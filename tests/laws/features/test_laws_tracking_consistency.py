@@ -94,6 +94,20 @@ def test_a_tracked_pose_is_as_far_off_as_it_says_after_a_chain_of_pictures(noise
         assert_consistent(column, 3, most_surplus=1.5)
 
 
+@pytest.mark.parametrize("slid_px", [0.0, 3.0, 8.0])
+def test_how_far_off_a_belief_was_lets_no_landmark_slide(slid_px: float) -> None:
+    """Those far ahead tell little of the way, and of the near one something beside is taken for it."""
+    belief, covariance = Pose2(0.5, 0.0, 0.0), 25.0 * AT_FIRST
+    anchor = Anchor("frame", 0.5, 0.0, covariance_tuple(covariance))
+    points = [(3.4, -1.2, 2.1), *((12.0, aside_m, up_m) for aside_m in (-1.0, -0.3, 0.4, 1.1) for up_m in (0.1, 2.6))]
+    seen_px = CAMERA.project(ROBOT.camera_from_world(belief).apply(np.array(points))) + np.eye(9, 1) * slid_px * (-1, 1)
+    tracks = [Track("landmark", point, "frame", (0.0, 0.0), 1.0, (0.0, 0.0), (u, v), 1.0, SIGMA_PX)
+              for point, (u, v) in zip(points, seen_px.tolist(), strict=True)]
+    found = correct_pose(ROBOT, tracks, (anchor,), belief, covariance + STEP)
+    assert found.world_from_robot.distance_to(belief) < 0.03
+    assert covariance[0, 0] < found.covariance[0, 0] < (covariance + 4.0 * STEP)[0, 0]
+
+
 @cache
 def build_robot() -> RobotModel:
     scenario = load_scenario("lab-to-allens-office")
