@@ -7,11 +7,12 @@ the noise of the second one allows. The largest of these is the protection level
 autonomous integrity monitoring; multiple hypothesis solution separation, Blanch et al., 2012). What cannot be told
 apart is in it: a pose that rests on one wall alone is no surer than what was believed before.
 
-One thing is a landmark, all that is on one side, what is near or what is far; and the belief. A side and a landmark are
-held against the belief as it is stated: the model is false there, and the belief is not. What is near or far is held
-against a loosened belief: lines that were taken for their neighbours come with a belief that was pushed, and they
-disagree with depth. A robot that was only just put down was not pushed. The camera's own state is an unknown beside the
-pose, with what is known of it. How much the lines scatter is taken from the picture itself.
+One thing is a landmark, a wall with all that is on it, all that is on one side, what is near or what is far; and the
+belief. A wall, a side and a landmark are held against the belief as it is stated: the model is false there, and the
+belief is not. What is near or far is held against a loosened belief: lines that were taken for their neighbours come
+with a belief that was pushed, and they disagree with depth. A robot that was only just put down was not pushed. The
+camera's own state is an unknown beside the pose, with what is known of it. How much the lines scatter is taken from the
+picture itself.
 """
 
 from __future__ import annotations
@@ -47,10 +48,12 @@ class Rests(NamedTuple):
     Attributes:
         lines_world: (n, 2, 3) [m] of the lines that agree; segments_px: (n, 2, 2); landmarks: n names.
         camera, mount: as it was solved for; step: (7,) from what was believed of it.
-        belief: before; covariance: (3, 3) of it over (x, y, heading), as stated; loosened: as it may have been pushed;
-            None: it was not.
+        belief: before; covariance: (3, 3) of it over (x, y, heading), as wide as its protection level, as it may rest
+            on the same false thing; loosened: as it may have been pushed; None: it was not.
         camera_covariance: (7, 7) of what was believed of the camera.
         seen_from: where the robot was when it saw each line, as looks of one turn round; none: at the pose itself.
+        model_m: deviation of the model, where what is left is as far off as it is.
+        walls: by name, (n, 3) by how much each line moves with a wall along its normal, with all that is on it [m].
     """
 
     lines_world: Floats
@@ -64,6 +67,8 @@ class Rests(NamedTuple):
     loosened: Floats | None
     camera_covariance: Floats
     seen_from: Sequence[Pose2] = ()
+    model_m: float = 0.0
+    walls: Sequence[tuple[str, Floats]] = ()
 
 
 def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protection:
@@ -86,12 +91,21 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
         *((name, ~of, loosened) for name, of in _list_depths(rests, pose)),
         (BELIEF, everything, camera),
     ]
-    factor = count_sigmas(1 + len(left_out))
+    factor = count_sigmas(1 + len(left_out) + len(rests.walls))
+    shared = np.diag(np.square([rests.model_m, rests.model_m, 0.0]))
     levels = [_measure(NOISE, np.zeros(POSE), covariance, factor)]
     for name, rest, information in left_out:
         without = _invert(hessians[rest].sum(axis=0) + information)
         step = -(without @ (gradients[rest].sum(axis=0) + information @ offset))[:POSE]
-        levels.append(_measure(name, step, without[:POSE, :POSE], factor))
+        levels.append(_measure(name, step, without[:POSE, :POSE] + shared, factor))
+    hessian, gradient = hessians.sum(axis=0) + stated, gradients.sum(axis=0) + stated @ offset
+    for name, moved in rests.walls:  # where it stands is open: one unknown more, which is solved for and left out again
+        by_wall = np.einsum("nea,na->ne", slopes[..., :2], -moved[:, :2]) / math.sqrt(variance)
+        share, size = np.einsum("nea,ne->a", slopes, by_wall) / math.sqrt(variance), float(np.sum(by_wall**2)) + 1.0
+        without = _invert(hessian - np.outer(share, share) / size)
+        off = float(np.sum(by_wall * distances)) / math.sqrt(variance)
+        step = -(without @ (gradient - share * off / size))[:POSE]
+        levels.append(_measure(name, step, without[:POSE, :POSE] + shared, factor))
     worst = max(levels)
     return Protection(worst.place_m, max(level.heading_rad for level in levels), worst.doubted)
 
