@@ -34,7 +34,7 @@ from knowledge_sources.methods.pose import (
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, find_camera, find_difference, find_robot, name_model, tell_time_s
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.building.model_errors import INEXACT_M, WALL, LineErrors
+from world_models.building.model_errors import INEXACT_M, LineErrors
 from world_models.entries import CameraState, Difference, Evidence, LineMatch, Milestone, PoseFix
 from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
@@ -92,10 +92,10 @@ class MedRAndT(RobotKnowledgeSource):
         rests = Rests(
             match.value.lines_world[near], match.value.segments_px[near],
             [m.landmarks[m.landmark_of[i]] for i in match.value.pairs[near, 0]], robot.camera, robot.mount,
-            np.zeros(len(known)) if moved is None else moved.step, here, belief.covariance + belief.excess,
-            None if belief.value.basis == PUT_DOWN else prior + belief.excess, known,
-            walls=[(mode, errors.restate(1.0).displacements[k, near])
-                   for k, mode in enumerate(errors.displacement_modes) if WALL in mode])
+            np.zeros(len(known)) if moved is None else moved.step, here, belief.covariance,
+            None if belief.value.basis == PUT_DOWN else prior, known,
+            excess=(belief.value.excess_m, belief.value.excess_rad),
+            walls=errors.take(np.flatnonzero(near)).list_walls())
         because = match, milestone, belief.entry, *view.where(Difference, lambda d: d.about == name_model(view))
         yield Post(
             PoseFix(

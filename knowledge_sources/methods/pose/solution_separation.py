@@ -48,11 +48,13 @@ class Rests(NamedTuple):
     Attributes:
         lines_world: (n, 2, 3) [m] of the lines that agree; segments_px: (n, 2, 2); landmarks: n names.
         camera, mount: as it was solved for; step: (7,) from what was believed of it.
-        belief: before; covariance: (3, 3) of it over (x, y, heading), as wide as its protection level, as it may rest
-            on the same false thing; loosened: as it may have been pushed; None: it was not.
+        belief: before; covariance: (3, 3) of it over (x, y, heading), as stated; loosened: as it may have been pushed;
+            None: it was not.
         camera_covariance: (7, 7) of what was believed of the camera.
         seen_from: where the robot was when it saw each line, as looks of one turn round; none: at the pose itself.
         model_m: deviation of the model, where what is left is as far off as it is.
+        excess: by how much the protection level of the belief is above that covariance [m, rad]: what is false now was
+            so when it came to be believed.
         walls: by name, (n, 3) by how much each line moves with a wall along its normal, with all that is on it [m].
     """
 
@@ -68,6 +70,7 @@ class Rests(NamedTuple):
     camera_covariance: Floats
     seen_from: Sequence[Pose2] = ()
     model_m: float = 0.0
+    excess: tuple[float, float] = (0.0, 0.0)
     walls: Sequence[tuple[str, Floats]] = ()
 
 
@@ -80,8 +83,10 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
     hessians = np.einsum("nea,neb->nab", slopes, slopes) / variance
     gradients = np.einsum("nea,ne->na", slopes, distances) / variance
     offset = np.concatenate([pose.minus(rests.belief), rests.step])[FREE]
-    known = STATED_FACTOR * rests.covariance + LEAST
-    stated, loosened = (build_information(prior, rests.camera_covariance)[np.ix_(FREE, FREE)]
+    known, (place_m, turn_rad) = STATED_FACTOR * rests.covariance + LEAST, rests.excess
+    factor = count_sigmas(6 + len(set(rests.landmarks)) + len(rests.walls))
+    excess = np.diag(np.square([place_m, place_m, turn_rad])) / factor**2
+    stated, loosened = (build_information(prior + excess, rests.camera_covariance)[np.ix_(FREE, FREE)]
                         for prior in (known, known if rests.loosened is None else rests.loosened))
     camera = np.array(loosened)
     camera[:POSE, :POSE] = 0.0
@@ -91,7 +96,6 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
         *((name, ~of, loosened) for name, of in _list_depths(rests, pose)),
         (BELIEF, everything, camera),
     ]
-    factor = count_sigmas(1 + len(left_out) + len(rests.walls))
     shared = np.diag(np.square([rests.model_m, rests.model_m, 0.0]))
     levels = [_measure(NOISE, np.zeros(POSE), covariance, factor)]
     for name, rest, information in left_out:
