@@ -46,6 +46,7 @@ from knowledge_sources.reads import (
     with_anchors,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.building.model_errors import find_sigma_m
 from world_models.entries import Anchor, CameraPicture, Discrepancy, Drift, Hypothesis, Track, Tracks, open_or_measure
 
 MAX_MISSES = 2  # a landmark that is not found so many times in a row is dropped
@@ -74,17 +75,16 @@ class CorrelatorTracker(RobotKnowledgeSource):
         frame, held, old = case
         belief, image = held.entry, rectify(held.robot, frame)
         followed = [] if old is None else self._follow(view, held, old.value.items, image)
-        seen = [f.track for f in followed if f.track.found_px is not None]
+        tracks = [f.track for f in followed]
+        seen = [track for track in tracks if track.found_px is not None]
         because = (frame, belief) if old is None else (frame, belief, old)
-        corrected, agreeing = self._correct(held, seen, old.value.anchors) if seen and old is not None else (None, 0)
-        expected = sum(1 for f in followed if f.expected)
-        unseen = 0 if seen or old is None else old.value.unseen + 1
+        corrected, agreeing = self._correct(held, seen, old.value.anchors) if seen and old else (None, 0)
+        expected, unseen = sum(f.expected for f in followed), 0 if seen or old is None else old.value.unseen + 1
         bare = find_missing_floors(view, unseen)
         what = f"no landmark in {unseen} pictures, and the floor is nowhere free where it should be" if bare else ""
         if expected >= MIN_EXPECTED_LANDMARKS and agreeing < MIN_AGREEING_PART * expected:
             what = f"{expected - agreeing} of {expected} landmarks are not where they were expected{tell_worst(seen)}"
         if what:
-            tracks = [f.track for f in followed]
             yield from self._post_discrepancy(view, what, math.inf, held, tracks, (*because, *bare))
             yield post_or_revise(old, Tracks(frame.id, TEMPLATE_HALF_PX, ()), because)
             return
@@ -111,8 +111,9 @@ class CorrelatorTracker(RobotKnowledgeSource):
         return follow_landmarks(belief.seeing, tracks, template_of, image, belief.pose, belief.covariance)
 
     def _correct(self, held: Belief, seen: list[Track], anchors: tuple[Anchor, ...]) -> tuple[Hypothesis, int]:
-        """The belief after the landmarks were found, and how many of them agree with it."""
-        pose, covariance, agreeing = correct_pose(held.robot, seen, anchors, held.pose, held.covariance)
+        """The belief by landmarks that were found, and how many of them agree with it."""
+        pose, covariance, agreeing = correct_pose(
+            held.robot, seen, anchors, held.pose, held.covariance, find_sigma_m(held.world, held.locale))
         return held.moved_to(pose, covariance, "tracks"), agreeing
 
     def _renew(self, case: Following, image: Image, followed: list[TrackUpdate], belief: Hypothesis) -> Renewed:

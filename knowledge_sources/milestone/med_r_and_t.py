@@ -88,13 +88,14 @@ class MedRAndT(RobotKnowledgeSource):
         if learnt is not None:
             spread = learnt.covariance if moves else known
             covariance = covariance + learnt.pose_slopes @ spread @ learnt.pose_slopes.T
-        moved = learnt if moves else None
-        near = np.asarray(found.inliers, bool)
+        moved, near = learnt if moves else None, np.asarray(found.inliers, bool)
         rests = Rests(
             match.value.lines_world[near], match.value.segments_px[near],
             [m.landmarks[m.landmark_of[i]] for i in match.value.pairs[near, 0]], robot.camera, robot.mount,
             np.zeros(len(known)) if moved is None else moved.step, here, belief.covariance,
-            None if belief.value.basis == PUT_DOWN else prior, known)
+            None if belief.value.basis == PUT_DOWN else prior, known,
+            excess=(belief.value.excess_m, belief.value.excess_rad),
+            walls=errors.take(np.flatnonzero(near)).list_walls())
         because = match, milestone, belief.entry, *view.where(Difference, lambda d: d.about == name_model(view))
         yield Post(
             PoseFix(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Retract, Revised, View, Watch
 from knowledge_sources.methods import localization
 from knowledge_sources.methods.calibration import compute_camera_covariance
@@ -25,6 +27,7 @@ from knowledge_sources.reads import (
     locate_contact,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
+from world_models.building.model_errors import find_sigma_m
 from world_models.entries import (
     CameraState,
     Certificate,
@@ -101,10 +104,12 @@ class Localizer(RobotKnowledgeSource):
             yield Post(odds, (found, held.entry))
         is_found = result.status is localization.LocalizationStatus.FOUND
         for c in result.candidates[:1] if is_found else result.candidates:
-            there = held.moved_to(c.world_from_robot, c.covariance, "relocalization", locale=c.room)
+            model_m = find_sigma_m(building, c.room)
+            spread = c.covariance + np.diag(np.square([model_m, model_m, 0.0]))  # no look averages the model's errors
+            there = held.moved_to(c.world_from_robot, spread, "relocalization", locale=c.room)
             if is_found:
                 there = there.protected(localization.protect_place(
-                    robots[which], looks, c.world_from_robot, c.covariance, compute_camera_covariance(cameras[0])))
+                    robots[which], looks, c.world_from_robot, spread, compute_camera_covariance(cameras[0]), model_m))
             place = replace(there, status="candidate", weight=c.weight, evidence=str(c.likelihood))
             yield Post(place, (found, panorama, held.entry))
 

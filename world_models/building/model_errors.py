@@ -84,6 +84,11 @@ class LineErrors:
         """Those of some of the lines, which may be repeated."""
         return LineErrors(self.displacement_modes, self.displacements[:, np.asarray(lines, np.int64)])
 
+    def list_walls(self) -> list[tuple[str, Floats]]:
+        """Each wall that is seen, by name, with how far each line (n, 3) goes with one metre along its normal [m]."""
+        metres = self.restate(1.0).displacements
+        return [(mode, metres[k]) for k, mode in enumerate(self.displacement_modes) if WALL in mode and metres[k].any()]
+
     def displace(self, lines_world: Floats, amplitudes: Floats) -> Floats:
         """The lines (n, 2, 3) displaced by the modes with amplitudes (k,), in standard deviations."""
         return np.asarray(lines_world + np.tensordot(amplitudes, self.displacements, axes=1)[:, None])

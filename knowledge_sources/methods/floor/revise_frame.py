@@ -12,7 +12,7 @@ from world_models.building.changes import find_along, outline_door
 from world_models.building.locale_frame import UNDONE, FrameChange, LocaleFrame
 from world_models.building.locales import Doorway
 from world_models.building.model_errors import INEXACT_M, Side
-from world_models.entries import DOOR_STATES, Difference, DoorState, Obstacle, UserReport
+from world_models.entries import DOOR_STATES, RISK, Difference, DoorState, Obstacle, UserReport
 from world_models.entries.difference import SURE
 
 MIN_BESIDE_SIGMAS = 3.0
@@ -52,12 +52,15 @@ def revise_by_door(frame: LocaleFrame, door: DoorState, by: str) -> LocaleFrame:
 
 
 def revise_by_difference(frame: LocaleFrame, found: Difference, by: str) -> LocaleFrame:
-    """The building's frame, whose model is surely inexact, or surely as it was measured; else the same frame."""
-    what = found.leader
-    if what.p < SURE or what.kind != ("chance" if frame.is_inexact else "wall"):
-        return frame
-    change = FrameChange("inexact", frame.name, by)
-    return frame.restored("inexact", frame.name) if frame.is_inexact else frame.changed(change)
+    """The building's frame, whose model is surely inexact, or as it was measured; else the same frame.
+
+    It is acquitted only where it is inexact with a probability of at most :data:`RISK`: all poses rest on that then.
+    """
+    what, wall = found.leader, found.find("wall")
+    if frame.is_inexact:
+        is_acquitted = what.kind == "chance" and (wall is None or wall.p <= RISK)
+        return frame.restored("inexact", frame.name) if is_acquitted else frame
+    return frame.changed(FrameChange("inexact", frame.name, by)) if what.p >= SURE and what.kind == "wall" else frame
 
 
 def redraw_door(frame: LocaleFrame, door: Doorway, found: Difference, by: str) -> LocaleFrame:

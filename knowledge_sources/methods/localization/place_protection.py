@@ -21,11 +21,12 @@ from world_models.robot import RobotModel
 
 
 def protect_place(
-    robot: RobotModel, looks: Sequence[CameraView], pose: Pose2, covariance: Floats, camera_covariance: Floats
+    robot: RobotModel, looks: Sequence[CameraView], pose: Pose2, covariance: Floats, camera_covariance: Floats,
+    model_m: float = 0.0,
 ) -> Protection:
     """The protection level of a place (world) with its covariance (3, 3), by the looks from which it was found.
 
-    ``camera_covariance``: (7, 7) of what is believed of the camera.
+    ``camera_covariance``: (7, 7) of what is believed of the camera. ``model_m``: deviation of the model.
     """
     views = refine_view_motions(robot, align_headings(looks, robot.camera, robot.mount.camera_from_robot), pose,
                                 covariance)
@@ -40,4 +41,4 @@ def protect_place(
     nothing = np.diag(np.square(np.array([apart_m, apart_m, apart_rad]) / sigmas))
     return compute_protection(pose, covariance, Rests(
         np.concatenate(lines), np.concatenate(segments), names, robot.camera, robot.mount,
-        np.zeros(len(camera_covariance)), pose, nothing, nothing, camera_covariance, seen_from))
+        np.zeros(len(camera_covariance)), pose, nothing, nothing, camera_covariance, seen_from, model_m))

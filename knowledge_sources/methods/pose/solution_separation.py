@@ -7,11 +7,12 @@ the noise of the second one allows. The largest of these is the protection level
 autonomous integrity monitoring; multiple hypothesis solution separation, Blanch et al., 2012). What cannot be told
 apart is in it: a pose that rests on one wall alone is no surer than what was believed before.
 
-One thing is a landmark, all that is on one side, what is near or what is far; and the belief. A side and a landmark are
-held against the belief as it is stated: the model is false there, and the belief is not. What is near or far is held
-against a loosened belief: lines that were taken for their neighbours come with a belief that was pushed, and they
-disagree with depth. A robot that was only just put down was not pushed. The camera's own state is an unknown beside the
-pose, with what is known of it. How much the lines scatter is taken from the picture itself.
+One thing is a landmark, a wall with all that is on it, all that is on one side, what is near or what is far; and the
+belief. A wall, a side and a landmark are held against the belief as it is stated: the model is false there, and the
+belief is not. What is near or far is held against a loosened belief: lines that were taken for their neighbours come
+with a belief that was pushed, and they disagree with depth. A robot that was only just put down was not pushed. The
+camera's own state is an unknown beside the pose, with what is known of it. How much the lines scatter is taken from the
+picture itself.
 """
 
 from __future__ import annotations
@@ -51,6 +52,10 @@ class Rests(NamedTuple):
             None: it was not.
         camera_covariance: (7, 7) of what was believed of the camera.
         seen_from: where the robot was when it saw each line, as looks of one turn round; none: at the pose itself.
+        model_m: deviation of the model, where what is left is as far off as it is.
+        excess: by how much the protection level of the belief is above that covariance [m, rad]: what is false now was
+            so when it came to be believed.
+        walls: by name, (n, 3) by how much each line moves with a wall along its normal, with all that is on it [m].
     """
 
     lines_world: Floats
@@ -64,6 +69,9 @@ class Rests(NamedTuple):
     loosened: Floats | None
     camera_covariance: Floats
     seen_from: Sequence[Pose2] = ()
+    model_m: float = 0.0
+    excess: tuple[float, float] = (0.0, 0.0)
+    walls: Sequence[tuple[str, Floats]] = ()
 
 
 def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protection:
@@ -71,27 +79,33 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
     if not len(rests.lines_world):
         return _measure(NOISE, np.zeros(POSE), covariance, count_sigmas(1))
     distances, slopes = _measure_lines(pose, rests)
-    variance = _estimate_variance(distances)
+    said = LINE_SIGMA_FREEDOM * LINE_SIGMA_PX**2 + float(np.sum(distances**2))  # as expected, and as the lines scatter
+    variance = said / (LINE_SIGMA_FREEDOM + max(distances.size - POSE, 0))
     hessians = np.einsum("nea,neb->nab", slopes, slopes) / variance
     gradients = np.einsum("nea,ne->na", slopes, distances) / variance
     offset = np.concatenate([pose.minus(rests.belief), rests.step])[FREE]
-    known = STATED_FACTOR * rests.covariance + LEAST
-    stated, loosened = (build_information(prior, rests.camera_covariance)[np.ix_(FREE, FREE)]
+    known, (place_m, turn_rad) = STATED_FACTOR * rests.covariance + LEAST, rests.excess
+    factor = count_sigmas(6 + len(set(rests.landmarks)) + len(rests.walls))
+    excess = np.diag(np.square([place_m, place_m, turn_rad])) / factor**2
+    stated, loosened = (build_information(prior + excess, rests.camera_covariance)[np.ix_(FREE, FREE)]
                         for prior in (known, known if rests.loosened is None else rests.loosened))
-    camera = np.array(loosened)
+    camera, everything = np.array(loosened), np.ones(len(distances), bool)
     camera[:POSE, :POSE] = 0.0
-    everything = np.ones(len(distances), bool)
-    left_out = [
-        *((name, ~of, stated) for name, of in _list_landmarks_and_sides(rests, pose)),
-        *((name, ~of, loosened) for name, of in _list_depths(rests, pose)),
-        (BELIEF, everything, camera),
-    ]
-    factor = count_sigmas(1 + len(left_out))
+    shared = np.diag(np.square([rests.model_m, rests.model_m, 0.0]))
     levels = [_measure(NOISE, np.zeros(POSE), covariance, factor)]
-    for name, rest, information in left_out:
+    left_out = ((name, rest, loosened if is_depth else stated) for name, rest, is_depth in _list_left_out(rests, pose))
+    for name, rest, information in (*left_out, (BELIEF, everything, camera)):
         without = _invert(hessians[rest].sum(axis=0) + information)
         step = -(without @ (gradients[rest].sum(axis=0) + information @ offset))[:POSE]
-        levels.append(_measure(name, step, without[:POSE, :POSE], factor))
+        levels.append(_measure(name, step, without[:POSE, :POSE] + shared, factor))
+    hessian, gradient = hessians.sum(axis=0) + stated, gradients.sum(axis=0) + stated @ offset
+    for name, moved in rests.walls:  # where it stands is open: one unknown more, which is solved for and left out again
+        by_wall = np.einsum("nea,na->ne", slopes[..., :2], -moved[:, :2]) / math.sqrt(variance)
+        share, size = np.einsum("nea,ne->a", slopes, by_wall) / math.sqrt(variance), float(np.sum(by_wall**2)) + 1.0
+        without = _invert(hessian - np.outer(share, share) / size)
+        off = float(np.sum(by_wall * distances)) / math.sqrt(variance)
+        step = -(without @ (gradient - share * off / size))[:POSE]
+        levels.append(_measure(name, step, without[:POSE, :POSE] + shared, factor))
     worst = max(levels)
     return Protection(worst.place_m, max(level.heading_rad for level in levels), worst.doubted)
 
@@ -122,35 +136,16 @@ def tell_unavailable(protection: Protection) -> str:
             f" above the alert limit of {words.metres(ALERT_LIMIT_M)}")
 
 
-def _estimate_variance(distances: Floats) -> float:
-    """The variance [px2] of the lines' ends, by what was expected and by how much they scatter."""
-    freedom = max(distances.size - POSE, 0)
-    said = LINE_SIGMA_FREEDOM * LINE_SIGMA_PX**2 + float(np.sum(distances**2))
-    return said / (LINE_SIGMA_FREEDOM + freedom)
+def _list_left_out(rests: Rests, pose: Pose2) -> Iterator[tuple[str, Mask, bool]]:
+    """What may be false, by its name: the lines (n,) that are left without it, and whether it is told by depth.
 
-
-def _list_landmarks_and_sides(rests: Rests, pose: Pose2) -> Iterator[tuple[str, Mask]]:
-    """Each landmark, and each side of the robot, by its name: the lines (n,) that are false with it."""
-    names = np.asarray(rests.landmarks)
-    for name in dict.fromkeys(rests.landmarks):
-        yield name, names == name
-    x_m, y_m = _find_middles(rests, pose).T
+    Each landmark, what is on each side of the robot, and the nearer half of the lines and the farther one.
+    """
+    names, (x_m, y_m) = np.asarray(rests.landmarks), (rests.lines_world[..., :2].mean(axis=1) - pose.position).T
     is_left = math.cos(pose.heading_rad) * y_m - math.sin(pose.heading_rad) * x_m > 0.0
-    yield LEFT, is_left
-    yield RIGHT, ~is_left
-
-
-def _list_depths(rests: Rests, pose: Pose2) -> Iterator[tuple[str, Mask]]:
-    """The nearer half of the lines and the farther one."""
-    away_m = np.hypot(*_find_middles(rests, pose).T)
-    far = away_m > np.median(away_m)
-    yield NEAR, ~far
-    yield FAR, far
-
-
-def _find_middles(rests: Rests, pose: Pose2) -> Floats:
-    """(n, 2) the lines' middles on the floor, from the robot, in the world's directions [m]."""
-    return np.asarray(rests.lines_world[..., :2].mean(axis=1) - (pose.x_m, pose.y_m))
+    is_far = (away_m := np.hypot(x_m, y_m)) > np.median(away_m)
+    yield from ((name, names != name, False) for name in dict.fromkeys(rests.landmarks))
+    yield from ((LEFT, ~is_left, False), (RIGHT, is_left, False), (NEAR, is_far, True), (FAR, ~is_far, True))
 
 
 def _measure(name: str, step: Floats, covariance: Floats, factor: float) -> Protection:

@@ -23,6 +23,7 @@ from knowledge_sources.methods.features import (
 )
 from knowledge_sources.methods.pose import compute_point_jacobian, planar_from_points
 from knowledge_sources.settings import DEFAULT, Settings
+from world_models.building.model_errors import INEXACT_M
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.entries import Anchor, Hypothesis, Track
 from world_models.frames import Pose2
@@ -47,6 +48,8 @@ SEARCH_MARGIN_PX = 2.0  # what is added to that half-width
 MIN_SIGMA_PX = 0.3
 """Least standard deviation of a landmark's place, as the model's corner is not exactly the seen one (experiment
 table1)."""
+LEAST_SIGMAS = np.array([1e-3, 1e-3, 3e-4])
+"""Least standard deviations of what wheels and tracks tell of a motion [m, m, rad], whatever they say."""
 MIN_SCALE = 0.55  # least scale of a landmark's view against its template
 MAX_SCALE = 1.8  # largest scale of a landmark's view against its template
 
@@ -109,21 +112,22 @@ def cut_template(
 
 def correct_pose(
     robot: RobotModel, seen: list[Track], anchors: tuple[Anchor, ...], pose: Pose2, covariance: Floats,
+    model_m: float = 0.0,
 ) -> PoseCorrection:
     """Solve for the pose from landmarks that were found; no surer than the beliefs at which their templates were cut.
 
+    Landmarks tell the motion since then, and so does what was believed before: how far off the belief was when the
+    templates were cut says nothing of that motion. So it counts neither as freedom to move nor twice.
+
     Args:
         pose, covariance: ``world_from_robot`` as believed, and (3, 3) over (x, y, heading), world.
+        model_m: deviation of the landmarks from where the model has them; 0: nobody has said it, they may be inexact.
     """
+    since = _hold_positive(covariance - _compute_anchor_covariance(pose, seen, anchors))
+    by_model_px = _compute_sigmas_by_model(robot, seen, anchors, pose, model_m or INEXACT_M)
     estimate = planar_from_points(
-        np.array([t.point_world for t in seen]),
-        np.array([t.found_px for t in seen]),
-        robot.camera,
-        robot.mount.camera_from_robot,
-        pose,
-        covariance,
-        sigma_px=np.array([t.sigma_px for t in seen]),
-    )
+        np.array([t.point_world for t in seen]), np.array([t.found_px for t in seen]), robot.camera,
+        robot.mount.camera_from_robot, pose, since, sigma_px=np.hypot([t.sigma_px for t in seen], by_model_px))
     after = estimate.world_from_robot
     spread = np.asarray(estimate.covariance + _compute_anchor_covariance(after, seen, anchors))
     return PoseCorrection(after, spread, int(np.count_nonzero(estimate.inliers)))
@@ -207,6 +211,29 @@ def _compute_anchor_covariance(pose: Pose2, seen: list[Track], anchors: tuple[An
         lever[0, 2], lever[1, 2] = -(pose.y_m - anchor.y_m), pose.x_m - anchor.x_m
         parts.append(lever @ np.array(anchor.covariance) @ lever.T)
     return np.asarray(np.mean(parts, axis=0))
+
+
+def _compute_sigmas_by_model(
+    robot: RobotModel, seen: list[Track], anchors: tuple[Anchor, ...], pose: Pose2, model_m: float
+) -> Floats:
+    """(n,) by how much landmarks are seen elsewhere [px] that are nearer or farther than the model has them.
+
+    Nothing while the robot only turns: their templates were cut where the model has them.
+    """
+    at, camera_from_world = {a.frame: (a.x_m, a.y_m) for a in anchors}, robot.camera_from_world(pose)
+    gone = np.array([(pose.x_m - x, pose.y_m - y, 0.0) for x, y in (at[t.template_frame] for t in seen)])
+    points = np.array([t.point_world for t in seen])
+    rays = points - camera_from_world.inverse().translation + gone
+    farther = points + model_m * rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    moved_px = np.subtract(*(robot.camera.project(camera_from_world.apply(some)) for some in (farther, points)))
+    return np.asarray(np.linalg.norm(moved_px, axis=1))
+
+
+def _hold_positive(covariance: Floats) -> Floats:
+    """A difference of covariances (3, 3) as one: nothing is surer than :data:`LEAST_SIGMAS`."""
+    scale = np.outer(LEAST_SIGMAS, LEAST_SIGMAS)
+    values, vectors = np.linalg.eigh(covariance / scale)
+    return np.asarray((vectors * np.maximum(values, 1.0)) @ vectors.T * scale)
 
 
 def action_px(robot: RobotModel, belief: Hypothesis, points_world: Floats, settings: Settings = DEFAULT) -> float:

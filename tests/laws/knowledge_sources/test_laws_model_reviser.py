@@ -21,6 +21,7 @@ from world_models.building.locale_frame import FRAME_OF, FrameChange, LocaleFram
 from world_models.building.model_errors import INEXACT_M, find_sigma_m, list_facing
 from world_models.entries import Difference, DoorPicture, DoorState, Evidence, Explanation, Obstacle, Rival, UserReport
 from world_models.entries.difference import DOORS, MODEL, SURE
+from world_models.entries.protection_level import RISK
 
 SOURCE = ModelReviser()
 DOOR, ROOMS = "archive-north-door", ("archive", HALL)
@@ -141,8 +142,9 @@ def test_a_model_that_is_surely_inexact_is_so_in_every_room_until_acquitted(draw
         evidence.append(Evidence(MODEL, "", told[kind == "chance":], 2.0 * number, 0.0, 0.0, 1.0, 0.3, float(number)))
         difference = weigh_rivals(MODEL, evidence)
         tell(hall, difference)
-        if difference.leader.p >= SURE and difference.leader.kind in ("wall", "chance"):
-            is_inexact = difference.leader.kind == "wall"
+        leader, wall = difference.leader, difference.find("wall")
+        is_inexact = (leader.kind != "chance" or bool(wall and wall.p > RISK)) if is_inexact else (
+            leader.kind == "wall" and leader.p >= SURE)
         world = find_building(hall.board.view)
         assert [c.what for c in changes(hall, world.root)] == ["inexact"] * is_inexact
         assert {find_sigma_m(world, room) for room in ("archive", HALL)} == {INEXACT_M if is_inexact else 0.0}
@@ -159,7 +161,7 @@ def test_walls_that_are_farther_apart_explain_a_model_that_seems_inexact(order: 
     assert set(drawn) == {side.mode for side in sides}
     assert bool(changes(hall, world.root)) == (order == -1)  # what was found before stays until looks acquit it
     hall.put(Difference(name_model(hall.board.view), tuple(
-        Rival(kind, "", 1.0, p) for kind, p in (("chance", 0.99), ("wall", 0.01))), (), 2.0))  # type: ignore[arg-type]
+        Rival(kind, "", 1.0, p) for kind, p in (("chance", 0.9999), ("wall", RISK))), (), 2.0))  # type: ignore[arg-type]
     assert not changes(hall, world.root)
     assert sum(side.outward[:2] @ drawn[side.mode].by_m for side in sides) == pytest.approx(0.1, abs=0.003)
     for side in sides:

@@ -105,6 +105,18 @@ def test_no_side_of_a_corridor_that_stands_elsewhere_moves_the_pose_beyond_it(
 
 
 @quick
+@given(seeds, st.floats(-0.15, 0.15))
+def test_no_wall_ahead_that_stands_elsewhere_moves_the_pose_beyond_it(seed: int, by_m: float) -> None:
+    """With all that is on it, on both sides; and the belief came of the same wall, within its own protection level."""
+    ahead = HALL[HALL[:, 0, 1] > 0.0][..., [1, 0, 2]] * (1.0, -1.0, 1.0) + (2.5, 7.5, 0.0)
+    elsewhere = np.tile([by_m, 0.0, 0.0], (len(ahead), 1))
+    found, rests, truth = look(seed, hall=ahead, shift=elsewhere, belief=(-by_m, 0.0, 0.0))
+    normal = np.tile([1.0, 0.0, 0.0], (len(rests.lines_world), 1))
+    held = rests._replace(walls=[("wall", normal)], covariance=rests.covariance / 16.0, excess=(abs(by_m), 0.0))
+    assert is_within(found, truth, protect(found, held))
+
+
+@quick
 @given(seeds, st.floats(-0.3, 0.3), st.floats(-0.3, 0.3))
 def test_no_belief_that_was_pushed_or_told_wrongly_moves_the_pose_beyond_it(seed: int, x_m: float, y_m: float) -> None:
     """Put down as told it was not pushed, so that what is near or far leaves no more open; were it told wrongly."""
