@@ -29,13 +29,13 @@ from knowledge_sources.methods.floor import (
 from knowledge_sources.methods.motion import MAX_LOOK_ERROR_RAD, Clearance, choose_move, plan_turn
 from knowledge_sources.reads.conditions import Belief
 from knowledge_sources.reads.lost import locate_contact
-from knowledge_sources.reads.questions import active_goal, deepest_sketch, find_robot
+from knowledge_sources.reads.questions import active_goal, deepest_sketch, find_robot, list_touches
 from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.locales import EXTRA_KIND
 from world_models.entries import (
-    AROUND_SIGMA_RAD,
     CameraPicture,
     Contact,
+    DoorState,
     FreeFloor,
     Goal,
     Hypothesis,
@@ -65,6 +65,7 @@ TOUCH_HOLDS_M = 0.5  # after so much of the way a touch that is no obstacle tell
 AWAY_M = 0.15  # length of the move away from what was touched
 AWAY_STEP_RAD = math.radians(15.0)  # of the directions that are tried for it
 MAX_DRIVEN_GAP_M = 0.8  # between two pictures that are no further apart the robot drove straight
+LOOK_BEFORE_M = 0.4  # from so far before its rim would touch a door that may be shut, it looks at that once more
 LOOK_AHEAD_M = 1.1  # so much of the way beyond a leg is looked at before it ends: what is too near to be seen then
 LOOK_FROM_M = 3.0  # distance from the end of a leg from which that begins
 
@@ -89,6 +90,10 @@ class FloorAhead:
         self._tested = shapely.buffer(shapely.union_all([self._floor, *found]), -NEAR_MODEL_M)
         self._suspected = _list_what_may_stand(view)
         self._touches = _list_touches(view, self._here)
+        doubted = {entry.value.door: entry for entry in view.where(
+            DoorState, lambda door: door.may_be_shut and door.touched_s is None)}
+        self._doubted = [(doubted[door.name], shapely.MultiPoint(np.concatenate(door.thresholds_world)).convex_hull)
+                         for door in self._robot.world.doorways_of(belief.value.locale) if door.name in doubted]
         self._scans = _find_scans(view, belief, settings)
         self._discs = list_free_discs(view, self._robot, self._here, self._scans)
         search = _find_last_search(view)  # what was seen before it was found does not count
@@ -134,6 +139,7 @@ class FloorAhead:
 
     def keep_to_seen(self, command: MotorCommand) -> tuple[Leg, MotorCommand | None]:
         """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
+        Before a door that may be shut it stops once more, for a picture from there: it is not felt before it is seen.
 
         Returns the leg and the command. That is None where something may stand in floor that is not seen, right before
         the robot.
@@ -150,8 +156,10 @@ class FloorAhead:
         clearance = self.measure_clearance(wanted_m + MAX_BRAKING_M)
         if clearance.room_m < min(MIN_MOVE_M, wanted_m):
             return leg, self._lead_away() if self._touches else None
+        before_m = self._measure_to(self._doubted, wanted_m + LOOK_BEFORE_M) - LOOK_BEFORE_M
         free_m, speed = choose_move(
-            clearance, wanted_m, actuator, self._settings.creep_speed_m_per_s, LOOK_PICTURE_S)
+            clearance, before_m if before_m >= MIN_MOVE_M else wanted_m, actuator,
+            self._settings.creep_speed_m_per_s, LOOK_PICTURE_S)
         move_m = min(command.move_m, actuator.compute_command_m(free_m))
         return leg, MotorCommand(command.turn_rad, move_m, None if speed >= actuator.speed_m_per_s else speed)
 
@@ -181,13 +189,19 @@ class FloorAhead:
     def _measure_to_things_m(self, way_m: float, *, touched: bool = False) -> float:
         """The same of what was touched, along which the robot does not go, but away from it; or of all else.
         """
+        if not touched:
+            return self._measure_to(self._suspected, way_m)
+        felt = [(entry, polygon) for entry, polygon in self._suspected if entry.value.touched_s is not None]
+        return self._measure_to([*felt, *self._touches], way_m, TOUCHED_GAP_M, TOUCHED_AWAY * STEP_M)
+
+    def _measure_to(
+        self, stands: Sequence[tuple[Entry[Any], shapely.Geometry]], way_m: float, near_m: float = 0.0,
+        away_m: float = -1e-9,
+    ) -> float:
         along, free_m = np.arange(0.0, way_m + STEP_M, STEP_M), way_m
         points = shapely.points(self._find_ahead(along))
-        stands = [(entry, polygon) for entry, polygon in self._suspected
-                  if not touched or entry.value.touched_s is not None]
-        for entry, polygon in [*stands, *(self._touches if touched else ())]:
+        for entry, polygon in stands:
             gaps = shapely.distance(points, polygon)
-            near_m, away_m = (TOUCHED_GAP_M, TOUCHED_AWAY * STEP_M) if touched else (0.0, -1e-9)
             met = np.flatnonzero((gaps[1:] < self._robot.radius_m + near_m) & (gaps[1:] < gaps[:-1] + away_m))
             if len(met):
                 free_m = min(free_m, float(along[met[0]]))
@@ -262,7 +276,7 @@ def _list_touches(view: View, here: Pose2) -> list[tuple[Entry[Contact], shapely
     """Where something was touched on the last of the way, and is no obstacle: the model explains it, or may [world]."""
     known = {obstacle.value.touched_s for obstacle in view.all(Obstacle)}
     found = []
-    for contact in view.where(Contact, lambda touch: touch.sigma_rad < AROUND_SIGMA_RAD):
+    for contact in list_touches(view):
         gone_m = math.fsum(report.value.move_m for report in view.since(MotionReport, contact.cycle)
                            if report.because != contact.because)
         if gone_m < TOUCH_HOLDS_M and contact.value.when_s not in known:
