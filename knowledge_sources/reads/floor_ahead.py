@@ -30,6 +30,7 @@ from knowledge_sources.methods.motion import MAX_LOOK_ERROR_RAD, Clearance, choo
 from knowledge_sources.reads.conditions import Belief
 from knowledge_sources.reads.lost import locate_contact
 from knowledge_sources.reads.questions import active_goal, deepest_sketch, find_robot, list_touches
+from knowledge_sources.reads.sketches import find_first_level
 from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.locales import EXTRA_KIND
 from world_models.entries import (
@@ -39,6 +40,7 @@ from world_models.entries import (
     FreeFloor,
     Goal,
     Hypothesis,
+    Impasse,
     Leg,
     MotionReport,
     MotorCommand,
@@ -94,6 +96,9 @@ class FloorAhead:
             DoorState, lambda door: door.may_be_shut and door.touched_s is None)}
         self._doubted = [(doubted[door.name], shapely.MultiPoint(np.concatenate(door.thresholds_world)).convex_hull)
                          for door in self._robot.world.doorways_of(belief.value.locale) if door.name in doubted]
+        drawn, named = find_first_level(view), {id for impasse in view.all(Impasse) for id in impasse.value.behind}
+        self._asks_for_look = drawn is not None and not drawn.value.halts and not any(
+            entry.id in named for entry in doubted.values())
         self._scans = _find_scans(view, belief, settings)
         self._discs = list_free_discs(view, self._robot, self._here, self._scans)
         search = _find_last_search(view)  # what was seen before it was found does not count
@@ -139,7 +144,8 @@ class FloorAhead:
 
     def keep_to_seen(self, command: MotorCommand) -> tuple[Leg, MotorCommand | None]:
         """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
-        Before a door that may be shut it stops once more, for a picture from there: it is not felt before it is seen.
+        Before a door that may be shut it stops for a picture; where that does not tell, it halts once, so that the door
+        is looked at from elsewhere before it is touched.
 
         Returns the leg and the command. That is None where something may stand in floor that is not seen, right before
         the robot.
@@ -157,6 +163,8 @@ class FloorAhead:
         if clearance.room_m < min(MIN_MOVE_M, wanted_m):
             return leg, self._lead_away() if self._touches else None
         before_m = self._measure_to(self._doubted, wanted_m + LOOK_BEFORE_M) - LOOK_BEFORE_M
+        if before_m < min(MIN_MOVE_M, wanted_m) and self._asks_for_look:
+            return leg, None
         free_m, speed = choose_move(
             clearance, before_m if before_m >= MIN_MOVE_M else wanted_m, actuator,
             self._settings.creep_speed_m_per_s, LOOK_PICTURE_S)

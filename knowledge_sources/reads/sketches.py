@@ -6,15 +6,27 @@ import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
 import shapely
 
 from blackboard import Effect, Entry, Revise, View
+from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import build_polygon
 from knowledge_sources.methods.motion import SubgoalPlanner
-from knowledge_sources.reads.questions import find_building, find_robot
+from knowledge_sources.reads.questions import find_building, find_frames, find_robot
 from knowledge_sources.settings import PlanSettings
 from world_models import words
-from world_models.entries import Goal, Hypothesis, Obstacle, Place, PlanSketch, SketchStatus, Subgoal
+from world_models.entries import (
+    DoorState,
+    Goal,
+    Hypothesis,
+    Impasse,
+    Obstacle,
+    Place,
+    PlanSketch,
+    SketchStatus,
+    Subgoal,
+)
 from world_models.frames import wrap_angle
 
 MAX_ADJUSTMENTS = 8  # so often a sketch is adjusted at one milestone; then adjusting has failed
@@ -35,6 +47,20 @@ def list_planners(view: View, settings: PlanSettings) -> list[SubgoalPlanner]:
     robot, obstacles = find_robot(view), [entry.value for entry in find_obstacles(view)]
     ways = [False, *([True] if any(obstacle.core for obstacle in obstacles) else [])]
     return [SubgoalPlanner(robot, settings, obstacles, by_cores=by_cores) for by_cores in ways]
+
+
+def plan_door_look(view: View, planner: SubgoalPlanner, belief: Hypothesis, door: DoorState) -> Subgoal | None:
+    """To where a door of this room is seen from the front, and from where it was not seen yet; None: nowhere."""
+    (frame,) = find_frames(view, {belief.locale})
+    doorway = next((d for d in frame.value.doorways if d.name == door.door), None)
+    seen_from = [np.array([picture.x_m, picture.y_m]) for picture in (*door.views, door.last)]
+    return None if doorway is None else planner.plan_door_look(belief, doorway, seen_from)
+
+
+def list_lookouts(view: View, goal: str) -> Floats:
+    """Where the robot went to look again at what left no way to a goal, each time: (n, 2) [m, world]."""
+    closed = view.where(Impasse, lambda impasse: impasse.goal == goal and not impasse.is_open)
+    return np.array([entry.value.lookout for entry in closed]).reshape(-1, 2)
 
 
 def find_way(planners: Iterable[SubgoalPlanner], ask: Callable[[SubgoalPlanner], Way | None]) -> Way | None:

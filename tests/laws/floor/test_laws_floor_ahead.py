@@ -33,6 +33,7 @@ from world_models.entries import (
     DoorState,
     FreeFloor,
     Hypothesis,
+    Impasse,
     Leg,
     MotorCommand,
     Place,
@@ -222,23 +223,27 @@ def test_what_the_file_lacks_stands_on_floor_that_is_asked_after_and_what_it_has
 
 @pytest.mark.parametrize(("log_odds", "touched_s", "stops"), [
     (0.5, None, True), (-0.5, None, False), (0.5, 9.0, False)])
-def test_before_a_door_that_may_be_shut_it_stops_for_a_picture_and_then_goes_on(
+def test_before_a_door_that_may_be_shut_it_stops_for_a_picture_then_to_look_from_elsewhere_and_then_goes_on(
     log_odds: float, touched_s: float | None, stops: bool
 ) -> None:
     bench = Bench(ROBOT)
+    bench.sketch()
     (door,) = house().doorways_of(HALL)
-    inward = -door.outward_from(HALL)
-    middle = door.threshold_of(HALL).mean(axis=0)
-    heading = math.atan2(*(-inward)[::-1])
+    inward, middle = -door.outward_from(HALL), door.threshold_of(HALL).mean(axis=0)
     picture = DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), 0.0, 0.0, 0.0, 4.5, "a leaf")
-    bench.put(DoorState(door.name, door.between, "unknown", 0.6, log_odds, 1, picture, 1.0, touched_s=touched_s))
-    for gap_m in (1.0, LOOK_BEFORE_M):
-        at = Pose2(*(middle + (ROBOT.radius_m + gap_m) * inward), heading)
+    state = bench.put(DoorState(
+        door.name, door.between, "unknown", 0.6, log_odds, 1, picture, 1.0, touched_s=touched_s))
+
+    def go(gap_m: float) -> MotorCommand | None:
+        at = Pose2(*(middle + (ROBOT.radius_m + gap_m) * inward), math.atan2(*(-inward)[::-1]))
         belief = bench.put(Hypothesis.of_world(house(), HALL, at, np.diag([1e-6] * 3), "milestone"))
         floor = shapely.Point(at.position).buffer(4.0)
         bench.put(scan_floor(floor, at, HALL, near_m=0.05, forward_m=0.0, half_rad=1.5))
         leg = Leg("PlanSketch-1", 0, at.x_m, at.y_m, *(middle - 0.3 * inward), 0.1)
-        _, command = FloorAhead(bench.view, leg, belief, DEFAULT).keep_to_seen(MotorCommand(0.0, 1.0))
-        assert command is not None
-        goes_m = ROBOT.actuator.reach * command.move_m
-        assert (goes_m == pytest.approx(gap_m - LOOK_BEFORE_M, abs=0.06)) == (stops and gap_m > LOOK_BEFORE_M)
+        return FloorAhead(bench.view, leg, belief, DEFAULT).keep_to_seen(MotorCommand(0.0, 1.0))[1]
+
+    far, near = go(1.0), go(LOOK_BEFORE_M)
+    assert far is not None and (near is None) == stops
+    assert (ROBOT.actuator.reach * far.move_m < 1.0 - LOOK_BEFORE_M + 0.06) == stops
+    bench.put(Impasse("blocked", "it may be shut", behind=(state.id,), is_open=False))
+    assert (go(1.0) == far) and (again := go(LOOK_BEFORE_M)) is not None and again.move_m > LOOK_BEFORE_M
