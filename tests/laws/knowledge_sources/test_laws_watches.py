@@ -152,6 +152,7 @@ WATCHES: Mapping[str, list[Row]] = {
     "door_toucher": [MOVED],
     "door_watcher": [(CameraPicture, NEW, lambda f: f.purpose == "track"), (Milestone, AGAIN, is_verified)],
     "elevator_rider": [(PlanSketch, EITHER, is_carried_out), (BodyFault, AGAIN, always)],
+    "exposure_monitor": [(Segments, NEW, always)],
     "fault_handler": [
         (BodyFault, NEW, always), (BodyFault, AGAIN, lambda f: f.what in ("stopped", "base refuses")),
         (Contact, NEW, always), (Recovery, AGAIN, lambda r: r.status != "asked"),
