@@ -158,9 +158,7 @@ class TurnCounts:
 
 
 def tell_refusal(decision: Decision) -> str:
-    """Who raised in a decision, or was refused, and why; "" where nobody was."""
-    if not decision.refused:
-        return ""
+    """Who raised in a decision that was refused, or may not write something, and why."""
     who = decision.chosen.source.name if decision.chosen else "a knowledge source that was asked"
     return (f"{who} {'raised' if decision.refused.startswith(RAISED) else 'was refused:'}"
             f" {decision.refused.strip().splitlines()[-1]}")

@@ -162,7 +162,7 @@ class FloorAhead:
         clearance = self.measure_clearance(wanted_m + MAX_BRAKING_M)
         if clearance.room_m < min(MIN_MOVE_M, wanted_m):
             return leg, self._lead_away() if self._touches else None
-        before_m = self._measure_to(self._doubted, wanted_m + LOOK_BEFORE_M) - LOOK_BEFORE_M
+        before_m = min(wanted_m, self._measure_to(self._doubted, wanted_m + 2.0 * LOOK_BEFORE_M) - LOOK_BEFORE_M)
         if before_m < min(MIN_MOVE_M, wanted_m) and self._asks_for_look:
             return leg, None
         free_m, speed = choose_move(
