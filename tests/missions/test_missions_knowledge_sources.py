@@ -49,15 +49,12 @@ camera, doubt a sense, or refine what passes through more than one room."""
 
 @pytest.mark.parametrize("missing", NAMES)
 def test_without_any_one_of_them_the_outcome_is_clear(short_stage: Stage, missing: str) -> None:
-    refusals: list[str] = []
-
     def sources(settings: Settings) -> Sequence[KnowledgeSource]:
         return [ks for ks in knowledge_sources(settings) if ks.name != missing]
 
-    result = run_mission(short_stage, 3, sources=sources, sinks=[lambda d: refusals.append(d.refused)])
+    result = run_mission(short_stage, 3, sources=sources)
     assert result.outcome in {"reached", "lost", "blocked", "failed"}
     assert result.reason
-    assert not any(refusals)
     if missing not in NOT_NEEDED:
         assert result.outcome != "reached"
 
