@@ -8,6 +8,7 @@ None asks how long an example takes: the first one may compile what it calls.
 import os
 import signal
 from collections.abc import Iterator
+from functools import wraps
 from typing import Any
 
 import pytest
@@ -23,6 +24,30 @@ settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("search", derandomize=False, print_blob=True, deadline=None)
 settings.register_profile("mutants", derandomize=True, deadline=None, phases=(Phase.explicit, Phase.generate))
 settings.load_profile("same")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def nothing_is_refused() -> Iterator[None]:
+    """A mission of a test stops where a source raises or may not write; ``may_refuse`` is for those that want that."""
+    from harvey.runner.result import Refusals, tell_refusal
+
+    @wraps(Refusals.__call__)
+    def hear(refusals: Any, decision: Any) -> None:
+        assert not decision.refused, f"cycle {decision.cycle}: {tell_refusal(decision)}"
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Refusals, "__call__", hear)
+        yield
+
+
+@pytest.fixture(scope="module")
+def may_refuse() -> Iterator[None]:
+    """In the missions of this module sources may raise, and be refused."""
+    from harvey.runner.result import Refusals
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Refusals, "__call__", getattr(Refusals.__call__, "__wrapped__"))  # noqa: B009  # mypy knows none
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -89,6 +89,7 @@ def format_result(r: MissionResult, out: Path | None, story: Sequence[str] = ())
         *(f"  camera        {lesson.text()}" for lesson in r.camera),
         *(f"  amiss         {text}" for text in r.amiss),
         *(f"  starved       {text}" for text in r.starved),
+        *(f"  refused       {text}" for text in r.refused),
         f"  way           {r.path_length_m:.1f} m in {r.sim_time_s:.0f} s of the robot's time",
         f"  took          {r.wall_time_s:.1f} s for {count(r.frames, 'picture')} and {count(r.decisions, 'cycle')},"
         f" {r.waits} of them only to ask for locale frames",
@@ -115,7 +116,7 @@ def format_results(results: Sequence[MissionResult]) -> str:
                      [sum(column) for column in zip(*counts, strict=True)],
                      [math.fsum(column) / len(results) for column in zip(*ways, strict=True)]))
     return "\n".join([table(COLUMNS, rows, last_is_summary=True),
-                      *(f"seed {r.seed}: {text}" for r in results for text in (*r.amiss, *r.starved))])
+                      *(f"seed {r.seed}: {text}" for r in results for text in (*r.amiss, *r.starved, *r.refused))])
 
 
 def _row(

@@ -161,6 +161,7 @@ def summary(result: MissionResult, out: Path) -> str:
     return (f"{result.outcome}: {result.reason}\n"
             f"  milestones    {m['verified']} verified, {m['refuted']} refuted, {m['not_testable']} not testable\n"
             f"{''.join(f'  camera        {lesson.text()}{chr(10)}' for lesson in result.camera)}"
+            f"{''.join(f'  refused       {text}{chr(10)}' for text in result.refused)}"
             f"  way           {result.path_length_m:.1f} m, as the wheels claim, in {result.sim_time_s:.0f} s\n"
             f"  recording     {out / 'recording.rrd'}\n\n{first}\n\n"
             f"open it with    harvey view {out}\nhave it told    harvey story {out}\nask it with     harvey why {out}")

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from blackboard import Activation, Decision, Posted
+from blackboard import RAISED, Activation, Decision, Posted
 from logs.explain.turning_points import Collision, Happening, TurningPoint, TurningPointFinder, is_adjusted
 from world_models.building.locale_frame import FrameRequest
 from world_models.entries import (
@@ -56,6 +56,7 @@ class MissionResult:
         happened: what the simulator did to the robot and its building; None on hardware, and in the results of older
             versions.
         starved: which knowledge sources of other packages seldom got their turn, in words.
+        refused: acts of which nothing applied, as their knowledge source raised or may not write that, in words.
         belief_off_m: true distance of where it believed to be at the end; None where nobody knows it.
     """
 
@@ -86,6 +87,7 @@ class MissionResult:
     belief_off_m: float | None = None
     happened: Sequence[Happening] | None = None
     starved: Sequence[str] = ()
+    refused: Sequence[str] = ()
 
     @property
     def error_m(self) -> float:
@@ -155,6 +157,28 @@ class TurnCounts:
                 f"{name}; docs/how-to/knowledge-source.md says which level and priority)")
 
 
+def tell_refusal(decision: Decision) -> str:
+    """Who raised in a decision that was refused, or may not write something, and why."""
+    who = decision.chosen.source.name if decision.chosen else "a knowledge source that was asked"
+    return (f"{who} {'raised' if decision.refused.startswith(RAISED) else 'was refused:'}"
+            f" {decision.refused.strip().splitlines()[-1]}")
+
+
+class Refusals:
+    """A sink that counts what was refused; a source that raises on every act is not heard of otherwise."""
+
+    def __init__(self) -> None:
+        self._counts = Counter[str]()
+
+    def __call__(self, decision: Decision) -> None:
+        if decision.refused:
+            self._counts[tell_refusal(decision)] += 1
+
+    def told(self) -> tuple[str, ...]:
+        """A sentence for each, the most frequent first."""
+        return tuple(f"{what} ({count(times, 'time')})" for what, times in self._counts.most_common())
+
+
 class RunCounts:
     """A sink that counts what was decided, and adds up what the wheels claim."""
 
@@ -165,7 +189,7 @@ class RunCounts:
         self.milestones = {"verified": 0, "refuted": 0, "not_testable": 0}
         self.path_m = self.time_s = 0.0
         self.turning_points: list[TurningPoint] = []
-        self.turns = TurnCounts()
+        self.turns, self.refusals = TurnCounts(), Refusals()
         self.nominal_camera: CameraState | None = None
         self.camera: CameraState | None = None
         self._finder = TurningPointFinder()
@@ -173,6 +197,7 @@ class RunCounts:
     def __call__(self, decision: Decision) -> None:
         self.decisions += 1
         self.turns(decision)
+        self.refusals(decision)
         self.waits += bool(decision.made) and all(isinstance(c.entry.value, FrameRequest) for c in decision.made)
         self.turning_points += [point for point in self._finder.find(decision) if point.is_main]
         for change in decision.observed:
@@ -216,4 +241,5 @@ class RunCounts:
             relocalizations=self.relocalizations, sketches=self.sketches, collisions=None, max_cross_track_m=None,
             turning_points=tuple(self.turning_points), waits=self.waits, camera=self.camera_lessons(),
             probes=self.probes, starved=self.turns.starved(),
+            refused=self.refusals.told(),
         )

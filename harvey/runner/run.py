@@ -14,7 +14,7 @@ from blackboard import RAISED, Decision, Post, Quiescence, Scheduler, Sink
 from harvey.agent import Agent
 from harvey.errors import BadInput
 from harvey.runner.ports import Body, BodyPort
-from harvey.runner.result import UNFINISHED, MissionResult, RunCounts
+from harvey.runner.result import UNFINISHED, MissionResult, RunCounts, tell_refusal
 from harvey.runner.teller import FileTeller, Tell, Teller, tell_each, tell_nothing
 from harvey.runner.world_port import WorldPort, tell_robot
 from logs.disk import CannotWriteError
@@ -199,10 +199,7 @@ def run_to_outcome(
 
 
 def _why_over(decision: Decision, scheduler: Scheduler, over: Over) -> str | None:
-    if decision.refused.startswith(RAISED):
-        who = decision.chosen.source.name if decision.chosen else "a knowledge source that was asked"
-        return f"{who} raised {decision.refused.strip().splitlines()[-1]}"
-    return over(scheduler)
+    return tell_refusal(decision) if decision.refused.startswith(RAISED) else over(scheduler)
 
 
 def _declare(scheduler: Scheduler, reason: str) -> Outcome:

@@ -10,6 +10,7 @@ from knowledge_sources.methods.doors import is_in_opening, touch_door
 from knowledge_sources.methods.floor import locate_touch
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import GOING_ON, HELD, UP_TO_DATE, find_frames, last_motion
+from knowledge_sources.reads.questions import list_touches
 from world_models.building.locale_frame import FrameRequest
 from world_models.entries import Contact, DoorState, Hypothesis
 
@@ -22,7 +23,7 @@ Touched = tuple[Entry[Contact], Entry[DoorState]]
 def find_touched_door(view: View, _trigger: Change) -> Touched | None:
     """The contact that ended the last motion, and the door that may be shut and was touched in its opening."""
     belief, contact, last = HELD.of(view), view.latest(Contact), last_motion(view)
-    if contact is None or last is None or contact.because[0].id != last.id:
+    if contact is None or last is None or contact not in list_touches(view) or contact.because[0].id != last.id:
         return None
     doors = view.where(DoorState, lambda d: d.may_be_shut and d.touched_s is None and belief.locale in d.between)
     if not doors:

@@ -21,6 +21,7 @@ from knowledge_sources.methods.floor.weigh_touch import Touched
 from knowledge_sources.methods.motion import find_nearest
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, Belief, find_difference
+from knowledge_sources.reads.questions import list_touches
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Contact, Course, Difference, Evidence, Hypothesis, MotorCommand, Obstacle
 
@@ -88,7 +89,7 @@ def _find_new_touch(view: View) -> tuple[Entry[Contact], float, tuple[Entry[Moto
     """The newest contact, if no obstacle rests on it yet and the robot stands where it touched: it has only turned; by
     how much [rad], and by which commands.
     """
-    contact = view.latest(Contact)
+    contact = next(reversed(list_touches(view)), None)
     if contact is None or any(o.value.touched_s == contact.value.when_s for o in view.all(Obstacle)):
         return None
     asked = contact.because[0].id  # of the same cycle as the contact, or the one before

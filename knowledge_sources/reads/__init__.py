@@ -1,7 +1,7 @@
 """What a knowledge source may ask of the board: conditions that it needs, and questions with one answer.
 
 Read ``conditions`` (needs, and what they bind) and ``questions`` first; the others answer for one subject each:
-``place_believed``, ``sketches``, ``looks``, ``followed_landmarks``, ``doors_in_view``, ``lost``, ``floor_ahead``,
+``place_believed``, ``sketches``, ``followed_landmarks``, ``doors_in_view``, ``lost``, ``floor_ahead``,
 ``motion_between``.
 """
 
@@ -23,7 +23,6 @@ from knowledge_sources.reads.followed_landmarks import (
     Following, Renewed, find_missing_floors, find_near_frames, post_or_revise, rectify, take_new, tell_worst,
     with_anchors,
 )
-from knowledge_sources.reads.looks import MAX_LOOK_ERROR_RAD, find_car, find_car_of, find_tried, list_log_odds
 from knowledge_sources.reads.lost import (
     WHILE_LOST, declare_lost, find_panorama, is_dark, list_contacts, list_views, locate_contact,
 )
@@ -36,8 +35,9 @@ from knowledge_sources.reads.questions import (
     unmeasured_doubt,
 )
 from knowledge_sources.reads.sketches import (
-    Way, find_first_level, find_obstacles, find_planner, find_way_to_goal, has_missed, is_just_found, list_locales,
-    name_obstacles, place_of, supersede, tell_missed,
+    MAX_LOOK_ERROR_RAD, Way, find_car, find_car_of, find_first_level, find_obstacles, find_planner, find_tried,
+    find_way_to_goal, has_missed, is_just_found, list_locales, list_log_odds, name_obstacles, place_of, supersede,
+    tell_missed,
 )
 
 __all__ = [

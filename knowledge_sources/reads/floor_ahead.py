@@ -28,16 +28,18 @@ from knowledge_sources.methods.floor import (
 from knowledge_sources.methods.motion import MAX_LOOK_ERROR_RAD, Clearance, choose_move, plan_turn
 from knowledge_sources.reads.conditions import Belief
 from knowledge_sources.reads.lost import locate_contact
-from knowledge_sources.reads.questions import active_goal, deepest_sketch, find_robot
+from knowledge_sources.reads.questions import active_goal, deepest_sketch, find_robot, list_touches
+from knowledge_sources.reads.sketches import find_first_level
 from knowledge_sources.settings import ActionSettings, Settings
 from world_models.building.locales import EXTRA_KIND
 from world_models.entries import (
-    AROUND_SIGMA_RAD,
     CameraPicture,
     Contact,
+    DoorState,
     FreeFloor,
     Goal,
     Hypothesis,
+    Impasse,
     Leg,
     MotionReport,
     MotorCommand,
@@ -64,10 +66,15 @@ TOUCH_HOLDS_M = 0.5  # after so much of the way a touch that is no obstacle tell
 AWAY_M = 0.15  # length of the move away from what was touched
 AWAY_STEP_RAD = math.radians(15.0)  # of the directions that are tried for it
 MAX_DRIVEN_GAP_M = 0.8  # between two pictures that are no further apart the robot drove straight
+LOOK_BEFORE_M = 0.4  # from so far before its rim would touch a door that may be shut, it looks at that once more
 LOOK_AHEAD_M = 1.1  # so much of the way beyond a leg is looked at before it ends: what is too near to be seen then
 LOOK_FROM_M = 3.0  # distance from the end of a leg from which that begins
 
 Point = tuple[float, float]
+Standing = tuple[Entry[Any], shapely.Geometry, float, float]
+"""What may stand there, from how near to it a move leads away, and by how much of the way [m]."""
+NOT_TOUCHED = (0.0, -1e-9)
+"""The last two of these for what the robot may drive along."""
 
 
 class FloorAhead:
@@ -88,6 +95,13 @@ class FloorAhead:
         self._tested = shapely.buffer(shapely.union_all([self._floor, *found]), -NEAR_MODEL_M)
         self._suspected = _list_what_may_stand(view)
         self._touches = _list_touches(view, self._here)
+        doubted = {entry.value.door: entry for entry in view.where(
+            DoorState, lambda door: door.may_be_shut and door.touched_s is None)}
+        self._doubted = [(doubted[door.name], shapely.MultiPoint(np.concatenate(door.thresholds_world)).convex_hull)
+                         for door in self._robot.world.doorways_of(belief.value.locale) if door.name in doubted]
+        drawn, named = find_first_level(view), {id for impasse in view.all(Impasse) for id in impasse.value.behind}
+        self._asks_for_look = drawn is not None and not drawn.value.halts and not any(
+            entry.id in named for entry in doubted.values())
         self._scans = _find_scans(view, belief, settings)
         self._discs = list_free_discs(view, self._robot, self._here, self._scans)
         search = _find_last_search(view)  # what was seen before it was found does not count
@@ -133,6 +147,8 @@ class FloorAhead:
 
     def keep_to_seen(self, command: MotorCommand) -> tuple[Leg, MotorCommand | None]:
         """A move only as far as the floor is seen to be free; before it a look at what will be needed behind the leg.
+        Before a door that may be shut it stops for a picture; where that does not tell, it halts once, so that the door
+        is looked at from elsewhere before it is touched.
 
         Returns the leg and the command. That is None where something may stand in floor that is not seen, right before
         the robot.
@@ -149,8 +165,13 @@ class FloorAhead:
         clearance = self.measure_clearance(wanted_m + MAX_BRAKING_M)
         if clearance.room_m < min(MIN_MOVE_M, wanted_m):
             return leg, self._lead_away() if self._touches else None
+        doors = [(*pair, *NOT_TOUCHED) for pair in self._doubted]
+        before_m = min(wanted_m, self._measure_to_m(doors, wanted_m + 2.0 * LOOK_BEFORE_M) - LOOK_BEFORE_M)
+        if before_m < min(MIN_MOVE_M, wanted_m) and self._asks_for_look:
+            return leg, None
         free_m, speed = choose_move(
-            clearance, wanted_m, actuator, self._settings.creep_speed_m_per_s, LOOK_PICTURE_S)
+            clearance, before_m if before_m >= MIN_MOVE_M else wanted_m, actuator,
+            self._settings.creep_speed_m_per_s, LOOK_PICTURE_S)
         move_m = min(command.move_m, actuator.compute_command_m(free_m))
         return leg, MotorCommand(command.turn_rad, move_m, None if speed >= actuator.speed_m_per_s else speed)
 
@@ -178,12 +199,13 @@ class FloorAhead:
 
         Along what was touched it does not go, but away from it.
         """
+        touched = [pair for pair in self._suspected if pair[0].value.touched_s is not None]
+        away = ((*pair, TOUCHED_GAP_M, TOUCHED_AWAY * STEP_M) for pair in (*touched, *self._touches))
+        return self._measure_to_m([*((*pair, *NOT_TOUCHED) for pair in self._suspected), *away], way_m)
+
+    def _measure_to_m(self, stands: Sequence[Standing], way_m: float) -> float:
         along, free_m = np.arange(0.0, way_m + STEP_M, STEP_M), way_m
         points = shapely.points(self._find_ahead(along))
-        touched = [pair for pair in self._suspected if pair[0].value.touched_s is not None]
-        stands: list[tuple[Entry[Any], shapely.Geometry, float, float]] = [
-            *((*pair, 0.0, -1e-9) for pair in self._suspected),
-            *((*pair, TOUCHED_GAP_M, TOUCHED_AWAY * STEP_M) for pair in (*touched, *self._touches))]
         for entry, polygon, near_m, away_m in stands:
             gaps = shapely.distance(points, polygon)
             met = np.flatnonzero((gaps[1:] < self._robot.radius_m + near_m) & (gaps[1:] < gaps[:-1] + away_m))
@@ -258,7 +280,7 @@ def _list_touches(view: View, here: Pose2) -> list[tuple[Entry[Contact], shapely
     """Where something was touched on the last of the way, and is no obstacle: the model explains it, or may [world]."""
     known = {obstacle.value.touched_s for obstacle in view.all(Obstacle)}
     found = []
-    for contact in view.where(Contact, lambda touch: touch.sigma_rad < AROUND_SIGMA_RAD):
+    for contact in list_touches(view):
         gone_m = math.fsum(report.value.move_m for report in view.since(MotionReport, contact.cycle)
                            if report.because != contact.because)
         if gone_m < TOUCH_HOLDS_M and contact.value.when_s not in known:

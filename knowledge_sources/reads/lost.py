@@ -13,9 +13,8 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.features import picture
 from knowledge_sources.methods.localization import CameraView
 from knowledge_sources.reads.conditions import GOING_ON, HELD, LOST, STANDING
-from knowledge_sources.reads.questions import find_robot
+from knowledge_sources.reads.questions import find_robot, list_touches
 from world_models.entries import (
-    AROUND_SIGMA_RAD,
     Contact,
     Discrepancy,
     Glimpse,
@@ -46,7 +45,7 @@ def list_views(view: View, glimpses: Iterable[Glimpse]) -> list[CameraView]:
 def list_contacts(view: View, doubt: Entry[Discrepancy]) -> list[Entry[Contact]]:
     """What was touched since the robot is lost, and the last before that, where the direction is known."""
     last = view.latest(Contact)
-    return [entry for entry in view.where(Contact, lambda touch: touch.sigma_rad < AROUND_SIGMA_RAD)
+    return [entry for entry in list_touches(view)
             if entry.cycle >= doubt.cycle or (last is not None and entry.id == last.id)]
 
 

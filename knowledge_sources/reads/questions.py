@@ -11,6 +11,7 @@ from world_models import words
 from world_models.building.locale_frame import CHANGED, FRAME_OF, REDRAWN, LocaleFrame
 from world_models.building.model_errors import WALL
 from world_models.entries import (
+    AROUND_SIGMA_RAD,
     GO_ON,
     OPEN,
     SENSES,
@@ -49,6 +50,8 @@ HELD: Index[Hypothesis] = Index(Hypothesis, lambda h: h.is_held or None, "held")
 ACTIVE_GOAL: Index[Goal] = Index(Goal, lambda g: g.is_active or None, "active")
 OPEN_MILESTONE: Index[Milestone] = Index(Milestone, lambda m: m.is_open or None, "open")
 ACTIVE_SKETCH: Index[PlanSketch] = Index(PlanSketch, lambda s: s.goal if s.is_active else None, "active")
+BUMPER, MAX_P_STUCK = "bumper", 0.03
+"""What differs where the bumper feels what is not there; a touch tells nothing while that is likelier than this."""
 NOWHERE = FrameBuilding(Blackboard().view)
 """A building of which nothing is known."""
 
@@ -200,6 +203,13 @@ def last_motion(view: View) -> Entry[MotorCommand] | Entry[Course] | None:
     if command is None or course is None:
         return command or course
     return course if course.cycle > command.cycle else command
+
+
+def list_touches(view: View) -> list[Entry[Contact]]:
+    """What was touched in a known direction, the oldest first; nothing while the bumper may stay pressed."""
+    stuck = find_difference(view, BUMPER).find("bumper")
+    return [] if stuck is not None and stuck.p > MAX_P_STUCK else list(
+        view.where(Contact, lambda touch: touch.sigma_rad < AROUND_SIGMA_RAD))
 
 
 def find_contact(view: View, request: str) -> Entry[Contact] | None:

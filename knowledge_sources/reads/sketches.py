@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
 import shapely
 
 from blackboard import Effect, Entry, Revise, View
+from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.belief import to_log_odds
 from knowledge_sources.methods.floor import build_polygon
 from knowledge_sources.methods.motion import SubgoalPlanner
-from knowledge_sources.reads.questions import find_building, find_robot
+from knowledge_sources.methods.verification import MIN_MATCHED_LINES
+from knowledge_sources.reads.questions import find_building, find_frames, find_robot
 from knowledge_sources.settings import PlanSettings
 from world_models import words
-from world_models.entries import Goal, Hypothesis, Obstacle, Place, PlanSketch, SketchStatus, Subgoal
+from world_models.entries import (
+    Certificate,
+    DoorState,
+    Goal,
+    Hypothesis,
+    Impasse,
+    Milestone,
+    Obstacle,
+    Place,
+    PlanSketch,
+    SketchStatus,
+    Subgoal,
+)
 from world_models.frames import wrap_angle
 
 MAX_ADJUSTMENTS = 8  # so often a sketch is adjusted at one milestone; then adjusting has failed
@@ -23,12 +39,29 @@ GOAL_HEADING_TOLERANCE_RAD = 0.02  # tolerance of a heading that the goal states
 INEXACT_TOLERANCE_SIGMAS = 2.0
 """Deviations of the belief that are added to the tolerance of a goal where the model is inexact."""
 
+MAX_LOOK_LOG_ODDS = 3.0  # most that one look counts for or against a place, in log odds, with those in other directions
+MAX_LOOK_ERROR_RAD = math.radians(3.5)  # the robot faces a milestone when its heading is off by no more than this
+
 Way = tuple[Subgoal, ...]
 
 
 def find_planner(view: View, settings: PlanSettings) -> SubgoalPlanner:
     """It plans round what stands in the way; the robot drives only into what it then sees to be free."""
     return SubgoalPlanner(find_robot(view), settings, [entry.value for entry in find_obstacles(view)])
+
+
+def plan_door_look(view: View, planner: SubgoalPlanner, belief: Hypothesis, door: DoorState) -> Subgoal | None:
+    """To where a door of this room is seen from the front, and from where it was not seen yet; None: nowhere."""
+    (frame,) = find_frames(view, {belief.locale})
+    doorway = next((d for d in frame.value.doorways if d.name == door.door), None)
+    seen_from = [np.array([picture.x_m, picture.y_m]) for picture in (*door.views, door.last)]
+    return None if doorway is None else planner.plan_door_look(belief, doorway, seen_from)
+
+
+def list_lookouts(view: View, goal: str) -> Floats:
+    """Where the robot went to look again at what left no way to a goal, each time: (n, 2) [m, world]."""
+    closed = view.where(Impasse, lambda impasse: impasse.goal == goal and not impasse.is_open)
+    return np.array([entry.value.lookout for entry in closed]).reshape(-1, 2)
 
 
 def find_way_to_goal(planner: SubgoalPlanner, belief: Hypothesis, goal: Goal) -> Way | None:
@@ -113,3 +146,33 @@ def tell_missed(
     occupied = f"; it is occupied by {' and '.join(o.value.words() for o in taking)}" if taking else ""
     tries, last = words.count(sketch.adjustments + 1, "try", "tries"), f"the last ended {words.metres(off_m)} from it"
     return f"{what} at {there} was not reached in {tries}: {last}{occupied}", taking
+
+
+def find_tried(view: View, is_same: Callable[[Entry[Milestone]], bool]) -> tuple[float, ...]:
+    """The headings in which the last milestone, if it is the same one, was not testable."""
+    last = view.latest(Milestone)
+    if last is None or last.value.status != "not testable" or not is_same(last):
+        return ()
+    return (*last.value.tried, last.value.look_heading_rad)
+
+
+def find_car(sketch: PlanSketch, index: int) -> str:
+    """The elevator's car in which a ride before a milestone ends, or "": it looks the same on every floor."""
+    before = sketch.subgoals[index - 1] if index > 0 else None
+    return before.destination.locale if before is not None and before.is_ride else ""
+
+
+def find_car_of(view: View, milestone: Milestone) -> str:
+    """The same for a milestone of any sketch, or of none."""
+    sketch = view.get(milestone.sketch)
+    return "" if sketch is None else find_car(sketch.value, milestone.index)
+
+
+def list_log_odds(view: View, milestone: Milestone) -> tuple[float, ...]:
+    """The log odds of a wrong place by each view that was tried for a milestone; 0 where it showed nothing."""
+    last, certificate = view.latest(Milestone), view.latest(Certificate)
+    if not milestone.tried or last is None or certificate is None or certificate.value.milestone != last.id:
+        return (0.0,) * len(milestone.tried)
+    c, most = certificate.value, MAX_LOOK_LOG_ODDS
+    tells = c.matched >= MIN_MATCHED_LINES
+    return (*last.value.log_odds_so_far, min(max(to_log_odds(c.p_false), -most), most) if tells else 0.0)

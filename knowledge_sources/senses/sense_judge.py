@@ -11,17 +11,19 @@ from world_models.entries import MISLEADING, RISK, Difference, Discrepancy, Impa
 
 WRONG: Mapping[RivalKind, str] = {
     "lens": "the camera's lens is another", "still camera": "the camera stands still",
-    "late pictures": "the camera's pictures come late"}
+    "late pictures": "the camera's pictures come late", "bumper": "the bumper is stuck"}
 """How a mission ends by a sense, in words."""
 
 
-@rule(on=Watch(Difference, where=lambda d: d.is_of_sense and d.leader.kind in MISLEADING),
+@rule(on=Watch(Difference, where=lambda d: d.is_of_sense and d.leader.kind in WRONG),
       writes=(Discrepancy, Impasse), needs=(GOING_ON,), priority=Priority.REVISE)
 def sense_judge(view: View, trigger: Change) -> Iterable[Effect]:
-    """Puts the belief in doubt for a sense that tells wrong places; when looks leave no doubt of it, sees no way on."""
+    """Sees no way on once there is no doubt of a sense that is wrong; until then one that tells wrong places puts the
+    belief in doubt.
+    """
     wrong, leader = trigger.entry, trigger.entry.value.leader
     what = f"{WRONG[leader.kind]}: {leader.what}"
     if leader.p >= 1.0 - RISK:
         yield Post(Impasse("failed", f"{what}, by {len(wrong.value.counted)} looks"), (wrong,))
-    elif not is_in_doubt(view):
+    elif leader.kind in MISLEADING and not is_in_doubt(view):
         yield Post(Discrepancy(Level.PLAN, what, None, (0.0, 0.0), "px"), (wrong,))

@@ -17,9 +17,9 @@ from knowledge_sources.reads import (
     place_of,
     supersede,
 )
-from knowledge_sources.reads.sketches import MAX_ADJUSTMENTS
+from knowledge_sources.reads.sketches import MAX_ADJUSTMENTS, list_lookouts, plan_door_look
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import Impasse, Leg, PlanSketch
+from world_models.entries import DoorState, Impasse, Leg, PlanSketch
 
 Halted = tuple[Entry[Leg], Entry[PlanSketch]]
 
@@ -27,7 +27,8 @@ Halted = tuple[Entry[Leg], Entry[PlanSketch]]
 class DetourFinder(RobotKnowledgeSource):
     """Has the sketch drawn again when a leg was halted before what may stand in floor that is not seen.
 
-    So it does as often in a row as a subgoal may be repeated, and as long as a way leads to the goal round all that may
+    Before a door that may be shut it sees no way on until that was looked at from elsewhere, if it can be. Else it does
+    so as often in a row as a subgoal may be repeated, and as long as a way leads to the goal round all that may
     stand there.
     """
 
@@ -46,6 +47,11 @@ class DetourFinder(RobotKnowledgeSource):
     def act(self, view: View, case: Halted) -> Iterable[Effect]:
         (leg, drawn), goal, belief = case, GOAL.of(view), HELD.of(view).entry
         planner = find_planner(view, self._settings.plan)
+        door = next((entry for ref in leg.because if isinstance((entry := view[ref.id]).value, DoorState)), None)
+        if door is not None and len(list_lookouts(view, goal.id)) < self._settings.plan.max_lookouts and (
+                plan_door_look(view, planner, belief.value, door.value) is not None):
+            yield Post(Impasse("blocked", door.value.sentence(), goal.id, (door.id,)), (leg, belief, door))
+            return
         leads_there = find_way_to_goal(planner, belief.value, goal.value) is not None
         if leads_there and drawn.value.halts < MAX_ADJUSTMENTS:
             yield from supersede(view, leg, "halted")

@@ -6,11 +6,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
 import shapely
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
-from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import build_polygon
 from knowledge_sources.methods.motion import SubgoalPlanner
 from knowledge_sources.priority import Priority
@@ -25,6 +23,7 @@ from knowledge_sources.reads import (
     find_way_to_goal,
     supersede,
 )
+from knowledge_sources.reads.sketches import list_lookouts, plan_door_look
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import DoorState, Goal, Hypothesis, Impasse, Obstacle, PlanSketch, Subgoal
 from world_models.frame_building import FrameBuilding
@@ -54,13 +53,13 @@ class LookoutPlanner(RobotKnowledgeSource):
 
     def bind(self, view: View, trigger: Change) -> Case | None:
         impasse, belief = trigger.entry, HELD.of(view)
-        goal, lookouts = view.get(impasse.value.goal), _list_lookouts(view, impasse.value.goal)
+        goal, lookouts = view.get(impasse.value.goal), list_lookouts(view, impasse.value.goal)
         looked = len(lookouts)
         if goal is None or looked >= self._settings.plan.max_lookouts:
             return None
         planner = find_planner(view, self._settings.plan)
         for door in view.where(DoorState, lambda d: d.may_be_shut and belief.locale in d.between):
-            subgoal = _plan_door_look(view, planner, belief.value, door.value)
+            subgoal = plan_door_look(view, planner, belief.value, door.value)
             if subgoal is not None:
                 return Case(impasse, goal, door, subgoal)
         for obstacle in self._list_in_order(view, impasse.value, goal.value, belief, looked):
@@ -106,16 +105,3 @@ class LookoutPlanner(RobotKnowledgeSource):
         rest = [o.value for o in find_obstacles(view) if o not in without]
         planner = SubgoalPlanner(robot, self._settings.plan, rest)
         return not planner.explain_unfit(goal.destination) and find_way_to_goal(planner, belief, goal) is not None
-
-
-def _plan_door_look(view: View, planner: SubgoalPlanner, belief: Hypothesis, door: DoorState) -> Subgoal | None:
-    (frame,) = find_frames(view, {belief.locale})
-    doorway = next((d for d in frame.value.doorways if d.name == door.door), None)
-    seen_from = [np.array([picture.x_m, picture.y_m]) for picture in (*door.views, door.last)]
-    return None if doorway is None else planner.plan_door_look(belief, doorway, seen_from)
-
-
-def _list_lookouts(view: View, goal: str) -> Floats:
-    """Where the robot went to look again at what left no way to a goal, each time: (n, 2) [m, world]."""
-    closed = view.where(Impasse, lambda impasse: impasse.goal == goal and not impasse.is_open)
-    return np.array([entry.value.lookout for entry in closed]).reshape(-1, 2)

@@ -41,7 +41,7 @@ NOT_NEEDED = {
     "detour_finder", "lookout_planner", "belief_checker", "view_updater", "probe_photographer", "panorama_builder",
     "localizer", "prober", "pose_adopter", "goal_renewer", "landmark_chooser",
     "floor_changer", "travel_breaker", "refiner", "rival_weigher", "lens_monitor", "correction_monitor", "sense_judge",
-    "wheels_calibrator", "surveyor"}
+    "wheels_calibrator", "surveyor", "bumper_monitor", "exposure_monitor"}
 """Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
 the move, ride in elevators, find what is before the camera or in the way, take up what somebody tells, learn of the
 camera, doubt a sense, or refine what passes through more than one room."""
@@ -49,15 +49,12 @@ camera, doubt a sense, or refine what passes through more than one room."""
 
 @pytest.mark.parametrize("missing", NAMES)
 def test_without_any_one_of_them_the_outcome_is_clear(short_stage: Stage, missing: str) -> None:
-    refusals: list[str] = []
-
     def sources(settings: Settings) -> Sequence[KnowledgeSource]:
         return [ks for ks in knowledge_sources(settings) if ks.name != missing]
 
-    result = run_mission(short_stage, 3, sources=sources, sinks=[lambda d: refusals.append(d.refused)])
+    result = run_mission(short_stage, 3, sources=sources)
     assert result.outcome in {"reached", "lost", "blocked", "failed"}
     assert result.reason
-    assert not any(refusals)
     if missing not in NOT_NEEDED:
         assert result.outcome != "reached"
 

@@ -15,10 +15,12 @@ LAST_EVIDENCE = 64
 
 RivalKind = Literal[
     "chance", "thing", "jamb", "leaf", "wall", "dirt", "still camera", "late pictures", "lens", "focal length",
-    "mounting", "wheels", "turns", "odometry", "elsewhere", "mover",
+    "mounting", "wheels", "turns", "odometry", "bumper", "lamp", "cover", "exposure",
+    "elsewhere", "mover",
 ]
 SENSES: frozenset[RivalKind] = frozenset({
-    "dirt", "still camera", "late pictures", "lens", "focal length", "mounting", "wheels", "turns", "odometry"})
+    "dirt", "still camera", "late pictures", "lens", "focal length", "mounting", "wheels", "turns", "odometry",
+    "bumper", "cover", "exposure"})
 """Rivals by which not the building or the belief is wrong, but a sense is."""
 
 MISLEADING: frozenset[RivalKind] = frozenset({"still camera", "late pictures", "lens"})
@@ -30,7 +32,9 @@ TOLD_BY: Mapping[RivalKind, str] = {
     "still camera": "a picture after a turn", "late pictures": "a picture after a turn, and one long after it",
     "lens": "edges near the rim of the picture", "focal length": "the same edges from nearer and from further away",
     "mounting": "looks at near floor and far walls", "wheels": "another way between two sure places",
-    "odometry": "motions of other lengths", "elsewhere": "what can be seen from here alone",
+    "odometry": "motions of other lengths", "bumper": "a free motion", "lamp": "a picture in another room",
+    "cover": "a picture in another room", "exposure": "a picture in another room",
+    "elsewhere": "what can be seen from here alone",
     "mover": "the same look a second later",
 }
 """What would tell a rival from the others."""

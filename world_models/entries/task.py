@@ -357,7 +357,7 @@ class Impasse:
         kind: how the mission would end: blocked, lost, failed or stopped.
         reason: in words.
         goal: id of the goal to which no way leads; "" where it is no matter of a way.
-        behind: ids of the obstacles that leave none.
+        behind: ids of the obstacles that leave none, or of the door that may be shut.
         is_open: whether nobody has seen a way on.
         lookout: where the robot goes to look again at what leaves no way [m, world]; (): nowhere.
     """

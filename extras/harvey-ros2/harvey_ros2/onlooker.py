@@ -19,6 +19,7 @@ from blackboard import Decision, Effect, Post, Revise, Scheduler
 from harvey.agent import Agent, build_agent
 from harvey.errors import BadInput
 from harvey.runner.ports import STANDS_STILL, StillCamera
+from harvey.runner.result import Refusals
 from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.wiring import KNOWLEDGE_SOURCES
 from harvey_ros2.picture_lag import PictureLag
@@ -118,6 +119,7 @@ class Onlooker:
         pictures: how many were checked; certified: how many of them vouched for the place; protection_m: how far off
             the place may be after each of these.
         heard_s: when something last came of it, be it of use or not [s, of the run].
+        refusals: what was refused: after such a run nobody knows what it has missed.
     """
 
     def __init__(
@@ -135,7 +137,9 @@ class Onlooker:
         self._files = None if out is None else RunDirectory(out)
         self._recorder = RunRecorder(self._files, head, self._agent.world, self._agent.robot)
         port = self._recorder.record_port(WorldPort(self._agent.store))
-        self.scheduler: Scheduler = self._agent.scheduler(ports=(port,), sinks=(*self._recorder.sinks, self._hear))
+        self.refusals = Refusals()
+        self.scheduler: Scheduler = self._agent.scheduler(
+            ports=(port,), sinks=(*self._recorder.sinks, self.refusals, self._hear))
         tell_robot(self.scheduler, self._agent.robot)
         self.scheduler.post([Post(head.task())], "user")
         self._settle()
@@ -157,6 +161,8 @@ class Onlooker:
         """Whether it knows where the robot is, by certificates, and that in words."""
         if self.is_lost:
             return False, "lost"
+        if refused := self.refusals.told():
+            return False, f"it does not know where it is: {'; '.join(refused)}"
         if self.messages.unsure:
             return False, f"it does not know where it is: {self.messages.unsure}"
         if not self.certified:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from argparse import Namespace
 from collections.abc import Iterator
 from itertools import pairwise
@@ -21,6 +22,7 @@ from harvey_ros2.follow_command import build_robot, follow_film
 from harvey_ros2.messages import message_types
 from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
 from harvey_ros2.run_messages import RunMessages, TimedMessage
+from knowledge_sources.senses.lens_monitor import LensMonitor
 from sim.faults.built_in_faults import Kidnap
 from world_models.files.toml.camera_file import camera_text
 from world_models.files.toml.mission import ROOT, named_file
@@ -81,6 +83,23 @@ def test_carried_off_it_is_lost_within_three_seconds_and_nothing_is_certain(tmp_
     assert check_poses(told, truth, truth[0][0]) > 10
     said = [(item.time_s, item.message.status[0].message) for item in told if item.topic == "/diagnostics"]
     assert any(message.startswith("lost") and 0.0 < time_s - jump_s < 3.0 for time_s, message in said)
+
+
+def test_a_source_that_raises_is_said_and_then_nothing_is_sure(
+    film: tuple[Path, Path, Truth], tmp_path: Path, may_refuse: None, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def break_down(*_: object) -> None:
+        raise ValueError("broken")
+
+    few = tmp_path / "pictures"
+    few.mkdir()
+    for picture in sorted(film[0].iterdir())[:4]:
+        (few / picture.name).write_bytes(picture.read_bytes())
+    monkeypatch.setattr(LensMonitor, "bind", break_down)
+    assert main(["follow", str(few), "--rate", str(HZ), "--world", "research_center", "--calibration", str(film[1]),
+                 "--start", START, "--out", str(tmp_path / "run")]) == 1
+    assert re.search(r"does not know where it is: .* raised ValueError: broken \(\d+ times\)", capsys.readouterr().out)
 
 
 def follow(pictures: Path, calibration: Path, until_s: float = math.inf) -> list[TimedMessage]:

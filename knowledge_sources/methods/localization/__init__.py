@@ -15,7 +15,6 @@ Which of these poses is it, and what to look at next?
 * :mod:`none_of_these`: a place against being at none of those that are searched.
 * :mod:`global_localization`: all of the above: found, look again, or ambiguous.
 * :mod:`place_odds`: the prior odds of where it was told to be, or was tracked to.
-* :mod:`place_protection`: how far off the place that was found may be although nothing says so.
 
 Could a known pose be another one that looks the same?
 
@@ -37,10 +36,9 @@ from knowledge_sources.methods.localization.place_odds import (
     LOST_AGAIN_ODDS, MAX_ALIKE_LOG_RATIO, MIN_P_SURE, P_STATED, StatedPlace, compute_prior, weigh_alias_odds,
     weigh_prior,
 )
-from knowledge_sources.methods.localization.place_protection import protect_place
 from knowledge_sources.methods.localization.place_search import (
     MAX_FAR_PROBES, MAX_FLOOR_DIFFERENCE_M, MAX_ROOMS, Search, describe, find_far_action, find_odds_used,
-    list_rooms, prefer_reachable, search,
+    list_rooms, prefer_reachable, protect_place, search,
 )
 from knowledge_sources.methods.localization.pose_candidates import DISTINCT, are_distinct, get_visibility_map
 from knowledge_sources.methods.localization.refinement import ALIKE_LOG_NOISE, compute_pose_likelihood

@@ -29,10 +29,12 @@ from knowledge_sources.methods.localization.next_view import (
     normalize_log_likelihoods,
 )
 from knowledge_sources.methods.localization.place_odds import StatedPlace
-from knowledge_sources.methods.localization.pose_candidates import are_distinct
-from knowledge_sources.methods.localization.views import CameraView
+from knowledge_sources.methods.localization.pose_candidates import DISTINCT, are_distinct
+from knowledge_sources.methods.localization.refinement import list_pairs, refine_view_motions
+from knowledge_sources.methods.localization.views import CameraView, align_headings
+from knowledge_sources.methods.pose import Rests, compute_protection
 from world_models.building.building import Building
-from world_models.entries import PlaceOdds
+from world_models.entries import PlaceOdds, Protection, count_sigmas
 from world_models.frame_building import FrameBuilding
 from world_models.frames import Pose2
 from world_models.robot import RobotModel
@@ -200,3 +202,29 @@ def describe(result: LocalizationResult, *, is_far: bool, looks: int = 0) -> str
     if is_far:
         return f"perhaps {places}, which look alike from here; on the way to a view that tells: {probe}"
     return f"perhaps {places}; {probe} tells most" if places else f"no place bears it out; {probe} shows something new"
+
+
+def protect_place(
+    robot: RobotModel, looks: Sequence[CameraView], pose: Pose2, covariance: Floats, camera_covariance: Floats,
+    model_m: float = 0.0,
+) -> Protection:
+    """The protection level of a place (world) with its covariance (3, 3), by all lines that agree, in all looks.
+
+    Nothing was believed before of a robot that is lost: where a line is left out, and no other tells, its place is
+    known no better than candidates are apart. Motions between the looks are taken as they were refined with the place.
+    ``camera_covariance``: (7, 7) of what is believed of the camera. ``model_m``: deviation of the model.
+    """
+    views = refine_view_motions(robot, align_headings(looks, robot.camera, robot.mount.camera_from_robot), pose,
+                                covariance)
+    lines, segments, names, seen_from = list[Floats](), list[Floats](), list[str](), list[Pose2]()
+    for view in views:
+        found = list_pairs(robot, view, view.pose_then(pose))
+        lines.append(found.lines_world)
+        segments.append(found.segments_px)
+        names += found.names
+        seen_from += [view.pose_then(pose)] * len(found.names)
+    (apart_m, apart_rad), sigmas = DISTINCT, 2.0 * count_sigmas(1)  # where something is false, twice is taken
+    nothing = np.diag(np.square(np.array([apart_m, apart_m, apart_rad]) / sigmas))
+    return compute_protection(pose, covariance, Rests(
+        np.concatenate(lines), np.concatenate(segments), names, robot.camera, robot.mount,
+        np.zeros(len(camera_covariance)), pose, nothing, nothing, camera_covariance, seen_from, model_m))

@@ -18,6 +18,7 @@ from harvey.testing import HALL, HOUSE, STUDY, house, plain_robot
 from knowledge_sources.methods.floor import Lookout, find_floor
 from knowledge_sources.reads import SEEN_MARGIN_M, FloorAhead, find_robot, floor_ahead
 from knowledge_sources.reads.floor_ahead import (
+    LOOK_BEFORE_M,
     LOOK_FROM_M,
     MAX_DRIVEN_GAP_M,
     PUT_DOWN_FREE_M,
@@ -27,7 +28,18 @@ from knowledge_sources.reads.floor_ahead import (
 from knowledge_sources.settings import DEFAULT
 from perfect_eye import scan_floor
 from world_models.building.locales import EXTRA_KIND
-from world_models.entries import FreeFloor, Place, PlaceSearch, Subgoal
+from world_models.entries import (
+    DoorPicture,
+    DoorState,
+    FreeFloor,
+    Hypothesis,
+    Impasse,
+    Leg,
+    MotorCommand,
+    Place,
+    PlaceSearch,
+    Subgoal,
+)
 from world_models.entries.floor import FloorSense
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
@@ -207,3 +219,31 @@ def test_what_the_file_lacks_stands_on_floor_that_is_asked_after_and_what_it_has
     for thing in things:
         middle = shapely.Polygon(thing.footprint_world).centroid
         assert asked.contains(middle) == (thing.kind == EXTRA_KIND)
+
+
+@pytest.mark.parametrize(("log_odds", "touched_s", "stops"), [
+    (0.5, None, True), (-0.5, None, False), (0.5, 9.0, False)])
+def test_before_a_door_that_may_be_shut_it_stops_for_a_picture_then_to_look_from_elsewhere_and_then_goes_on(
+    log_odds: float, touched_s: float | None, stops: bool
+) -> None:
+    bench = Bench(ROBOT)
+    bench.sketch()
+    (door,) = house().doorways_of(HALL)
+    inward, middle = -door.outward_from(HALL), door.threshold_of(HALL).mean(axis=0)
+    picture = DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), 0.0, 0.0, 0.0, 4.5, "a leaf")
+    state = bench.put(DoorState(
+        door.name, door.between, "unknown", 0.6, log_odds, 1, picture, 1.0, touched_s=touched_s))
+
+    def go(gap_m: float) -> MotorCommand | None:
+        at = Pose2(*(middle + (ROBOT.radius_m + gap_m) * inward), math.atan2(*(-inward)[::-1]))
+        belief = bench.put(Hypothesis.of_world(house(), HALL, at, np.diag([1e-6] * 3), "milestone"))
+        floor = shapely.Point(at.position).buffer(4.0)
+        bench.put(scan_floor(floor, at, HALL, near_m=0.05, forward_m=0.0, half_rad=1.5))
+        leg = Leg("PlanSketch-1", 0, at.x_m, at.y_m, *(middle - 0.3 * inward), 0.1)
+        return FloorAhead(bench.view, leg, belief, DEFAULT).keep_to_seen(MotorCommand(0.0, 1.0))[1]
+
+    far, near = go(1.0), go(LOOK_BEFORE_M)
+    assert far is not None and (near is None) == stops
+    assert (ROBOT.actuator.reach * far.move_m < 1.0 - LOOK_BEFORE_M + 0.06) == stops
+    bench.put(Impasse("blocked", "it may be shut", behind=(state.id,), is_open=False))
+    assert (go(1.0) == far) and (again := go(LOOK_BEFORE_M)) is not None and again.move_m > LOOK_BEFORE_M

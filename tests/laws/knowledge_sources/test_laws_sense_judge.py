@@ -28,7 +28,7 @@ def test_it_doubts_once_and_ends_only_where_no_doubt_is_left(
     if open_at is not None:
         bench.doubt(open_at)
     found = bench.put(differ(kind, p))
-    acts = p >= SURE and kind in MISLEADING
+    acts = p >= SURE and kind in WRONG and (kind in MISLEADING or p >= 1.0 - RISK)
     effects = bench.ask(sense_judge, found) if acts else ()
     ends, doubts = made(effects, Impasse), made(effects, Discrepancy)
     assert bool(ends) == (acts and p >= 1.0 - RISK)

@@ -88,6 +88,7 @@ VALUES: Mapping[type[Any], list[Any]] = {
     BodyFault: vary(BodyFault("base", "", "", "MotorCommand-1", 1.0), what=(
         "link lost", "stopped", "base refuses", STOP_KEY)),
     CameraPicture: vary(CameraPicture(b"", 0, 0.0), purpose=("track", "milestone", "probe", "")),
+    Contact: [Contact(by, 0.0, 0.1, 1.0) for by in ("bumper", "stall")],
     Certificate: vary(CERTIFICATE, verdict=get_args(MilestoneVerdict), p_false=(0.001, 0.03, 0.031, 0.5)),
     Difference: [differ(*case) for case in product((MODEL, "camera", "hall/obstacle-1"), (
         *sorted(SENSES), "wall", "thing"), (SURE_P - 1e-6, SURE_P, 1.0))],
@@ -139,6 +140,7 @@ MOVED: Row = (Hypothesis, AGAIN, is_held)
 WATCHES: Mapping[str, list[Row]] = {
     "alias_monitor": [(Certificate, NEW, is_verified)],
     "belief_checker": [DOUBTS, MOVED, (Milestone, AGAIN, is_judged)],
+    "bumper_monitor": [(Contact, NEW, lambda felt: felt.by == "bumper"), (MotionReport, NEW, always)],
     "camera_calibrator": [(Certificate, NEW, is_verified)],
     "correction_monitor": [(Certificate, NEW, lambda c: c.verdict != "refuted" and c.p_false <= 0.03)],
     "correlator_tracker": [(CameraPicture, NEW, lambda f: f.purpose == "track")],
@@ -150,6 +152,7 @@ WATCHES: Mapping[str, list[Row]] = {
     "door_toucher": [MOVED],
     "door_watcher": [(CameraPicture, NEW, lambda f: f.purpose == "track"), (Milestone, AGAIN, is_verified)],
     "elevator_rider": [(PlanSketch, EITHER, is_carried_out), (BodyFault, AGAIN, always)],
+    "exposure_monitor": [(Segments, NEW, always)],
     "fault_handler": [
         (BodyFault, NEW, always), (BodyFault, AGAIN, lambda f: f.what in ("stopped", "base refuses")),
         (Contact, NEW, always), (Recovery, AGAIN, lambda r: r.status != "asked"),
@@ -194,7 +197,8 @@ WATCHES: Mapping[str, list[Row]] = {
     "range_watcher": [(Ranges, NEW, always)],
     "refiner": [(PlanSketch, EITHER, lambda s: is_carried_out(s) and s.at == 0)],
     "rival_weigher": [(Evidence, NEW, always)],
-    "sense_judge": [(Difference, EITHER, lambda d: d.rivals[0].p >= SURE_P and d.rivals[0].kind in MISLEADING)],
+    "sense_judge": [(Difference, EITHER, lambda d: d.rivals[0].p >= SURE_P and (
+        d.rivals[0].kind in {*MISLEADING, "bumper"}))],
     "shut_door_explainer": [(Milestone, AGAIN, lambda m: m.status in ("refuted", "not testable"))],
     "sketch_advancer": [(Leg, AGAIN, lambda leg: leg.status == "arrived"),
                         (PlanSketch, AGAIN, lambda s: s.status == "done" and s.path != ())],

@@ -72,7 +72,7 @@ def entry(name: str, value: object, cycle: int, request: str) -> Any:
 def board(contacts: list[Any], reports: list[Any]) -> Any:
     """A view of a board with these contacts and motion reports."""
     return SimpleNamespace(
-        latest=lambda kind: contacts[-1] if contacts else None,
+        latest=lambda kind, *_: contacts[-1] if contacts and kind is Contact else None,
         where=lambda kind, which: [c for c in contacts if which(c.value)],
         since=lambda kind, cycle: [r for r in reports if r.cycle >= cycle])
 

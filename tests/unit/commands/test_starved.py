@@ -1,4 +1,4 @@
-"""A knowledge source of another package that seldom gets its turn is told of at the end of a run."""
+"""A knowledge source that seldom gets its turn, or is refused, is told of at the end of a run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import harvey
-from harvey.campaign.summary import format_result
+from harvey.campaign.summary import format_result, format_results
 from harvey.runner.result import MIN_WOKEN
 from logs.explain.story import tell_run
 from logs.run_directory import RunDirectory
@@ -46,10 +46,18 @@ class Keen(Onlooker):
     priority = 1.0
 
 
+class Meddler(Keen):
+    """Writes what it may not, at the first belief."""
+
+    def act(self, view: harvey.View, case: Any) -> Iterable[harvey.Effect]:
+        if case.entry.revision < 2:
+            yield harvey.Retract(case.entry, (case.entry,))
+
+
 @pytest.fixture(scope="module")
-def driven(tmp_path_factory: pytest.TempPathFactory) -> tuple[harvey.MissionResult, RunDirectory]:
+def driven(may_refuse: None, tmp_path_factory: pytest.TempPathFactory) -> tuple[harvey.MissionResult, RunDirectory]:
     run = RunDirectory(tmp_path_factory.mktemp("starved") / "run")
-    return harvey.run("forty-foot-hallway", seed=0, out=run.path, knowledge_sources=[Onlooker, Keen]), run
+    return harvey.run("forty-foot-hallway", seed=0, out=run.path, knowledge_sources=[Onlooker, Keen, Meddler]), run
 
 
 def test_who_starves_is_told_at_the_end(driven: tuple[harvey.MissionResult, RunDirectory]) -> None:
@@ -62,9 +70,16 @@ def test_who_starves_is_told_at_the_end(driven: tuple[harvey.MissionResult, RunD
     assert any(one.text.startswith("Onlooker acted ") for one in story.sections[-1].steps)
 
 
+def test_what_was_refused_is_told_at_the_end(driven: tuple[harvey.MissionResult, RunDirectory]) -> None:
+    (told,) = driven[0].refused
+    assert told == "meddler was refused: meddler may not write Hypothesis (2 times)"
+    assert f"  refused       {told}\n" in format_result(driven[0], None)
+    assert f"seed 0: {told}" in format_results(driven[:1])
+
+
 def test_what_decisions_yields_is_exported(driven: tuple[harvey.MissionResult, RunDirectory]) -> None:
     result, run = driven
-    decisions = list(harvey.open_run(run.path, knowledge_sources=[Onlooker, Keen]).decisions())
+    decisions = list(harvey.open_run(run.path, knowledge_sources=[Onlooker, Keen, Meddler]).decisions())
     assert all(isinstance(decision, harvey.DecisionRecord) for decision in decisions)
     woken = [one for decision in decisions for one in decision.activated if one.source == "onlooker"]
     acted = [decision for decision in decisions if decision.chosen and decision.chosen.source == "onlooker"]
