@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from enum import Enum, IntEnum
+from functools import cache
 from math import inf, isfinite, nan
 from typing import Any, NamedTuple
 
@@ -37,19 +38,25 @@ def plain(value: Any) -> Any:
         return value
     if isinstance(value, bytes):
         return {"bytes": len(value), "sha256": hashlib.sha256(value).hexdigest()}
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        if hasattr(value, "journal_form"):
-            return plain(value.journal_form())
-        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, tuple | list):
         if set(map(type, value)) == {float} and all(map(isfinite, value)):
             return list(value)
         return [plain(v) for v in value]
+    if (names := _names_of(type(value))) is not None:
+        if hasattr(value, "journal_form"):
+            return plain(value.journal_form())
+        return {name: plain(getattr(value, name)) for name in names}
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
     if hasattr(value, "tolist"):
         return plain(value.tolist())
     raise ValueError(f"expected a value of plain data, got a {type(value).__name__}")
+
+
+@cache
+def _names_of(kind: type[Any]) -> tuple[str, ...] | None:
+    """The fields of a dataclass; None for any other type."""
+    return tuple(field.name for field in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else None
 
 
 class Decision(NamedTuple):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.faces import Face, Region, area_vector
+from world_models.building.geometry.faces import Face, Region, area_vectors
 from world_models.building.geometry.landmarks import Edges, Landmark
 
 Ints = NDArray[np.int64]
@@ -111,7 +111,7 @@ def stack_regions(regions: Sequence[Region]) -> tuple[Floats, Floats]:
     """Polygons (m, k, 3) [m], padded with their last corners, and unit normals towards the visible side (m, 3)."""
     longest = max((len(region.polygon_world) for region in regions), default=4)
     polygons = [_pad_polygon(region.polygon_world, longest) for region in regions]
-    normals = [_normalize(area_vector(region.polygon_world)) for region in regions]
+    normals = [_normalize(vector) for vector in area_vectors([region.polygon_world for region in regions])]
     return np.array(polygons, float).reshape(-1, longest, 3), np.array(normals, float).reshape(-1, 3)
 
 
