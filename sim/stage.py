@@ -7,8 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import Elevators, SimulatedBuilding
 from sim.ground_truth.table import START_AS_STATED
