@@ -30,7 +30,8 @@ def plain(value: Any) -> Any:
     """
     if isinstance(value, float):
         return value if isfinite(value) else repr(value)
-    if type(value) is str or value is None:
+    kind: Any = type(value)
+    if kind is str or value is None:
         return value
     if isinstance(value, Enum):
         return value.name.lower()
@@ -42,7 +43,7 @@ def plain(value: Any) -> Any:
         if set(map(type, value)) == {float} and all(map(isfinite, value)):
             return list(value)
         return [plain(v) for v in value]
-    if (names := _names_of(type(value))) is not None:
+    if (names := _names_of(kind)) is not None:
         if hasattr(value, "journal_form"):
             return plain(value.journal_form())
         return {name: plain(getattr(value, name)) for name in names}

@@ -129,7 +129,7 @@ def area_vectors(polygons_world: Sequence[NDArray[np.float64]]) -> NDArray[np.fl
     corners, found = np.array([len(polygon) for polygon in polygons_world]), np.empty((len(polygons_world), 3))
     for count in set(corners.tolist()):
         of = np.flatnonzero(corners == count)
-        found[of] = area_vector(np.array([polygons_world[i] for i in of]))
+        found[of] = area_vector(np.array([polygons_world[i] for i in of.tolist()]))
     return found
 
 
