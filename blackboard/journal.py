@@ -7,7 +7,6 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from enum import Enum, IntEnum
-from functools import cache
 from math import inf, isfinite, nan
 from typing import Any, NamedTuple
 
@@ -30,8 +29,7 @@ def plain(value: Any) -> Any:
     """
     if isinstance(value, float):
         return value if isfinite(value) else repr(value)
-    kind: Any = type(value)
-    if kind is str or value is None:
+    if type(value) is str or value is None:
         return value
     if isinstance(value, Enum):
         return value.name.lower()
@@ -43,21 +41,15 @@ def plain(value: Any) -> Any:
         if set(map(type, value)) == {float} and all(map(isfinite, value)):
             return list(value)
         return [plain(v) for v in value]
-    if (names := _names_of(kind)) is not None:
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
         if hasattr(value, "journal_form"):
             return plain(value.journal_form())
-        return {name: plain(getattr(value, name)) for name in names}
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if hasattr(value, "tolist"):
         return plain(value.tolist())
     raise ValueError(f"expected a value of plain data, got a {type(value).__name__}")
-
-
-@cache
-def _names_of(kind: type[Any]) -> tuple[str, ...] | None:
-    """The fields of a dataclass; None for any other type."""
-    return tuple(field.name for field in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else None
 
 
 class Decision(NamedTuple):

@@ -207,7 +207,7 @@ def find_relief(
     sweep = _Sweep(both.picture[both.grid.top:], both.earlier)
     flat = sweep.place(floor)
     away = sweep.place(nearer) - flat
-    apart = _measure_apart(away)
+    apart = np.maximum(np.abs(away[..., 0]), np.abs(away[..., 1]))  # faster than along an axis
     gains = np.where(sweep.is_in(flat), apart / (1.0 / PARTS[1] - 1.0), 0.0).astype(np.float32)
     lying = reduce(np.maximum, (sweep.compare(_shifted(floor, near)) for near in np.array(NEAR_SHIFTS)))
     standing, parts = np.full(sweep.shape, -1.0, np.float32), np.ones(sweep.shape, np.float32)
@@ -245,11 +245,6 @@ def find_relief(
     is_mirrored = (kinds == FLAT) & (lying - on_floor >= MIN_LEAD)
     parts = np.where(kinds == STANDING, parts, np.where(is_mirrored, depths, np.float32(1.0)))
     return Relief(kinds, parts, gains)
-
-
-def _measure_apart(away: NDArray[np.float32]) -> Grey:
-    """(rows, columns) the larger part of vectors (rows, columns, 2); faster than along an axis."""
-    return np.maximum(np.abs(away[..., 0]), np.abs(away[..., 1]))
 
 
 def _align(both: TwoPictures, is_floor: NDArray[np.bool_], sigmas: Floats) -> TwoPictures | None:

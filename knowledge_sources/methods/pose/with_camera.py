@@ -138,13 +138,6 @@ class _Problem:
         """The unknowns that are estimated."""
         return np.append(FREE, np.arange(UNKNOWNS, UNKNOWNS + len(self.shifts)))
 
-    @cached_property
-    def _numbers(self) -> tuple[Floats, Floats]:
-        """Those of the camera and of its mounting, as :func:`measure_lines` takes them."""
-        c, m = self.camera, self.mount
-        return (np.array([c.fx, c.fy, c.cx, c.cy]),
-                np.array([m.height_m, m.forward_m, m.tilt_rad, m.roll_rad, m.yaw_rad]))
-
     def start_at(self, pose: Pose2) -> Floats:
         """The state at a pose with the prior's camera, its heading near the prior's."""
         off = math.remainder(pose.heading_rad - self.prior.heading_rad, math.tau)
@@ -162,10 +155,12 @@ class _Problem:
         """(n, 2) distances of the segments' ends from the projected infinite model lines, in deviations;
         and (n, 2, 10 + k) their derivatives, 0 by the yaw.
         """
-        moved = self.model
+        c, m, moved = self.camera, self.mount, self.model
         if len(self.shifts):
             moved = moved + np.tensordot(state[UNKNOWNS:], self.shifts, axes=1)[:, None]
-        distances, slopes = measure_lines(moved, self.segments, *self._numbers, state[:UNKNOWNS])
+        distances, slopes = measure_lines(
+            moved, self.segments, np.array([c.fx, c.fy, c.cx, c.cy]),
+            np.array([m.height_m, m.forward_m, m.tilt_rad, m.roll_rad, m.yaw_rad]), state[:UNKNOWNS])
         if len(self.shifts):  # lines go there, or the camera goes back
             x, y, z = self.shifts.T[:, :, None]  # each (n, 1, k); written out, as einsum takes eight times as long
             by_modes = slopes[..., :1] * x + slopes[..., 1:2] * y + slopes[..., HEIGHT, None] * z
