@@ -181,8 +181,7 @@ class View:
     def newest(self, index: Index[T], key: Hashable) -> Entry[T] | None:
         """The newest posting that an index files under a key, or None."""
         store = self._board._stores.get(index.kind)
-        found = () if store is None else store.having(index, key)
-        return found[-1] if found else None
+        return None if store is None else store.newest(index, key)
 
     def keys(self, index: Index[T]) -> Collection[Hashable]:
         """The keys under which an index files something now."""

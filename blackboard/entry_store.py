@@ -61,6 +61,11 @@ class EntryStore:
         found = self._filed(index).get(key, {}).values()
         return list(found) if len(found) < 2 else sorted(found, key=_number)
 
+    def newest(self, index: Index[Any], key: Hashable) -> Entry[Any] | None:
+        """The newest posting with a key, or None."""
+        found = self._filed(index).get(key, {}).values()
+        return max(found, key=_number) if len(found) > 1 else next(iter(found), None)
+
     def keys(self, index: Index[Any]) -> Collection[Hashable]:
         """The keys that some entry has."""
         return self._filed(index).keys()

@@ -37,16 +37,16 @@ def plain(value: Any) -> Any:
         return value
     if isinstance(value, bytes):
         return {"bytes": len(value), "sha256": hashlib.sha256(value).hexdigest()}
+    if isinstance(value, tuple | list):
+        if set(map(type, value)) == {float} and all(map(isfinite, value)):
+            return list(value)
+        return [plain(v) for v in value]
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         if hasattr(value, "journal_form"):
             return plain(value.journal_form())
         return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, tuple | list):
-        if set(map(type, value)) == {float} and all(map(isfinite, value)):
-            return list(value)
-        return [plain(v) for v in value]
     if hasattr(value, "tolist"):
         return plain(value.tolist())
     raise ValueError(f"expected a value of plain data, got a {type(value).__name__}")

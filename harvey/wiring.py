@@ -35,9 +35,8 @@ def _find_sources() -> Iterator[type[KnowledgeSource]]:
 
 def sources_of(module: ModuleType) -> list[type[KnowledgeSource]]:
     """The knowledge sources that a module defines, as classes or as rules."""
-    own = (type(found) if isinstance(found, KnowledgeSource) else found for found in vars(module).values())
-    return [kind for kind in own if isinstance(kind, type) and issubclass(kind, KnowledgeSource)
-            and kind.__module__ == module.__name__]
+    kinds = (found if isinstance(found, type) else type(found) for found in vars(module).values())
+    return [kind for kind in kinds if kind.__module__ == module.__name__ and issubclass(kind, KnowledgeSource)]
 
 
 KNOWLEDGE_SOURCES: tuple[type[KnowledgeSource], ...] = tuple(_find_sources())

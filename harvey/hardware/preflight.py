@@ -23,7 +23,6 @@ from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.camera import Camera, CameraDeviation, CameraMount
 from world_models.commands import parse_command
-from world_models.entries import Place
 from world_models.files.toml.camera_file import load_camera
 from world_models.files.toml.source import WorldError
 from world_models.files.world_files import load_world
@@ -150,7 +149,7 @@ class Preflight:
             return
         for fault in filter(None, (telling.find_fault(world) for telling in self._mission.told)):
             yield Check("told", fault, "name a door, a thing or a room of the world: harvey world show")
-        lost = [p for p in (origin, destination) if not _is_inside(world, p)]
+        lost = [p for p in (origin, destination) if world.locale_at(p.in_world(world).position) is None]
         if lost:
             todo = "feet, in the locale's own frame: harvey world show"
             yield Check("goal", f"{lost[0]} is not within its locale", todo)
@@ -220,10 +219,6 @@ class Preflight:
         free = shutil.disk_usage(there).free
         return Check("disk", f"{free / 1e9:.1f} GB free for {self._out}",
                      "" if free >= MIN_FREE_BYTES else f"make room: {MIN_FREE_BYTES / 1e9:.1f} GB, or another --out")
-
-
-def _is_inside(world: World, place: Place) -> bool:
-    return world.locale_at(place.in_world(world).position) is not None
 
 
 def _camera_todo(fault: CameraFault) -> str:

@@ -23,7 +23,6 @@ from knowledge_sources.settings import Settings
 from logs.records import WHAT_IF, DecisionRecord
 from world_models.building.changes import element_names
 from world_models.building.locale_frame import FrameChange, FrameRequest, LocaleFrame
-from world_models.building.world import World
 from world_models.entries import CameraPicture, CameraState, Footprint, Segments, Wheels
 from world_models.frame_store import FrameStore
 from world_models.frames import frozen
@@ -90,7 +89,7 @@ def check_removals(names: Sequence[str], store: FrameStore, sources: Sequence[st
         BadInput: the world has none of a name; near names are listed, those of knowledge sources too.
     """
     for name in names:
-        if not _is_in_its_locale(name, store) and name not in (known := _list_elements(store.world)):
+        if not _is_in_its_locale(name, store) and name not in (known := element_names(store.world.parts)):
             raise BadInput(f"--without {name}: expected {_suggest(name, sources, known)}, got {name!r}")
 
 
@@ -99,10 +98,6 @@ def _is_in_its_locale(name: str, store: FrameStore) -> bool:
     _, answered = store.answer(FrameRequest(elements=(name,)))
     locales = answered.answers[0].locales
     return any(name in element_names(store.frame(locale).parts) for locale in locales)
-
-
-def _list_elements(world: World) -> frozenset[str]:
-    return element_names(world.parts)
 
 
 def _suggest(name: str, sources: Sequence[str], elements: Set[str]) -> str:

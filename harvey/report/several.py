@@ -100,7 +100,8 @@ def build_page_of_several(missions: Sequence[MissionSummary], title: str, out: P
         "plots": "\n".join(f"<figure>{svg}<figcaption>{escape(words)}</figcaption></figure>"
                            for svg, words in draw_distributions(columns)) or "<p>No number of them differs.</p>",
         "filters": "\n".join(_filters(columns)),
-        "heads": "".join(_head(label) for label in ("mission", *(column.label for column in columns))),
+        "heads": "".join(f'<th scope="col"><button type="button">{escape(label)}</button></th>'
+                         for label in ("mission", *(column.label for column in columns))),
         "rows": "\n".join(f"<tr>{_name(mission, link)}{''.join(_cells(columns, number))}</tr>"
                           for number, (mission, link) in enumerate(zip(missions, links, strict=True))),
     }
@@ -153,10 +154,6 @@ def _filters(columns: Sequence[Field]) -> Iterator[str]:
                               for kind, often in column.kinds.items())
             yield (f'<label>{escape(column.label)} <select data-column="{number}"><option value="">all</option>'
                    f"{options}</select></label>")
-
-
-def _head(label: str) -> str:
-    return f'<th scope="col"><button type="button">{escape(label)}</button></th>'
 
 
 def _name(mission: MissionSummary, link: str | None) -> str:

@@ -74,8 +74,8 @@ class FloorWatcher(RobotKnowledgeSource):
         lit = _find_lit(view, frame.value.sim_time_s)
         seen, learnt = see_free_floor(
             robot, locale, pose, held.covariance, frame.value.jpeg,
-            [Seen(view[entry.value.frame].value.jpeg, _pose_of(entry.value), motion)
-             for entry, (motion, _) in zip(earlier, motions, strict=True)],
+            [Seen(view[then.frame].value.jpeg, Pose2(then.x_m, then.y_m, then.heading_rad), motion)
+             for then, (motion, _) in zip((entry.value for entry in earlier), motions, strict=True)],
             {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings,
             None if lit is None else lit.value.light)
         reasons = (*kept, *wheels.values(), *(known[name] for name in (locale,) if name in known),
@@ -117,10 +117,6 @@ def _is_like(kept: FloorView, pose: Pose2) -> bool:
     """Whether a picture shows hardly more than one that is kept."""
     turned_rad = abs(wrap_angle(pose.heading_rad - kept.heading_rad))
     return _measure_way_m(kept, pose) < FLOOR_VIEW_DISTANCE_M and turned_rad < FLOOR_VIEW_TURN_RAD
-
-
-def _pose_of(kept: FloorView) -> Pose2:
-    return Pose2(kept.x_m, kept.y_m, kept.heading_rad)
 
 
 def _measure_way_m(kept: FloorView, pose: Pose2) -> float:

@@ -117,10 +117,6 @@ def _find_lost(view: View) -> Entry[Discrepancy] | None:
     return open_discrepancy(view, Level.GOAL)
 
 
-def _find_plan_doubt(view: View) -> Entry[Discrepancy] | None:
-    return open_discrepancy(view, Level.PLAN)
-
-
 def _list_doubts_above(view: View) -> list[Entry[Discrepancy]]:
     return [entry for entry in open_discrepancies(view) if entry.value.level is not Level.ACTION]
 
@@ -152,7 +148,8 @@ NOT_LOST = Condition("not lost", _none_open(_find_lost), _tell_open(_find_lost, 
 NO_DOUBT_ABOVE = Condition("no doubt above", lambda view: not _list_doubts_above(view), lambda view: (
     f"{', '.join(str(entry.ref) for entry in _list_doubts_above(view))} was open"))
 DOUBTED = Condition("an unmeasured doubt", unmeasured_doubt, "none was open at the plan level")
-PLAN_DOUBT = Condition("a doubt at the plan level", _find_plan_doubt, "none was open there")
+PLAN_DOUBT = Condition(
+    "a doubt at the plan level", lambda view: open_discrepancy(view, Level.PLAN), "none was open there")
 LOST = Condition("lost", _find_lost, "nothing was open at the goal level")
 SOUND = Condition("no fault", _none_open(find_stop), _tell_open(find_stop, "not over, or nobody has said go on since"))
 MILESTONE = Condition("a milestone awaited", open_milestone, "none was")

@@ -85,6 +85,8 @@ def _cut_to_band(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _clip(polygon: NDArray[np.float64], inside: NDArray[np.float64]) -> NDArray[np.float64]:
     """Sutherland-Hodgman clipping: keep where ``inside`` (k,), linear over the polygon, is not negative."""
+    if inside.min() >= 0.0 or inside.max() < 0.0:  # as most are
+        return polygon if inside[0] >= 0.0 else polygon[:0]
     out = []
     for i in range(len(polygon)):
         j = (i + 1) % len(polygon)

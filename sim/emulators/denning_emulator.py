@@ -293,7 +293,8 @@ class DenningEmulator:
             self._send(self._token, seq, "NO", "number")
         elif self.moving:
             self._send(self._token, seq, "NO", "busy")
-        elif not (abs(turn_rad) <= MAX_TURN_RAD and 0.0 <= move_m <= MAX_MOVE_M and _is_speed(speed_m_per_s)):
+        elif not (abs(turn_rad) <= MAX_TURN_RAD and 0.0 <= move_m <= MAX_MOVE_M
+                  and (speed_m_per_s is None or 0.0 < speed_m_per_s < math.inf)):
             self._send(self._token, seq, "NO", "range")
         else:
             self._seq, self._status = seq, "run"
@@ -351,11 +352,6 @@ class DenningEmulator:
     def _send(self, token: str, seq: int, verb: str, *words: str) -> None:
         body = " ".join((token, str(seq), verb, *words)).encode("ascii")
         self._out += b"#%b*%08X\n" % (body, binascii.crc32(body))
-
-
-def _is_speed(speed_m_per_s: float | None) -> bool:
-    """Whether a speed is none, or a finite one ahead."""
-    return speed_m_per_s is None or 0.0 < speed_m_per_s < math.inf
 
 
 KIND = EmulatorKind("denning", lambda ground: DenningEmulator(ConstantSpeedMotion(ground)),

@@ -41,7 +41,7 @@ def shut_door(parts: tuple[LocaleGeometry, ...], doorway: Doorway, floor_m: floa
     for face in shut:
         key = face.locale, face.neighbour
         part = changed.get(key) or LocaleGeometry(*key, (), ())
-        faces = dict(part.faces) | {_number_of(face): face}
+        faces = dict(part.faces) | {-1 - zlib.crc32(face.name.encode()): face}
         changed[key] = replace(part, faces=tuple(sorted(faces.items())))
     return tuple(changed.values())
 
@@ -64,10 +64,6 @@ def _build_shut_face(doorway: Doorway, locale: str, floor_m: float) -> Face:
     top_m = floor_m + doorway.height_m
     corners = [(*left, floor_m), (*right, floor_m), (*right, top_m), (*left, top_m)]
     return build_barrier(f"{locale}/{doorway.name}/shut", locale, corners, UNKNOWN, neighbour=doorway.other(locale))
-
-
-def _number_of(face: Face) -> int:
-    return -1 - zlib.crc32(face.name.encode())
 
 
 def _without_opening(part: LocaleGeometry, doorway: Doorway) -> LocaleGeometry:
@@ -248,7 +244,8 @@ class Shift:
         return doorway if moved is doorway.thresholds_world else replace(doorway, thresholds_world=moved)
 
     def _move_part(self, part: LocaleGeometry, whole: Mapping[str, bool]) -> LocaleGeometry:
-        faces = tuple((number, self._move_face(face, whole.get(_name_thing(face.name)))) for number, face in part.faces)
+        faces = tuple((number, self._move_face(face, whole.get("/".join(face.name.split("/")[:2]))))
+                      for number, face in part.faces)  # a thing's faces are called after it
         marks = tuple((number, self._move_mark(mark, whole.get(mark.name))) for number, mark in part.landmarks)
         is_same = all(new is old for (_, new), (_, old) in zip((*faces, *marks), (*part.faces, *part.landmarks),
                                                                strict=True))
@@ -269,8 +266,3 @@ class Shift:
     def _move_mark(self, mark: Landmark, whole: bool | None) -> Landmark:
         lines = self.move(mark.lines_world, whole)
         return mark if lines is mark.lines_world else replace(mark, edges=replace(mark.edges, lines_world=lines))
-
-
-def _name_thing(face: str) -> str:
-    """The name that a thing has whose face is called so."""
-    return "/".join(face.split("/")[:2])

@@ -97,7 +97,8 @@ def _overlapping(world: World, watched: Watched) -> Iterator[Finding]:
     outlines = [world.outline(name) for name in watched(world.rooms, "rooms apart")]
     for i, j in _near_pairs(outlines):
         a, b = world.rooms[i], world.rooms[j]
-        if _share_height(world, a, b) and _overlap(outlines[i], outlines[j]):
+        one, other = outlines[i], outlines[j]
+        if _share_height(world, a, b) and (_reaches_into(one, other) or _reaches_into(other, one)):
             yield Finding(world.locales[b].source, f"{b}: expected a room apart from others, got one that overlaps {a}")
 
 
@@ -147,12 +148,8 @@ def _near_pairs(outlines: list[NDArray[np.float64]]) -> Iterator[tuple[int, int]
         yield from ((i, i + 1 + int(j)) for j in np.flatnonzero(meets.all(axis=1)))
 
 
-def _overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Whether two simple polygons share more than a border, by points just inside their sides and in the middle."""
-    return _reaches_into(one, other) or _reaches_into(other, one)
-
-
 def _reaches_into(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Whether points just inside the sides of a simple polygon, or in its middle, are well within another."""
     points = [_find_inner_point(one)]
     for a, b in zip(one, np.roll(one, -1, axis=0), strict=True):
         inward = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)

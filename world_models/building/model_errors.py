@@ -123,8 +123,9 @@ def find_line_errors(
         unstated_m: the deviation of what nothing is stated of.
     """
     rows: dict[str, Floats] = {}
+    modes = {mark: _find_modes(building, mark, unstated_m) for mark in dict.fromkeys(marks)}
     for i, (mark, number) in enumerate(zip(marks, line, strict=True)):
-        for name, shifts in _find_modes(building, mark, unstated_m).items():
+        for name, shifts in modes[mark].items():
             if np.any(shifts[number]):
                 rows.setdefault(name, np.zeros((len(marks), 3)))[i] = shifts[number]
     return LineErrors(tuple(rows), np.array(list(rows.values()), float).reshape(len(rows), len(marks), 3))

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from harvey_people.mover import SURE_LOG_ODDS, Mover
 from harvey_people.sightings import Sighting, is_seen_free
@@ -84,6 +83,8 @@ def _assign(movers: Sequence[Mover], seen: Sequence[Sighting]) -> dict[int, int]
     """Which sighting is whose: each mover's by its number, so that all together fit best; none beyond the gate."""
     if not movers or not seen:
         return {}
+    from scipy.optimize import linear_sum_assignment  # loaded when somebody is about: most missions see nobody
+
     far = 1e6
     costs = np.full((len(movers), len(seen)), far)
     for i, mover in enumerate(movers):

@@ -39,6 +39,8 @@ ECHO_APART_M = 0.125
 """Readings from nearer to one another hear the same once more."""
 MAX_RANGED_M = 3.0
 """Further from a reading its cones are too wide to tell of a cell."""
+MAX_WEDGE_RAD = 3.0
+"""A sight with a wider wedge is stamped all round."""
 MIN_CELLS = 3
 WINDOW_M = 0.15
 """Fewer cells than that within so much of the way hide nothing: 75 square centimetres."""
@@ -140,11 +142,10 @@ def _stamp(sight: FreeFloor) -> Stamp:
     near_m, far_m = np.array(sight.near_m), np.array(sight.far_m)
     sure_m = far_m if is_ranged else np.minimum(far_m, sight.confirmed_m or 0.0)
     reach_m = min(float(far_m.max()) + HIDDEN_M, MAX_RANGED_M if is_ranged else math.inf)
-    low = np.floor((origin - reach_m) / CELL_M).astype(int)
-    count = np.ceil((origin + reach_m) / CELL_M).astype(int) - low
+    bearings = np.unwrap(np.asarray(sight.bearings_rad)) - sight.bearings_rad[0]
+    low, count = _find_box(origin, sight.bearings_rad, reach_m, float(np.diff(bearings).max()))
     out = [(low[k] + np.arange(count[k]) + 0.5) * CELL_M - origin[k] for k in (0, 1)]
     away_m = np.hypot(out[0][:, None], out[1])
-    bearings = np.unwrap(np.asarray(sight.bearings_rad)) - sight.bearings_rad[0]
     right = np.searchsorted(bearings, np.mod(np.arctan2(out[1], out[0][:, None]) - sight.bearings_rad[0], math.tau))
     within = (right > 0) & (right < len(bearings)) & (away_m <= reach_m)
     j = np.clip(right, 1, len(bearings) - 1)
@@ -162,6 +163,18 @@ def _stamp(sight: FreeFloor) -> Stamp:
         return Stamp(low, np.zeros((0, 0), np.float32))
     (a, b), (c, d) = told.min(axis=0), told.max(axis=0) + 1
     return Stamp(low + np.array([a, b]), odds[a:c, b:d].copy())
+
+
+def _find_box(origin: Floats, bearings_rad: Sequence[float], reach_m: float, widest_rad: float) -> tuple[Ints, Ints]:
+    """The first cell, and how many in either direction, of a box round all wedges: with a camera a quarter of what is
+    round their tip.
+    """
+    ends = reach_m * np.array([[-1.0, 1.0], [-1.0, 1.0]])
+    if widest_rad < MAX_WEDGE_RAD:  # all arcs are within these corners
+        round_m = reach_m / math.cos(0.5 * widest_rad)
+        ends = round_m * np.array([[0.0, *np.cos(bearings_rad)], [0.0, *np.sin(bearings_rad)]])
+    low = np.floor((origin + np.maximum(ends.min(axis=1), -reach_m)) / CELL_M).astype(int)
+    return low, np.ceil((origin + np.minimum(ends.max(axis=1), reach_m)) / CELL_M).astype(int) - low
 
 
 class Sweep(NamedTuple):

@@ -35,6 +35,7 @@ NEARER = 0.7
 """A sight from less than this part of the distance of another is from clearly nearer."""
 MIN_COMMON_DIRECTIONS = 0.6
 """A sight without feet tells nothing new where this part of its directions is that of what is known."""
+MAX_FLOORS = 64
 REACH_M = 10.0
 """No thing is further off than this when it is seen."""
 
@@ -261,7 +262,11 @@ def find_room(world: Building, shape: shapely.Polygon, near: str) -> str:
 
 
 def find_open_floor(world: Building, locale: str, margin_m: float) -> shapely.Geometry:
-    """The floor of a room, with its open doorways, so far from its walls and from what the file has there."""
+    """The floor of a room, with its open doorways, so far from its walls and from what the file has there; cached."""
+    return world.cached("floors of rooms", MAX_FLOORS, (locale, margin_m), lambda: _open(world, locale, margin_m))
+
+
+def _open(world: Building, locale: str, margin_m: float) -> shapely.Geometry:
     openings = [shapely.MultiPoint(np.concatenate(doorway.thresholds_world)).convex_hull.buffer(0.01)
                 for doorway in world.doorways_of(locale)]
     floor = shapely.union_all([shapely.Polygon(world.outline(locale)), *openings])

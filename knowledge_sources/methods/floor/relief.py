@@ -207,17 +207,18 @@ def find_relief(
     sweep = _Sweep(both.picture[both.grid.top:], both.earlier)
     flat = sweep.place(floor)
     away = sweep.place(nearer) - flat
-    apart = _measure_apart(away)
+    apart = np.maximum(np.abs(away[..., 0]), np.abs(away[..., 1]))  # faster than along an axis
     gains = np.where(sweep.is_in(flat), apart / (1.0 / PARTS[1] - 1.0), 0.0).astype(np.float32)
     lying = reduce(np.maximum, (sweep.compare(_shifted(floor, near)) for near in np.array(NEAR_SHIFTS)))
     standing, parts = np.full(sweep.shape, -1.0, np.float32), np.ones(sweep.shape, np.float32)
     on_floor, depths = lying, np.ones(sweep.shape, np.float32)
     for depth in (*PARTS, *DEPTHS):
-        plane = both.find_map(depth)
+        too_near = gains * abs(1.0 / depth - 1.0) < MIN_APART_PX
+        plane = None if too_near.all() else both.find_map(depth)
         if plane is None:
             continue
         likeness = sweep.compare(plane)
-        likeness[gains * abs(1.0 / depth - 1.0) < MIN_APART_PX] = -1.0
+        likeness[too_near] = -1.0
         if depth > 1.0:
             depths[likeness > lying] = depth
             lying = np.maximum(lying, likeness)
@@ -244,11 +245,6 @@ def find_relief(
     is_mirrored = (kinds == FLAT) & (lying - on_floor >= MIN_LEAD)
     parts = np.where(kinds == STANDING, parts, np.where(is_mirrored, depths, np.float32(1.0)))
     return Relief(kinds, parts, gains)
-
-
-def _measure_apart(away: NDArray[np.float32]) -> Grey:
-    """(rows, columns) the larger part of vectors (rows, columns, 2); faster than along an axis."""
-    return np.maximum(np.abs(away[..., 0]), np.abs(away[..., 1]))
 
 
 def _align(both: TwoPictures, is_floor: NDArray[np.bool_], sigmas: Floats) -> TwoPictures | None:
@@ -295,8 +291,14 @@ def _align(both: TwoPictures, is_floor: NDArray[np.bool_], sigmas: Floats) -> Tw
 def _measure_contrast(grey: Grey) -> Grey:
     """Grey levels less their mean round each, in standard deviations round it."""
     mean = _blur(grey)
-    deviation = np.sqrt(np.maximum(_blur(grey * grey) - mean * mean, 0.0))
-    return np.asarray((grey - mean) / np.maximum(deviation, MIN_DEVIATION), np.float32)
+    return np.asarray((grey - mean) / np.maximum(_measure_deviation(grey, mean), MIN_DEVIATION), np.float32)
+
+
+def _measure_deviation(grey: Grey, mean: Grey) -> Grey:
+    """The standard deviation round each pixel; in place, as it is asked thirty times a picture."""
+    square = _blur(grey * grey)
+    square -= mean * mean
+    return np.asarray(np.sqrt(np.maximum(square, 0.0, out=square), out=square))
 
 
 def _changed(motion: Pose2, by: Floats) -> Pose2:
@@ -314,7 +316,7 @@ class _Sweep:
         self._now, self._earlier = now, earlier
         self.shape = now.shape
         self._mean = _blur(now)
-        self._deviation = np.sqrt(np.maximum(_blur(now * now) - self._mean**2, 0.0))
+        self._deviation = _measure_deviation(now, self._mean)
         self.tells = self._deviation >= MIN_DEVIATION
 
     def place(self, plane: Floats) -> NDArray[np.float32]:
@@ -346,10 +348,13 @@ class _Sweep:
         """(rows, columns) normalized correlation of patches; -1 where they are not in the earlier picture."""
         seen = self.warp(plane)
         mean = _blur(seen)
-        deviation = np.sqrt(np.maximum(_blur(seen * seen) - mean * mean, 0.0))
-        likeness = (_blur(self._now * seen) - self._mean * mean) / np.maximum(self._deviation * deviation, 1.0)
+        deviation = _measure_deviation(seen, mean)
+        deviation *= self._deviation
+        likeness = _blur(self._now * seen)
+        likeness -= self._mean * mean
+        likeness /= np.maximum(deviation, 1.0, out=deviation)
         likeness[mean < 0.0] = -1.0
-        return np.asarray(likeness, np.float32)
+        return likeness
 
 
 @lru_cache(maxsize=4)

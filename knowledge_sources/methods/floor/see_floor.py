@@ -307,9 +307,8 @@ def _scan(
             at = region.feet[:, 1]
             own_m[at] = np.minimum(own_m[at], grid.ranges_m[region.feet[:, 0], at] * region.parts)
             thing_m = np.minimum(thing_m, own_m)
-    stops = _first((model.kinds < 0)[::-1])
-    groups = _Groups(columns)
-    stop = groups.least(stops)
+    ends, groups = (model.kinds < 0)[::-1], _Groups(columns)
+    stop = groups.least(np.where(ends.any(axis=0), np.argmax(ends, axis=0), rows))
     lowest_m = grid.ranges_m[-1]
     near_m = groups.most(lowest_m) * max(0.0, 1.0 - MAX_HIDDEN_M / grid.camera_height_m)
     column_of = np.arange(columns)
@@ -379,11 +378,6 @@ def _measure_confirmed_m(grid: FloorGrid, relief: Relief | None) -> tuple[float,
 def _find_confirmed_part(grid: FloorGrid) -> float:
     """How far what is CONFIRMED_HEIGHT_M high is, as a part of the distance of the floor that it hides."""
     return max(0.0, 1.0 - CONFIRMED_HEIGHT_M / grid.camera_height_m)
-
-
-def _first(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """The first row of each column that is set; the number of rows where none is."""
-    return np.where(mask.any(axis=0), np.argmax(mask, axis=0), len(mask))
 
 
 def _build_thing(

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -115,7 +116,7 @@ def estimate_camera_and_pose(
     return _build_estimate(problem, state, covariance, bound)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Problem:
     """The data of one call. A state is (10 + k,): x [m], y [m], heading [rad], step of the camera's unknowns, modes.
 
@@ -132,7 +133,7 @@ class _Problem:
     prior: Pose2
     shifts: Floats
 
-    @property
+    @cached_property
     def free(self) -> Floats:
         """The unknowns that are estimated."""
         return np.append(FREE, np.arange(UNKNOWNS, UNKNOWNS + len(self.shifts)))
@@ -154,8 +155,9 @@ class _Problem:
         """(n, 2) distances of the segments' ends from the projected infinite model lines, in deviations;
         and (n, 2, 10 + k) their derivatives, 0 by the yaw.
         """
-        c, m = self.camera, self.mount
-        moved = self.model + np.tensordot(state[UNKNOWNS:], self.shifts, axes=1)[:, None]
+        c, m, moved = self.camera, self.mount, self.model
+        if len(self.shifts):
+            moved = moved + np.tensordot(state[UNKNOWNS:], self.shifts, axes=1)[:, None]
         distances, slopes = measure_lines(
             moved, self.segments, np.array([c.fx, c.fy, c.cx, c.cy]),
             np.array([m.height_m, m.forward_m, m.tilt_rad, m.roll_rad, m.yaw_rad]), state[:UNKNOWNS])

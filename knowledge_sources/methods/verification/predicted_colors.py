@@ -11,7 +11,7 @@ from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints
 from world_models.building.building import Building
-from world_models.building.geometry.faces import Finish, area_vector, expected_brightness
+from world_models.building.geometry.faces import Finish, area_vectors, expected_brightness
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.camera import NEAR_PLANE_M, Camera
 from world_models.frames import Pose, Pose2
@@ -145,7 +145,7 @@ def _build_surfaces(packet: LocaleGeometry) -> tuple[Floats, Floats, Floats]:
                if len(region.polygon_world) <= MAX_CORNERS]
     corners = np.array([[*r.polygon_world, *[r.polygon_world[-1]] * (MAX_CORNERS - len(r.polygon_world))]
                         for r in regions]).reshape(-1, MAX_CORNERS, 3)
-    normals = np.array([area_vector(region.polygon_world) for region in regions]).reshape(-1, 3)
+    normals = area_vectors([region.polygon_world for region in regions])
     normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
     light = np.array([expected_brightness(WHITE, normal) for normal in normals]).reshape(-1, 1)
     return corners, np.array([region.colour for region in regions]).reshape(-1, 3) * light, normals

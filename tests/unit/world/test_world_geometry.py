@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from world_models.building.geometry.faces import Finish, area_vector
+from world_models.building.geometry.faces import Finish, area_vector, area_vectors
 from world_models.building.geometry.outlines import convex_pieces, subtract_intervals
 from world_models.building.geometry.solids import Box, Solid, Surface
 from world_models.building.world import World
@@ -78,8 +78,9 @@ def test_left_over_pieces() -> None:
 
 def test_an_l_shaped_floor_is_cut_into_convex_pieces_of_the_same_area() -> None:
     outline = np.array([[0, 0], [5, 0], [5, 2], [3, 2], [3, 3], [0, 3]], float)
-    pieces = [outline[piece] for piece in convex_pieces(outline)]
-    areas = [float(area_vector(np.column_stack([p, np.zeros(len(p))]))[2]) for p in pieces]
+    pieces = [np.pad(outline[piece], ((0, 0), (0, 1))) for piece in convex_pieces(outline)]
+    areas = area_vectors(pieces)[:, 2]
+    assert np.array_equal(areas, [area_vector(piece)[2] for piece in pieces])
     assert len(pieces) == 4 and min(areas) > 0
     assert np.isclose(np.sum(areas), 13.0)
 
@@ -117,7 +118,7 @@ def test_nothing_fights_for_the_same_depth(building: World) -> None:
     """Regions that face the same way and overlap lie in one plane only within one face, else 4 mm apart."""
     regions = [(face.name, region) for face in building.faces for region in face.front]
     polygons = [region.polygon_world for _, region in regions]
-    normals = np.array([area_vector(p) / np.linalg.norm(area_vector(p)) for p in polygons])
+    normals = np.array([vector / np.linalg.norm(vector) for vector in area_vectors(polygons)])
     low, high = (np.array([getattr(p, end)(axis=0) for p in polygons]) for end in ("min", "max"))
     fights = []
     for i in range(len(regions)):

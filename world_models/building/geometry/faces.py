@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -118,10 +118,19 @@ class Face:
 
 
 def area_vector(polygon_world: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3,) normal of a flat polygon (k, 3) times its area (Newell's method) [m^2]."""
-    x, y, z = (polygon_world - polygon_world[0]).T
-    u, v, w = (np.concatenate([c[1:], c[:1]]) for c in (x, y, z))
-    return np.asarray(0.5 * np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1).sum(axis=0))
+    """(..., 3) normal of a flat polygon (..., k, 3) times its area (Newell's method) [m^2]."""
+    x, y, z = np.moveaxis(polygon_world - polygon_world[..., :1, :], -1, 0)
+    u, v, w = (np.concatenate([c[..., 1:], c[..., :1]], axis=-1) for c in (x, y, z))
+    return np.asarray(0.5 * np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1).sum(axis=-2))
+
+
+def area_vectors(polygons_world: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """(m, 3) :func:`area_vector` of each polygon (k, 3): of all with as many corners at once."""
+    corners, found = np.array([len(polygon) for polygon in polygons_world]), np.empty((len(polygons_world), 3))
+    for count in set(corners.tolist()):
+        of = np.flatnonzero(corners == count)
+        found[of] = area_vector(np.array([polygons_world[i] for i in of.tolist()]))
+    return found
 
 
 def build_barrier(name: str, locale: str, polygon_world: Any, finish: Finish, **more: Any) -> Face:

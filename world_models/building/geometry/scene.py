@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world_models.building.geometry.faces import Face, Region, area_vector
+from world_models.building.geometry.faces import Face, Region, area_vectors
 from world_models.building.geometry.landmarks import Edges, Landmark
 
 Ints = NDArray[np.int64]
@@ -111,7 +111,7 @@ def stack_regions(regions: Sequence[Region]) -> tuple[Floats, Floats]:
     """Polygons (m, k, 3) [m], padded with their last corners, and unit normals towards the visible side (m, 3)."""
     longest = max((len(region.polygon_world) for region in regions), default=4)
     polygons = [_pad_polygon(region.polygon_world, longest) for region in regions]
-    normals = [_normalize(area_vector(region.polygon_world)) for region in regions]
+    normals = [area / np.linalg.norm(area) for area in area_vectors([region.polygon_world for region in regions])]
     return np.array(polygons, float).reshape(-1, longest, 3), np.array(normals, float).reshape(-1, 3)
 
 
@@ -192,7 +192,3 @@ def _pad_polygon(polygon: Floats, length: int) -> Floats:
 def _count_up(counts: Sequence[int]) -> Ints:
     """0 .. count - 1 for each count, one after the other."""
     return np.concatenate([np.zeros(0, np.int64), *(np.arange(count) for count in counts)])
-
-
-def _normalize(vector: Floats) -> Floats:
-    return vector / np.linalg.norm(vector)

@@ -96,7 +96,8 @@ class DoorSide:
         """The closed leaf with its panel."""
         polygon = self.wall.rectangle(self.x, (0.0, self.opening.top_m), -self.depth_m)
         face = build_barrier(f"{self.name}/leaf", self.wall.locale, polygon, self.spec.leaf, parent=self.wall.face_name)
-        middle = self.wall.world_from_wall @ _translation((self.x[0] + self.x[1]) / 2, -self.depth_m)
+        to_middle = np.array([(self.x[0] + self.x[1]) / 2, -self.depth_m, 0.0])
+        middle = self.wall.world_from_wall @ Pose(np.eye(3), to_middle)
         surface = surface_from_polygon(polygon, self.spec.leaf)
         panel = Solid(f"{self.name}/panel", self.spec.panel, middle, (*self._surfaces, surface))
         (a, b), h, y, frame = self.x, self.opening.top_m, -self.depth_m, self.casing
@@ -191,7 +192,3 @@ def build_closed_door(side: DoorSide) -> tuple[list[Face], Landmark]:
     faces = [*side.casing_faces(), *side.lining(side.depth_m), side.threshold(side.floor), *leaf_faces]
     edges = Edges.concatenate([side.casing_edges(), side.lining_edges(side.depth_m, side.floor), leaf_edges])
     return faces, Landmark(side.name, side.wall.locale, "door", edges, source=side.spec.source)
-
-
-def _translation(x: float, y: float) -> Pose:
-    return Pose(np.eye(3), np.array([x, y, 0.0]))

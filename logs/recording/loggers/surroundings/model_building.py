@@ -16,7 +16,7 @@ from logs.recording.logger import BACKGROUND, Logger, Moment, Panel
 from logs.recording.palette import DOOR, NAME, REJECTED, TRUE, Colour
 from logs.recording.paths import BELIEVED_TRAIL, BUILDING, DOORWAYS, NAMES, TRUE_ADDED, TRUE_GONE, TRUE_TRAIL, WORLD
 from logs.recording.stream import RecordingStream, viewable
-from world_models.building.geometry.faces import LAMP, Face, Region, area_vector
+from world_models.building.geometry.faces import LAMP, Face, Region, area_vectors
 from world_models.building.geometry.scene import stack_regions
 from world_models.building.locales import Doorway
 from world_models.building.world import World
@@ -183,7 +183,7 @@ def _log_outlines(stream: RecordingStream, path: str, regions: Sequence[Region],
 def _log_surfaces(stream: RecordingStream, regions: Sequence[Region]) -> None:
     corners = [len(region.polygon_world) for region in regions]
     faces = [triangles(1, k) + start for k, start in zip(corners, np.cumsum([0, *corners])[:-1], strict=True)]
-    normals = np.array([area_vector(region.polygon_world) for region in regions]).reshape(-1, 3)
+    normals = area_vectors([region.polygon_world for region in regions])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     colours = light_colours(np.array([region.colour for region in regions]).reshape(-1, 3), normals)
     stream.log(
