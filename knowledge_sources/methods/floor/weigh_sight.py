@@ -343,7 +343,7 @@ def miss(
         explanations = explain_free(math.log1p(free_part * (odds - 1.0)), sight.know(known.name))
         told = sight.tell(known.name, f"{free_part:.0%} of the floor where it may stand is seen free", explanations)
         return Sighted(None, judge_thing(known, sight.weigh(told), settings), told)
-    left = take_free(likeliest, free)
+    left = take_free(likeliest, shapely.buffer(free, -known.sigma_m))  # as far as its edges are known
     footprint = list_corners(left)
     if not footprint or measure_change_m(known.footprint, footprint) < settings.min_footprint_change_m:
         return None
