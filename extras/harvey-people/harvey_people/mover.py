@@ -16,6 +16,8 @@ LAST_MOVERS = 24
 """The newest that stay on the board."""
 SURE_LOG_ODDS = math.log(19.0)
 """What moves so surely is acted on: 95 %."""
+SLOW_M_PER_S = 0.2
+"""Who is slower stands, as far as anybody can tell."""
 MoverStatus = Literal["may move", "moves", "gone"]
 
 
@@ -58,6 +60,11 @@ class Mover:
     def is_moving(self) -> bool:
         """Whether it surely moves."""
         return self.status == "moves"
+
+    @property
+    def is_walking(self) -> bool:
+        """Whether it rather walks than stands."""
+        return self.status != "gone" and self.log_odds > 0.0 and self.speed_m_per_s >= SLOW_M_PER_S
 
     @property
     def state(self) -> NDArray[np.float64]:
