@@ -66,3 +66,26 @@ class PeoplePass:
         how = f"{words.metres(abs(self.aside_m))} to the {side} of its line" if self.aside_m else "on its line"
         return (f"passes {self.who}, {how}, at most {self.speed_m_per_s:.2f} m/s: {self.where}; risk of a touch"
                 f" straight on {self.p:.1%}")
+
+
+@inference(keep=8)
+@dataclass(frozen=True, slots=True)
+class PeopleHide:
+    """What people hide of a milestone in a picture.
+
+    Attributes:
+        milestone: id of its entry.
+        hidden, of: of so many expected lines so many are hidden.
+        who: names of the movers that stand before them.
+        at_s: when, by the body's clock.
+    """
+
+    milestone: str
+    hidden: int
+    of: int
+    who: tuple[str, ...]
+    at_s: float
+
+    def sentence(self) -> str:
+        return (f"{self.hidden} of {words.count(self.of, 'line')} of {self.milestone} are hidden by"
+                f" {', '.join(self.who)} at {self.at_s:.1f} s, and are not asked of the picture")

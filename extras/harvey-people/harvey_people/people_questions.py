@@ -39,9 +39,9 @@ def _tell_waits(asked: Asked) -> Iterator[Story]:
 def _tell_people(asked: Asked) -> Iterator[Story]:
     """Each of those for whom it waited, or whom it passed."""
     met: dict[str, list[Record]] = {}
-    for kind in (PeopleWait, PeoplePass):
-        for record in asked.history.of_kind(kind, until=asked.at):
-            met.setdefault(record.value.who, []).append(record)
+    waited: list[Record] = [*asked.history.of_kind(PeopleWait, until=asked.at)]
+    for record in (*waited, *asked.history.of_kind(PeoplePass, until=asked.at)):
+        met.setdefault(record.value.who, []).append(record)
     if not met:
         yield Story("Nobody was in the way.")
     for who, records in sorted(met.items(), key=lambda one: one[1][-1].cycle)[-MOST:]:
