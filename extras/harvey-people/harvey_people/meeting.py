@@ -50,14 +50,19 @@ class Move(NamedTuple):
         places: (n, 2) where it is [m, world]; velocities: (n, 2) of these moments [m/s].
         at_s: (n,) these, STEP_S apart, by the body's clock.
         reach_m: from how far it touches a person's middle.
-        speed_m_per_s: by which harm is counted.
+        speed_m_per_s: by which harm is counted; None: each touch counts, also one that the robot's motion is none of.
     """
 
     places: Floats
     velocities: Floats
     at_s: Floats
     reach_m: float
-    speed_m_per_s: float
+    speed_m_per_s: float | None
+
+    def weigh(self, velocities: Floats, ways: Floats) -> Floats:
+        """(..., k) how much a touch counts in directions (k, 2), at velocities (..., 2)."""
+        own = np.maximum(0.0, velocities @ ways.T)
+        return np.ones_like(own) if self.speed_m_per_s is None else np.asarray((own / self.speed_m_per_s) ** 2)
 
 
 def plan_straight(here: Pose2, heading_rad: float, move_m: float, radius_m: float, speed_m_per_s: float,
@@ -71,16 +76,17 @@ def plan_straight(here: Pose2, heading_rad: float, move_m: float, radius_m: floa
 
 
 def plan_beside(here: Pose2, aim: tuple[float, float], along_rad: float, lasts_s: float, radius_m: float,
-                speed_m_per_s: float, begins_s: float) -> Move:
-    """A move to a point, and from there on along a line, for so long; the end of a plan, of which each move is new."""
+                speed_m_per_s: float, now_s: float, begins_s: float) -> Move:
+    """To stand until a moment, then a move to a point, and on along a line; for so long. Each touch on it counts."""
     to_aim, along = np.array(aim) - here.position, np.array([math.cos(along_rad), math.sin(along_rad)])
     away_m = float(np.hypot(*to_aim))
-    rolls_m = np.arange(0.0, lasts_s + STEP_S, STEP_S) * speed_m_per_s
+    at_s = np.arange(0.0, lasts_s + STEP_S, STEP_S)
+    rolls_m = np.maximum(0.0, at_s - (begins_s - now_s)) * speed_m_per_s
     first, then = np.minimum(rolls_m, away_m), np.maximum(0.0, rolls_m - away_m)
     ahead = to_aim / max(away_m, 1e-9)
     places = here.position + first[:, None] * ahead + then[:, None] * along
-    velocities = speed_m_per_s * np.where((rolls_m < away_m)[:, None], ahead, along)
-    return Move(places, velocities, begins_s + rolls_m / speed_m_per_s, radius_m + PERSON_M, speed_m_per_s)
+    velocities = np.where((rolls_m < away_m)[:, None], ahead, along) * speed_m_per_s * (rolls_m > 0.0)[:, None]
+    return Move(places, velocities, now_s + at_s, radius_m + PERSON_M, None)
 
 
 def measure_meeting(movers: Sequence[Mover], move: Move) -> tuple[Clearance, tuple[float, ...]]:
@@ -107,14 +113,14 @@ def _meets(mover: Mover, move: Move) -> Floats:
     mean, covariance, velocity, follows = foresee(mover, move.at_s - mover.at_s)
     inside, ways = _disc(move.reach_m)
     area = np.hypot(*inside.T) * (move.reach_m / 5.0) * (math.tau / ROUND)
-    harm = (np.maximum(0.0, ways @ move.velocities[0]) / move.speed_m_per_s) ** 2
+    harm = move.weigh(move.velocities[0], ways)
     there = float(_density(mean[:1], covariance[:1], move.places[:1, None] + inside)[0] @ (area * harm))
     angles = (np.arange(ROUND) + 0.5) / ROUND * math.tau
     out = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     rim = move.places[:, None] + move.reach_m * out
     moving = velocity + np.einsum("nij,nkj->nki", follows, rim - mean[:, None])
     nearer = np.maximum(0.0, np.einsum("nki,ki->nk", move.velocities[:, None] - moving, out))
-    harms = (np.maximum(0.0, move.velocities @ out.T) / move.speed_m_per_s) ** 2
+    harms = move.weigh(move.velocities, out)
     each = np.sum(_density(mean, covariance, rim) * nearer * harms, axis=1) * move.reach_m * math.tau / ROUND
     came = np.concatenate([[0.0], np.cumsum(0.5 * (each[1:] + each[:-1]) * STEP_S)])
     return np.asarray(to_probability(mover.log_odds) * np.minimum(1.0, there + came))

@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from harvey_people.meeting import PERSON_M, THINKS_S, find_speed, measure_meeting, plan_beside
+import numpy as np
+
+from harvey_people.meeting import PERSON_M, THINKS_S, find_speed, measure_meeting, plan_beside, plan_straight
 from harvey_people.mover import Mover
 from knowledge_sources.methods.motion import MAX_HEADING_ERROR_RAD, find_aim, measure_progress
 from world_models.actuator import ActuatorModel
@@ -23,9 +25,9 @@ MIN_TO_GO_M = 1.5
 TURN_S, TURN_RAD_PER_S = 0.4, math.radians(45.0)
 """What a turn on the spot takes, besides the turn."""
 WINDOW_S = 4.0
-"""By how much of the next seconds it can use it chooses its side."""
+"""Its side is the one on which it can use most of the next seconds, and is touched least."""
 MET_P = 0.1
-"""What is likelier to be met in them is worth another side."""
+"""Where a touch in them is likelier another side may be better."""
 GAIN = 1.1
 """From the side that it is on it goes to another one where that is better by this factor."""
 UNMOVED_LOG_ODDS = -6.0
@@ -41,7 +43,7 @@ class Way(NamedTuple):
         leg: the leg, or one beside it.
         aside_m: how far that is to the left of it.
         speed_m_per_s: what is borne on it; 0: it waits.
-        who: the mover that is likeliest met straight on, at full speed; p: how probably, as harm counts it.
+        who: the mover that is likeliest touched straight on, at full speed; p: how probably.
     """
 
     leg: Leg
@@ -60,9 +62,10 @@ def shift(leg: Leg, aside_m: float) -> Leg:
 
 def find_way(movers: Sequence[Mover], leg: Leg, here: Pose2, radius_m: float, actuator: ActuatorModel, now_s: float,
              borne: float, has_room: Callable[[tuple[float, float]], bool], kept_m: float = 0.0) -> Way | None:
-    """The way that brings the robot on fastest of those on which the expected harm is borne.
+    """The way on which somebody who is ahead is touched least, of those on which the expected harm is borne.
 
-    None where nobody is met straight on at full speed: nothing is to be decided then.
+    So it makes way to one who comes, in time. None where straight on at full speed is the best: nothing is to be
+    decided then.
 
     Args:
         borne: speed at which a certain touch is borne [m/s].
@@ -74,6 +77,8 @@ def find_way(movers: Sequence[Mover], leg: Leg, here: Pose2, radius_m: float, ac
     if not near:
         return None
     along_rad = math.atan2(leg.y1_m - leg.y0_m, leg.x1_m - leg.x0_m)
+    along = np.array([math.cos(along_rad), math.sin(along_rad)])
+    ahead = [mover for mover in near if (mover.state[:2] - here.position) @ along > 0.0]
     found: list[tuple[float, Leg, float, float]] = []
     p, who = 0.0, near[0]
     for aside_m in ASIDES_M if measure_progress(leg, here)[0] > MIN_TO_GO_M else (0.0,):
@@ -86,16 +91,20 @@ def find_way(movers: Sequence[Mover], leg: Leg, here: Pose2, radius_m: float, ac
         turns_s = TURN_S + turn_rad / TURN_RAD_PER_S if turn_rad > MAX_HEADING_ERROR_RAD else 0.0
         begins_s = now_s + THINKS_S + turns_s
         speed = find_speed(near, here, heading_rad, radius_m, actuator, begins_s, borne)
-        lasts_s = WINDOW_S - turns_s
-        beyond = plan_beside(here, aim, along_rad, lasts_s, radius_m, actuator.speed_m_per_s, begins_s)
-        met, each = measure_meeting(near, beyond)
+        beyond = plan_beside(here, aim, along_rad, WINDOW_S, radius_m, actuator.speed_m_per_s, now_s, begins_s)
+        met, each = measure_meeting(ahead, beyond) if ahead else (None, ())
         if not aside_m:
-            p, who = max(zip(each, near, strict=True), key=lambda one: one[0])
-            if speed >= actuator.speed_m_per_s and p <= MET_P:
+            _, harms = measure_meeting(near, plan_straight(
+                here, heading_rad, LOOKAHEAD_M, radius_m, actuator.speed_m_per_s, begins_s))
+            p, who = max(zip((*harms, *each), (*near, *ahead), strict=True), key=lambda one: one[0])
+            if speed >= actuator.speed_m_per_s and (met is None or met.p[-1] <= MET_P):
                 return None
-        gain = lasts_s / WINDOW_S * (1.0 - float(met.p[-1])) * (speed > 0.0)
+        free = 1.0 if met is None else 1.0 - float(met.p[-1])
+        gain = max(0.0, WINDOW_S - turns_s) / WINDOW_S * free * (speed > 0.0)
         found.append((gain, beside, aside_m, speed))
     best = next((one for one in found if one[2] == kept_m), found[0])
     other = max(found, key=lambda one: one[0])
-    gain, beside, aside_m, speed = other if other[0] > GAIN * best[0] else best
+    _, beside, aside_m, speed = other if other[0] > GAIN * best[0] else best
+    if not aside_m and speed >= actuator.speed_m_per_s:
+        return None
     return Way(beside, aside_m, speed, who, p)

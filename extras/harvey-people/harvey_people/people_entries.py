@@ -19,7 +19,7 @@ class PeopleWait:
     Attributes:
         leg: id of the leg that waits.
         who: the name of the mover that is likeliest met; where: that one in words.
-        p: how probably the next move would meet that one, as harm counts it.
+        p: how probably the robot would touch that one straight on.
         since_s, at_s: when it began, and when it was looked last, by the body's clock.
         looks: pictures that were taken meanwhile.
         status: waiting, over (it goes on), or in vain: the way stayed blocked too long.

@@ -59,7 +59,7 @@ def test_a_mission_with_people_is_charged_and_its_body_does_the_same_again(tmp_p
     assert redraw(RunDirectory(tmp_path / "run")) == among.decisions
     history = Timeline(RunDirectory(tmp_path / "run").journal)
     who, why = (list(answers(history, question)) for question in ("who was in the way?", "why did it wait there?"))
-    assert who and all("mover-" in story.head for story in who), "each of them is told by name"
-    assert all(story.head == "It waited for nobody." or "it waited for mover-" in story.head for story in why)
+    assert who and all("mover-" in story.headline for story in who), "each of them is told by name"
+    assert all(story.headline == "It waited for nobody." or "it waited for mover-" in story.headline for story in why)
     told = [step.text for story in who for step in story.steps]
     assert any("risk of a touch" in text for text in told)

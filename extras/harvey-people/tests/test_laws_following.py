@@ -158,6 +158,14 @@ def test_what_is_met_is_as_probable_as_drawn_people_touch_it(speed: float) -> No
     assert meet(mover, move_m=1.2 * speed, speed=speed)[-1] == pytest.approx(float(harm.mean()), abs=0.05)
 
 
+@pytest.mark.parametrize("heading_rad", [0.5, 2.0, math.pi])
+def test_a_way_is_found_however_the_robot_faces(heading_rad: float) -> None:
+    near = walker(1.3, 0.0, -1.0, 0.0)
+    args = LEG, Pose2(0.0, 0.0, heading_rad), 0.35, WALKS, near.at_s, BORNE, lambda aim: True
+    way = find_way([near], *args)
+    assert way is None or way.speed_m_per_s <= WALKS.speed_m_per_s
+
+
 @given(st.floats(0.5, 3.0), st.floats(-1.5, 1.5), st.floats(-1.4, 1.4), st.floats(-1.4, 1.4))
 def test_what_is_chosen_is_borne_and_to_nobody_it_does_nothing(x: float, y: float, vx: float, vy: float) -> None:
     """The expected harm of the way that is chosen is no greater than that of a certain touch at the speed borne."""
