@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from harvey_people.mover import SLOW_M_PER_S, SURE_LOG_ODDS, Mover
+from harvey_people.mover import MIN_SIGHTS, SLOW_M_PER_S, SURE_LOG_ODDS, Mover
 from harvey_people.sightings import Sighting, is_seen_free
 from world_models.entries import FreeFloor
 
@@ -32,8 +32,8 @@ MOST_LOG_RATIO = 3.9
 MOST_LOG_ODDS, LEAST_LOG_ODDS = 8.0, -7.0
 MAX_UNSEEN_S = 3.0
 """Whom nobody has seen for so long may be anywhere."""
-MIN_SIGHTS, MAX_PASSING_S = 3, 0.8
-"""What was seen less often is an echo gone astray, where it is not seen again soon."""
+MAX_PASSING_S = 0.8
+"""What was seen less than MIN_SIGHTS times is gone where it is not seen again so soon."""
 LEAST_STOOD_M = 0.1
 """Where something stands is known no better: from elsewhere another side of it is seen."""
 
@@ -153,7 +153,8 @@ def _miss(mover: Mover, floor: FreeFloor) -> Mover:
 def _judge(mover: Mover) -> Mover:
     """What surely moves, and is not so slow that it stands."""
     moves = mover.log_odds >= SURE_LOG_ODDS and mover.speed_m_per_s >= SLOW_M_PER_S
-    return replace(mover, status="moves" if moves else "may move")
+    walks = mover.log_odds > 0.0 and mover.speed_m_per_s >= SLOW_M_PER_S and mover.seen_s == mover.at_s
+    return replace(mover, status="moves" if moves else "may move", walked_s=mover.at_s if walks else mover.walked_s)
 
 
 def _mean_sigma(sighting: Sighting) -> float:

@@ -8,8 +8,8 @@ from dataclasses import replace
 import shapely
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
-from harvey_people.following import MIN_SIGHTS, follow
-from harvey_people.mover import SLOW_M_PER_S, Mover
+from harvey_people.following import follow
+from harvey_people.mover import Mover
 from harvey_people.sightings import Sighting, list_sightings
 from knowledge_sources.methods.belief import to_probability
 from knowledge_sources.priority import Priority
@@ -68,6 +68,5 @@ def weigh(thing: FloorThing, people: Iterable[Mover]) -> FloorThing:
 
 
 def find_p_walks(mover: Mover) -> float:
-    """How probably somebody walks; of one who has come to stand it is nothing."""
-    may_walk = mover.sights < MIN_SIGHTS or mover.speed_m_per_s >= SLOW_M_PER_S
-    return float(to_probability(mover.log_odds)) if may_walk else 0.0
+    """How probably somebody walks, or will go on; at least a half while it is not known to stand."""
+    return max(0.5, float(to_probability(mover.log_odds))) if mover.may_go_on else 0.0

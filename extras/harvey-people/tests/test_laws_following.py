@@ -75,6 +75,14 @@ def test_sightings_are_given_to_whom_they_fit_in_any_order(order: list[int]) -> 
     assert far[1].mover.name == "mover-4"
 
 
+def test_what_stands_becomes_a_thing_and_who_pauses_does_not() -> None:
+    """What was never seen to walk is known to stand after two seconds; who walked is so after four more."""
+    assert watch([(1.0, 0.0)]).may_go_on and not watch([(1.0, 0.0)] * 6).may_go_on
+    ways = [(0.4 * k, 0.0) for k in range(8)]
+    assert watch([*ways, *[ways[-1]] * 6]).may_go_on
+    assert not watch([*ways, *[ways[-1]] * 24]).may_go_on
+
+
 def test_who_is_not_seen_is_gone_where_the_floor_is_seen_free_or_after_a_while() -> None:
     known = watch([(1.0, 0.0)])
     hidden, free = floor(0.2), floor(0.2, (3.0,) * 121, ("sight",) * 121)
