@@ -36,7 +36,7 @@ NEVER_MET_M = 8.0
 """Who is further away is not met by the next move."""
 
 
-class Way(NamedTuple):
+class PassingWay(NamedTuple):
     """How the next move leads.
 
     Attributes:
@@ -61,7 +61,7 @@ def shift(leg: Leg, aside_m: float) -> Leg:
 
 
 def find_way(movers: Sequence[Mover], leg: Leg, here: Pose2, radius_m: float, actuator: ActuatorModel, now_s: float,
-             borne: float, has_room: Callable[[tuple[float, float]], bool], kept_m: float = 0.0) -> Way | None:
+             borne: float, has_room: Callable[[tuple[float, float]], bool], kept_m: float = 0.0) -> PassingWay | None:
     """The way on which somebody who is ahead is touched least, of those on which the expected harm is borne.
 
     So it makes way to one who comes, in time. None where straight on at full speed is the best: nothing is to be
@@ -107,4 +107,4 @@ def find_way(movers: Sequence[Mover], leg: Leg, here: Pose2, radius_m: float, ac
     _, beside, aside_m, speed = other if other[0] > GAIN * best[0] else best
     if not aside_m and speed >= actuator.speed_m_per_s:
         return None
-    return Way(beside, aside_m, speed, who, p)
+    return PassingWay(beside, aside_m, speed, who, p)

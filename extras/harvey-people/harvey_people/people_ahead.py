@@ -10,7 +10,7 @@ import shapely
 
 from blackboard import Entry, View
 from harvey_people.mover import Mover
-from harvey_people.passing import UNMOVED_LOG_ODDS, Way, find_way
+from harvey_people.passing import UNMOVED_LOG_ODDS, PassingWay, find_way
 from harvey_people.people_entries import PeoplePass, PeopleWait
 from knowledge_sources.methods.floor import find_floor
 from knowledge_sources.reads import HELD, Belief, current_leg
@@ -23,13 +23,13 @@ WALL_GAP_M = 0.1
 """So much room the robot keeps from walls, when it goes aside."""
 
 
-class Ahead(NamedTuple):
+class PeopleAhead(NamedTuple):
     """A leg under way, who may be in it, and how the next move leads; ``way`` is None where nobody is met."""
 
     leg: Entry[Leg]
     belief: Belief
     movers: tuple[Entry[Mover], ...]
-    way: Way | None
+    way: PassingWay | None
     now_s: float
 
     @property
@@ -38,7 +38,7 @@ class Ahead(NamedTuple):
         return (self.leg, *self.movers)
 
 
-def look_ahead(view: View, settings: Settings, seen_as: Callable[[Mover], Mover] | None = None) -> Ahead | None:
+def look_ahead(view: View, settings: Settings, seen_as: Callable[[Mover], Mover] | None = None) -> PeopleAhead | None:
     """What is ahead of the leg under way; None where none is.
 
     Args:
@@ -54,7 +54,7 @@ def look_ahead(view: View, settings: Settings, seen_as: Callable[[Mover], Mover]
     people = [*(known if seen_as is None else map(seen_as, known)), *map(as_standing, filter(_is_no_thing, known))]
     before = view.latest(PeoplePass, lambda one: one.leg == leg.id)
     kept_m = 0.0 if before is None else before.value.aside_m
-    return Ahead(leg, belief, movers, _find_way(people, leg.value, belief, now_s, settings, kept_m), now_s)
+    return PeopleAhead(leg, belief, movers, _find_way(people, leg.value, belief, now_s, settings, kept_m), now_s)
 
 
 def as_standing(mover: Mover) -> Mover:
@@ -71,7 +71,7 @@ def _is_no_thing(mover: Mover) -> bool:
 
 
 def _find_way(people: Sequence[Mover], leg: Leg, belief: Belief, now_s: float, settings: Settings, kept_m: float,
-              ) -> Way | None:
+              ) -> PassingWay | None:
     robot, here = belief.robot, belief.pose
 
     def has_room(aim: tuple[float, float]) -> bool:

@@ -21,8 +21,8 @@ from harvey.agent import build_agent
 from harvey.simulation.simulated_run import SimulatedRun, build_head
 from harvey.wiring import knowledge_sources
 from harvey_people.mover import Mover
-from harvey_people.passing import Way
-from harvey_people.people_ahead import Ahead, look_ahead
+from harvey_people.passing import PassingWay
+from harvey_people.people_ahead import PeopleAhead, look_ahead
 from harvey_people.people_passer import PeoplePasser
 from harvey_people.people_waiter import PeopleWaiter
 from harvey_people.peopled import STEP_S, People, people_in
@@ -89,21 +89,21 @@ class PeopleEnd(GoalEnd):
 class StillPasser(PeoplePasser):
     """Takes people as standing where they were seen last."""
 
-    def look(self, view: View) -> Ahead | None:
+    def look(self, view: View) -> PeopleAhead | None:
         return look_ahead(view, self._settings, stand)
 
 
 class StillWaiter(PeopleWaiter):
     """Takes people as standing where they were seen last."""
 
-    def look(self, view: View) -> Ahead | None:
+    def look(self, view: View) -> PeopleAhead | None:
         return look_ahead(view, self._settings, stand)
 
 
 class StopWaiter(PeopleWaiter):
     """Waits while anybody who may walk is ahead and near; goes to no side, and no slower."""
 
-    def look(self, view: View) -> Ahead | None:
+    def look(self, view: View) -> PeopleAhead | None:
         ahead = look_ahead(view, self._settings)
         if ahead is None:
             return None
@@ -111,7 +111,7 @@ class StopWaiter(PeopleWaiter):
         for mover in (entry.value for entry in ahead.movers if entry.value.is_walking):
             x, y = (here.inverse().apply((mover.x_m, mover.y_m)))
             if 0.0 < x < ahead.belief.robot.radius_m + STOPS_M and abs(y) < 2.0 * ahead.belief.robot.radius_m:
-                return ahead._replace(way=Way(ahead.leg.value, 0.0, 0.0, mover, 1.0))
+                return ahead._replace(way=PassingWay(ahead.leg.value, 0.0, 0.0, mover, 1.0))
         return ahead._replace(way=None)
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from harvey_people.mover import Mover
 from harvey_people.passing import LOOKAHEAD_M
-from harvey_people.people_ahead import Ahead, find_wait, look_ahead
+from harvey_people.people_ahead import PeopleAhead, find_wait, look_ahead
 from harvey_people.people_entries import PeoplePass, PeopleWait
 from knowledge_sources.methods.motion import count_increment, find_aim, plan_increment, update_leg
 from knowledge_sources.priority import Priority
@@ -25,7 +25,7 @@ MIN_MOVE_M = 0.05
 class Case(NamedTuple):
     """What is ahead, the increment that leads by it, and the floor that this rests on."""
 
-    ahead: Ahead
+    ahead: PeopleAhead
     command: MotorCommand
     floor: tuple[Entry[Any], ...]
 
@@ -64,7 +64,7 @@ class PeoplePasser(RobotKnowledgeSource):
             return None
         return Case(ahead, _slow(free, way.speed_m_per_s), floor.because)
 
-    def look(self, view: View) -> Ahead | None:
+    def look(self, view: View) -> PeopleAhead | None:
         """What is ahead of the leg."""
         return look_ahead(view, self._settings)
 

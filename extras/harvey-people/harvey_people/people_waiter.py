@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from harvey_people.mover import Mover
-from harvey_people.people_ahead import Ahead, find_wait, look_ahead
+from harvey_people.people_ahead import PeopleAhead, find_wait, look_ahead
 from harvey_people.people_entries import PeopleWait
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import GOAL, GOING_ON, HELD, NO_MILESTONE, SOUND, STANDING, SURE
@@ -21,7 +21,7 @@ MAX_WAIT_S = 60.0  # a way on which people are for so long is blocked
 class Case(NamedTuple):
     """What is ahead, whether it is waited for, and the wait so far."""
 
-    ahead: Ahead
+    ahead: PeopleAhead
     is_met: bool
     wait: Entry[PeopleWait] | None
 
@@ -45,7 +45,7 @@ class PeopleWaiter(RobotKnowledgeSource):
         is_met = ahead.way is not None and ahead.way.speed_m_per_s == 0.0
         return Case(ahead, is_met, wait) if is_met or wait is not None else None
 
-    def look(self, view: View) -> Ahead | None:
+    def look(self, view: View) -> PeopleAhead | None:
         """What is ahead of the leg."""
         return look_ahead(view, self._settings)
 
