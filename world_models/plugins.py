@@ -16,6 +16,7 @@
 ``harvey.renderers``          a ``sim.render.lights.LitRenderers``, named ``lit``
 ``harvey.experiments``        the ``run`` of an experiment, by its name
 ``harvey.importers``          by the ending of its files, a ``harvey_buildings.Importer``
+``harvey.questions``          of a run's ``Timeline`` the questions that it answers, as ``logs.explain``'s ``KNOWN``
 ``harvey.run_exporters``      a ``logs.export.RunExporter``, named ``mcap``
 ``harvey.exporters``          a ``harvey_buildings.exporters.Exporter``
 ============================  ==========================================================================
@@ -33,6 +34,7 @@ SOURCES_GROUP, GUESTS_GROUP = "harvey.knowledge_sources", "harvey.guest_sources"
 """The groups of knowledge sources: named in ``run.json`` and put round the board, so it is said once, here."""
 
 COMMANDS_GROUP, PAGES_GROUP, CAMERAS_GROUP = "harvey.commands", "harvey.pages", "harvey.cameras"
+QUESTIONS_GROUP = "harvey.questions"
 WORKERS_GROUP, RENDERERS_GROUP, RUN_EXPORTERS_GROUP = "harvey.workers", "harvey.renderers", "harvey.run_exporters"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
     COMMANDS_GROUP: {**dict.fromkeys(("calibrate", "survey", "world.ledger"), "harvey-survey"),

@@ -43,7 +43,7 @@ class ObstructionFinder(RobotKnowledgeSource):
     level, priority = Level.PLAN, Priority.REVISE
     on = (
         Watch(Segments, (Posted,), lambda s: s.milestone != ""),
-        Watch(FreeFloor, (Posted,), lambda f: f.sense == "camera" and bool(f.things)),
+        Watch(FreeFloor, (Posted, Revised), lambda f: f.sense == "camera" and bool(f.things)),
         Watch(Obstruction, (Posted, Revised)),
     )
     writes = (Obstruction, Obstacle, Evidence)

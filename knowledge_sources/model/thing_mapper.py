@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 import shapely
 
-from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
 from knowledge_sources.methods.floor import Sight, is_telling, may_be_there
 from knowledge_sources.methods.floor.rivals_on_floor import tell_of_door
 from knowledge_sources.methods.floor.weigh_sight import weigh_sight
@@ -28,7 +28,7 @@ class ThingMapper(RobotKnowledgeSource):
     """
 
     level, priority = Level.ACTION, Priority.REVISE
-    on = (Watch(FreeFloor, (Posted,)),)
+    on = (Watch(FreeFloor, (Posted, Revised)),)
     needs = (HELD, SURE)
     writes = (Obstacle, Evidence)
 

@@ -8,7 +8,7 @@ a part of the run's story.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from difflib import SequenceMatcher
 from itertools import groupby
 from typing import Any, NamedTuple
@@ -40,6 +40,7 @@ from world_models.entries import (
     Subgoal,
     UserReport,
 )
+from world_models.plugins import QUESTIONS_GROUP, load_plugins
 from world_models.words import count, metres
 
 MOST_STORIES = 6
@@ -63,6 +64,8 @@ class Asked(NamedTuple):
 
 
 Answer = Callable[[Asked], Iterator[Story]]
+Known = tuple[frozenset[str], Answer]
+"""Which words in a question mean it, and what answers."""
 
 
 def is_question(text: str) -> bool:
@@ -79,18 +82,25 @@ def answers(
     """
     asked = set(re.findall(r"[^\W_](?:[\w'/.-]*\w)?", question.lower()))
     asked |= {"gap"} if "not" in asked and asked & ROUND else set()  # why not round it: there was no room
-    meant = next((answer for words, answer in KNOWN.values() if words & asked), None)
-    foreign = _find_foreign(history, asked)
+    known = {**_find_more(history), **KNOWN}
+    meant = next((answer for words, answer in known.values() if words & asked), None)
+    foreign = _find_foreign(history, asked.difference(*(words for words, _ in known.values())))
     if meant is None or foreign:
         heard = f"; {', '.join(map(repr, foreign[:3]))} said nothing" if foreign else ""
-        near = sorted(KNOWN, key=lambda one: -_likeness(asked, question, one))[:NEAREST]
+        near = sorted(known, key=lambda one: -_likeness(asked & known[one][0], question, one))[:NEAREST]
         raise BadInput(f"expected a question as {', '.join(map(repr, near))}, got {question!r}{heard}")
     return meant(Asked(history, question.lower(), at, run))
 
 
+def _find_more(history: Timeline) -> Mapping[str, Known]:
+    """The questions that other packages answer of this run."""
+    return {name: known for find in load_plugins(QUESTIONS_GROUP, Callable).values()  # type: ignore[arg-type]
+            for name, known in find(history).items()}
+
+
 def _find_foreign(history: Timeline, asked: set[str]) -> list[str]:
-    """The words of a question that are neither of those that are understood nor names of the building."""
-    left = sorted(asked.difference(FILLERS, *(words for words, _ in KNOWN.values())))
+    """Of words of a question that nobody understands those that are no names of the building."""
+    left = sorted(asked.difference(FILLERS))
     if not left:
         return []
     names = {record.value.locale for record in history.frames()}
@@ -105,9 +115,9 @@ def _find_passages(history: Timeline) -> set[str]:
     return {part.passage for record in history.of_kind(PlanSketch) for part in record.value.subgoals} - {""}
 
 
-def _likeness(asked: set[str], question: str, known: str) -> float:
+def _likeness(decide: Set[str], question: str, known: str) -> float:
     """How near a question is to one that is known: by the words that decide, then by its letters."""
-    return len(asked & KNOWN[known][0]) + SequenceMatcher(None, question.lower(), known).ratio()
+    return len(decide) + SequenceMatcher(None, question.lower(), known).ratio()
 
 
 def _entries(
@@ -352,7 +362,7 @@ def _words(text: str) -> frozenset[str]:
 
 
 ROUND, ROUND_GAP = _words("round around past by through between"), _words("gap fit squeeze")
-KNOWN: Mapping[str, tuple[frozenset[str], Answer]] = {
+KNOWN: Mapping[str, Known] = {
     "what went wrong?": (_words("wrong trouble happened"), _part(TROUBLE, "Up to then nothing had gone wrong.")),
     "what was done to it?": (_words("done simulator bumped carried"),
                              _part(HAPPENED, "Up to then the simulator did nothing to it.")),
@@ -387,8 +397,7 @@ KNOWN: Mapping[str, tuple[frozenset[str], Answer]] = {
         _words("think thought believe believed know known"),
         lambda asked: tell_thoughts(asked.run, asked.history, asked.at)),
 }
-"""A question as somebody may ask it: one of which words in a question means it, and what answers. Of several that are
-meant, the first."""
+"""A question as somebody may ask it; of several that are meant, the first."""
 QUESTIONS = tuple(KNOWN)
 FILLERS = _words(
     "a all along always and any anything anywhere are at be been before by can cannot cycle did "

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from harvey_people.mover import SURE_LOG_ODDS, Mover
+from harvey_people.mover import MIN_SIGHTS, SLOW_M_PER_S, SURE_LOG_ODDS, Mover
 from harvey_people.sightings import Sighting, is_seen_free
 from world_models.entries import FreeFloor
 
@@ -21,19 +21,20 @@ TURNS_M2_PER_S3 = 0.3
 """Spectral density of the acceleration: in a second the velocity changes by some 0.5 m/s."""
 GATE = 11.8
 """Squared distance, in standard deviations, within which a sighting may be of somebody: 99.7 % of two dimensions."""
-PRIOR_LOG_ODDS = -2.0
-"""That what is seen for the first time moves: where people are about, one in eight; the rest of it stands."""
-ANYWHERE_PER_M2 = 0.05
-"""Density of other things that may come into sight: one on 20 square metres."""
+PRIOR_LOG_ODDS = 0.0
+"""That what is seen for the first time moves: where people are about, as much walks as stands of what a model lacks."""
+ELSE_PER_M2 = 0.01
+"""Density of sightings that are of something else: one thing on 20 square metres, and one in five times what stood is
+out of sight when that comes into it."""
 MOST_LOG_RATIO = 3.9
 """One sighting says no more: one in 50 is misread."""
 MOST_LOG_ODDS, LEAST_LOG_ODDS = 8.0, -7.0
 MAX_UNSEEN_S = 3.0
 """Whom nobody has seen for so long may be anywhere."""
+MAX_PASSING_S = 0.8
+"""What was seen less than MIN_SIGHTS times is gone where it is not seen again so soon."""
 LEAST_STOOD_M = 0.1
 """Where something stands is known no better: from elsewhere another side of it is seen."""
-SLOW_M_PER_S = 0.2
-"""Who is slower stands, as far as anybody can tell."""
 
 
 class FollowStep(NamedTuple):
@@ -122,7 +123,7 @@ def _see(mover: Mover, sighting: Sighting, floor: FreeFloor) -> Mover:
     _, moves = _fit(mover.state[:2], covariance[:2, :2], sighting)
     stood = np.array([mover.stood_x_m, mover.stood_y_m])
     _, stands = _fit(stood, mover.stood_sigma_m**2 * np.eye(2), sighting)
-    ratio = moves - float(np.logaddexp(stands, math.log(ANYWHERE_PER_M2)))
+    ratio = moves - float(np.logaddexp(stands, math.log(ELSE_PER_M2)))
     odds = mover.log_odds + min(MOST_LOG_RATIO, max(-MOST_LOG_RATIO, ratio))
     odds = min(MOST_LOG_ODDS, max(LEAST_LOG_ODDS, odds))
     seen = replace(_with(mover, state, updated, floor.seen_s), seen_s=floor.seen_s, sights=mover.sights + 1,
@@ -145,14 +146,16 @@ def _settle(mover: Mover, sighting: Sighting) -> Mover:
 def _miss(mover: Mover, floor: FreeFloor) -> Mover:
     """A mover that is not seen: it is gone where its place is seen free, or where nobody has seen it for long."""
     is_free = is_seen_free(floor, mover.state[:2], min(0.5, mover.sigma_m))
-    is_gone = is_free or floor.seen_s - mover.seen_s > MAX_UNSEEN_S
+    most_s = MAX_UNSEEN_S if mover.sights >= MIN_SIGHTS else MAX_PASSING_S
+    is_gone = is_free or floor.seen_s - mover.seen_s > most_s
     return replace(mover, status="gone") if is_gone else _judge(mover)
 
 
 def _judge(mover: Mover) -> Mover:
     """What surely moves, and is not so slow that it stands."""
     moves = mover.log_odds >= SURE_LOG_ODDS and mover.speed_m_per_s >= SLOW_M_PER_S
-    return replace(mover, status="moves" if moves else "may move")
+    walks = mover.log_odds > 0.0 and mover.speed_m_per_s >= SLOW_M_PER_S and mover.seen_s == mover.at_s
+    return replace(mover, status="moves" if moves else "may move", walked_s=mover.at_s if walks else mover.walked_s)
 
 
 def _mean_sigma(sighting: Sighting) -> float:

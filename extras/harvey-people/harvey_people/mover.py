@@ -16,6 +16,12 @@ LAST_MOVERS = 24
 """The newest that stay on the board."""
 SURE_LOG_ODDS = math.log(19.0)
 """What moves so surely is acted on: 95 %."""
+SLOW_M_PER_S = 0.2
+"""Who is slower stands, as far as anybody can tell."""
+MIN_SIGHTS = 3
+"""What was seen less often may be an echo gone astray, and its velocity is not known."""
+PAUSES_S = 4.0
+"""Who walks and stops goes on within so long, or stands."""
 MoverStatus = Literal["may move", "moves", "gone"]
 
 
@@ -33,6 +39,7 @@ class Mover:
         log_odds: that it moves, against that it stands, or is something else each time.
         at_s, seen_s: the moment of all this, and of the last sight, by the body's clock.
         sights: how many.
+        walked_s: when it was last seen to walk; None: never.
         evidence: the last sight, in words.
         status: may move, moves (surely), or gone: out of sight, or its place is seen free.
     """
@@ -53,11 +60,25 @@ class Mover:
     sights: int
     evidence: str = ""
     status: MoverStatus = "may move"
+    walked_s: float | None = None
 
     @property
     def is_moving(self) -> bool:
         """Whether it surely moves."""
         return self.status == "moves"
+
+    @property
+    def is_walking(self) -> bool:
+        """Whether it rather walks than stands."""
+        return self.status != "gone" and self.log_odds > 0.0 and self.speed_m_per_s >= SLOW_M_PER_S
+
+    @property
+    def may_go_on(self) -> bool:
+        """Whether it may walk, or go on: it is not known to stand, or has walked until just now."""
+        if self.walked_s is not None and self.at_s - self.walked_s <= PAUSES_S:
+            return True
+        return self.log_odds > -SURE_LOG_ODDS and (self.sights < MIN_SIGHTS or self.speed_m_per_s >= SLOW_M_PER_S
+                                                   or self.log_odds < SURE_LOG_ODDS)
 
     @property
     def state(self) -> NDArray[np.float64]:

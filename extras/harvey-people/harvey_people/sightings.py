@@ -16,6 +16,8 @@ SIDE_M = 0.2
 """Only a side of it is seen: its middle is unknown to this, along each axis (half the depth and width of a person)."""
 MIN_P = 0.5
 """A thing in a picture that is less probable is no sighting."""
+APART_M = 0.5
+"""Feet in a picture that are nearer to one another are of one person."""
 MAX_REACH_M = 5.0
 """Further away a cone of the ring is wider than a way is long."""
 
@@ -40,10 +42,16 @@ def list_sightings(floor: FreeFloor) -> list[Sighting]:
 
 
 def _in_picture(floor: FreeFloor) -> Iterator[Sighting]:
+    seen: list[tuple[Floats, float]] = []
     for thing in floor.things:
-        if thing.p_thing >= MIN_P:
-            middle = np.mean(thing.footprint, axis=0)
-            yield Sighting(middle, (thing.sigma_m**2 + SIDE_M**2) * np.eye(2), "feet on the floor of a picture")
+        middle = np.mean(thing.footprint, axis=0)
+        near = next((k for k, (other, _) in enumerate(seen) if np.linalg.norm(other - middle) < APART_M), None)
+        if thing.p_thing >= MIN_P and near is None:
+            seen.append((middle, thing.sigma_m))
+        elif thing.p_thing >= MIN_P and near is not None:
+            seen[near] = 0.5 * (seen[near][0] + middle), max(seen[near][1], thing.sigma_m)
+    for middle, sigma_m in seen:
+        yield Sighting(middle, (sigma_m**2 + SIDE_M**2) * np.eye(2), "feet on the floor of a picture")
 
 
 def _in_ring(floor: FreeFloor) -> Iterator[Sighting]:

@@ -23,7 +23,7 @@ from world_models.plugins import GUESTS_GROUP, list_plugins
 from world_models.units import Bounded, bounded
 
 MOST = 20
-SOURCES = ("mover_watcher", "mover_explainer", "people_waiter")
+SOURCES = ("mover_watcher", "mover_explainer", "people_masker", "people_passer", "people_waiter")
 """The knowledge sources of the package."""
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,8 @@ PAST_M = ROBOT_RADIUS_M + 0.45
 """How far beside the robot's axis one passes it."""
 ASIDE_M_PER_S = 0.4
 """One whom the robot stops steps aside so fast."""
-NEAR_M = 1.2
-"""Nearer to the robot's rim than this, a person counts as near."""
+CLOSE_M, NEAR_M = 0.5, 1.2
+"""Nearer to the robot's rim than this, a person on the way counts as close, or near."""
 TOUCH_M = 0.01
 """Nearer than this is a touch."""
 
@@ -60,7 +61,8 @@ class Pedestrian:
         waits_until_s: stands until then.
         held_s: how long the robot has been in the way; falls again while it is not.
         news: what this person has just done to the robot, in words.
-        nearest_m, near_s: least distance from the robot's rim so far, and time within NEAR_M of it.
+        nearest_m: least distance from the robot's rim so far.
+        close_s, near_s: time on the way within CLOSE_M and NEAR_M of it.
     """
 
     figure: Figure
@@ -78,6 +80,7 @@ class Pedestrian:
     held_s: float = 0.0
     news: str = ""
     nearest_m: float = math.inf
+    close_s: float = 0.0
     near_s: float = 0.0
 
     @staticmethod
@@ -119,7 +122,19 @@ class Pedestrian:
         if robot is None:
             return moved
         away_m = moved.pose.distance_to(robot.pose) - ROBOT_RADIUS_M
-        return replace(moved, nearest_m=min(me.nearest_m, away_m), near_s=me.near_s + duration_s * (away_m < NEAR_M))
+        counts_s = duration_s * me.is_under_way(now_s)
+        return replace(moved, nearest_m=min(me.nearest_m, away_m), close_s=me.close_s + counts_s * (away_m < CLOSE_M),
+                       near_s=me.near_s + counts_s * (away_m < NEAR_M))
+
+    def is_under_way(self, now_s: float) -> bool:
+        """Whether this one walks, or would, but for what is in the way."""
+        return self.aim < len(self.way) and now_s >= self.waits_until_s
+
+    def measure_way_m(self) -> float:
+        """How far on the way this one has come; of a way that is walked again, since its last end."""
+        left = [(self.pose.x_m, self.pose.y_m), *self.way[self.aim:]]
+        whole_m = math.fsum(math.dist(a, b) for a, b in pairwise(self.way))
+        return whole_m - math.fsum(math.dist(a, b) for a, b in pairwise(left))
 
     def _take_aim(self, now_s: float) -> Pedestrian:
         """The next point where this one is reached; at an end it waits, and turns back if it walks again."""
@@ -131,7 +146,7 @@ class Pedestrian:
 
     def _towards(self, now_s: float, robot: Robot | None, obstacles: Obstacles) -> Floats:
         """(2,) unit vector to where is walked, past the robot where it is in the way; zero for one who stands."""
-        if self.aim >= len(self.way) or now_s < self.waits_until_s:
+        if not self.is_under_way(now_s):
             return np.zeros(2)
         ahead = _unit(np.array(self.way[self.aim]) - self.pose.position)
         if robot is None:

@@ -11,7 +11,9 @@ from harvey.simulation.simulated_run import redraw, run_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, foreign_sources
 from harvey_people.charged import CHARGED_S, OTHERS_S
 from harvey_people.walkers import WALKERS
+from logs.explain.questions_in_words import answers
 from logs.run_directory import RunDirectory
+from logs.timeline import Timeline
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
 from world_models.entries import Course
@@ -20,7 +22,7 @@ from world_models.plugins import GUESTS_GROUP
 
 MISSION = 'world = "research_center"\ngoal = "(ptrans (hallway (4,4,0)) (hallway (9,4,0)))"\n[ranges]\nsensors = 24\n'
 WALKER = ('[[walkers]]\nname = "anna"\nlocale = "hallway"\n'
-          "way = [{x_ft = 30.0, y_ft = 6.0}, {x_ft = 60.0, y_ft = 6.0}]\n")
+          "way = [{x_ft = 26.0, y_ft = 4.4}, {x_ft = 1.5, y_ft = 4.4}]\n")
 
 
 def test_every_source_that_is_charged_for_itself_is_there() -> None:
@@ -55,3 +57,9 @@ def test_a_mission_with_people_is_charged_and_its_body_does_the_same_again(tmp_p
     among = run_mission(build_stage(parse_scenario(MISSION + WALKER)), 0, out=tmp_path / "run")
     assert alone.outcome == among.outcome == "reached" and among.sim_time_s > alone.sim_time_s + 0.5
     assert redraw(RunDirectory(tmp_path / "run")) == among.decisions
+    history = Timeline(RunDirectory(tmp_path / "run").journal)
+    who, why = (list(answers(history, question)) for question in ("who was in the way?", "why did it wait there?"))
+    assert who and all("mover-" in story.headline for story in who), "each of them is told by name"
+    assert all(story.headline == "It waited for nobody." or "it waited for mover-" in story.headline for story in why)
+    told = [step.text for story in who for step in story.steps]
+    assert any("risk of a touch" in text for text in told)

@@ -14,9 +14,10 @@ from harvey.testing import HALL, check_source, plain_robot
 from harvey_people.mover import Mover
 from harvey_people.mover_explainer import MoverExplainer
 from harvey_people.mover_watcher import MoverWatcher
+from harvey_people.people_entries import PeoplePass, PeopleWait
+from harvey_people.people_passer import PeoplePasser
 from harvey_people.people_waiter import MAX_WAIT_S, PeopleWaiter
-from harvey_people.wait_entry import PeopleWait
-from world_models.entries import Evidence, FloorThing, FreeFloor, Impasse, Obstacle, PictureRequest, Place
+from world_models.entries import Evidence, FloorThing, FreeFloor, Impasse, MotorCommand, Obstacle, PictureRequest, Place
 from world_models.frames import Pose2
 
 NOW_S = 10.0
@@ -31,6 +32,8 @@ def in_hall(mover: Mover) -> Mover:
 
 
 COMES = Mover("mover-1", HALL, 3.2, 2.0, -1.0, 0.0, EYE4, 3.2, 2.0, 0.2, 6.0, NOW_S, NOW_S, 5, "a law", "moves")
+ABREAST = [replace(COMES, name=f"mover-{n}", x_m=2.65, y_m=y, vx_m_per_s=-0.2)
+           for n, y in enumerate((2.0, 1.7, 2.3, 1.4, 2.6, 1.1, 2.9), 1)]
 
 
 def square(x: float, y: float, half: float = 0.15) -> tuple[tuple[float, float], ...]:
@@ -62,12 +65,15 @@ def test_the_mover_watcher_keeps_the_laws_and_follows_from_sight_to_sight() -> N
     bench = Bench(plain_robot())
     bench.believe()
     known: Entry[Any] | None = None
+    left: list[float] = []
     for number, x in enumerate((4.0, 3.6, 3.2, 2.8, 2.4)):
         scan = bench.put(picture_of(x, 2.0, NOW_S + 0.4 * number))
-        (effect,) = check_source(MoverWatcher, bench, scan)
+        effect, seen = check_source(MoverWatcher, bench, scan)
+        left.append(seen.value.things[0].p_thing)
         assert isinstance(effect, Post if known is None else Revise)
         known = bench.apply(effect)[0].entry
     assert known is not None and known.value.is_moving and known.value.vx_m_per_s < -0.5
+    assert left[0] == pytest.approx(0.45) and left[-1] < 0.05, "what walks is no thing"
     assert "walking at" in known.value.sentence()
     empty = bench.put(replace(picture_of(2.0, 2.0, NOW_S + 9.0), things=()))
     (effect,) = check_source(MoverWatcher, bench, empty)
@@ -80,17 +86,19 @@ def test_the_mover_explainer_keeps_the_laws_and_a_thing_is_as_certain_as_it_leav
     bench = Bench(plain_robot())
     bench.believe()
     bench.put(COMES)
-    seen = bench.put(thing())
+    seen = bench.put(thing(3.4, 2.0, NOW_S - 0.2))
     told, judged = check_source(MoverExplainer, bench, seen)
     assert isinstance(told.value, Evidence) and [e.kind for e in told.value.explanations] == ["mover"]
     assert judged.value.status == "gone" and judged.value.certainty < 0.5
 
 
 @pytest.mark.parametrize(("mover", "seen"), [
-    (replace(COMES, status="may move"), thing()),        # who may stand explains nothing
-    (COMES, thing(3.2, 4.0)),                            # was not there
-    (COMES, thing(3.2, 2.0, NOW_S - 2.0)),               # not then: was two metres on
-    (COMES, replace(thing(), touched_s=NOW_S)),          # what was touched is there
+    (replace(COMES, log_odds=-0.1), thing(3.4, 2.0, NOW_S - 0.2)),             # who rather stands explains nothing
+    (replace(COMES, vx_m_per_s=-0.1), thing(3.2, 2.0, NOW_S - 0.2)),           # nor who has come to stand
+    (COMES, thing(3.2, 4.0, NOW_S - 0.2)),                                     # was not there
+    (COMES, thing(3.2, 2.0, NOW_S - 2.0)),                                     # not then: was two metres on
+    (COMES, thing()),                                                          # this sight was weighed by the watcher
+    (COMES, replace(thing(3.4, 2.0, NOW_S - 0.2), touched_s=NOW_S)),           # what was touched is there
 ])
 def test_who_was_not_there_explains_nothing(mover: Mover, seen: Obstacle) -> None:
     bench = Bench(plain_robot())
@@ -100,7 +108,7 @@ def test_who_was_not_there_explains_nothing(mover: Mover, seen: Obstacle) -> Non
 
 
 def test_the_people_waiter_keeps_the_laws_waits_looks_and_goes_on() -> None:
-    bench, (mover,) = on_a_leg(in_hall(COMES))
+    bench, (mover, *others) = on_a_leg(*map(in_hall, ABREAST))
     wait, look = check_source(PeopleWaiter, bench, mover)
     assert isinstance(wait.value, PeopleWait) and wait.value.who == "mover-1" and wait.value.p > 0.1
     assert look.value == PictureRequest("people")
@@ -109,17 +117,32 @@ def test_the_people_waiter_keeps_the_laws_waits_looks_and_goes_on() -> None:
     again, _ = check_source(PeopleWaiter, bench, bench.revise(mover, at_s=NOW_S + 0.2, seen_s=NOW_S + 0.2))
     assert isinstance(again, Revise) and again.value.looks == 1 and again.value.since_s == began.value.since_s
     bench.apply(again)
+    for other in others:
+        bench.revise(other, status="gone")
     (over,) = check_source(PeopleWaiter, bench, bench.revise(mover, status="gone"))
     assert isinstance(over, Revise) and over.value.status == "over" and "goes on" in over.value.sentence()
 
 
 def test_a_way_that_stays_blocked_ends_as_blocked_by_people() -> None:
     long_ago_s = NOW_S - MAX_WAIT_S - 1.0
-    bench, (mover, _) = on_a_leg(in_hall(COMES), PeopleWait("Leg-1", "mover-1", "somebody", 0.5, long_ago_s, NOW_S))
+    wait = PeopleWait("Leg-1", "mover-1", "somebody", 0.5, long_ago_s, NOW_S)
+    bench, (mover, *_) = on_a_leg(*map(in_hall, ABREAST), wait)
     vain, end = check_source(PeopleWaiter, bench, mover)
     assert vain.value.status == "in vain" and "in vain" in vain.value.sentence()
     assert isinstance(end.value, Impasse) and end.value.kind == "blocked"
     assert end.value.reason.startswith("blocked by people: somebody at")
+
+
+def test_the_people_passer_keeps_the_laws_and_leads_by_them_beside_the_line_or_slower() -> None:
+    bench, (mover,) = on_a_leg(in_hall(COMES))
+    done = check_source(PeoplePasser, bench, mover)
+    passing, command = (next(e.value for e in done if isinstance(e.value, kind)) for kind in (PeoplePass, MotorCommand))
+    assert passing.who == "mover-1" and "passes mover-1" in passing.sentence()
+    assert command.move_m == 0.0 or command.speed_m_per_s <= passing.speed_m_per_s
+    assert passing.aside_m != 0.0 or passing.speed_m_per_s < 0.6
+    assert bench.ask(PeopleWaiter(), mover) is None, "one of them acts"
+    bench.put(PeopleWait("Leg-1", "mover-1", "somebody", 0.5, NOW_S, NOW_S))
+    assert bench.ask(PeoplePasser(), mover) is None, "who waits ends that first"
 
 
 @pytest.mark.parametrize("mover", [
@@ -130,4 +153,4 @@ def test_a_way_that_stays_blocked_ends_as_blocked_by_people() -> None:
 def test_it_does_not_wait_for_whom_it_does_not_meet(mover: Mover) -> None:
     bench, (entry,) = on_a_leg(replace(in_hall(mover), covariance=tuple(
         tuple(0.01 if i == j else 0.0 for j in range(4)) for i in range(4))))
-    assert bench.ask(PeopleWaiter(), entry) is None
+    assert bench.ask(PeopleWaiter(), entry) is None and bench.ask(PeoplePasser(), entry) is None
