@@ -12,7 +12,7 @@ from harvey_words.lexicon import Word
 from harvey_words.told_acts import ThingWords
 from harvey_words.word_map import COLOUR_REACH, Area, NamedFeature, WordMap
 
-NEUTRAL = frozenset(("long", "colored", "frame", "north", "south", "east", "west"))
+NEUTRAL = frozenset(("long", "colored", "frame", "picture", "north", "south", "east", "west"))
 """Words by which things are hardly told apart, and points of the compass, which are no part of a thing."""
 Senses = frozenset[tuple[str, str]]
 """Words with what this writer means by them."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,8 @@ STARTS = frozenset(
     ("go", "turn", "take", "face", "reach", "enter", "through", "exit", "pass", "halt", "stand", "there"))
 """Verbs with which another clause begins, also where nothing stands between."""
 NOUNS = frozenset(("HEAD", "THING", "MOD", "NAME", "STRANGE", "COUNT"))
+STATING = frozenset(("has", "have"))
+"""Words that say of a place what is there, and do not tell it from others by that."""
 MOST_BETWEEN = 6
 """Words between the two that are joined by ``and``."""
 
@@ -100,8 +103,16 @@ def read_clauses(words: Sequence[Word]) -> tuple[Tree[Any], list[Clause]]:
                 clause = Clause([part])
             else:
                 clause.parts.append(part)
-        clauses.append(clause)
+        clauses += _split_turns(clause)
     return tree, clauses
+
+
+def _split_turns(clause: Clause) -> Iterator[Clause]:
+    """``The wood hall one block left one block right one block``: each turn begins a clause."""
+    turns = [at for at, part in enumerate(clause.parts) if part.sort == "way" and part.meaning in ("left", "right")]
+    cuts = [at for at in turns if at] if len(turns) > 1 else []
+    for begin, end in pairwise((0, *cuts, len(clause.parts))):
+        yield Clause(clause.parts[begin:end], clause.end if end == len(clause.parts) else "")
 
 
 def _is_posture(clause: Clause, part: Part) -> bool:
@@ -120,6 +131,12 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
         before = words[index - 1] if index else None
         after = words[index + 1] if index + 1 < len(words) else None
         is_joint = bool(before and after and before.sort in NOUNS and after.sort in NOUNS)
+        if word.sort == "NOT" and after is not None and after.meaning == "open":
+            continue
+        if word.meaning == "open" and before and before.sort == "NOT":
+            word = Word("MOD", "closed", word.text, word.place)
+        if word.text.startswith("the one") and before and before.sort not in ("SEP", "VERB"):
+            yield from (Word("SEP", "comma", "", word.place), Word("VERB", "enter", "", word.place))
         if word.text == "its" and before and before.sort == "PREP":
             continue
         if word.text == "after that" and before and before.sort in NOUNS and (after is None or after.meaning == "dot"):
@@ -132,19 +149,25 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
             yield Word("COUNT", "1", word.text, word.place)
         elif word.meaning in COMPASS and after is not None and after.sort == "HEAD":
             yield Word("NAME", word.meaning, word.text, word.place)
-        elif word.meaning == "and" and index < pair:
+        elif word.meaning == "and" and index < pair and after is not None and after.sort in NOUNS:
             pair = 0
             yield Word("NAME", "&", word.text, word.place)
+        elif word.meaning == "past" and after is not None and after.meaning == "on" and any(
+                one.meaning == "side" for one in words[index + 3:index + 4]):
+            yield from (word, Word("HEAD", "it", "", word.place))  # "the one after, on the same side"
         elif word.meaning == "of" and word.sort == "PREP":
             if is_joint and before and before.meaning == "side":
                 yield Word("PREP", "in", word.text, word.place)  # "on the left side of the hall"
             elif is_joint:
-                pair = index + MOST_BETWEEN if before and before.meaning == "crossing" else pair
+                pair = index + MOST_BETWEEN if before and before.meaning in ("crossing", "corner") else pair
                 yield word
         elif before and before.sort in NOUNS and (
                 word.text.startswith("all the way") or (before.meaning == "unit" and word.sort in NOUNS)):
             yield from (Word("SEP", "comma", "", word.place), word)  # "two blocks chair", "the hall all the way down"
+        elif word.text in STATING and is_joint:
+            yield from (Word("SEP", "comma", "", word.place), Word("VERB", "there", word.text, word.place))
         elif word.meaning == "with" and is_joint and before and before.sort in ("HEAD", "MOD"):
+            pair = index + MOST_BETWEEN if before and before.meaning in ("crossing", "corner") else pair
             yield Word("PREP", "of", word.text, word.place)
         elif word.text == "where" and word.sort == "VERB" and (after is None or after.sort in ("VERB", "SEP") or (
                 before and (before.sort == "PREP" or before.meaning == "reach"))):

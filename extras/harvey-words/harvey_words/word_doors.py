@@ -18,6 +18,8 @@ OPEN_ONLY = -1.8
 """That only open doors were counted."""
 BEHIND = 1.5
 """Off for a thing that lies behind when the walk begins, where a door after it is meant."""
+BEFORE_M = 4.0
+"""A door before a thing that was reached lies no further back."""
 OPPOSITE_M = 0.3
 """What is hardly further along than the door one comes out of lies opposite, and is not counted."""
 
@@ -55,13 +57,15 @@ class WordDoors(WordSights):
                 if area.is_tile and (area.meanings & {"crossing", "corner"} or len(self.ways(here)) != 2):
                     yield from self._named_crossing(here, what)
                 continue
-            for feature in area.features:
+            for feature in area.features if area.is_hall else ():
                 fit, senses = self.match.fit(what, feature, state.senses)
-                if fit > UNKNOWN_HEAD and feature.sort == "door" and area.is_hall:
+                if fit > UNKNOWN_HEAD and feature.sort == "door":
                     ahead = feature.outward if feature.outward is not None else 0.0
                     before = replace(here, at=feature.at, heading=ahead)
                     yield self._at_door(before, NamedSight(feature, 0.0, 0.0, "ahead", area.name),
                                         here.odds + fit, senses)
+                elif fit > UNKNOWN_HEAD and feature.sort == "thing" and area.is_tile:
+                    yield replace(here, odds=here.odds + fit, senses=senses)
 
     def _named_crossing(self, state: State, what: ThingWords) -> Iterator[State]:
         """A crossing or end of halls, each word of which is said of one that leaves here or of what stands here."""
@@ -75,10 +79,11 @@ class WordDoors(WordSights):
 
     def _find_from(self, facings: Iterable[State], what: ThingWords) -> Iterator[State]:
         """The doors that may be meant from where one stands, along the ways that one may face."""
+        least = -BEFORE_M if any(relation == "before" for relation, _ in what.relations) else -0.2
         for facing in facings:
             doors = [sight for sight in self.sights(facing) if sight.feature is not None
                      and sight.feature.sort == "door" and sight.side != "behind"
-                     and sight.ahead_m > (OPPOSITE_M if facing.came and facing.begun == facing.at else -0.2)
+                     and sight.ahead_m > (OPPOSITE_M if facing.came and facing.begun == facing.at else least)
                      and sight.feature.name != facing.came]
             for sight in doors:
                 cost, senses = self._weigh_door(facing, sight, doors, what)
@@ -101,6 +106,11 @@ class WordDoors(WordSights):
             open_rank = opened.index(sight) + 1 if sight in opened else 0
             only_open = any(word.meaning == "open" for word in what.names)
             own = self._weigh_rank(what, rank, len(row), open_rank, len(opened), only_open)
+            called = [one for one in row if what.names and one.feature
+                      and self.match.fit(what, one.feature, senses)[0] > -1.0]
+            if len(called) > 1 and sight in called:  # "the second closet"
+                rank = called.index(sight) + 1
+                own = max(own, self._weigh_rank(what, rank, len(called), rank, len(called), False))
             cost += own
         between = [other for relation, other in what.relations if relation == "between"]
         if len(between) == 2:
@@ -139,6 +149,9 @@ class WordDoors(WordSights):
     def _weigh_relation(self, state: State, sight: NamedSight, doors: Sequence[NamedSight], relation: str,
                         other: ThingWords) -> float:
         """How well a door lies to other things as it is said."""
+        if relation == "across" and not other.names and other.heads <= {"hall"}:
+            own = next((one.side for one in self.sights(state) if one.feature and one.feature.name == state.came), "")
+            return WRONG_SIDE if sight.side == own else max(-2.0 * abs(sight.ahead_m), WRONG_SIDE)
         best = -2.0 if not any(word.meaning in self.plan.vocabulary for word in other.names) else -3.5
         rank = 0
         for mark in self.sights(state):
@@ -161,8 +174,6 @@ class WordDoors(WordSights):
             else:
                 fit += -max(abs(gap) - 1.5, 0.0) / 2.0
             best = max(best, fit)
-        if relation == "across" and not other.names:
-            best = max(best, -2.0 * abs(sight.ahead_m))
         return best
 
     def _at_door(self, state: State, sight: NamedSight, odds: float, senses: Senses) -> State:

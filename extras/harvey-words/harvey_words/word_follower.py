@@ -24,6 +24,11 @@ ALL_ACTS = 800
 PASSED_M = 0.4
 """How far beyond what was passed one stands."""
 
+PACES = -0.5
+"""Steps are counted where there is no crossing."""
+ABREAST_M = 0.5
+"""A door so near to what is passed may be passed with it, or come after it."""
+
 
 class WordFollower(WordDoors):
     """Follows acts on one map."""
@@ -174,6 +179,8 @@ class WordFollower(WordDoors):
             yield self.stand(state, nodes[act.units - 1])
         elif nodes:
             yield replace(self.stand(state, nodes[-1]), odds=state.odds + MISSED)
+            if nodes[0].feature is None and nodes[0].side == "ahead":  # where no hall leaves, steps are paces
+                yield replace(state, odds=state.odds + PACES, moving=True)
         if act.until is not None and act.until.names:
             for new in self.reach(state, act.until):
                 yield replace(new, odds=new.odds + WRONG_COUNT)
@@ -181,11 +188,15 @@ class WordFollower(WordDoors):
     def _pass(self, state: State, what: ThingWords) -> Iterator[State]:
         """Beyond what is passed."""
         any_seen = False
+        doors = [one.ahead_m for one in self.sights(state) if one.feature is not None and one.feature.sort == "door"]
         for sight, cost, senses in self.candidates(state, what):
             any_seen = True
             beyond = PASSED_M if sight.feature is None or sight.feature.sort != "opening" else 0.1
             there = self.stand(state, sight, beyond)
             yield replace(there, odds=state.odds + cost, senses=senses, moving=True)
+            if sight.feature is not None and sight.feature.sort == "thing" and any(
+                    abs(door - sight.ahead_m) < ABREAST_M for door in doors):  # which some count, some do not
+                yield replace(self.stand(state, sight, -ABREAST_M), odds=state.odds + cost, senses=senses, moving=True)
         if not any_seen or what.names:
             known = any(word.meaning in self.plan.vocabulary for word in what.names)
             yield replace(state, odds=state.odds + (MISSED - 1.0 if known else UNKNOWN_HEAD), moving=True)

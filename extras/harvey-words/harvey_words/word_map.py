@@ -6,7 +6,7 @@ Positions are (x, y) on the plan [m, world], directions angles counter-clockwise
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -99,12 +99,11 @@ class WordMap:
 
     def __init__(self, world: World) -> None:
         self.world = world
-        names = {word for locale in world.locales.values() for word in words_about(locale)}
-        names |= {word for locale in world.locales.values() for said in locale.properties.get(WORDS_OF, {}).values()
-                  for word in _split(said)}
-        names |= {word for door in _door_names(world) for word in _split(door)}
-        names |= {word for thing in world.things for word in (*_split(thing.kind), *_split(thing.name))}
-        self.lexicon = Lexicon(lexicon_data(), {name for name in names if len(name) > 1})
+        named: list[Collection[str]] = [words_about(locale) for locale in world.locales.values()]
+        named += [_split(said) for locale in world.locales.values()
+                  for said in locale.properties.get(WORDS_OF, {}).values()]
+        named += [_split(name) for name in (*_door_names(world), *(f"{one.kind} {one.name}" for one in world.things))]
+        self.lexicon = Lexicon(lexicon_data(), [[word for word in words if len(word) > 1] for words in named])
         self._surfaces: dict[str, list[Face]] = {}
         for face in world.faces:
             for depth in range(1, face.name.count("/") + 2):

@@ -166,7 +166,11 @@ class WordPlaces:
                 if any(is_along(way, state.heading + turn) for turn in turns)]
 
     def side_of(self, state: State, side: str) -> str:
-        """Left or right; of a point of the compass, which of them it is."""
+        """Left or right; of a point of the compass, or of the side of what was named last, which of them it is."""
+        if side in ("same", "other"):
+            last = next((mark for *_, mark in reversed(state.way) if mark), "")
+            own = next((one.side for one in self.sights(state) if one.feature and one.feature.name == last), "")
+            return own if side == "same" else {"left": "right", "right": "left"}.get(own, "")
         if side not in POINTS:
             return side
         turn = math.remainder(POINTS[side] - state.heading, math.tau)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from harvey_words.matching import MISFIT, UNKNOWN_HEAD, WORST, Senses
 from harvey_words.told_acts import ThingWords
 from harvey_words.word_map import Area, NamedSight, is_along, turned
-from harvey_words.word_places import HERE_M, NEAR_M, TURNS, UNSAID_WALK, WRONG_RANK, State, WordPlaces
+from harvey_words.word_places import HERE_M, NEAR_M, TURNS, UNSAID_WALK, WRONG_RANK, WRONG_SIDE, State, WordPlaces
 
 AGAIN = -1.0
 """Of each further place that would do as well as the first."""
@@ -92,8 +92,10 @@ class WordSights(WordPlaces):
         """Where one stands, if what is to be reached is here."""
         is_end = bool(what.heads & {"end", "wall"})
         here, senses = self.seen_from(state, what) if what.names and not is_end else (WORST, state.senses)
-        if is_end and not what.names and not self.nodes(state):
-            here = -ALREADY
+        if is_end and not self.nodes(state):
+            behind = self.hall_ahead(replace(state, heading=turned(state.heading, math.pi)))
+            here, senses = self.match.fit_area(what, behind, state.senses)
+            here -= ALREADY
         if here > -1.0:
             yield replace(state, odds=state.odds + here + ALREADY, senses=senses, moving=False)
 
@@ -155,12 +157,14 @@ class WordSights(WordPlaces):
             return self.nodes(state)
         least = 0.3 if self.area(state).is_tile else -0.1
         return [sight for sight in self.sights(state) if sight.feature is not None and sight.feature.sort != "opening"
-                and sight.ahead_m > least and sight.side != "behind"
+                and sight.ahead_m > least and sight.side != "behind" and sight.feature.name != state.came
                 and (abs(sight.left_m) < NEAR_M or not self.area(state).is_hall)]
 
     def _fit_sight(self, state: State, sight: NamedSight, what: ThingWords) -> tuple[float, Senses]:
         if sight.feature is not None and sight.feature.sort != "opening":
-            return self.match.fit(what, sight.feature, state.senses)
+            fit, senses = self.match.fit(what, sight.feature, state.senses)
+            sides = {self.side_of(state, what.side), sight.side}
+            return fit + WRONG_SIDE * (sides == {"left", "right"} and not self.area(state).is_tile), senses
         there = self.stand(state, sight)
         halls = self.halls_at(there, "")
         if what.is_stretch:

@@ -156,7 +156,7 @@ def test_a_detail_more_never_lowers_the_odds_of_the_right_end() -> None:
 
 
 def test_a_known_word_is_never_corrected() -> None:
-    lexicon = Lexicon(lexicon_data(), ("wright",))
+    lexicon = Lexicon(lexicon_data(), (("wright",),))
     assert [word.meaning for word in lexicon.read("the wright door to the rigth")] == ["wright", "door", "to", "right"]
 
 
