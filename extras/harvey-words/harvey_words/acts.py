@@ -28,7 +28,6 @@ class _Reader:
     last_thing: ThingWords | None = None
     last_stretch: ThingWords | None = None
     wants_orient: bool = False
-    goes_on: bool = False
     side: str = ""
     goals: list[Act] = field(default_factory=list)
     notes_on: bool = False
@@ -42,12 +41,7 @@ class _Reader:
         verbs |= {"be"} if verbs & {"with", "meet", "there", "stand"} else set()
         things, ways, wheres = self._collect(parts, verbs)
         begun, before = len(self.acts), self.acts[-1] if self.acts else None
-        if (self.goes_on and not verbs and things and self.acts[-1].until is None
-                and 0 < len(self.acts[-1].past) < MOST_PASSED):
-            last, more = self.acts[-1], things[0]
-            self.acts[-1] = (replace(last, units=more.number or 1) if "unit" in more.heads
-                             else replace(last, past=(*last.past, more)))
-        elif not verbs and before and before.until and "end" in before.until.heads and not ways and things and all(
+        if not verbs and before and before.until and "end" in before.until.heads and not ways and things and all(
                 "unit" in thing.heads for thing in things):
             pass  # "to the end, four blocks"
         elif self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
@@ -94,7 +88,6 @@ class _Reader:
             self._state(things, ways, wheres, verbs)
         else:
             self._terse(things, ways, wheres)
-        self.goes_on = clause.end == "and" and bool(self.acts) and self.acts[-1].sort == "go"
         begun = len(self.acts) if begun and self.acts[-1] is before else begun
         self.notes_on = clause.end == "and" and bool(self.acts) and (self.notes_on or self.acts[-1].sort == "note")
         self.wants_orient = clause.end == "so"
@@ -137,12 +130,8 @@ class _Reader:
             elif part.sort == "way":
                 ways.append(side)
             located = False
-        things = [self._resolve(thing, verbs) for thing in things]
-        subject = self.last_thing
-        wheres = [(self._by(meaning, one), self._resolve(one, {meaning})) for meaning, one in wheres]
-        if things and things[-1].names and verbs & {"be", "see"}:
-            self.last_thing = subject  # "there is an easel down the hall: go to it"
-        return things, ways, wheres
+        return [self._resolve(thing, verbs) for thing in things], ways, [
+            (self._by(meaning, one), self._resolve(one, {meaning})) for meaning, one in wheres]
 
     def _read_side(self, part: Part) -> str:
         """``The same side``, ``the other side``: left or right where that was said before."""
@@ -151,10 +140,7 @@ class _Reader:
             return self.acts[-1].way  # "turn left, there is a door on that side"
         if not ("side" in meanings and meanings <= {"side", *SAME}) or len(meanings) != 2:
             return ""
-        known, is_same = self._it().side, "same" in meanings
-        if known in ("left", "right"):
-            return known if is_same else {"left": "right", "right": "left"}[known]
-        return "same" if is_same else "other"
+        return "same" if "same" in meanings else "other"
 
     def _by(self, meaning: str, thing: ThingWords) -> str:
         """By a hall is along it, by a thing past it."""
@@ -350,9 +336,6 @@ class _Reader:
             goal = replace(goal, side=goal.side or (side if side in SIDES else ""),
                            relations=(*goal.relations, *related))
             self.acts.append(Act("find", what=goal))
-        elif "see" in verbs and things and not self.acts:
-            self._orient(things, ways, wheres)
-            return
         elif not things and (related or side):
             self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), side=side, relations=related)))
         ended = next((one for meaning, one in wheres if meaning in ("at", "in") and "end" in one.heads), None)

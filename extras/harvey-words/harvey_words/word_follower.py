@@ -65,7 +65,7 @@ class WordFollower(WordDoors):
         elif act.sort == "see" and act.what is not None:
             yield from self.see(state, act.what)
         elif act.sort == "note" and act.what is not None:
-            best = max((cost for _, cost, _ in self.candidates(state, replace(act.what, count=""))), default=NOT_SEEN)
+            best = max((cost for _, cost in self.candidates(state, replace(act.what, count=""))), default=NOT_SEEN)
             yield replace(state, odds=state.odds + max(best, NOT_SEEN), moving=True)
         elif act.sort == "orient" and act.what is not None:
             yield from self.orient(state, act.what)
@@ -109,10 +109,8 @@ class WordFollower(WordDoors):
     def _turn_to(self, state: State, heading: float, act: Act, cost: float) -> Iterator[State]:
         """Turned to a heading, where the hall that is named begins if one is."""
         new = replace(state, heading=turned(heading, 0.0), moving=False, begun=state.at)
-        fit, senses = 0.0, state.senses
-        if act.along is not None:
-            fit, senses = self.match.fit_area(act.along, self.hall_ahead(new), senses)
-        yield replace(new, odds=state.odds + cost + fit, senses=senses)
+        fit = 0.0 if act.along is None else self.match.fit_area(act.along, self.hall_ahead(new))
+        yield replace(new, odds=state.odds + cost + fit)
 
     def _turn_here_or_on(self, state: State, act: Act) -> Iterator[State]:
         """Turn where one stands, or at the places ahead where there is a way to that side."""
@@ -189,14 +187,14 @@ class WordFollower(WordDoors):
         """Beyond what is passed."""
         any_seen = False
         doors = [one.ahead_m for one in self.sights(state) if one.feature is not None and one.feature.sort == "door"]
-        for sight, cost, senses in self.candidates(state, what):
+        for sight, cost in self.candidates(state, what):
             any_seen = True
             beyond = PASSED_M if sight.feature is None or sight.feature.sort != "opening" else 0.1
             there = self.stand(state, sight, beyond)
-            yield replace(there, odds=state.odds + cost, senses=senses, moving=True)
+            yield replace(there, odds=state.odds + cost, moving=True)
             if sight.feature is not None and sight.feature.sort == "thing" and any(
                     abs(door - sight.ahead_m) < ABREAST_M for door in doors):  # which some count, some do not
-                yield replace(self.stand(state, sight, -ABREAST_M), odds=state.odds + cost, senses=senses, moving=True)
+                yield replace(self.stand(state, sight, -ABREAST_M), odds=state.odds + cost, moving=True)
         if not any_seen or what.names:
             known = any(word.meaning in self.plan.vocabulary for word in what.names)
             yield replace(state, odds=state.odds + (MISSED - 1.0 if known else UNKNOWN_HEAD), moving=True)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from harvey_words.matching import Senses, WordMatcher
+from harvey_words.matching import WordMatcher
 from harvey_words.told_acts import ThingWords
 from harvey_words.word_map import (
     Area,
@@ -44,7 +44,6 @@ class State:
         odds: log odds so far.
         moving: whether one walks on, and the next sentence says until where.
         door: the door that the text says it is.
-        senses: what the writer's words mean.
         misfits: numbers of the acts that fitted badly.
         way: the places on the way (locale, x, y), each with the name of what the words named there, or "".
         begun: where the walk began about whose end nothing is said; came: the door by which one came out here.
@@ -56,7 +55,6 @@ class State:
     odds: float = 0.0
     moving: bool = False
     door: str = ""
-    senses: Senses = frozenset()
     misfits: tuple[int, ...] = ()
     way: tuple[tuple[str, float, float, str], ...] = ()
     begun: Point | None = None
@@ -180,7 +178,7 @@ class WordPlaces:
         """Out of a room by each of its open doors."""
         for feature in self.area(state).features:
             if feature.is_open and feature.beyond is not None:
-                fit, senses = self.match.fit(by, feature, state.senses) if by else (0.0, state.senses)
+                fit = self.match.fit(by, feature) if by else 0.0
                 area = self.plan.areas[feature.beyond]
                 at, heading = feature.at, state.heading if feature.outward is None else feature.outward
                 if area.is_hall:
@@ -190,7 +188,7 @@ class WordPlaces:
                                0.0 if 0.8 < abs(turn) < 2.3 else left)
                 else:
                     at = moved(at, heading, 0.5)
-                yield replace(state, locale=area.name, at=at, heading=heading, odds=state.odds + fit, senses=senses,
+                yield replace(state, locale=area.name, at=at, heading=heading, odds=state.odds + fit,
                               moving=False, door="", begun=at, came=feature.name,
                               way=state.by(area.name, at, feature.name))
 
@@ -211,9 +209,7 @@ class WordPlaces:
             if state.moving and abs(turn) > 2.3:
                 cost *= 2.0  # nobody turns back in the middle of a walk and says nothing of it
             if along is not None and along.names:
-                fit, senses = self.match.fit_area(along, self.hall_ahead(new), state.senses)
-                new = replace(new, senses=senses)
-                cost = 0.5 * cost + fit
+                cost = 0.5 * cost + self.match.fit_area(along, self.hall_ahead(new))
             if not is_along(way, state.heading):
                 new = replace(new, moving=False, begun=None)
             yield replace(new, odds=state.odds + cost)

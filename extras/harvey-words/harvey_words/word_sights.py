@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from harvey_words.matching import MISFIT, UNKNOWN_HEAD, WORST, Senses
+from harvey_words.matching import MISFIT, UNKNOWN_HEAD, WORST
 from harvey_words.told_acts import ThingWords
 from harvey_words.word_map import Area, NamedSight, is_along, turned
 from harvey_words.word_places import HERE_M, NEAR_M, TURNS, UNSAID_WALK, WRONG_RANK, WRONG_SIDE, State, WordPlaces
@@ -30,36 +30,35 @@ class WordSights(WordPlaces):
 
     def see(self, state: State, what: ThingWords, is_there: bool = False) -> Iterator[State]:
         """Where a thing is as it is said; walking on to where it is, at a price if nobody was walking."""
-        here, senses = self.seen_from(state, what)
+        here = self.seen_from(state, what)
         if not state.moving:
             for there in self.reach(state, what) if here < UNSAID_WALK and what.names and not is_there else ():
                 yield replace(there, odds=there.odds + UNSAID_WALK)
-            kept = senses if here > NOT_SEEN else state.senses
-            yield replace(state, odds=state.odds + max(here, NOT_SEEN), senses=kept)
+            yield replace(state, odds=state.odds + max(here, NOT_SEEN))
             return
         found = list(self.candidates(state, what))
-        for sight, cost, own in found:
-            yield replace(self.stand(state, sight), odds=state.odds + cost, senses=own, moving=True)
-        yield replace(state, odds=state.odds + max(here, NOT_SEEN) - 0.5 * bool(found), senses=senses)
+        for sight, cost in found:
+            yield replace(self.stand(state, sight), odds=state.odds + cost, moving=True)
+        yield replace(state, odds=state.odds + max(here, NOT_SEEN) - 0.5 * bool(found))
 
-    def seen_from(self, state: State, what: ThingWords) -> tuple[float, Senses]:
+    def seen_from(self, state: State, what: ThingWords) -> float:
         """The best fit of what is to be seen where one stands, on the side where it is said to be."""
         if not (what.heads - {"side"} or what.names):
-            return 0.0, state.senses
+            return 0.0
         ways = self.ways(state) if self.area(state).is_hall else []
         if what.heads & {"wall", "end"} and (not what.names or (what.side == "behind" and "wall" in what.heads)):
             turn = state.heading + TURNS.get(what.side, 0.0)
-            return (NOT_SEEN if any(is_along(way, turn) for way in ways) else 0.0), state.senses
+            return NOT_SEEN if any(is_along(way, turn) for way in ways) else 0.0
         if what.heads & {"corner"} and not what.names:
-            return (0.0 if len(ways) <= 2 else NOT_SEEN), state.senses
+            return 0.0 if len(ways) <= 2 else NOT_SEEN
         if what.heads & {"crossing", "corner"}:
             return self.fit_place(state, what, [self.hall_ahead(replace(state, heading=way)) for way in ways])
-        best: tuple[float, Senses] = (NOT_SEEN - 1.0, state.senses)
+        best = NOT_SEEN - 1.0
         side = self.side_of(state, what.side)
         for way in ways:
             if side not in TURNS or is_along(way, state.heading + TURNS[side]):
-                fit = self.match.fit_area(what, self.hall_ahead(replace(state, heading=way)), state.senses)
-                best = max(best, fit, key=lambda pair: pair[0])
+                fit = self.match.fit_area(what, self.hall_ahead(replace(state, heading=way)))
+                best = max(best, fit)
         far = side in ("ahead", "behind", "left", "right") or not self.area(state).is_hall
         looking = replace(state, heading=turned(state.heading, TURNS.get(side, 0.0))) if side in TURNS else state
         for sight in self.sights(looking):
@@ -71,8 +70,7 @@ class WordSights(WordPlaces):
                 continue
             if far and self.area(state).is_hall and abs(sight.left_m) > min(NEAR_M, max(ahead, HERE_M)):
                 continue
-            fit = self.match.fit(what, sight.feature, state.senses)
-            best = max(best, (fit[0] - 0.02 * abs(sight.ahead_m), fit[1]), key=lambda pair: pair[0])
+            best = max(best, self.match.fit(what, sight.feature) - 0.02 * abs(sight.ahead_m))
         return best
 
     def orient(self, state: State, what: ThingWords) -> Iterator[State]:
@@ -84,20 +82,19 @@ class WordSights(WordPlaces):
         ways = self.ways(state)
         for heading in headings:
             new = replace(state, heading=heading, moving=False)
-            fit, senses = self.seen_from(new, what)
+            fit = self.seen_from(new, what)
             closed = 0.0 if any(is_along(way, heading) for way in ways) or what.side == "ahead" else -1.0
-            yield replace(new, odds=state.odds + 1.5 * fit + closed, senses=senses)
+            yield replace(new, odds=state.odds + 1.5 * fit + closed)
 
     def stay(self, state: State, what: ThingWords) -> Iterator[State]:
         """Where one stands, if what is to be reached is here."""
         is_end = bool(what.heads & {"end", "wall"})
-        here, senses = self.seen_from(state, what) if what.names and not is_end else (WORST, state.senses)
+        here = self.seen_from(state, what) if what.names and not is_end else WORST
         if is_end and not self.nodes(state):
             behind = self.hall_ahead(replace(state, heading=turned(state.heading, math.pi)))
-            here, senses = self.match.fit_area(what, behind, state.senses)
-            here -= ALREADY
+            here = self.match.fit_area(what, behind) - ALREADY
         if here > -1.0:
-            yield replace(state, odds=state.odds + here + ALREADY, senses=senses, moving=False)
+            yield replace(state, odds=state.odds + here + ALREADY, moving=False)
 
     def reach(self, state: State, what: ThingWords) -> Iterator[State]:
         """At what is to be reached."""
@@ -105,9 +102,9 @@ class WordSights(WordPlaces):
             yield from self._reach_end(state, what)
             return
         found = False
-        for sight, cost, senses in self.candidates(state, what):
+        for sight, cost in self.candidates(state, what):
             found = True
-            yield replace(self.stand(state, sight), odds=state.odds + cost, senses=senses, moving=False)
+            yield replace(self.stand(state, sight), odds=state.odds + cost, moving=False)
         known = any(word.meaning in self.plan.vocabulary for word in what.names)
         if not found or what.names:
             yield replace(state, odds=state.odds + (MISSED - 1.0 if known else UNKNOWN_HEAD), moving=True)
@@ -131,25 +128,25 @@ class WordSights(WordPlaces):
             if not self.plan.areas[sight.locale].is_tile:
                 yield replace(state, odds=state.odds - 0.5, moving=True)  # what follows may be short of the end
 
-    def candidates(self, state: State, what: ThingWords) -> Iterator[tuple[NamedSight, float, Senses]]:
+    def candidates(self, state: State, what: ThingWords) -> Iterator[tuple[NamedSight, float]]:
         """What is seen ahead and fits, nearest first, each with its price."""
-        found: list[tuple[NamedSight, float, Senses, int, int]] = []
+        found: list[tuple[NamedSight, float, int, int]] = []
         rank = 0
         taken = -math.inf
         for place, sight in enumerate(self._sights_for(state, what), 1):
-            fit, senses = self._fit_sight(state, sight, what)
+            fit = self._fit_sight(state, sight, what)
             if fit <= MISFIT or (sight.ahead_m - taken < 0.3 and not sight.feature):
                 continue
             if fit > -1.0:
                 rank += 1
                 taken = sight.ahead_m
-            found.append((sight, fit, senses, rank, place))
-        for sight, fit, senses, own, place in found:
+            found.append((sight, fit, rank, place))
+        for sight, fit, own, place in found:
             number = rank if what.count == "last" else what.number
             miscount = MISCOUNT if "crossing" in what.heads and place == number else WRONG_RANK
             cost = fit + (miscount * (own != number) if number else AGAIN * max(own - 1, 0))
             if cost > WORST:
-                yield sight, cost, senses
+                yield sight, cost
 
     def _sights_for(self, state: State, what: ThingWords) -> Iterable[NamedSight]:
         """The sights that a description may be of: crossings for a crossing or hall, features for the rest."""
@@ -160,34 +157,31 @@ class WordSights(WordPlaces):
                 and sight.ahead_m > least and sight.side != "behind" and sight.feature.name != state.came
                 and (abs(sight.left_m) < NEAR_M or not self.area(state).is_hall)]
 
-    def _fit_sight(self, state: State, sight: NamedSight, what: ThingWords) -> tuple[float, Senses]:
+    def _fit_sight(self, state: State, sight: NamedSight, what: ThingWords) -> float:
         if sight.feature is not None and sight.feature.sort != "opening":
-            fit, senses = self.match.fit(what, sight.feature, state.senses)
+            fit = self.match.fit(what, sight.feature)
             sides = {self.side_of(state, what.side), sight.side}
-            return fit + WRONG_SIDE * (sides == {"left", "right"} and not self.area(state).is_tile), senses
+            return fit + WRONG_SIDE * (sides == {"left", "right"} and not self.area(state).is_tile)
         there = self.stand(state, sight)
         halls = self.halls_at(there, "")
         if what.is_stretch:
-            fits = [self.match.fit_area(what, hall, state.senses) for hall in self.halls_at(there, what.side)]
+            fits = [self.match.fit_area(what, hall) for hall in self.halls_at(there, what.side)]
             onward, before = self.hall_ahead(there), self.hall_ahead(state)
             if what.names and not what.side and onward.meanings != before.meanings:
-                fit, senses = self.match.fit_area(what, onward, state.senses)
-                fits.append((fit + STRAIGHT_ON, senses))
-            return max(fits, key=lambda pair: pair[0], default=(MISFIT, state.senses))
+                fits.append(self.match.fit_area(what, onward) + STRAIGHT_ON)
+            return max(fits, default=MISFIT)
         cost = -1.5 if what.heads & {"crossing"} and not halls else 0.0
-        fit, senses = self.fit_place(there, what, halls)
-        return cost + fit, senses
+        return cost + self.fit_place(there, what, halls)
 
-    def fit_place(self, state: State, what: ThingWords, halls: Sequence[Area]) -> tuple[float, Senses]:
+    def fit_place(self, state: State, what: ThingWords, halls: Sequence[Area]) -> float:
         """How well a place fits: each word by a hall that leaves to the side, by what stands there, or straight on."""
-        score, senses = 0.0, state.senses
+        score = 0.0
         onward = [self.hall_ahead(replace(state, heading=way)) for way in self.ways(state)]
         for word in what.names:
             one = ThingWords(names=(word,))
-            fits = [self.match.fit_area(one, hall, senses) for hall in halls]
-            fits += [self.match.fit(one, feature, senses) for feature in self.area(state).features
+            fits = [self.match.fit_area(one, hall) for hall in halls]
+            fits += [self.match.fit(one, feature) for feature in self.area(state).features
                      if math.dist(feature.at, state.at) < NEAR_M and not (word.sort == "MOD" and "hall" in what.heads)]
-            fits += [(fit + ALONG, own) for fit, own in (self.match.fit_area(one, hall, senses) for hall in onward)]
-            fit, senses = max(fits, key=lambda pair: pair[0], default=(MISFIT, senses))
-            score += fit
-        return max(score, WORST), senses
+            fits += [self.match.fit_area(one, hall) + ALONG for hall in onward]
+            score += max(fits, default=MISFIT)
+        return max(score, WORST)
