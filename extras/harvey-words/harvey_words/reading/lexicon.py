@@ -80,8 +80,7 @@ class Lexicon:
     def _spellings(self) -> dict[int, list[str]]:
         """All single words of four letters and more, by length."""
         known: dict[int, list[str]] = {}
-        words = {word for phrase in (*self.phrases, *self.skipped) for word in phrase} | self.names
-        for word in sorted(words):
+        for word in sorted(self._words):
             if len(word) >= SHORT - 1 and word.isalpha():
                 known.setdefault(len(word), []).append(word)
         return known

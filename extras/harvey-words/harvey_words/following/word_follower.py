@@ -10,12 +10,24 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from harvey_words.matching import UNKNOWN_HEAD
-from harvey_words.told_acts import COMPASS, Act, ThingWords
-from harvey_words.word_doors import WordDoors
-from harvey_words.word_map import is_along, moved, turned
-from harvey_words.word_places import HERE_M, POINTS, TURNS, UNSAID_EXIT, UNSAID_WALK, State, best_of
-from harvey_words.word_sights import AGAIN, MISSED, NO_WAY, NOT_SEEN, WRONG_COUNT
+from harvey_words.following.word_doors import WordDoors
+from harvey_words.following.word_map import is_along, moved, turned
+from harvey_words.following.word_places import (
+    AGAIN,
+    HERE_M,
+    MISSED,
+    NO_WAY,
+    NOT_SEEN,
+    POINTS,
+    TURNS,
+    UNKNOWN_HEAD,
+    UNSAID_EXIT,
+    UNSAID_WALK,
+    WRONG_COUNT,
+    State,
+    best_of,
+)
+from harvey_words.reading.told_acts import COMPASS, Act, ThingWords
 
 BEAM, DEEP = 80, 14.0
 """Hypotheses that are followed on after an act; none is whose log odds are so far below those of the best."""
@@ -24,8 +36,6 @@ ALL_ACTS = 800
 PASSED_M = 0.4
 """How far beyond what was passed one stands."""
 
-PACES = -0.5
-"""Steps are counted where there is no crossing."""
 ABREAST_M = 0.5
 """A door so near to what is passed may be passed with it, or come after it."""
 
@@ -52,7 +62,11 @@ class WordFollower(WordDoors):
         return best_of(ended, len(ended))
 
     def _expand(self, state: State, act: Act, is_last: bool) -> Iterator[State]:
-        if act.sort == "exit":
+        if act.sort in ("turn", "go", "find") and not self.area(state).is_hall:
+            for out in self.leave(state, None):  # through rooms, each once
+                if self.area(out).is_hall or all(locale != out.locale for locale, *_ in state.way):
+                    yield from self._expand(replace(out, odds=out.odds + UNSAID_EXIT), act, is_last)
+        elif act.sort == "exit":
             yield from self._exit(state, act)
         elif act.sort == "turn":
             yield from self._turn(state, act)
@@ -79,10 +93,6 @@ class WordFollower(WordDoors):
         yield from self.leave(state, act.along)
 
     def _turn(self, state: State, act: Act) -> Iterator[State]:
-        if not self.area(state).is_hall:
-            for out in self.leave(state, None):
-                yield from self._turn(replace(out, odds=out.odds + UNSAID_EXIT), act)
-            return
         starts: Iterable[State] = (state,)
         for passed in act.past:
             starts = best_of(new for one in starts for new in self._pass(one, passed))
@@ -177,8 +187,6 @@ class WordFollower(WordDoors):
             yield self.stand(state, nodes[act.units - 1])
         elif nodes:
             yield replace(self.stand(state, nodes[-1]), odds=state.odds + MISSED)
-            if nodes[0].feature is None and nodes[0].side == "ahead":  # where no hall leaves, steps are paces
-                yield replace(state, odds=state.odds + PACES, moving=True)
         if act.until is not None and act.until.names:
             for new in self.reach(state, act.until):
                 yield replace(new, odds=new.odds + WRONG_COUNT)

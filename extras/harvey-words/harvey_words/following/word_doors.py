@@ -6,11 +6,19 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from harvey_words.matching import MISFIT, UNKNOWN_HEAD, WORST
-from harvey_words.told_acts import ThingWords
-from harvey_words.word_map import NamedSight, is_along, moved, offsets, turned
-from harvey_words.word_places import TURNS, UNSAID_EXIT, WRONG_RANK, WRONG_SIDE, State
-from harvey_words.word_sights import AGAIN, WordSights
+from harvey_words.following.word_map import NamedSight, is_along, moved, offsets, turned
+from harvey_words.following.word_places import (
+    AGAIN,
+    MISFIT,
+    TURNS,
+    UNKNOWN_HEAD,
+    WORST,
+    WRONG_RANK,
+    WRONG_SIDE,
+    State,
+    WordPlaces,
+)
+from harvey_words.reading.told_acts import ThingWords
 
 UNTOLD = -4.0
 """A goal out of sight to which no way is told."""
@@ -24,17 +32,13 @@ OPPOSITE_M = 0.3
 """What is hardly further along than the door one comes out of lies opposite, and is not counted."""
 
 
-class WordDoors(WordSights):
+class WordDoors(WordPlaces):
     """Finds the doors and places that a text may mean."""
 
     def find(self, state: State, what: ThingWords) -> Iterator[State]:
         """At each door, or thing, that may be meant."""
         if what.heads & {"crossing", "corner", "end"} and not what.heads & {"door"}:
             yield from self._anywhere(state, what)
-            return
-        if not self.area(state).is_hall:
-            for out in self.leave(state, None):
-                yield from self.find(replace(out, odds=out.odds + UNSAID_EXIT), what)
             return
         at_door = bool(state.came) and state.begun is not None and math.dist(state.begun, state.at) < 0.1
         if at_door and what.side in ("left", "right") and not any(
@@ -70,8 +74,6 @@ class WordDoors(WordSights):
     def _named_crossing(self, state: State, what: ThingWords) -> Iterator[State]:
         """A crossing or end of halls, each word of which is said of one that leaves here or of what stands here."""
         ways = self.ways(state)
-        if (what.heads & {"end"} and len(ways) > 2) or (what.heads & {"corner"} and len(ways) != 2):
-            return
         halls = [self.hall_ahead(replace(state, heading=way)) for way in ways]
         fit = self.fit_place(state, what, halls)
         if fit > WORST:

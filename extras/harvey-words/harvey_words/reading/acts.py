@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-from harvey_words.lexicon import Word
-from harvey_words.told_acts import COMPASS, POINTS, Act, ThingWords, describe
-from harvey_words.word_clauses import Clause, Part
+from harvey_words.reading.lexicon import Word
+from harvey_words.reading.told_acts import COMPASS, POINTS, Act, ThingWords, describe
+from harvey_words.reading.word_clauses import Clause, Part
 
 RELATIONS = ("past", "before", "across", "between", "next-to")
 MOST_PASSED = 6
@@ -113,8 +113,6 @@ class _Reader:
                         -1].is_door:
                     things[-1] = replace(things[-1], relations=(
                         *things[-1].relations, *self._relation(part.meaning, part.words)))
-                elif part.words and part.meaning == "on" and {word.meaning for word in part.words} == {"side"}:
-                    pass  # "on that side"
                 elif part.words or part.meaning not in ("at", "on", "along" if self._it().is_door else "at"):
                     wheres.append((part.meaning, self._describe(part.meaning, part.words)))
                     target, located = None, True
@@ -491,7 +489,8 @@ def _correct(clauses: Sequence[Clause]) -> list[Clause]:
             if any(part.sort == "verb" for part in new):
                 del kept[wrong:]
             else:
-                same = [place for place, part in enumerate(old) if _kind_of(part) == _kind_of(new[0])]
+                same = [place for place, part in enumerate(old) if bool(part.words) == bool(new[0].words) and (
+                    part.sort == new[0].sort or {part.sort, new[0].sort} == {"where", "thing"})]
                 at = same[-1] if same else len(old)
                 if same and all(word.sort == "COUNT" for word in new[0].words):  # "not the first door but the second"
                     named = tuple(word for word in old[at].words if word.sort != "COUNT")
@@ -503,11 +502,6 @@ def _correct(clauses: Sequence[Clause]) -> list[Clause]:
         clause = Clause(clause.parts[1:], clause.end) if is_denied else clause
         kept.append(clause)
     return kept
-
-
-def _kind_of(part: Part) -> str:
-    """What a part is corrected by: a thing by a thing, also where something leads to it."""
-    return "thing" if part.words and part.sort in ("where", "thing") else "way" if part.side else part.sort
 
 
 def _join_exits(clauses: Sequence[Clause]) -> list[Clause]:
