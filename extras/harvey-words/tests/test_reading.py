@@ -17,8 +17,8 @@ from harvey_words import Reading, RouteError, read_route, write_directions
 from harvey_words.experiments.instructions import PARAGRAPHS, draw_routes, read_paragraphs, run
 from harvey_words.experiments.mazes import Hall, Node, write_maze
 from harvey_words.experiments.told_routes import draw_maze, tell_maze
-from harvey_words.lexicon import Lexicon, lexicon_data
-from harvey_words.word_map import WordMap
+from harvey_words.following.word_map import WordMap
+from harvey_words.reading.lexicon import Lexicon, lexicon_data
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world
 
@@ -156,7 +156,7 @@ def test_a_detail_more_never_lowers_the_odds_of_the_right_end() -> None:
 
 
 def test_a_known_word_is_never_corrected() -> None:
-    lexicon = Lexicon(lexicon_data(), ("wright",))
+    lexicon = Lexicon(lexicon_data(), (("wright",),))
     assert [word.meaning for word in lexicon.read("the wright door to the rigth")] == ["wright", "door", "to", "right"]
 
 

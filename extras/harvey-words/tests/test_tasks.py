@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 import harvey
 from harvey.runner.resume import find_remains
 from harvey.simulation.simulated_run import resume_mission
-from harvey_words.task_tour import order_stops
-from harvey_words.task_words import TaskWordsError, read_wanted
+from harvey_words.tasks.task_tour import order_stops
+from harvey_words.tasks.task_words import TaskWordsError, read_wanted
 from logs.run_directory import RunDirectory
 from sim.scenario import parse_scenario
 from tests.recorded_runs import cut_off

@@ -14,10 +14,10 @@ from experiments import drives
 from experiments.drives import Trial
 from experiments.report import Report
 from harvey.campaign.mission_task import Task
-from harvey_words.directions import write_directions
+from harvey_words.directions.directions import write_directions
 from harvey_words.experiments.instructions import OTHERS, read_paragraphs
 from harvey_words.experiments.told_routes import Told, tell_rooms
-from harvey_words.word_map import WordMap
+from harvey_words.following.word_map import WordMap
 from world_models.entries import Goal
 from world_models.files.world_files import WORLDS, load_world
 

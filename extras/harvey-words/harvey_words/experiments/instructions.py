@@ -13,12 +13,12 @@ import numpy as np
 
 from experiments.generated.floors import generated_floor
 from experiments.report import Cell, Report
-from harvey_words.directions import write_directions
+from harvey_words.directions.directions import write_directions
 from harvey_words.experiments.mazes import Hall, Node, write_maze
 from harvey_words.experiments.told_routes import Told, draw_maze, tell_maze, tell_rooms
-from harvey_words.lexicon import split_text
-from harvey_words.reading import RouteError, read_route
-from harvey_words.word_map import WordMap
+from harvey_words.following.reading import RouteError, read_route
+from harvey_words.following.word_map import WordMap
+from harvey_words.reading.lexicon import split_text
 from world_models.files.toml.source import Source
 from world_models.files.world_files import WORLDS, load_world, read_world
 
@@ -126,7 +126,6 @@ NOTES = (
     "Routes: told by a generator with its own wording, from a room to a door of its hall in the research centre and on"
     " generated floors, and from crossing to crossing in drawn mazes; nobody says which way the body faces.",
     "Paragraphs: written down before the grammar, in differing styles; an installed package has none. Those of"
-    " development are others, of other mazes: the reader is bettered by them, so they claim nothing; fresh ones were"
-    " read once before that (25 of the first 40 arrived and 8 were silently elsewhere, 32 and 2 of the next 40).",
+    " development are others, of other mazes: the reader is bettered by them, so they claim nothing.",
     "Directions: written from room to room, and from crossing to crossing, and read again from the same start.",
 )

@@ -12,9 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from harvey_words.directions import NUMBERS, ORDINALS
+from harvey_words.directions.directions import NUMBERS, ORDINALS
 from harvey_words.experiments.mazes import Hall, Node
-from harvey_words.word_map import NamedFeature, NamedSight, WordMap, moved, turned
+from harvey_words.following.word_map import NamedFeature, NamedSight, WordMap, moved, turned
 
 SAID = {"notice-board": "bulletin board", "hose-cabinet": "fire hose", "fountain": "drinking fountain",
         "white-board": "whiteboard", "exit-sign": "exit sign", "picture": "painting", "pillar": "column",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from harvey_words.lexicon import Word
+from harvey_words.reading.lexicon import Word
 
 COMPASS = ("north", "south", "east", "west")
 DOORS = frozenset(("door", "room"))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -16,13 +16,13 @@ from typing import Any
 CLASSES = ("VERB", "WAY", "PREP", "SEP", "NOT", "COUNT", "HEAD", "THING", "MOD")
 LONGEST = 5
 """Words of the longest phrase."""
-MOST_WORDS = 400
+MOST_WORDS = 300
 """What comes after so many words of a text is not read: a way told by a person has some tens."""
 SHORT, LONG = 4, 8
 """Letters of a word that may have one wrong, and two."""
 ARTICLES = frozenset(("the", "a", "an", "your", "this", "that", "of", "past", "to"))
 POINTING = frozenset(("the", "this", "that", "which", "each", "no"))
-TAKING = frozenset(("follow", "take", "taking", "following", "reach", "pass", "walk", "go"))
+TAKING = frozenset(("follow", "take", "taking", "following", "reach", "pass", "walk", "go", "ignore", "skip"))
 """Words before ``one``, and before ``it`` or ``that``, that make them stand for something that was named."""
 Phrase = tuple[str, ...]
 
@@ -47,7 +47,10 @@ class Word:
 class Lexicon:
     """The words of a language, with the names of one building."""
 
-    def __init__(self, data: Mapping[str, Any], names: Iterable[str] = ()) -> None:
+    def __init__(self, data: Mapping[str, Any], named: Iterable[Collection[str]] = ()) -> None:
+        """``named``: of each thing of the building, the words by which it is named there."""
+        called = {frozenset(words) for words in named}
+        names = frozenset[str]().union(*called)
         self.phrases: dict[Phrase, tuple[str, str]] = {
             tuple(phrase.split()): (sort, meaning)
             for sort in CLASSES for meaning, phrases in data[sort].items() for phrase in phrases}
@@ -57,17 +60,27 @@ class Lexicon:
             name: (rgb[0], rgb[1], rgb[2]) for name, rgb in data["COLOURS"].items()}
         groups: list[list[str]] = list(data["RELATED"].values())
         self.related = frozenset((one, other) for group in groups for one in group for other in group if one != other)
+        self._tell_apart(data, called, names)
         self.names = frozenset(name for name in names if not name.isdigit() and (name,) not in self.phrases)
         self.names -= {word for (word, *more) in self.skipped if not more}
         self._naming = frozenset(data["NAMING"]["words"])
         self._nearest: dict[str, str] = {}
 
+    def _tell_apart(self, data: Mapping[str, Any], called: Iterable[frozenset[str]], names: frozenset[str]) -> None:
+        """Two words of one meaning that the building has for different things mean each its own there."""
+        for sort in ("THING", "MOD"):
+            for meaning, phrases in data[sort].items():
+                own = names.intersection(phrases)
+                if len(own) > 1 and all(len(words & own) < 2 for words in called):
+                    self.phrases |= {(word,): (sort, word) for word in own}
+                    kindred = own | {meaning}
+                    self.related |= {(one, other) for one in kindred for other in kindred if one != other}
+
     @cached_property
     def _spellings(self) -> dict[int, list[str]]:
         """All single words of four letters and more, by length."""
         known: dict[int, list[str]] = {}
-        words = {word for phrase in (*self.phrases, *self.skipped) for word in phrase} | self.names
-        for word in sorted(words):
+        for word in sorted(self._words):
             if len(word) >= SHORT - 1 and word.isalpha():
                 known.setdefault(len(word), []).append(word)
         return known
@@ -167,6 +180,8 @@ def split_text(text: str) -> list[str]:
     """The words of a text in small letters, full stops and commas; at most ``MOST_WORDS``."""
     plain = text[:40 * MOST_WORDS].lower().replace("’", "'")
     plain = re.sub(r"'s\b", " s", plain)
+    plain = re.sub(r"\b(i)'?m\b", r"\1 am", plain)
+    plain = re.sub(r" -+ |--+|[–—]", " , ", plain)
     plain = re.sub(r"\b(can|don|won|isn|doesn)t\b", r"\1 t", plain)
     plain = re.sub(r"\b(you|they|we)(re|ll)\b|\b(that|there|here)(s)\b", r"\1\3 \2\4", plain)
     pieces = re.findall(r"[a-z]+|\d+(?:st|nd|rd|th)?|[.,;:!?\n]", plain)[:MOST_WORDS]

@@ -9,8 +9,8 @@ from itertools import pairwise, takewhile
 import numpy as np
 
 from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
-from harvey_words.task_entries import ToldTask, active_task, find_time_s, leave_goal
-from harvey_words.task_tour import order_stops
+from harvey_words.tasks.task_entries import ToldTask, active_task, find_time_s, leave_goal
+from harvey_words.tasks.task_tour import order_stops
 from knowledge_sources.methods.motion import SubgoalPlanner
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, NOT_ENDED, NOT_LOST, find_building, find_planner, place_of

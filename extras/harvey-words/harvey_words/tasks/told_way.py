@@ -10,11 +10,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from harvey_words.reading import Reading, read_route
-from harvey_words.task_entries import Step
-from harvey_words.task_words import TaskWordsError
-from harvey_words.way_commands import name_end
-from harvey_words.word_map import WordMap
+from harvey_words.directions.way_commands import name_end
+from harvey_words.following.reading import Reading, read_route
+from harvey_words.following.word_map import WordMap
+from harvey_words.tasks.task_entries import Step
+from harvey_words.tasks.task_words import TaskWordsError
 from world_models.building.locale_frame import LocaleFrame
 from world_models.building.world import World
 from world_models.commands import find_open_point

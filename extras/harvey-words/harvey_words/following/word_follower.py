@@ -10,12 +10,24 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from harvey_words.matching import UNKNOWN_HEAD
-from harvey_words.told_acts import COMPASS, Act, ThingWords
-from harvey_words.word_doors import WordDoors
-from harvey_words.word_map import is_along, moved, turned
-from harvey_words.word_places import HERE_M, POINTS, TURNS, UNSAID_EXIT, UNSAID_WALK, State, best_of
-from harvey_words.word_sights import AGAIN, MISSED, NO_WAY, NOT_SEEN, WRONG_COUNT
+from harvey_words.following.word_doors import WordDoors
+from harvey_words.following.word_map import is_along, moved, turned
+from harvey_words.following.word_places import (
+    AGAIN,
+    HERE_M,
+    MISSED,
+    NO_WAY,
+    NOT_SEEN,
+    POINTS,
+    TURNS,
+    UNKNOWN_HEAD,
+    UNSAID_EXIT,
+    UNSAID_WALK,
+    WRONG_COUNT,
+    State,
+    best_of,
+)
+from harvey_words.reading.told_acts import COMPASS, Act, ThingWords
 
 BEAM, DEEP = 80, 14.0
 """Hypotheses that are followed on after an act; none is whose log odds are so far below those of the best."""
@@ -23,6 +35,9 @@ ALL_ACTS = 800
 """A text with more acts than a tenth of these is followed with fewer hypotheses, so that it takes no longer."""
 PASSED_M = 0.4
 """How far beyond what was passed one stands."""
+
+ABREAST_M = 0.5
+"""A door so near to what is passed may be passed with it, or come after it."""
 
 
 class WordFollower(WordDoors):
@@ -47,7 +62,11 @@ class WordFollower(WordDoors):
         return best_of(ended, len(ended))
 
     def _expand(self, state: State, act: Act, is_last: bool) -> Iterator[State]:
-        if act.sort == "exit":
+        if act.sort in ("turn", "go", "find") and not self.area(state).is_hall:
+            for out in self.leave(state, None):  # through rooms, each once
+                if self.area(out).is_hall or all(locale != out.locale for locale, *_ in state.way):
+                    yield from self._expand(replace(out, odds=out.odds + UNSAID_EXIT), act, is_last)
+        elif act.sort == "exit":
             yield from self._exit(state, act)
         elif act.sort == "turn":
             yield from self._turn(state, act)
@@ -60,7 +79,7 @@ class WordFollower(WordDoors):
         elif act.sort == "see" and act.what is not None:
             yield from self.see(state, act.what)
         elif act.sort == "note" and act.what is not None:
-            best = max((cost for _, cost, _ in self.candidates(state, replace(act.what, count=""))), default=NOT_SEEN)
+            best = max((cost for _, cost in self.candidates(state, replace(act.what, count=""))), default=NOT_SEEN)
             yield replace(state, odds=state.odds + max(best, NOT_SEEN), moving=True)
         elif act.sort == "orient" and act.what is not None:
             yield from self.orient(state, act.what)
@@ -74,10 +93,6 @@ class WordFollower(WordDoors):
         yield from self.leave(state, act.along)
 
     def _turn(self, state: State, act: Act) -> Iterator[State]:
-        if not self.area(state).is_hall:
-            for out in self.leave(state, None):
-                yield from self._turn(replace(out, odds=out.odds + UNSAID_EXIT), act)
-            return
         starts: Iterable[State] = (state,)
         for passed in act.past:
             starts = best_of(new for one in starts for new in self._pass(one, passed))
@@ -104,10 +119,8 @@ class WordFollower(WordDoors):
     def _turn_to(self, state: State, heading: float, act: Act, cost: float) -> Iterator[State]:
         """Turned to a heading, where the hall that is named begins if one is."""
         new = replace(state, heading=turned(heading, 0.0), moving=False, begun=state.at)
-        fit, senses = 0.0, state.senses
-        if act.along is not None:
-            fit, senses = self.match.fit_area(act.along, self.hall_ahead(new), senses)
-        yield replace(new, odds=state.odds + cost + fit, senses=senses)
+        fit = 0.0 if act.along is None else self.match.fit_area(act.along, self.hall_ahead(new))
+        yield replace(new, odds=state.odds + cost + fit)
 
     def _turn_here_or_on(self, state: State, act: Act) -> Iterator[State]:
         """Turn where one stands, or at the places ahead where there is a way to that side."""
@@ -181,11 +194,15 @@ class WordFollower(WordDoors):
     def _pass(self, state: State, what: ThingWords) -> Iterator[State]:
         """Beyond what is passed."""
         any_seen = False
-        for sight, cost, senses in self.candidates(state, what):
+        doors = [one.ahead_m for one in self.sights(state) if one.feature is not None and one.feature.sort == "door"]
+        for sight, cost in self.candidates(state, what):
             any_seen = True
             beyond = PASSED_M if sight.feature is None or sight.feature.sort != "opening" else 0.1
             there = self.stand(state, sight, beyond)
-            yield replace(there, odds=state.odds + cost, senses=senses, moving=True)
+            yield replace(there, odds=state.odds + cost, moving=True)
+            if sight.feature is not None and sight.feature.sort == "thing" and any(
+                    abs(door - sight.ahead_m) < ABREAST_M for door in doors):  # which some count, some do not
+                yield replace(self.stand(state, sight, -ABREAST_M), odds=state.odds + cost, moving=True)
         if not any_seen or what.names:
             known = any(word.meaning in self.plan.vocabulary for word in what.names)
             yield replace(state, odds=state.odds + (MISSED - 1.0 if known else UNKNOWN_HEAD), moving=True)

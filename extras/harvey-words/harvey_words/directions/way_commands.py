@@ -12,7 +12,7 @@ from harvey.commands.world_command import load_file
 from harvey.errors import BadInput
 
 if TYPE_CHECKING:
-    from harvey_words.reading import Reading, RouteEnd
+    from harvey_words.following.reading import Reading, RouteEnd
 
 MOST_CHARACTERS = 10_000
 
@@ -37,7 +37,7 @@ def _add_directions(parser: ArgumentParser) -> None:
 
 
 def _parse(args: Namespace) -> int:
-    from harvey_words.reading import RouteError, read_route
+    from harvey_words.following.reading import RouteError, read_route
 
     if len(args.text) > MOST_CHARACTERS:
         raise BadInput(f"TEXT: expected at most {MOST_CHARACTERS} characters, got {len(args.text)}")
@@ -52,9 +52,9 @@ def _parse(args: Namespace) -> int:
 
 
 def _direct(args: Namespace) -> int:
-    from harvey_words.directions import write_directions
-    from harvey_words.reading import RouteError
-    from harvey_words.word_map import WordMap
+    from harvey_words.directions.directions import write_directions
+    from harvey_words.following.reading import RouteError
+    from harvey_words.following.word_map import WordMap
 
     try:
         written = write_directions(WordMap(load_file(args.world, [])), args.start, args.goal, args.heading)

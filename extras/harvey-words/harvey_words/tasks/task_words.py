@@ -15,8 +15,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from harvey_words.lexicon import Lexicon, lexicon_data
-from harvey_words.task_entries import Step
+from harvey_words.reading.lexicon import Lexicon, lexicon_data
+from harvey_words.tasks.task_entries import Step
 
 START, HOME = "start", "home of"  # for words of a place: where it was told, and where the model says a thing is kept
 MOST_WORDS, MOST_STEPS, LONGEST = 200, 40, 6

@@ -6,17 +6,28 @@ be said that is taken by which the right end is the surest.
 
 from __future__ import annotations
 
+import heapq
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 
-from harvey_words.lexicon import lexicon_data
-from harvey_words.reading import SURE, Reading, RouteError, find_start, read_route
-from harvey_words.way_legs import Spot, WayLeg, find_legs, find_way
-from harvey_words.word_doors import OPPOSITE_M
-from harvey_words.word_follower import WordFollower
-from harvey_words.word_map import NamedFeature, NamedSight, WordMap, is_along, moved, offsets, turned
-from harvey_words.word_places import HERE_M, NEAR_M, State
+from harvey_words.following.reading import SURE, Reading, RouteError, find_start, read_route
+from harvey_words.following.word_doors import OPPOSITE_M
+from harvey_words.following.word_follower import WordFollower
+from harvey_words.following.word_map import (
+    Area,
+    NamedFeature,
+    NamedSight,
+    Point,
+    WordMap,
+    is_along,
+    moved,
+    offsets,
+    turned,
+)
+from harvey_words.following.word_places import HERE_M, NEAR_M, State
+from harvey_words.reading.lexicon import lexicon_data
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
 NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
@@ -27,6 +38,12 @@ ROUNDS = 2
 """How often all steps are gone through for a better wording."""
 Wordings = list[str]
 """What can be said of one step, the shortest first."""
+Spot = tuple[str, Point]
+"""A locale, and a place in it [m, world]."""
+ROOM_COST_M = 40.0
+"""A way through a room counts as so much longer: people are sent along halls."""
+LEAST_LEG_M = 0.95
+"""A shorter step to the side is no leg of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,9 +154,8 @@ class _Teller:
         others = [one for one in room.features if one.is_open and one is not door]
         if not others:
             return ["Leave the room."]
-        return [*(f"Leave the room by the {word} door." for word in self._words(door.own, [one.own for one in others])),
-                *(f"Leave the room by the door to the {word} hall."
-                  for word in self._words(door.meanings, [one.meanings for one in others])), "Leave the room."]
+        words = self._words(door.meanings, [one.meanings for one in others])
+        return [*(f"Leave the room by the {word} door." for word in words), "Leave the room."]
 
     def _tell_turn(self, state: State, leg: WayLeg, is_known: bool) -> Wordings:
         there = State(*leg.begin, leg.heading)
@@ -213,8 +229,6 @@ class _Teller:
         else:
             said = [f"It is the {ORDINALS[rank]} door{side}."] if rank < len(ORDINALS) else []
             said += [f"It is the last door{side}."] if own is row[-1] else []
-            said += [f"Walk past the {name}. It is the next door{side}."
-                     for name in self._marks_before(state, row, rank)]
         others = [sight.feature.meanings for sight in doors if sight.feature is not None and sight is not own]
         return said + [f"It is the {word} door{side}." for word in self._words(door.meanings, others)]
 
@@ -244,12 +258,78 @@ class _Teller:
     def _marks(self, state: State, length: float) -> list[str]:
         return [name for sight, name in self._things(state) if abs(sight.ahead_m - length) < HERE_M]
 
-    def _marks_before(self, state: State, row: Sequence[NamedSight], rank: int) -> list[str]:
-        """Things between a door and the one before it."""
-        low = row[rank - 1].ahead_m if rank else 0.3
-        return [name for sight, name in self._things(state) if low + 0.4 < sight.ahead_m < row[rank].ahead_m - 0.4]
-
 
 def _side_of_turn(before: float, after: float) -> str:
     turn = turned(after, -before)
     return "" if abs(turn) < 0.8 else "back" if abs(turn) > 2.3 else "left" if turn > 0 else "right"
+
+
+# -- the way -----------------------------------------------------------------------------------------------------------
+
+@dataclass(frozen=True)
+class WayLeg:
+    """A straight walk.
+
+    Attributes:
+        heading: of the walk [rad]; begin: where it begins; end: where it ends.
+    """
+
+    heading: float
+    begin: Spot
+    end: Spot
+
+
+def find_way(plan: WordMap, begin: Spot, goal: Spot) -> list[NamedFeature] | None:
+    """The doors and openings of the shortest way, one after the other; None where there is no way."""
+    order = count()
+    todo: list[tuple[float, int, Spot, tuple[NamedFeature, ...]]] = [(0.0, next(order), begin, ())]
+    seen: set[Spot] = set()
+    while todo:
+        cost, _, spot, way = heapq.heappop(todo)
+        if spot == goal:
+            return list(way)
+        if spot in seen:
+            continue
+        seen.add(spot)
+        locale, at = spot
+        if locale == goal[0]:
+            heapq.heappush(todo, (cost + math.dist(at, goal[1]), next(order), goal, way))
+        extra = 0.0 if plan.areas[locale].is_hall or not way else ROOM_COST_M
+        for feature in plan.areas[locale].features:
+            if feature.is_open and feature.beyond is not None and feature.outward is not None:
+                heapq.heappush(todo, (cost + extra + math.dist(at, feature.at), next(order),
+                                      (feature.beyond, feature.at), (*way, feature)))
+    return None
+
+
+def find_legs(plan: WordMap, begin: Spot, way: Sequence[NamedFeature], end: Point) -> list[WayLeg]:
+    """The legs from a place through openings to another place; steps to the side are no legs."""
+    spots = [begin]
+    for feature in way:
+        spots += _within(plan.areas[feature.locale], spots[-1][1], feature.at)
+        spots.append((feature.beyond or feature.locale, feature.at))
+    last = plan.areas[spots[-1][0]]
+    spots += [*_within(last, spots[-1][1], end), (last.name, end)]
+    legs: list[WayLeg] = []
+    corner = spots[0]
+    for spot in spots[1:]:
+        long = math.dist(corner[1], spot[1])
+        heading = math.atan2(spot[1][1] - corner[1][1], spot[1][0] - corner[1][0])
+        if legs and is_along(legs[-1].heading, heading):
+            legs[-1] = WayLeg(legs[-1].heading, legs[-1].begin, spot)
+        elif long > LEAST_LEG_M:
+            legs.append(WayLeg(heading, corner, spot))
+        else:
+            continue
+        corner = spot
+    return legs
+
+
+def _within(area: Area, here: Point, there: Point) -> Iterator[Spot]:
+    """The places between in a hall: its middle line, or its middle if it is a crossing."""
+    if area.is_tile:
+        yield area.name, area.middle
+    elif area.is_hall:
+        for point in (here, there):
+            ahead, _ = offsets(area.middle, area.axis, point)
+            yield area.name, moved(area.middle, area.axis, max(-area.half[0], min(area.half[0], ahead)))

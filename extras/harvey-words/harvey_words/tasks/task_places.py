@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 
-from harvey_words.task_entries import Step
-from harvey_words.task_words import HOME, START, TaskWordsError, task_lexicon
-from harvey_words.told_way import list_rooms, read_way
+from harvey_words.tasks.task_entries import Step
+from harvey_words.tasks.task_words import HOME, START, TaskWordsError, task_lexicon
+from harvey_words.tasks.told_way import list_rooms, read_way
 from world_models.building.world import words_of
 from world_models.commands import find_open_point
 from world_models.entries import Place

@@ -6,11 +6,19 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from harvey_words.matching import MISFIT, UNKNOWN_HEAD, WORST, Senses
-from harvey_words.told_acts import ThingWords
-from harvey_words.word_map import NamedSight, is_along, moved, offsets, turned
-from harvey_words.word_places import TURNS, UNSAID_EXIT, WRONG_RANK, WRONG_SIDE, State
-from harvey_words.word_sights import AGAIN, WordSights
+from harvey_words.following.word_map import NamedSight, is_along, moved, offsets, turned
+from harvey_words.following.word_places import (
+    AGAIN,
+    MISFIT,
+    TURNS,
+    UNKNOWN_HEAD,
+    WORST,
+    WRONG_RANK,
+    WRONG_SIDE,
+    State,
+    WordPlaces,
+)
+from harvey_words.reading.told_acts import ThingWords
 
 UNTOLD = -4.0
 """A goal out of sight to which no way is told."""
@@ -18,21 +26,19 @@ OPEN_ONLY = -1.8
 """That only open doors were counted."""
 BEHIND = 1.5
 """Off for a thing that lies behind when the walk begins, where a door after it is meant."""
+BEFORE_M = 4.0
+"""A door before a thing that was reached lies no further back."""
 OPPOSITE_M = 0.3
 """What is hardly further along than the door one comes out of lies opposite, and is not counted."""
 
 
-class WordDoors(WordSights):
+class WordDoors(WordPlaces):
     """Finds the doors and places that a text may mean."""
 
     def find(self, state: State, what: ThingWords) -> Iterator[State]:
         """At each door, or thing, that may be meant."""
         if what.heads & {"crossing", "corner", "end"} and not what.heads & {"door"}:
             yield from self._anywhere(state, what)
-            return
-        if not self.area(state).is_hall:
-            for out in self.leave(state, None):
-                yield from self.find(replace(out, odds=out.odds + UNSAID_EXIT), what)
             return
         at_door = bool(state.came) and state.begun is not None and math.dist(state.begun, state.at) < 0.1
         if at_door and what.side in ("left", "right") and not any(
@@ -55,41 +61,41 @@ class WordDoors(WordSights):
                 if area.is_tile and (area.meanings & {"crossing", "corner"} or len(self.ways(here)) != 2):
                     yield from self._named_crossing(here, what)
                 continue
-            for feature in area.features:
-                fit, senses = self.match.fit(what, feature, state.senses)
-                if fit > UNKNOWN_HEAD and feature.sort == "door" and area.is_hall:
+            for feature in area.features if area.is_hall else ():
+                fit = self.match.fit(what, feature)
+                if fit > UNKNOWN_HEAD and feature.sort == "door":
                     ahead = feature.outward if feature.outward is not None else 0.0
                     before = replace(here, at=feature.at, heading=ahead)
                     yield self._at_door(before, NamedSight(feature, 0.0, 0.0, "ahead", area.name),
-                                        here.odds + fit, senses)
+                                        here.odds + fit)
+                elif fit > UNKNOWN_HEAD and feature.sort == "thing" and area.is_tile:
+                    yield replace(here, odds=here.odds + fit)
 
     def _named_crossing(self, state: State, what: ThingWords) -> Iterator[State]:
         """A crossing or end of halls, each word of which is said of one that leaves here or of what stands here."""
         ways = self.ways(state)
-        if (what.heads & {"end"} and len(ways) > 2) or (what.heads & {"corner"} and len(ways) != 2):
-            return
         halls = [self.hall_ahead(replace(state, heading=way)) for way in ways]
-        fit, senses = self.fit_place(state, what, halls)
+        fit = self.fit_place(state, what, halls)
         if fit > WORST:
-            yield replace(state, odds=state.odds + fit, senses=senses)
+            yield replace(state, odds=state.odds + fit)
 
     def _find_from(self, facings: Iterable[State], what: ThingWords) -> Iterator[State]:
         """The doors that may be meant from where one stands, along the ways that one may face."""
+        least = -BEFORE_M if any(relation == "before" for relation, _ in what.relations) else -0.2
         for facing in facings:
             doors = [sight for sight in self.sights(facing) if sight.feature is not None
                      and sight.feature.sort == "door" and sight.side != "behind"
-                     and sight.ahead_m > (OPPOSITE_M if facing.came and facing.begun == facing.at else -0.2)
+                     and sight.ahead_m > (OPPOSITE_M if facing.came and facing.begun == facing.at else least)
                      and sight.feature.name != facing.came]
             for sight in doors:
-                cost, senses = self._weigh_door(facing, sight, doors, what)
+                cost = self._weigh_door(facing, sight, doors, what)
                 if cost > WORST:
-                    yield self._at_door(facing, sight, facing.odds + cost, senses)
+                    yield self._at_door(facing, sight, facing.odds + cost)
 
-    def _weigh_door(self, state: State, sight: NamedSight, doors: Sequence[NamedSight],
-                    what: ThingWords) -> tuple[float, Senses]:
+    def _weigh_door(self, state: State, sight: NamedSight, doors: Sequence[NamedSight], what: ThingWords) -> float:
         """Words, side, rank and relations of a door, together."""
         assert sight.feature is not None
-        cost, senses = self.match.fit(what, sight.feature, state.senses)
+        cost = self.match.fit(what, sight.feature)
         side = self.side_of(state, what.side)
         sided = side in ("left", "right") or what.side == "ahead"
         if sided and sight.side != (side or "ahead"):
@@ -101,13 +107,17 @@ class WordDoors(WordSights):
             open_rank = opened.index(sight) + 1 if sight in opened else 0
             only_open = any(word.meaning == "open" for word in what.names)
             own = self._weigh_rank(what, rank, len(row), open_rank, len(opened), only_open)
+            called = [one for one in row if what.names and one.feature and self.match.fit(what, one.feature) > -1.0]
+            if len(called) > 1 and sight in called:  # "the second closet"
+                rank = called.index(sight) + 1
+                own = max(own, self._weigh_rank(what, rank, len(called), rank, len(called), False))
             cost += own
         between = [other for relation, other in what.relations if relation == "between"]
         if len(between) == 2:
             cost += self._weigh_between(state, sight, doors, between[0], between[1])
         for relation, other in what.relations if len(between) != 2 else ():
             cost += self._weigh_relation(state, sight, doors, relation, other)
-        return cost, senses
+        return cost
 
     def _weigh_rank(self, what: ThingWords, rank: int, count: int, open_rank: int, open_count: int,
                     only_open: bool) -> float:
@@ -126,7 +136,7 @@ class WordDoors(WordSights):
         best = WRONG_SIDE
         marks = [mark for mark in self.sights(state) if mark.feature is not None and mark.feature.sort != "opening"]
         fits = [[(mark, fit) for mark in marks if mark.feature and mark is not sight and (
-            fit := self.match.fit(what, mark.feature, state.senses)[0]) > MISFIT] for what in (one, other)]
+            fit := self.match.fit(what, mark.feature)) > MISFIT] for what in (one, other)]
         for first, fit in fits[0]:
             for second, more in fits[1]:
                 low, high = sorted((first.ahead_m, second.ahead_m))
@@ -139,12 +149,15 @@ class WordDoors(WordSights):
     def _weigh_relation(self, state: State, sight: NamedSight, doors: Sequence[NamedSight], relation: str,
                         other: ThingWords) -> float:
         """How well a door lies to other things as it is said."""
+        if relation == "across" and not other.names and other.heads <= {"hall"}:
+            own = next((one.side for one in self.sights(state) if one.feature and one.feature.name == state.came), "")
+            return WRONG_SIDE if sight.side == own else max(-2.0 * abs(sight.ahead_m), WRONG_SIDE)
         best = -2.0 if not any(word.meaning in self.plan.vocabulary for word in other.names) else -3.5
         rank = 0
         for mark in self.sights(state):
             if mark.feature is None or mark.feature.sort == "opening" or mark is sight:
                 continue
-            fit, _ = self.match.fit(other, mark.feature, state.senses)
+            fit = self.match.fit(other, mark.feature)
             gap = sight.ahead_m - mark.ahead_m
             walked_m = offsets(state.begun or state.at, state.heading, mark.feature.at)[0]
             if walked_m > 0.0 and fit > -1.0:
@@ -161,11 +174,9 @@ class WordDoors(WordSights):
             else:
                 fit += -max(abs(gap) - 1.5, 0.0) / 2.0
             best = max(best, fit)
-        if relation == "across" and not other.names:
-            best = max(best, -2.0 * abs(sight.ahead_m))
         return best
 
-    def _at_door(self, state: State, sight: NamedSight, odds: float, senses: Senses) -> State:
+    def _at_door(self, state: State, sight: NamedSight, odds: float) -> State:
         """At a door: in the room behind it where it is open, else before it."""
         feature = sight.feature
         assert feature is not None
@@ -173,5 +184,5 @@ class WordDoors(WordSights):
         heading = state.heading if feature.outward is None else feature.outward
         locale = feature.beyond if feature.is_open and feature.beyond else sight.locale
         at = moved(feature.at, heading, 0.5) if feature.is_open else front.at
-        return replace(front, locale=locale, at=at, heading=heading, odds=odds, senses=senses, moving=False,
+        return replace(front, locale=locale, at=at, heading=heading, odds=odds, moving=False,
                        door=feature.name, way=front.by(locale, at, feature.name))

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from blackboard import Change, Effect, Entry, KnowledgeSource, Level, Post, Posted, Revise, Revised, View, Watch
-from harvey_words.task_entries import Step, ToldTask, active_task, find_time_s, leave_goal
+from harvey_words.tasks.task_entries import Step, ToldTask, active_task, find_time_s, leave_goal
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import NOT_ENDED, NOT_LOST
 from world_models.entries import Goal, Impasse, Milestone, MotionReport, Outcome, Recovery

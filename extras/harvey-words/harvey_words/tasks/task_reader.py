@@ -7,9 +7,9 @@ from dataclasses import replace
 from itertools import takewhile
 
 from blackboard import Change, Effect, Entry, KnowledgeSource, Level, Post, Posted, Revise, View, Watch
-from harvey_words.task_entries import Step, ToldTask, active_task, find_time_s
-from harvey_words.task_places import find_places
-from harvey_words.task_words import START, TaskWordsError, is_word_to_go_on, read_tokens, read_wanted, tells_way
+from harvey_words.tasks.task_entries import Step, ToldTask, active_task, find_time_s
+from harvey_words.tasks.task_places import find_places
+from harvey_words.tasks.task_words import START, TaskWordsError, is_word_to_go_on, read_tokens, read_wanted, tells_way
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, NOT_ENDED, find_building, place_of
 from world_models.building.locale_frame import FrameRequest

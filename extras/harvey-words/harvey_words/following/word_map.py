@@ -6,16 +6,16 @@ Positions are (x, y) on the plan [m, world], directions angles counter-clockwise
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from harvey_words.lexicon import Lexicon, lexicon_data
+from harvey_words.reading.lexicon import Lexicon, lexicon_data
 from world_models.building.geometry.faces import Face
 from world_models.building.locales import WORDS_OF, Doorway, Locale
-from world_models.building.world import World, words_about
+from world_models.building.world import World, words_about, words_of
 
 Point = tuple[float, float]
 HALL_WORDS = frozenset(("hall", "crossing", "corner", "end"))
@@ -99,12 +99,11 @@ class WordMap:
 
     def __init__(self, world: World) -> None:
         self.world = world
-        names = {word for locale in world.locales.values() for word in words_about(locale)}
-        names |= {word for locale in world.locales.values() for said in locale.properties.get(WORDS_OF, {}).values()
-                  for word in _split(said)}
-        names |= {word for door in _door_names(world) for word in _split(door)}
-        names |= {word for thing in world.things for word in (*_split(thing.kind), *_split(thing.name))}
-        self.lexicon = Lexicon(lexicon_data(), {name for name in names if len(name) > 1})
+        named: list[Collection[str]] = [words_about(locale) for locale in world.locales.values()]
+        named += [words_of(said) for locale in world.locales.values()
+                  for said in locale.properties.get(WORDS_OF, {}).values()]
+        named += [words_of(name) for name in (*_door_names(world), *(f"{one.kind} {one.name}" for one in world.things))]
+        self.lexicon = Lexicon(lexicon_data(), [[word for word in words if len(word) > 1] for words in named])
         self._surfaces: dict[str, list[Face]] = {}
         for face in world.faces:
             for depth in range(1, face.name.count("/") + 2):
@@ -278,10 +277,6 @@ def _door_names(world: World) -> set[str]:
 
 def _texts(locale: Locale) -> list[str]:
     return [locale.name, locale.kind, *(str(value) for value in locale.properties.values() if isinstance(value, str))]
-
-
-def _split(text: str) -> list[str]:
-    return [word for word in "".join(c if c.isalnum() else " " for c in text.lower()).split() if not word.isdigit()]
 
 
 def _textures(faces: Iterable[Face]) -> frozenset[str]:

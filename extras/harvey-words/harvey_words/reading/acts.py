@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-from harvey_words.lexicon import Word
-from harvey_words.told_acts import COMPASS, POINTS, Act, ThingWords, describe
-from harvey_words.word_clauses import Clause, Part
+from harvey_words.reading.lexicon import Word
+from harvey_words.reading.told_acts import COMPASS, POINTS, Act, ThingWords, describe
+from harvey_words.reading.word_clauses import Clause, Part
 
 RELATIONS = ("past", "before", "across", "between", "next-to")
 MOST_PASSED = 6
@@ -15,7 +15,9 @@ MOST_PASSED = 6
 Wheres = list[tuple[str, ThingWords]]
 """Prepositions with their things."""
 LENGTHS_M = {"metre": 1.0, "foot": 0.3048}
-SIDES = ("left", "right", "ahead", "behind", "north", "south", "east", "west")
+SAME = ("same", "other")
+"""Sides by that of what was named before."""
+SIDES = (*SAME, "left", "right", "ahead", "behind", "north", "south", "east", "west")
 
 
 @dataclass
@@ -26,23 +28,22 @@ class _Reader:
     last_thing: ThingWords | None = None
     last_stretch: ThingWords | None = None
     wants_orient: bool = False
-    goes_on: bool = False
     side: str = ""
     goals: list[Act] = field(default_factory=list)
     notes_on: bool = False
+    ahead: int = 0
 
     def read(self, clause: Clause) -> None:
         """Add the acts of one clause."""
+        self.ahead = 0 if clause.parts else self.ahead
         parts = clause.parts
         verbs = {part.meaning for part in parts if part.sort == "verb"}
         verbs |= {"be"} if verbs & {"with", "meet", "there", "stand"} else set()
         things, ways, wheres = self._collect(parts, verbs)
         begun, before = len(self.acts), self.acts[-1] if self.acts else None
-        if (self.goes_on and not verbs and things and self.acts[-1].until is None
-                and 0 < len(self.acts[-1].past) < MOST_PASSED):
-            last, more = self.acts[-1], things[0]
-            self.acts[-1] = (replace(last, units=more.number or 1) if "unit" in more.heads
-                             else replace(last, past=(*last.past, more)))
+        if not verbs and before and before.until and "end" in before.until.heads and not ways and things and all(
+                "unit" in thing.heads for thing in things):
+            pass  # "to the end, four blocks"
         elif self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
             self._orient(things, ways, wheres)
         elif "goal" in verbs and (things or wheres) and not self._has_way():
@@ -76,16 +77,17 @@ class _Reader:
             self._go(things, ways, wheres, until=True)
         elif verbs & {"go", "pass"} and not (verbs & {"be"} and any(thing.is_door for thing in things)):
             self._go(things, ways, wheres, passing="pass" in verbs and "go" not in verbs)
+        elif "through" in verbs and any(thing.heads & {"crossing", "corner"} for thing in things):
+            self._go(things, ways, wheres, passing=True)
         elif verbs & {"enter", "take", "through"}:
             self._enter(things, ways, wheres)
             if "through" in verbs and self.acts[-1:] and self.acts[-1].sort == "turn" and self.acts[-1].along:
                 along = self.acts[-1].along  # through a hall is to its end
                 self.acts.append(Act("go", until=replace(along, heads=along.heads | {"end", "hall"})))
-        elif verbs & {"be", "see"}:
+        elif (verbs & {"be", "see"} and (things or wheres or not ways)) or ("goal" in verbs and not things and wheres):
             self._state(things, ways, wheres, verbs)
         else:
             self._terse(things, ways, wheres)
-        self.goes_on = clause.end == "and" and bool(self.acts) and self.acts[-1].sort == "go"
         begun = len(self.acts) if begun and self.acts[-1] is before else begun
         self.notes_on = clause.end == "and" and bool(self.acts) and (self.notes_on or self.acts[-1].sort == "note")
         self.wants_orient = clause.end == "so"
@@ -102,20 +104,19 @@ class _Reader:
         located = False
         turning = bool(verbs & {"turn", "take"}) and not verbs & {"be"}
         for part in parts:
-            side = part.side or (part.meaning if part.sort == "way" else "")
-            if part.sort == "thing":
+            side = part.side or (part.meaning if part.sort == "way" else "") or self._read_side(part)
+            if part.sort == "thing" and not (side and wheres):
                 things.append(describe(part.words))
                 target = things
-            elif part.sort == "where" and not part.side:
+            elif part.sort == "where" and not side:
                 if part.meaning in RELATIONS and target is things and things and (verbs & {"be", "see"}) and things[
                         -1].is_door:
                     things[-1] = replace(things[-1], relations=(
                         *things[-1].relations, *self._relation(part.meaning, part.words)))
-                else:
-                    if part.words or part.meaning != "at":
-                        wheres.append((part.meaning, self._describe(part.meaning, part.words)))
-                        target, located = None, True
-                        continue
+                elif part.words or part.meaning not in ("at", "on", "along" if self._it().is_door else "at"):
+                    wheres.append((part.meaning, self._describe(part.meaning, part.words)))
+                    target, located = None, True
+                    continue
             elif part.sort == "where" and located and side in SIDES:
                 meaning, one = wheres[-1]
                 wheres[-1] = meaning, replace(one, side=side)  # "to the first hall on the right"
@@ -129,6 +130,15 @@ class _Reader:
             located = False
         return [self._resolve(thing, verbs) for thing in things], ways, [
             (self._by(meaning, one), self._resolve(one, {meaning})) for meaning, one in wheres]
+
+    def _read_side(self, part: Part) -> str:
+        """``The same side``, ``the other side``: left or right where that was said before."""
+        meanings = {word.meaning for word in part.words}
+        if meanings == {"side"} and part.meaning == "on" and self.acts and self.acts[-1].sort == "turn":
+            return self.acts[-1].way  # "turn left, there is a door on that side"
+        if not ("side" in meanings and meanings <= {"side", *SAME}) or len(meanings) != 2:
+            return ""
+        return "same" if "same" in meanings else "other"
 
     def _by(self, meaning: str, thing: ThingWords) -> str:
         """By a hall is along it, by a thing past it."""
@@ -146,7 +156,7 @@ class _Reader:
             thing = replace(thing, heads=(thing.heads - {"it"}) | stretch.heads, names=thing.names + stretch.names)
         elif "it" in thing.heads:
             hall = self.last_stretch or ThingWords(frozenset(("hall",)))
-            thing = replace(hall if by & {"along", "go", "take"} else self._it(), side=thing.side, count="")
+            thing = replace(hall if by & {"along", "go", "take"} else self._it(), side=thing.side, count=thing.count)
         if thing.names or thing.heads - {"side", "unit", "end"}:
             self.last_thing = thing
             self.last_stretch = thing if thing.is_stretch else self.last_stretch
@@ -175,7 +185,7 @@ class _Reader:
         self.acts += [Act("turn", way) for way in ways if way not in ("ahead", "behind")]
         rest = [(meaning, one) for meaning, one in wheres
                 if one not in by and meaning not in ("on", "at", "in", "away", "from")
-                and not (meaning == "to" and one.is_stretch)]
+                and not (meaning in ("to", "across") and one.is_stretch)]
         if rest:
             self._go([], [], rest)
 
@@ -210,7 +220,8 @@ class _Reader:
         onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch]
         at = [one for meaning, one in wheres if (meaning == "at" or (meaning == "on" and not one.is_stretch))
               and (one.heads or one.names)]
-        past = tuple(one for meaning, one in wheres if meaning in ("past", "before"))
+        begin = [meaning for meaning, one in wheres if meaning in ("past", "before") or one in onto][:1]
+        past = tuple(one for meaning, one in wheres if meaning in ("past", "before") and begin[0] == meaning)
         way = next((way for way in ways if way not in ("ahead", "behind")), "")
         hall = next(iter((*halls, *onto)), None)
         is_on = ("on", hall) in wheres  # "left on the brick two", not "the second left onto the brick"
@@ -260,16 +271,16 @@ class _Reader:
         if not (ends or passed or along or units or metres or things or ways or wheres) and self.acts and self.acts[
                 -1].sort in ("orient", "see"):
             ends = [replace(self._it(), side="")]  # "go there"
-        end = ends[0] if ends else None
+        end, past = ends[0] if ends else None, tuple(passed[:MOST_PASSED])
         if end is not None and end.is_door and not end.heads & {"end", "crossing", "corner", "hall"}:
             if along or passed or units:
-                self.acts.append(Act("go", past=tuple(passed), along=along, units=units, metres=metres))
+                self.acts.append(Act("go", past=past, along=along, units=units, metres=metres))
             self.acts.append(Act("find", what=_at_end(replace(end, count=end.count), wheres)))
         else:
-            self.acts.append(Act("go", until=end, past=tuple(passed), along=along, units=units, metres=metres))
+            self.acts.append(Act("go", until=end, past=past, along=along, units=units, metres=metres))
         onward = [one for meaning, one in wheres if meaning == "to"]
         at_end = end is not None and (end.is_door or "wall" in end.heads)
-        for more in [one for one in ends[1:] if not (at_end and "end" in one.heads)]:
+        for more in [one for one in ends[1:] if "end" not in one.heads or not (at_end or (end and "end" in end.heads))]:
             self.acts.append(Act("find", what=more) if more.is_door else
                              Act("go", until=more) if more in onward else Act("see", what=more))
 
@@ -283,6 +294,11 @@ class _Reader:
         halls = [one for one in (*things, *(one for _, one in wheres)) if one.is_stretch]
         if halls and not (what and what[0].is_door):
             self._turn(halls, ways, [(meaning, one) for meaning, one in wheres if one is not halls[0]])
+        elif not what and [meaning for meaning, _ in wheres] == ["past"] and self._it().is_door:
+            # "skip a door and take the one after"
+            last = self.acts[-1].past[-1:] if self.acts else ()
+            self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), count="1", side=last[0].side) if last
+                                 else ThingWords(frozenset(("door",)), relations=tuple(wheres)), enters=True))
         elif not what:
             self._terse(things, ways, wheres)
         else:
@@ -299,12 +315,16 @@ class _Reader:
                 self.acts.append(Act("go", units=rank.number))
             else:
                 things[-1] = replace(things[-1], count=rank.count, side=rank.side)
+        if "there" in verbs and things and things[0].number > 1 and "unit" not in things[0].heads:
+            self.acts.append(Act("see", what=replace(things[0], count="")))  # "there are two closets"
+            return
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS)
         side = next((one.side for _, one in wheres if one.side), ways[0] if ways else "")
         blocks = [thing for thing in things if "unit" in thing.heads]
         if blocks and len(things) > 1:  # "an easel one block in front of you"
             side = side or blocks[0].side
             things = [thing for thing in things if "unit" not in thing.heads]
+            self.ahead = blocks[0].number if side in ("ahead", "") and not verbs & {"there", "see"} else 0
         doors = [thing for thing in things if thing.is_door or (
             thing.count and thing.side and not thing.heads and not thing.names)]
         if doors or not things:
@@ -314,9 +334,6 @@ class _Reader:
             goal = replace(goal, side=goal.side or (side if side in SIDES else ""),
                            relations=(*goal.relations, *related))
             self.acts.append(Act("find", what=goal))
-        elif "see" in verbs and things and not self.acts:
-            self._orient(things, ways, wheres)
-            return
         elif not things and (related or side):
             self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), side=side, relations=related)))
         ended = next((one for meaning, one in wheres if meaning in ("at", "in") and "end" in one.heads), None)
@@ -344,14 +361,16 @@ class _Reader:
         last = self.acts[-1] if self.acts else None
         if not things and last is not None and last.sort in ("find", "see") and (related or side) and not ways:
             self._amend(related, side)
-        elif things and things[0].heads == {"side"} and not wheres:
-            return  # "same side"
+        elif things and things[0].heads == {"side"}:
+            self.side = things[0].count if things[0].count in SAME else ""  # "same side as this room, the next door"
         elif side and not things and not related and not ways:
             self.side = side  # "on your right, the last door"
         elif wheres and self._is_walk_told(things, ways) and all(meaning == "past" for meaning, _ in wheres):
             self._note_before([one for _, one in wheres])
         elif things and things[0].is_stretch and things[0].side in ("left", "right") and last and not things[0].count:
             self._turn(things, [*ways, things[0].side], wheres)  # "then the flowers on the left"
+        elif things and "unit" in things[0].heads and last and last.sort == "find" and (things[0].side or side or ways):
+            self._amend((), things[0].side or side or ways[0])  # "it is opposite, a few steps to the left"
         elif things and "unit" in things[0].heads and things[0].side in ("left", "right"):
             self._turn(things, [things[0].side], wheres)  # "one block to your right"
         elif (things and ways and "unit" in things[0].heads) or (set(ways) & {"left", "right"} and any(
@@ -421,26 +440,31 @@ def _at_end(goal: ThingWords, wheres: Sequence[tuple[str, ThingWords]]) -> Thing
 
 def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     """The acts of a text in the order in which they are to be done."""
-    clauses = _join_exits(list(_leave_warnings(clauses)))
+    clauses = _join_exits(_correct(list(_leave_warnings(clauses))))
     ordered: list[Clause] = []
     behind: Clause | None = None
     for clause in clauses:
         if clause.end == "when" and clause.parts:
             behind = clause
             continue
-        ordered.append(clause)
+        is_out = behind is not None and [part.meaning for part in clause.parts] == ["exit"]
+        ordered.insert(0 if is_out else len(ordered), clause)  # "the door across, to the left as you come out"
         if behind is not None and clause.parts:
             ordered.append(Clause(behind.parts, ""))
             behind = None
     reader = _Reader()
     for clause in ordered:
         reader.read(clause)
+    if reader.ahead and reader.acts[-1].sort == "see" and not reader.goals:  # "the lamp is one block ahead", no more
+        what = reader.acts.pop().what
+        reader.acts.append(Act("go", until=what and replace(what, side=""), units=reader.ahead))
     reader.acts += reader.goals
-    if not any(act.sort in ("find", "exit", "turn", "go") for act in reader.acts):  # a goal, and no way
-        goal = next((index for index, act in enumerate(reader.acts) if act.sort == "see" and act.what
-                     and act.what.names), None)
-        if goal is not None:
-            reader.acts[goal] = replace(reader.acts[goal], sort="find")
+    if not any(act.sort in ("exit", "turn", "go") for act in reader.acts):  # "find the lamp, it is in the corner"
+        reader.acts = [replace(act, sort="see") if act.sort == "orient" and act.what and act.what.side == "ahead"
+                       else act for act in reader.acts]
+        reader.acts.sort(key=lambda act: act.sort == "see")
+        if all(act.sort == "see" for act in reader.acts[:1]):
+            reader.acts[:1] = [replace(act, sort="find") for act in reader.acts[:1] if act.what and act.what.names]
     for index, act in enumerate(reader.acts[:-1]):
         after = reader.acts[index + 1]
         if act.sort == "find" == after.sort and after.what and any(by == "past" for by, _ in after.what.relations):
@@ -452,6 +476,32 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     if doors and not any(act.sort == "find" for act in ordered_acts):  # "the next door, left as you come out"
         ordered_acts = [*(act for act in reader.acts if act is not doors[-1]), doors[-1]]
     return ordered_acts
+
+
+def _correct(clauses: Sequence[Clause]) -> list[Clause]:
+    """``Turn right - no, left``: what is said after a correction stands for the clause before, or a part of it."""
+    kept: list[Clause] = []
+    is_fix = False
+    for clause in clauses:
+        wrong = next((place for place in range(len(kept) - 1, -1, -1) if kept[place].parts), None)
+        if is_fix and clause.parts and wrong is not None:
+            old, new = kept[wrong].parts, clause.parts
+            if any(part.sort == "verb" for part in new):
+                del kept[wrong:]
+            else:
+                same = [place for place, part in enumerate(old) if bool(part.words) == bool(new[0].words) and (
+                    part.sort == new[0].sort or {part.sort, new[0].sort} == {"where", "thing"})]
+                at = same[-1] if same else len(old)
+                if same and all(word.sort == "COUNT" for word in new[0].words):  # "not the first door but the second"
+                    named = tuple(word for word in old[at].words if word.sort != "COUNT")
+                    new = [replace(old[at], words=new[0].words + named), *new[1:]]
+                clause = Clause([*old[:at], *new, *old[at + 1:]], clause.end)
+                del kept[wrong:]
+        is_denied = clause.end == "but" and bool(clause.parts) and clause.parts[0].sort == "not"
+        is_fix = clause.end == "fix" or is_denied or (is_fix and not clause.parts)
+        clause = Clause(clause.parts[1:], clause.end) if is_denied else clause
+        kept.append(clause)
+    return kept
 
 
 def _join_exits(clauses: Sequence[Clause]) -> list[Clause]:
@@ -475,5 +525,5 @@ def _leave_warnings(clauses: Sequence[Clause]) -> Iterable[Clause]:
         sentence.append(clause)
         if clause.end == "dot" or clause is clauses[-1]:
             if not any(part.meaning == "beyond" for one in sentence for part in one.parts):
-                yield from sentence
+                yield from (one for one in sentence if not any(part.meaning == "count" for part in one.parts))
             sentence = []

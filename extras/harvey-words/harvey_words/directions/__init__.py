@@ -1,0 +1,1 @@
+"""Directions for people, and the commands."""

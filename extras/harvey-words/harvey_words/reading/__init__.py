@@ -1,0 +1,1 @@
+"""From a text to acts: words, clauses, what they ask to do and to see. No building is asked."""

@@ -1,0 +1,192 @@
+"""From the words of a text to its clauses: rows of parts. Every row of words has a reading: people write no grammar.
+
+    clause: part+ separator?
+    part:   verb | way | not | thing | where
+    thing:  noun ("of" noun)*               the end of the brick hall, the corner with the chair
+    noun:   count* named+ | count+
+    where:  prep prep? (way side? | thing)  up to the wall, on the left hand side, past it
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise, takewhile
+
+from harvey_words.reading.lexicon import Word
+from harvey_words.reading.told_acts import COMPASS
+
+STARTS = frozenset(
+    ("go", "turn", "take", "face", "reach", "enter", "through", "exit", "pass", "halt", "stand", "there"))
+"""Verbs with which another clause begins, also where nothing stands between."""
+NOUNS = frozenset(("HEAD", "THING", "MOD", "NAME", "STRANGE", "COUNT"))
+STATING = frozenset(("has", "have"))
+"""Words that say of a place what is there, and do not tell it from others by that."""
+MOST_BETWEEN = 6
+"""Words between the two that are joined by ``and``."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A verb, a way (left, right, ahead), a thing, or where: a preposition with what follows.
+
+    Attributes:
+        sort: ``verb``, ``way``, ``thing``, ``where``, ``not``, ``sep``.
+        meaning: of the verb, way or preposition.
+        words: those of the thing.
+        side: what stands for a thing: left, right, ahead.
+    """
+
+    sort: str
+    meaning: str = ""
+    words: tuple[Word, ...] = ()
+    side: str = ""
+
+
+@dataclass
+class Clause:
+    """The parts of a clause, with the word that ends it: ``dot``, ``comma``, ``then``, ``when``, ..., or nothing."""
+
+    parts: list[Part] = field(default_factory=list)
+    end: str = ""
+
+
+def read_clauses(words: Sequence[Word]) -> list[Clause]:
+    """The clauses of a text."""
+    clauses, clause = list[Clause](), Clause()
+    for part in _read_parts(list(_mend(words))):
+        if part.sort == "sep":
+            clause.end = part.meaning
+            clauses += _split_turns(clause)
+            clause = Clause()
+        elif part.meaning == "be" and clause.parts[-1:] and clause.parts[-1].sort == "thing" and any(
+                one.meaning == "exit" for one in clause.parts):
+            thing = clause.parts.pop()  # "when you come out of the lab the office is on the left"
+            clauses.append(clause)
+            clause = Clause([thing, part])
+        elif part.meaning in STARTS and part.sort == "verb" and not (  # "your back faces the wall" is no turn
+                part.meaning == "face" and [one.meaning for one in clause.parts[-1:]] == ["back"]) and any(
+                one.sort in ("thing", "where", "way") or one.meaning == "exit" for one in clause.parts):
+            clauses.append(clause)
+            clause = Clause([part])
+        else:
+            clause.parts.append(part)
+    return [*clauses, *(_split_turns(clause) if clause.parts else ())]
+
+
+def _split_turns(clause: Clause) -> Iterator[Clause]:
+    """``The wood hall one block left one block right one block``: each turn begins a clause."""
+    turns = [at for at, part in enumerate(clause.parts) if part.sort == "way" and part.meaning in ("left", "right")]
+    cuts = [at for at in turns if at] if len(turns) > 1 else []
+    for begin, end in pairwise((0, *cuts, len(clause.parts))):
+        yield Clause(clause.parts[begin:end], clause.end if end == len(clause.parts) else "")
+
+
+def _mend(words: Sequence[Word]) -> Iterator[Word]:
+    """Leave out what the grammar has no place for, and join what is one description.
+
+    ``Between A and B`` is one, so is ``where A and B meet``, and ``the corner with the chair``.
+    """
+    words = _join_meetings(words)
+    pair = 0
+    for index, word in enumerate(words):
+        before = words[index - 1] if index else None
+        after = words[index + 1] if index + 1 < len(words) else None
+        is_joint = bool(before and after and before.sort in NOUNS and after.sort in NOUNS)
+        if word.sort == "NOT" and after is not None and after.meaning == "open":
+            continue
+        if word.meaning == "open" and before and before.sort == "NOT":
+            word = Word("MOD", "closed", word.text, word.place)
+        if word.text.startswith("the one") and before and before.sort not in ("SEP", "VERB"):
+            yield from (Word("SEP", "comma", "", word.place), Word("VERB", "enter", "", word.place))
+        if word.text == "its" and before and before.sort == "PREP":
+            continue
+        if word.text == "after that" and before and before.sort in NOUNS and (after is None or after.meaning == "dot"):
+            yield from (Word("PREP", "past", "after", word.place), Word("HEAD", "it", "that", word.place))
+            continue
+        if word.text == "once" and (after is None or after.sort == "SEP" or (
+                before and before.meaning in ("go", "ahead"))):
+            yield Word("COUNT", "1", word.text, word.place)
+        elif word.meaning in COMPASS and after is not None and after.sort == "HEAD":
+            yield Word("NAME", word.meaning, word.text, word.place)
+        elif word.meaning == "and" and index < pair and after is not None and after.sort in NOUNS:
+            pair = 0
+            yield Word("NAME", "&", word.text, word.place)
+        elif word.meaning == "past" and after is not None and after.meaning == "on" and any(
+                one.meaning == "side" for one in words[index + 3:index + 4]):
+            yield from (word, Word("HEAD", "it", "", word.place))  # "the one after, on the same side"
+        elif word.meaning == "of" and word.sort == "PREP":
+            if is_joint and before and before.meaning == "side":
+                yield Word("PREP", "in", word.text, word.place)  # "on the left side of the hall"
+            elif is_joint:
+                pair = index + MOST_BETWEEN if before and before.meaning in ("crossing", "corner") else pair
+                yield word
+        elif before and before.sort in NOUNS and (
+                word.text.startswith("all the way") or (before.meaning == "unit" and word.sort in NOUNS)):
+            yield from (Word("SEP", "comma", "", word.place), word)  # "two blocks chair", "the hall all the way down"
+        elif word.text in STATING and is_joint:
+            yield from (Word("SEP", "comma", "", word.place), Word("VERB", "there", word.text, word.place))
+        elif word.meaning == "with" and is_joint and before and before.sort in ("HEAD", "MOD"):
+            pair = index + MOST_BETWEEN if before and before.meaning in ("crossing", "corner") else pair
+            yield Word("PREP", "of", word.text, word.place)
+        elif word.text == "where" and word.sort == "VERB" and (after is None or after.sort in ("VERB", "SEP") or (
+                before and (before.sort == "PREP" or before.meaning == "reach"))):
+            continue
+        else:
+            if word.meaning == "between":
+                pair = index + MOST_BETWEEN
+            yield word
+
+
+def _join_meetings(words: Sequence[Word]) -> list[Word]:
+    """``Where the grass meets the bricks`` and ``where A and B come together`` are crossings."""
+    joined = list(words)
+    for index, word in enumerate(words):
+        if word.sort != "VERB" or word.meaning != "meet":
+            continue
+        begin = next((back for back in range(index - 1, max(index - 10, -1), -1)
+                      if words[back].text == "where" or words[back].meaning == "dot"), 0)
+        if words[begin].text != "where":
+            continue
+        for place in range(begin + 1, index + 1):
+            if joined[place].meaning in ("and", "meet"):
+                joined[place] = Word("PREP", "of", joined[place].text, joined[place].place)
+        joined[begin] = Word("HEAD", "crossing", "where", word.place)
+    return joined
+
+
+def _read_parts(words: Sequence[Word]) -> Iterator[Part]:
+    """The parts of a text, one after the other; a description is as long as it can be."""
+    place = 0
+    while place < len(words):
+        preps = [word.meaning for word in takewhile(lambda one: one.sort == "PREP" and one.meaning != "of",
+                                                          words[place:place + 2])]
+        place += len(preps)
+        word = words[place] if place < len(words) else None
+        thing = _take_thing(words, place)
+        if preps and word is not None and word.sort == "WAY":
+            yield Part("where", preps[-1], (), word.meaning)
+            place += 1 + any(one.meaning == "side" for one in words[place + 1:place + 2])  # "on the left hand side"
+        elif preps:
+            strong = [prep for prep in preps if prep not in ("along", "at", "on", "in")]
+            yield Part("where", (strong or [preps[-1]])[0], tuple(one for one in thing if one.meaning != "of"))
+            place += len(thing)
+        elif thing:
+            yield Part("thing", "", tuple(one for one in thing if one.meaning != "of"))
+            place += len(thing)
+        elif word is not None:
+            yield Part(word.sort.lower(), word.meaning, (word,))
+            place += 1
+
+
+def _take_thing(words: Sequence[Word], place: int) -> list[Word]:
+    """The words of a description that begins here: a number after a name begins another."""
+    taken: list[Word] = []
+    for word in words[place:]:
+        is_next = not taken or taken[-1].meaning == "of"
+        if word.sort not in NOUNS and (is_next or word.meaning != "of"):
+            break
+        if word.sort == "COUNT" and not is_next and taken[-1].sort != "COUNT":
+            break
+        taken.append(word)
+    return taken

@@ -1,0 +1,1 @@
+"""Tasks: words become steps, and steps goals on the board, by three knowledge sources."""
